@@ -1,0 +1,30 @@
+# Every target sets up what it needs first (tools/setup.sh); a second time that takes no time.
+# Arguments go through ARGS, as in: make compare ARGS="--design slender"
+BIN := .venv/bin
+
+.PHONY: help setup compare test lint bench clean
+.DEFAULT_GOAL := help
+
+help: ## list these targets
+	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile | expand -t 16
+
+setup: ## set up this machine: Debian's packages, .venv, this project
+	@tools/setup.sh
+
+compare: setup ## the main job: compare all solvers on the default finger
+	$(BIN)/compare $(or $(ARGS),--design default)
+
+test: setup ## run the tests
+	$(BIN)/pytest $(ARGS)
+
+lint: setup ## check style, format and types
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+
+bench: setup ## speed and accuracy against peers
+	$(BIN)/python -m benchmarks $(ARGS)
+
+clean: ## remove .venv, caches and results
+	rm -rf .venv out build *.egg-info .mypy_cache .pytest_cache .ruff_cache
+	find . -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,73 @@
+#!/usr/bin/env bash
+# Brings .venv up to date: the distribution's packages, the locked PyPI packages, this project. Does only what is
+# missing and says what it does; ends at once when nothing changed. `make` calls it before everything else.
+#
+#   TORCH_INDEX  package index to take torch from, for machines whose default index serves the CUDA build
+#   OS_RELEASE   file that names the distribution (default /etc/os-release)
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+say() { printf 'setup: %s\n' "$*"; }
+stop() {
+    printf 'setup: cannot go on: %s\n' "$1" >&2
+    cat >&2 <<'EOF'
+Ways on that need neither root nor Debian:
+  container  docker build -t pinn-ray . && docker run --rm -v "$PWD/out:/out" pinn-ray
+  conda      conda create -n pinn-ray -c conda-forge python=3.12 fenics-dolfinx && conda activate pinn-ray &&
+             pip install -e '.[dev]', then call compare and pytest instead of make
+EOF
+    exit 1
+}
+
+os_release=${OS_RELEASE:-/etc/os-release}
+system=$(. "$os_release" 2>/dev/null && echo "${ID:-}${VERSION_ID:-}") || true
+apt=requirements/$system.apt lock=requirements/$system.txt
+if [[ ! -f $apt || ! -f $lock ]]; then
+    name=$(. "$os_release" 2>/dev/null && echo "${PRETTY_NAME:-}") || true
+    stop "this is ${name:-an unknown system}; DOLFINx is set up on Debian 12 and 13 only."
+fi
+
+# Everything that decides what is installed, and where.
+state=$(sha256sum "$0" pyproject.toml "$apt" "$lock" requirements/dev.txt; pwd; echo "${TORCH_INDEX:-}")
+[[ $state == "$(cat .venv/setup-state 2>/dev/null)" ]] && exit 0
+SECONDS=0
+
+mapfile -t wanted < "$apt"
+missing=()
+for package in "${wanted[@]}"; do
+    [[ $(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null) == installed ]] || missing+=("$package")
+done
+if ((${#missing[@]})); then
+    root=()
+    if ((EUID)); then
+        root=(sudo -n)
+        sudo -n true 2>/dev/null || stop "Debian packages are missing and neither root nor sudo without a password is at hand.
+Have an administrator run: apt-get install --no-install-recommends ${missing[*]}"
+    fi
+    apt_get() { "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -o Dpkg::Use-Pty=0 "$@" </dev/null; }
+    install() { apt_get install --no-install-recommends -y "${missing[@]}"; }
+    say "installing Debian packages: ${missing[*]}"
+    if ! install >/dev/null 2>&1; then # as a rule the package lists are absent or old
+        say "updating the package lists"
+        apt_get update && install >/dev/null || stop "apt-get could not install ${missing[*]}; its own message is above."
+    fi
+fi
+
+pip() { .venv/bin/python -m pip --quiet --disable-pip-version-check --no-input "$@"; }
+index=(${TORCH_INDEX:+--extra-index-url "$TORCH_INDEX"})
+
+say "creating .venv on $(/usr/bin/python3 --version), with the distribution's packages in sight"
+/usr/bin/python3 -m venv --system-site-packages .venv
+say "installing the packages of $lock and requirements/dev.txt"
+pip install --no-deps "${index[@]}" -r "$lock" -r requirements/dev.txt ||
+    stop "pip could not install the locked packages; its own message is above."
+# An index may serve torch for CUDA only, and the lock leaves out the libraries of that build (several GB).
+if ! .venv/bin/python -c 'import torch' 2>/dev/null; then
+    say "torch is the CUDA build: installing its libraries (TORCH_INDEX=<PyTorch's CPU index> avoids this)"
+    pip install "${index[@]}" "$(grep '^torch==' "$lock")" || stop "torch does not start."
+fi
+say "installing pinn-ray itself"
+pip install --no-deps --no-build-isolation -e . || stop "pip could not install this project."
+
+printf '%s\n' "$state" > .venv/setup-state
+say "done in $SECONDS s"
