@@ -1,0 +1,44 @@
+"""Checked, read-only arrays for the objects that cross package borders."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from geometry.errors import ShapeError, UserError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+def frozen_array(
+    values: ArrayLike, *, dtype: type[Any], shape: Sequence[int | None], name: str
+) -> NDArray[Any]:
+    """A read-only copy of `values` whose shape has been checked.
+
+    Args:
+        values: What the caller gave.
+        dtype: Wanted type of the entries.
+        shape: Wanted shape; None stands for any length.
+        name: How an error message calls the array.
+
+    Returns:
+        Read-only array of that type and shape.
+
+    Raises:
+        ShapeError: If the shape differs.
+        UserError: If an entry is not finite.
+    """
+    array = np.array(values, dtype=dtype)
+    wanted = tuple("n" if length is None else length for length in shape)
+    if array.ndim != len(shape) or any(
+        length is not None and length != actual
+        for length, actual in zip(shape, array.shape, strict=True)
+    ):
+        raise ShapeError(f"{name} must have shape {wanted}, got {array.shape}")
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        raise UserError(f"{name} holds a value that is not finite")
+    array.setflags(write=False)
+    return array

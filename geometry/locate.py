@@ -1,0 +1,82 @@
+"""Find the triangle that holds a point."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
+
+from geometry.arrays import FloatArray, IntArray, frozen_array
+from geometry.errors import OutsideBodyError
+
+INSIDE_TOLERANCE = 1e-9
+"""How far below zero a barycentric coordinate may fall: rounding on the boundary, far below any mesh size."""
+
+
+@dataclass(frozen=True, eq=False)
+class Location:
+    """Points in the body with the triangle that holds each.
+
+    Attributes:
+        points: Shape (n, 2), mm.
+        cells: Number of the triangle, shape (n,).
+        barycentric: Barycentric coordinates in it, shape (n, 3).
+    """
+
+    points: FloatArray
+    cells: IntArray
+    barycentric: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+
+class Locator:
+    """Point location by the nearest centroids, looking at ever more of them until the triangle is found."""
+
+    def __init__(self, points: FloatArray, triangles: IntArray) -> None:
+        corners = points[triangles]
+        self._centroids = cKDTree(corners.mean(axis=1))
+        self._radius = np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).max()
+        self._origin = corners[:, 0]
+        self._inverse = np.linalg.inv(
+            np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
+        )
+
+    def locate(self, points: ArrayLike) -> Location:
+        """Locate points of shape (n, 2), mm.
+
+        Raises:
+            OutsideBodyError: If a point lies outside the body.
+        """
+        where = frozen_array(points, dtype=np.float64, shape=(None, 2), name="points")
+        cells = np.full(len(where), -1, dtype=np.int64)
+        barycentric = np.zeros((len(where), 3))
+        todo = np.arange(len(where))
+        neighbours = 8
+        while len(todo):
+            count = min(neighbours, self._centroids.n)
+            distance, candidates = self._centroids.query(where[todo], k=count)
+            distance, candidates = distance.reshape(-1, count), candidates.reshape(-1, count)
+            local = np.einsum(
+                "nkij,nkj->nki",
+                self._inverse[candidates],
+                where[todo][:, None] - self._origin[candidates],
+            )
+            all_three = np.concatenate([1 - local.sum(axis=2, keepdims=True), local], axis=2)
+            best = all_three.min(axis=2).argmax(axis=1)
+            rows = np.arange(len(todo))
+            found = all_three[rows, best].min(axis=1) >= -INSIDE_TOLERANCE
+            cells[todo[found]] = candidates[rows, best][found]
+            barycentric[todo[found]] = all_three[rows, best][found]
+            # A triangle reaches at most _radius from its centroid: beyond it no candidate is left.
+            exhausted = ~found & ((distance[:, -1] > self._radius) | (count == self._centroids.n))
+            if exhausted.any():
+                x, y = where[todo[exhausted][0]]
+                raise OutsideBodyError(
+                    f"{int(exhausted.sum())} of {len(where)} points lie outside the body, "
+                    f"the first at ({x:.6g}, {y:.6g}) mm; fields exist in the body only"
+                )
+            todo = todo[~found]
+            neighbours *= 4
+        return Location(points=where, cells=cells, barycentric=barycentric)

@@ -1,0 +1,55 @@
+"""Displacements measured, or simulated, at the markers."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import BoolArray, FloatArray, frozen_array
+from geometry.errors import ShapeError, UserError
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """Marker displacements, final minus initial position, ordered from base to tip.
+
+    Attributes:
+        points: Initial positions, shape (m, 2), mm.
+        displacements: Shape (m, 2), mm; the values at markers that are not visible mean nothing.
+        standard_deviations: Of the displacements, shape (m, 2), mm.
+        visible: Which markers were seen, shape (m,).
+        source: One sentence on where the numbers come from; shown wherever they appear.
+        simulated: True if no camera was involved.
+
+    Raises:
+        ShapeError: If the arrays do not fit together.
+        UserError: If a standard deviation is negative or no marker is visible.
+    """
+
+    points: FloatArray
+    displacements: FloatArray
+    standard_deviations: FloatArray
+    visible: BoolArray
+    source: str
+    simulated: bool
+
+    def __post_init__(self) -> None:
+        count = len(np.atleast_1d(self.visible))
+        for name, dtype, shape in (
+            ("points", np.float64, (count, 2)),
+            ("displacements", np.float64, (count, 2)),
+            ("standard_deviations", np.float64, (count, 2)),
+            ("visible", np.bool_, (count,)),
+        ):
+            frozen = frozen_array(getattr(self, name), dtype=dtype, shape=shape, name=name)
+            object.__setattr__(self, name, frozen)
+        if not self.visible.any():
+            raise UserError("none of the markers is visible; at least one is needed")
+        if (self.standard_deviations < 0).any():
+            raise UserError("standard deviations must be zero or more (mm)")
+        if count == 0:
+            raise ShapeError("observations need at least one marker")
+
+    @property
+    def label(self) -> str:
+        """`simulated` or `measured`, for captions."""
+        return "simulated" if self.simulated else "measured"

@@ -1,0 +1,118 @@
+"""The constitutive laws, once, for NumPy arrays, torch tensors and UFL expressions alike.
+
+Every function takes the displacement gradient `H[..., i, j] = du_i/dx_j` and uses nothing but arithmetic and indexing
+on it, so that any of the three libraries can be passed. Linear elasticity is Hooke's law for the plane states (Timoshenko
+and Goodier, Theory of Elasticity, 3rd ed., sections 10 and 16-17); the neo-Hookean law is the compressible one of Bonet and
+Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed., eqs 6.27-6.29, in plane strain.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+Field = Any
+"""A NumPy array, a torch tensor or a UFL expression."""
+
+
+class Lame(NamedTuple):
+    """Lamé constants of a plane problem, MPa.
+
+    Attributes:
+        λ: First constant as it stands in the plane law; in plane stress the reduced one, 2 λ μ / (λ + 2 μ).
+        μ: Shear modulus.
+        λ_out: What multiplies the in-plane trace to give sigma_zz: λ in plane strain, 0 in plane stress.
+    """
+
+    λ: float
+    μ: float
+    λ_out: float
+
+
+class Plane(NamedTuple):
+    """Components of a symmetric tensor of a plane state."""
+
+    xx: Field
+    yy: Field
+    xy: Field
+    zz: Field
+
+
+def lame_constants(young: float, poisson: float, plane: str) -> Lame:
+    """Lamé constants from Young's modulus (MPa) and Poisson's ratio for plane "strain" or "stress"."""
+    μ = young / (2 * (1 + poisson))
+    if plane == "stress":
+        return Lame(λ=young * poisson / ((1 + poisson) * (1 - poisson)), μ=μ, λ_out=0.0)
+    λ = young * poisson / ((1 + poisson) * (1 - 2 * poisson))
+    return Lame(λ=λ, μ=μ, λ_out=λ)
+
+
+def small_strain(gradient: Field, lame: Lame) -> Plane:
+    """Infinitesimal strain, tensor components (the shear is half the engineering shear)."""
+    xx, yy = gradient[..., 0, 0], gradient[..., 1, 1]
+    xy = 0.5 * (gradient[..., 0, 1] + gradient[..., 1, 0])
+    # Plane stress: sigma_zz = 0 fixes eps_zz; there the reduced λ = 2 λ3 μ/(λ3 + 2 μ) gives eps_zz = -λ/(2 μ) (xx + yy).
+    zz = 0 * xx if lame.λ_out else (-lame.λ / (2 * lame.μ)) * (xx + yy)
+    return Plane(xx, yy, xy, zz)
+
+
+def linear_energy_density(gradient: Field, lame: Lame) -> Field:
+    """Strain energy density 1/2 sigma : eps, MPa (= N mm / mm^3)."""
+    strain = small_strain(gradient, lame)
+    trace = strain.xx + strain.yy
+    shear = strain.xx * strain.xx + strain.yy * strain.yy + 2 * strain.xy * strain.xy
+    return 0.5 * lame.λ * trace * trace + lame.μ * shear
+
+
+def linear_stress(gradient: Field, lame: Lame) -> Plane:
+    """Cauchy stress of Hooke's law, MPa."""
+    strain = small_strain(gradient, lame)
+    trace = strain.xx + strain.yy
+    return Plane(
+        xx=lame.λ * trace + 2 * lame.μ * strain.xx,
+        yy=lame.λ * trace + 2 * lame.μ * strain.yy,
+        xy=2 * lame.μ * strain.xy,
+        zz=lame.λ_out * trace,
+    )
+
+
+def deformation_jacobian(gradient: Field) -> Field:
+    """J = det(I + H); positive where the deformation is possible."""
+    return (1 + gradient[..., 0, 0]) * (1 + gradient[..., 1, 1]) - gradient[..., 0, 1] * gradient[..., 1, 0]
+
+
+def green_lagrange_strain(gradient: Field) -> Plane:
+    """E = (F^T F - I) / 2 of a plane-strain deformation."""
+    a, b, c, d = gradient[..., 0, 0], gradient[..., 0, 1], gradient[..., 1, 0], gradient[..., 1, 1]
+    return Plane(
+        xx=a + 0.5 * (a * a + c * c),
+        yy=d + 0.5 * (b * b + d * d),
+        xy=0.5 * (b + c + a * b + c * d),
+        zz=0 * a,
+    )
+
+
+def neo_hookean_energy_density(gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> Field:
+    """ψ = μ/2 (tr C - 3) - μ ln J + λ/2 (ln J)^2 per reference volume, MPa; `log` is that of the library in use."""
+    strain = green_lagrange_strain(gradient)
+    log_j = log(deformation_jacobian(gradient))
+    return lame.μ * (strain.xx + strain.yy) - lame.μ * log_j + 0.5 * lame.λ * log_j * log_j
+
+
+def neo_hookean_stress(gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> Plane:
+    """Cauchy stress μ/J (B - I) + λ ln(J)/J I, MPa, with B = F F^T."""
+    a, b, c, d = gradient[..., 0, 0], gradient[..., 0, 1], gradient[..., 1, 0], gradient[..., 1, 1]
+    jacobian = deformation_jacobian(gradient)
+    pressure = lame.λ * log(jacobian) / jacobian
+    return Plane(
+        xx=lame.μ / jacobian * (2 * a + a * a + b * b) + pressure,
+        yy=lame.μ / jacobian * (2 * d + c * c + d * d) + pressure,
+        xy=lame.μ / jacobian * (b + c + a * c + b * d),
+        zz=pressure,
+    )
+
+
+def von_mises(stress: Plane, sqrt: Callable[[Field], Field]) -> Field:
+    """Von Mises stress, MPa, with the out-of-plane stress that plane strain needs."""
+    xx, yy, xy, zz = stress
+    return sqrt(
+        0.5 * ((xx - yy) * (xx - yy) + (yy - zz) * (yy - zz) + (zz - xx) * (zz - xx)) + 3 * xy * xy
+    )

@@ -1,0 +1,1 @@
+"""Finite elements with DOLFINx: the linear reference and the finite-strain solver."""

@@ -1,0 +1,169 @@
+"""The one module that knows how DOLFINx changed between 0.5 (Debian 12) and 0.11.
+
+It offers a vector space on the shared mesh, with a map between its degrees of freedom and the nodes of a
+`LagrangeSpace`, and sparse solves by MUMPS.
+"""
+
+import inspect
+from collections.abc import Sequence
+
+import dolfinx
+import dolfinx.fem.petsc
+import numpy as np
+import ufl
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy.spatial import cKDTree
+
+from geometry.arrays import FloatArray, IntArray
+from geometry.errors import UserError
+from solvers.fem.lagrange import LagrangeSpace
+
+
+def _vector_element() -> object:
+    if hasattr(ufl, "VectorElement"):  # until 0.6
+        return ufl.VectorElement("Lagrange", "triangle", 1)
+    import basix.ufl
+
+    return basix.ufl.element("Lagrange", "triangle", 1, shape=(2,))
+
+
+def _create_mesh(comm: MPI.Comm, cells: IntArray, points: FloatArray) -> object:
+    domain = ufl.Mesh(_vector_element())
+    names = inspect.signature(dolfinx.mesh.create_mesh).parameters
+    return dolfinx.mesh.create_mesh(
+        comm, cells=cells, x=points, **{"domain" if "domain" in names else "e": domain}
+    )
+
+
+def _vector_space(mesh: object, degree: int) -> object:
+    if hasattr(dolfinx.fem, "functionspace"):  # from 0.7
+        return dolfinx.fem.functionspace(mesh, ("Lagrange", degree, (2,)))
+    return dolfinx.fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
+
+
+class DistributedSpace:
+    """A DOLFINx vector space on the shared mesh, distributed over the ranks of a communicator.
+
+    Nodal arrays of shape (N, 2), in the numbering of the `LagrangeSpace`, are the same on every rank.
+
+    Attributes:
+        space: The elements in NumPy.
+        function: The DOLFINx function that forms are written with.
+    """
+
+    def __init__(self, space: LagrangeSpace, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
+        mesh = space.mesh
+        share = slice(None) if comm.rank == 0 else slice(0, 0)
+        self.space = space
+        self.comm = comm
+        self.domain = _create_mesh(comm, mesh.triangles[share], np.array(mesh.points[share]))
+        self.dolfinx_space = _vector_space(self.domain, space.degree)
+        self.function = dolfinx.fem.Function(self.dolfinx_space)
+        positions = self.dolfinx_space.tabulate_dof_coordinates()[:, :2]
+        distance, self._node_of_dof = cKDTree(space.nodes).query(positions)
+        if len(distance) and distance.max() > 1e-9:
+            raise RuntimeError(
+                f"a degree of freedom lies {distance.max():.2g} mm from every node of the mesh"
+            )
+        self._owned = self.dolfinx_space.dofmap.index_map.size_local
+
+    def constant(self, value: float) -> object:
+        """A number that can change without compiling the form again."""
+        return dolfinx.fem.Constant(self.domain, PETSc.ScalarType(value))
+
+    def form(self, expression: object) -> object:
+        """Compile a UFL form."""
+        return dolfinx.fem.form(expression)
+
+    def clamp(self, nodes: IntArray, axes: Sequence[int] = (0, 1)) -> list[object]:
+        """Homogeneous Dirichlet conditions on components of nodes."""
+        dofs = np.flatnonzero(np.isin(self._node_of_dof, nodes)).astype(np.int32)
+        conditions = []
+        for axis in axes:
+            part = self.dolfinx_space.sub(axis)
+            # A sub-space numbers its degrees of freedom within the blocked parent.
+            conditions.append(
+                dolfinx.fem.dirichletbc(PETSc.ScalarType(0.0), (2 * dofs + axis).astype(np.int32), part)
+            )
+        return conditions
+
+    def assemble_matrix(self, form: object, conditions: Sequence[object]) -> PETSc.Mat:
+        """Matrix with rows and columns of clamped components replaced by the identity."""
+        matrix = dolfinx.fem.petsc.assemble_matrix(form, bcs=list(conditions))
+        matrix.assemble()
+        return matrix
+
+    def assemble_nodal(self, form: object) -> FloatArray:
+        """A linear form on every shape function, shape (N, 2)."""
+        vector = dolfinx.fem.petsc.assemble_vector(form)
+        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        return self.gather(vector)
+
+    def assemble_scalar(self, form: object) -> float:
+        """An integral over the whole body."""
+        return float(self.comm.allreduce(dolfinx.fem.assemble_scalar(form), op=MPI.SUM))
+
+    def set_function(self, values: FloatArray) -> None:
+        """Give `function` nodal values of shape (N, 2)."""
+        self.function.x.array[:] = values[self._node_of_dof].ravel()
+
+    def distribute(self, values: FloatArray, vector: PETSc.Vec) -> None:
+        """Fill a PETSc vector from nodal values of shape (N, 2)."""
+        vector.array[:] = values[self._node_of_dof[: self._owned]].ravel()
+
+    def gather(self, vector: PETSc.Vec) -> FloatArray:
+        """Nodal values of shape (N, 2) of a PETSc vector, the same on every rank."""
+        values = np.zeros((len(self.space.nodes), 2))
+        values[self._node_of_dof[: self._owned]] = vector.array.reshape(-1, 2)
+        if self.comm.size > 1:
+            self.comm.Allreduce(MPI.IN_PLACE, values, op=MPI.SUM)
+        return values
+
+
+class Factorisation:
+    """A symmetric matrix factorised by MUMPS, for any number of right-hand sides.
+
+    Args:
+        space: Whose nodal arrays the right-hand sides and solutions are.
+        matrix: The assembled matrix.
+        clamped: Mask of shape (N, 2): components whose right-hand side is set to zero.
+        positive_definite: False where a tangent may be indefinite.
+    """
+
+    def __init__(
+        self, space: DistributedSpace, matrix: PETSc.Mat, clamped: FloatArray, *, positive_definite: bool
+    ) -> None:
+        self._space = space
+        self._clamped = clamped
+        self._matrix = matrix
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        matrix.setOption(PETSc.Mat.Option.SPD, positive_definite)
+        self._ksp = PETSc.KSP().create(space.comm)
+        self._ksp.setOperators(matrix)
+        self._ksp.setType(PETSc.KSP.Type.PREONLY)
+        preconditioner = self._ksp.getPC()
+        preconditioner.setType(PETSc.PC.Type.CHOLESKY)
+        preconditioner.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+        self._ksp.setErrorIfNotConverged(True)
+        try:
+            self._ksp.setUp()
+        except PETSc.Error as error:
+            raise UserError(
+                "the stiffness matrix cannot be factorised: is part of the mesh not connected to the base?"
+            ) from error
+
+    def solve(self, nodal: FloatArray) -> FloatArray:
+        """Solve for a right-hand side of shape (N, 2); the solution has the same shape."""
+        right, solution = self._matrix.createVecs()
+        self._space.distribute(np.where(self._clamped, 0.0, nodal), right)
+        self._ksp.solve(right, solution)
+        values = self._space.gather(solution)
+        right.destroy()
+        solution.destroy()
+        return values
+
+    def destroy(self) -> None:
+        """Free the factors."""
+        self._ksp.destroy()
+        self._matrix.destroy()

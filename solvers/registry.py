@@ -1,0 +1,59 @@
+"""Solvers by name: ours, loaded when asked for, and those of other packages (entry-point group `pinnray.solvers`)."""
+
+import warnings
+from difflib import get_close_matches
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Any
+
+from geometry.errors import UserError
+from solvers.solver import Solver
+
+GROUP = "pinnray.solvers"
+
+BUILT_IN = {
+    "fem": "solvers.fem.linear:FemSolver",
+    "fem-nonlinear": "solvers.fem.nonlinear:FemNonlinearSolver",
+    "pinn-std": "solvers.pinn.standard:PinnStdSolver",
+}
+
+
+def solver_names() -> list[str]:
+    """Names of every solver that can be asked for, ours first."""
+    return [*BUILT_IN, *sorted({entry.name for entry in entry_points(group=GROUP)} - set(BUILT_IN))]
+
+
+def make_solver(name: str, **settings: Any) -> Solver:
+    """The solver called `name`, with the settings given and its defaults for the rest.
+
+    Raises:
+        UserError: If there is no such solver, or a package that offers it cannot be loaded.
+    """
+    if name in BUILT_IN:
+        module, _, attribute = BUILT_IN[name].partition(":")
+        factory = getattr(import_module(module), attribute)
+    else:
+        found = [entry for entry in entry_points(group=GROUP) if entry.name == name]
+        if not found:
+            near = get_close_matches(name, solver_names(), n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise UserError(f"no solver is called {name!r}{hint} (there are: {', '.join(solver_names())})")
+        try:
+            factory = found[0].load()
+        except Exception as error:
+            raise UserError(f"solver {name!r} ({found[0].value}) cannot be loaded: {error}") from error
+    solver = factory(**settings)
+    if not isinstance(solver, Solver):
+        raise UserError(f"solver {name!r} does not have the interface: name, solve(problem, progress), settings()")
+    return solver
+
+
+def usable_solvers() -> dict[str, Solver]:
+    """Every solver with its defaults; one that cannot be loaded is left out with a warning."""
+    solvers = {}
+    for name in solver_names():
+        try:
+            solvers[name] = make_solver(name)
+        except (UserError, ImportError) as error:
+            warnings.warn(f"solver {name!r} is left out: {error}", stacklevel=2)
+    return solvers

@@ -1,0 +1,139 @@
+"""What every solver returns, and everything that follows from the displacement gradient, derived once."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from geometry.arrays import FloatArray
+from geometry.locate import Location
+from solvers.elasticity import (
+    Plane,
+    green_lagrange_strain,
+    linear_energy_density,
+    linear_stress,
+    neo_hookean_energy_density,
+    neo_hookean_stress,
+    small_strain,
+    von_mises,
+)
+from solvers.problem import Problem
+
+
+class DisplacementField(Protocol):
+    """The displacement as a function of position: what a solver has to provide."""
+
+    def displacement(self, location: Location) -> FloatArray:
+        """Displacement at `location.points`, shape (n, 2), mm."""
+        ...
+
+    def gradient(self, location: Location) -> FloatArray:
+        """Displacement gradient H[i, j] = du_i/dx_j at `location.points`, shape (n, 2, 2)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Status:
+    """How the solve ended.
+
+    Attributes:
+        converged: Whether the solver's own criterion was met.
+        message: A sentence that says so and, where it was not, what to try.
+    """
+
+    converged: bool
+    message: str
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A displacement field with its problem and how it was found.
+
+    Attributes:
+        solver: Name of the solver.
+        problem: What was solved, with the material that the solver used.
+        field: The displacement field.
+        energy: Elastic energy per unit depth, N mm / mm.
+        reaction: Force of the indenter on the finger per unit depth, shape (2,), N/mm.
+        status: How the solve ended.
+        stats: Numbers that describe the solve: `seconds`, `unknowns`, ...
+        history: Columns of the training or load-stepping record, all of one length; empty for a direct solve.
+    """
+
+    solver: str
+    problem: Problem
+    field: DisplacementField
+    energy: float
+    reaction: FloatArray
+    status: Status
+    stats: Mapping[str, float | int | str]
+    history: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    def displacement(self, points: ArrayLike | Location) -> FloatArray:
+        """Displacement at points of shape (n, 2), mm: shape (n, 2), mm.
+
+        Raises:
+            OutsideBodyError: If a point lies outside the finger.
+        """
+        return self.field.displacement(self._locate(points))
+
+    def gradient(self, points: ArrayLike | Location) -> FloatArray:
+        """Displacement gradient du_i/dx_j at points of shape (n, 2), mm: shape (n, 2, 2).
+
+        Raises:
+            OutsideBodyError: If a point lies outside the finger.
+        """
+        return self.field.gradient(self._locate(points))
+
+    def state(self, points: ArrayLike | Location) -> "State":
+        """Strain, stress and what follows from them at points of shape (n, 2), mm."""
+        return State.from_gradient(self.gradient(points), self.problem)
+
+    def _locate(self, points: ArrayLike | Location) -> Location:
+        return points if isinstance(points, Location) else self.problem.mesh.locate(points)
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Strain and stress at n points.
+
+    Attributes:
+        strain: In-plane strain tensor, shape (n, 2, 2): infinitesimal for the linear law, Green-Lagrange for finite strain.
+        stress: In-plane Cauchy stress, shape (n, 2, 2), MPa.
+        stress_zz: Out-of-plane Cauchy stress, shape (n,), MPa; zero in plane stress.
+        von_mises: Shape (n,), MPa.
+        energy_density: Strain energy per reference volume, shape (n,), MPa.
+    """
+
+    strain: FloatArray
+    stress: FloatArray
+    stress_zz: FloatArray
+    von_mises: FloatArray
+    energy_density: FloatArray
+
+    @classmethod
+    def from_gradient(cls, gradient: FloatArray, problem: Problem) -> "State":
+        """The state that the problem's material has at displacement gradients of shape (n, 2, 2)."""
+        lame = problem.material.lame
+        if problem.material.law == "neo-hookean":
+            strain = green_lagrange_strain(gradient)
+            stress = neo_hookean_stress(gradient, lame, np.log)
+            energy_density = neo_hookean_energy_density(gradient, lame, np.log)
+        else:
+            strain = small_strain(gradient, lame)
+            stress = linear_stress(gradient, lame)
+            energy_density = linear_energy_density(gradient, lame)
+        return cls(
+            strain=_in_plane(strain),
+            stress=_in_plane(stress),
+            stress_zz=np.asarray(stress.zz, dtype=np.float64),
+            von_mises=von_mises(stress, np.sqrt),
+            energy_density=energy_density,
+        )
+
+
+def _in_plane(tensor: Plane) -> FloatArray:
+    rows = [np.stack([tensor.xx, tensor.xy], axis=-1), np.stack([tensor.xy, tensor.yy], axis=-1)]
+    return np.stack(rows, axis=-2)
