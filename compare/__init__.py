@@ -1,0 +1,1 @@
+"""Compare the solvers: metrics, pictures, report and the command line."""

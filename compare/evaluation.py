@@ -1,0 +1,126 @@
+"""A solution sampled on the shared mesh and at the markers: all that metrics, pictures and reports look at.
+
+It is an archive of NumPy arrays, so that a run can be resumed, and a result compared again, without any solver.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from compare.atomic import atomic_path
+from geometry.arrays import FloatArray
+from geometry.mesh import TriangleMesh
+from geometry.quadrature import body_quadrature
+from solvers.solution import Solution
+
+QUADRATURE_DEGREE = 2
+HISTORY_PREFIX = "history_"
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """One solver's result on the shared mesh of t triangles, n nodes, m markers and q = 3 t quadrature points.
+
+    Attributes:
+        solver: Name of the solver.
+        converged: Whether the solver's own criterion was met.
+        message: The solver's sentence on how it ended.
+        energy: Elastic energy per unit depth, N mm / mm.
+        reaction: Force of the indenter per unit depth, shape (2,), N/mm.
+        stats: What the solver says of its run: `seconds`, `unknowns`, ...
+        history: Columns of the training or load-stepping record, all of one length.
+        marker_displacement: Shape (m, 2), mm.
+        node_displacement: Shape (n, 2), mm.
+        weights: Quadrature weights, shape (q,), mm^2.
+        displacement: At the quadrature points, shape (q, 2), mm.
+        strain: At the quadrature points, shape (q, 2, 2).
+        stress: Cauchy, at the quadrature points, shape (q, 2, 2), MPa.
+        stress_zz: Shape (q,), MPa.
+        von_mises: Shape (q,), MPa.
+        energy_density: Shape (q,), MPa.
+    """
+
+    solver: str
+    converged: bool
+    message: str
+    energy: float
+    reaction: FloatArray
+    stats: Mapping[str, float | int | str]
+    history: Mapping[str, FloatArray]
+    marker_displacement: FloatArray
+    node_displacement: FloatArray
+    weights: FloatArray
+    displacement: FloatArray
+    strain: FloatArray
+    stress: FloatArray
+    stress_zz: FloatArray
+    von_mises: FloatArray
+    energy_density: FloatArray
+
+    @classmethod
+    def of(cls, solution: Solution, mesh: TriangleMesh) -> "Evaluation":
+        """Sample a solution on the nodes and quadrature points of `mesh` and at its markers."""
+        quadrature = body_quadrature(mesh, QUADRATURE_DEGREE)
+        state = solution.state(quadrature.location)
+        return cls(
+            solver=solution.solver,
+            converged=solution.status.converged,
+            message=solution.status.message,
+            energy=solution.energy,
+            reaction=np.asarray(solution.reaction, dtype=np.float64),
+            stats=dict(solution.stats),
+            history={name: np.asarray(column) for name, column in solution.history.items()},
+            marker_displacement=solution.displacement(mesh.markers),
+            node_displacement=solution.displacement(mesh.at_nodes()),
+            weights=quadrature.weights,
+            displacement=solution.displacement(quadrature.location),
+            strain=state.strain,
+            stress=state.stress,
+            stress_zz=state.stress_zz,
+            von_mises=state.von_mises,
+            energy_density=state.energy_density,
+        )
+
+    def per_triangle(self, values: FloatArray) -> FloatArray:
+        """Area-weighted mean over each triangle of values at the quadrature points, shape (q, ...) to (t, ...)."""
+        points = 3
+        weights = self.weights.reshape(-1, points)
+        grouped = values.reshape(-1, points, *values.shape[1:])
+        return np.asarray(
+            np.einsum("tq,tq...->t...", weights / weights.sum(axis=1, keepdims=True), grouped)
+        )
+
+    def save(self, path: Path, key: str) -> None:
+        """Write the evaluation atomically under a key that says what it is the result of."""
+        header: dict[str, Any] = {"key": key}
+        arrays: dict[str, FloatArray] = {}
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if isinstance(value, np.ndarray):
+                arrays[entry.name] = value
+            elif entry.name != "history":
+                header[entry.name] = dict(value) if isinstance(value, Mapping) else value
+        arrays |= {HISTORY_PREFIX + name: column for name, column in self.history.items()}
+        with atomic_path(path) as partial:
+            np.savez_compressed(partial, header=np.array(json.dumps(header)), **arrays)
+
+    @classmethod
+    def load(cls, path: Path, key: str) -> "Evaluation | None":
+        """Read an evaluation, or None if there is none under that path and key."""
+        if not path.exists():
+            return None
+        with np.load(path) as archive:
+            header = json.loads(str(archive["header"]))
+            if header.pop("key") != key:
+                return None
+            arrays = {name: archive[name] for name in archive.files if name != "header"}
+        history = {
+            name.removeprefix(HISTORY_PREFIX): arrays.pop(name)
+            for name in list(arrays)
+            if name.startswith(HISTORY_PREFIX)
+        }
+        return cls(history=history, **header, **arrays)

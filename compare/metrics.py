@@ -1,0 +1,135 @@
+"""How far each solver is from the measurements and from the reference."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from compare.evaluation import Evaluation
+from geometry.arrays import FloatArray
+from geometry.observations import Observations
+
+COMPONENTS: dict[str, tuple[int, int]] = {"xx": (0, 0), "yy": (1, 1), "xy": (0, 1)}
+
+
+class MarkerErrors(NamedTuple):
+    """Errors at the visible markers; rows of markers that were not seen are NaN.
+
+    Attributes:
+        ae_u: Absolute error of u at each marker, shape (m,), mm.
+        ae_v: The same for v.
+        mae_u: Its mean over the visible markers, mm.
+        mae_v: The same for v.
+        mae_sum: Mean of |du| + |dv|: the absolute error as the paper's text defines it, mm.
+        mae_rss: sqrt(mae_u^2 + mae_v^2): what the `disp` row of the paper's Table I holds, mm.
+    """
+
+    ae_u: FloatArray
+    ae_v: FloatArray
+    mae_u: float
+    mae_v: float
+    mae_sum: float
+    mae_rss: float
+
+
+class FieldDifference(NamedTuple):
+    """A field against the reference's, over the whole body.
+
+    Attributes:
+        rel_l2: Area-weighted L2 norm of the difference over that of the reference.
+        mean: Area-weighted mean of the pointwise absolute difference, in the field's unit.
+        p95: Area-weighted 95th percentile of it.
+    """
+
+    rel_l2: float
+    mean: float
+    p95: float
+
+
+class ReferenceDifferences(NamedTuple):
+    """A solver against the reference solver, on the shared mesh.
+
+    Attributes:
+        displacement: Of the displacement vector, mm.
+        von_mises: Of the von Mises stress, MPa.
+        stress: Of the in-plane Cauchy stress components, by name, MPa.
+        strain: Of the in-plane strain components, by name.
+        mae_markers: Mean over the markers of |du| + |dv|, mm.
+        energy: Relative difference of the energy (signed).
+    """
+
+    displacement: FieldDifference
+    von_mises: FieldDifference
+    stress: Mapping[str, FieldDifference]
+    strain: Mapping[str, FieldDifference]
+    mae_markers: float
+    energy: float
+
+
+def marker_errors(evaluation: Evaluation, observations: Observations) -> MarkerErrors:
+    """Absolute and mean absolute errors at the markers, in-sample for a solver that assimilated them."""
+    error = np.abs(evaluation.marker_displacement - observations.displacements)
+    error[~observations.visible] = np.nan
+    mae_u, mae_v = (float(value) for value in np.nanmean(error, axis=0))
+    return MarkerErrors(
+        ae_u=error[:, 0],
+        ae_v=error[:, 1],
+        mae_u=mae_u,
+        mae_v=mae_v,
+        mae_sum=mae_u + mae_v,
+        mae_rss=float(np.hypot(mae_u, mae_v)),
+    )
+
+
+def reference_differences(evaluation: Evaluation, reference: Evaluation) -> ReferenceDifferences:
+    """Differences of displacement, strain and stress from the reference."""
+
+    def differ(name: str, index: tuple[int, ...] = ()) -> FieldDifference:
+        chosen = (slice(None), *index)
+        return field_difference(
+            getattr(evaluation, name)[chosen], getattr(reference, name)[chosen], reference.weights
+        )
+
+    markers = np.abs(evaluation.marker_displacement - reference.marker_displacement).sum(axis=1)
+    return ReferenceDifferences(
+        displacement=differ("displacement"),
+        von_mises=differ("von_mises"),
+        stress={name: differ("stress", index) for name, index in COMPONENTS.items()},
+        strain={name: differ("strain", index) for name, index in COMPONENTS.items()},
+        mae_markers=float(markers.mean()),
+        energy=(evaluation.energy - reference.energy) / reference.energy,
+    )
+
+
+def field_difference(values: FloatArray, reference: FloatArray, weights: FloatArray) -> FieldDifference:
+    """Difference of two fields given at quadrature points.
+
+    Args:
+        values: Shape (q,) or (q, k).
+        reference: Of the same shape.
+        weights: Quadrature weights, shape (q,), mm^2.
+    """
+    size = _magnitude(values - reference)
+    norm = np.sqrt((weights * _magnitude(reference) ** 2).sum())
+    return FieldDifference(
+        rel_l2=float(np.sqrt((weights * size**2).sum()) / norm) if norm > 0 else float("nan"),
+        mean=float((weights * size).sum() / weights.sum()),
+        p95=weighted_percentile(size, weights, 95),
+    )
+
+
+def weighted_percentile(values: FloatArray, weights: FloatArray, percent: float) -> float:
+    """The value below which `percent` of the total weight lies."""
+    order = np.argsort(values)
+    share = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(share, percent / 100 * share[-1])])
+
+
+def pick_reference(evaluations: Sequence[Evaluation], wanted: str | None = None) -> Evaluation:
+    """The evaluation called `wanted`, else `fem`, else the first."""
+    named = {evaluation.solver: evaluation for evaluation in evaluations}
+    return named.get(wanted or "fem", evaluations[0])
+
+
+def _magnitude(values: FloatArray) -> FloatArray:
+    return np.abs(values) if values.ndim == 1 else np.asarray(np.linalg.norm(values, axis=1))
