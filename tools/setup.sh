@@ -8,27 +8,23 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 say() { printf 'setup: %s\n' "$*"; }
-stop() {
-    printf 'setup: cannot go on: %s\n' "$1" >&2
-    cat >&2 <<'EOF'
-Ways on that need neither root nor Debian:
+stop() { printf 'setup: cannot go on: %s\n' "$*" >&2; exit 1; }
+elsewhere='Ways on that need neither root nor Debian:
   container  docker build -t pinn-ray . && docker run --rm -v "$PWD/out:/out" pinn-ray
   conda      conda create -n pinn-ray -c conda-forge python=3.12 fenics-dolfinx && conda activate pinn-ray &&
-             pip install -e '.[dev]', then call compare and pytest instead of make
-EOF
-    exit 1
-}
+             pip install -e ".[dev]", then call compare and pytest instead of make'
 
 os_release=${OS_RELEASE:-/etc/os-release}
 system=$(. "$os_release" 2>/dev/null && echo "${ID:-}${VERSION_ID:-}") || true
 apt=requirements/$system.apt lock=requirements/$system.txt
 if [[ ! -f $apt || ! -f $lock ]]; then
     name=$(. "$os_release" 2>/dev/null && echo "${PRETTY_NAME:-}") || true
-    stop "this is ${name:-an unknown system}; DOLFINx is set up on Debian 12 and 13 only."
+    stop "this is ${name:-an unknown system}; DOLFINx is set up on Debian 12 and 13 only.
+$elsewhere"
 fi
 
 # Everything that decides what is installed, and where.
-state=$(sha256sum "$0" pyproject.toml "$apt" "$lock" requirements/dev.txt; pwd; echo "${TORCH_INDEX:-}")
+state=$(sha256sum tools/setup.sh pyproject.toml "$apt" "$lock" requirements/dev.txt; pwd; echo "${TORCH_INDEX:-}")
 [[ $state == "$(cat .venv/setup-state 2>/dev/null)" ]] && exit 0
 SECONDS=0
 
@@ -42,7 +38,8 @@ if ((${#missing[@]})); then
     if ((EUID)); then
         root=(sudo -n)
         sudo -n true 2>/dev/null || stop "Debian packages are missing and neither root nor sudo without a password is at hand.
-Have an administrator run: apt-get install --no-install-recommends ${missing[*]}"
+Have an administrator run: apt-get install --no-install-recommends ${missing[*]}
+$elsewhere"
     fi
     apt_get() { "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -o Dpkg::Use-Pty=0 "$@" </dev/null; }
     install() { apt_get install --no-install-recommends -y "${missing[@]}"; }
@@ -53,12 +50,12 @@ Have an administrator run: apt-get install --no-install-recommends ${missing[*]}
     fi
 fi
 
-pip() { .venv/bin/python -m pip --quiet --disable-pip-version-check --no-input "$@"; }
+pip() { .venv/bin/python -m pip -qq --disable-pip-version-check --no-input "$@"; }
 index=(${TORCH_INDEX:+--extra-index-url "$TORCH_INDEX"})
 
 say "creating .venv on $(/usr/bin/python3 --version), with the distribution's packages in sight"
 /usr/bin/python3 -m venv --system-site-packages .venv
-say "installing the packages of $lock and requirements/dev.txt"
+say "installing the packages of $lock and requirements/dev.txt (about a minute)"
 pip install --no-deps "${index[@]}" -r "$lock" -r requirements/dev.txt ||
     stop "pip could not install the locked packages; its own message is above."
 # An index may serve torch for CUDA only, and the lock leaves out the libraries of that build (several GB).
