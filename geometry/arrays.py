@@ -34,8 +34,7 @@ def frozen_array(
     array = np.array(values, dtype=dtype)
     wanted = tuple("n" if length is None else length for length in shape)
     if array.ndim != len(shape) or any(
-        length is not None and length != actual
-        for length, actual in zip(shape, array.shape, strict=True)
+        length is not None and length != actual for length, actual in zip(shape, array.shape, strict=True)
     ):
         raise ShapeError(f"{name} must have shape {wanted}, got {array.shape}")
     if array.dtype.kind == "f" and not np.isfinite(array).all():

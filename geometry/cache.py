@@ -1,0 +1,161 @@
+"""Meshes and CAD files, made once for each design and kept by the hash of all that they depend on."""
+
+import hashlib
+import importlib.metadata
+import json
+import os
+import tempfile
+import warnings
+import zipfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+from geometry.design import Design
+from geometry.errors import UserError
+from geometry.mesh import TriangleMesh
+from geometry.settings import MeshSettings
+from geometry.worker import run_task
+
+FORMAT = 1
+"""Raise it when the files of the cache change their meaning."""
+
+TIMEOUT_S = 300.0
+CAD_FORMATS = ("step", "stl", "dxf", "svg")
+
+MAKERS = ("cadquery", "cadquery-ocp", "gmsh", "numpy")
+"""Packages whose version the results depend on."""
+
+_Result = TypeVar("_Result")
+
+
+def finger_mesh(
+    design: Design,
+    *,
+    settings: MeshSettings | None = None,
+    cache_dir: Path | None = None,
+    timeout_s: float = TIMEOUT_S,
+) -> TriangleMesh:
+    """The mesh of a finger, from the cache if it was made before.
+
+    Args:
+        design: The finger.
+        settings: Element sizes; the default ones if None.
+        cache_dir: Where results are kept; by default `cache_folder()`.
+        timeout_s: Time after which meshing is given up, s.
+
+    Raises:
+        UserError: If meshing fails or takes too long.
+    """
+    settings = settings or MeshSettings()
+    task = {"kind": "mesh", "what": f"meshing design {design.name!r}", "settings": settings.model_dump()}
+    return _cached(design, task, ".npz", TriangleMesh.load, cache_dir, timeout_s)
+
+
+def cad_files(
+    design: Design,
+    folder: Path,
+    *,
+    formats: Sequence[str] = CAD_FORMATS,
+    cache_dir: Path | None = None,
+    timeout_s: float = TIMEOUT_S,
+) -> list[Path]:
+    """Write a finger's CAD files: solid as STEP and STL (body and markers), section as DXF and SVG.
+
+    Args:
+        design: The finger.
+        folder: Where the files go; made if it does not exist.
+        formats: Some of `CAD_FORMATS`.
+        cache_dir: Where results are kept; by default `cache_folder()`.
+        timeout_s: Time after which CAD is given up, s.
+
+    Returns:
+        The files written.
+
+    Raises:
+        UserError: If a format is unknown, or CAD fails or takes too long.
+    """
+    unknown = sorted(set(formats) - set(CAD_FORMATS))
+    if unknown:
+        raise UserError(f"unknown CAD format {unknown[0]!r}; there are {', '.join(CAD_FORMATS)}")
+    task = {"kind": "cad", "what": f"CAD of design {design.name!r}", "formats": sorted(set(formats))}
+    contents = _cached(design, task, ".zip", _unpack, cache_dir, timeout_s)
+    folder.mkdir(parents=True, exist_ok=True)
+    return [_replace(folder / name, content) for name, content in contents.items()]
+
+
+def cache_folder() -> Path:
+    """`PINNRAY_CACHE` if set, else `pinn-ray` in `XDG_CACHE_HOME` or `~/.cache`."""
+    if chosen := os.environ.get("PINNRAY_CACHE"):
+        return Path(chosen)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "pinn-ray"
+
+
+def cache_key(design: Design, task: dict[str, object]) -> str:
+    """SHA-256 over design, task, package versions and this package's own sources, in hexadecimal."""
+    sources = sorted(Path(__file__).parent.glob("*.py"))
+    parts = {
+        "format": FORMAT,
+        "design": design.digest,
+        "task": {key: value for key, value in task.items() if key != "what"},
+        "versions": {package: _version(package) for package in MAKERS},
+        "sources": [hashlib.sha256(source.read_bytes()).hexdigest() for source in sources],
+    }
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def _cached(
+    design: Design,
+    task: dict[str, object],
+    suffix: str,
+    load: Callable[[Path], _Result],
+    cache_dir: Path | None,
+    timeout_s: float,
+) -> _Result:
+    """Load the task's result; make it first if it is missing or cannot be read."""
+    folder = cache_dir or cache_folder()
+    entry = folder / f"{task['kind']}-{cache_key(design, task)}{suffix}"
+    if entry.exists():
+        try:
+            return load(entry)
+        except Exception as error:  # whatever a damaged file makes the reader raise
+            warnings.warn(
+                f"rebuilding {entry.name}: the cached file is damaged ({type(error).__name__})",
+                RuntimeWarning,
+                stacklevel=3,
+            )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        scratch = tempfile.TemporaryDirectory(dir=folder, prefix=".making-", ignore_cleanup_errors=True)
+    except OSError as error:
+        raise UserError(
+            f"cannot write to the cache folder {folder} ({error.strerror}); set PINNRAY_CACHE to one that can be "
+            "written"
+        ) from None
+    with scratch as made_in:
+        made = Path(made_in) / entry.name
+        run_task({**task, "design": design.model_dump(), "output": str(made)}, timeout_s)
+        result = load(made)
+        os.replace(made, entry)
+    return result
+
+
+def _unpack(path: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(path) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def _replace(path: Path, content: bytes) -> Path:
+    """Write a file so that it is never seen half written."""
+    with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}-", delete=False) as file:
+        file.write(content)
+    os.chmod(file.name, 0o644)
+    os.replace(file.name, path)
+    return path
+
+
+def _version(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "unknown"

@@ -1,0 +1,119 @@
+"""The parameters of a finger: names, the paper's symbols, units and bounds; mm and degrees throughout."""
+
+import hashlib
+import json
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+def _parameter(default: Any, low: float, high: float, unit: str, symbol: str, meaning: str) -> Any:
+    """A bounded number, described once for validation, messages and help texts."""
+    return Field(
+        default=default,
+        ge=low,
+        le=high,
+        description=f"{meaning} [{unit}]" if unit else meaning,
+        json_schema_extra={"unit": unit, "symbol": symbol, "low": low, "high": high},
+    )
+
+
+class Parameters(BaseModel):
+    """Numbers that describe a finger, each within its own bounds; `Design` also checks them together.
+
+    Frame: x runs from the base (0) to the tip (`height`); the front (contact) face is y = 0 and the body lies in
+    y <= 0. The base edge runs from (0, 0) to (0, -base_width) and is clamped; the back face is the straight line
+    from (0, -base_width) to the apex (height, 0). The section is extruded along z from 0 to `depth`.
+
+    The first nine are the paper's; the paper does not give the base wall, the fillets and the marker layout, so
+    the values of the others are this project's.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    name: str = Field(
+        default="default",
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$",
+        description="What files and reports call the design; no part of the geometry",
+    )
+    height: float = _parameter(90.0, 10, 500, "mm", "H", "Length from the base to the tip")
+    base_width: float = _parameter(30.0, 3, 200, "mm", "L", "Width of the base, in the plane")
+    depth: float = _parameter(20.0, 1, 200, "mm", "W", "Depth of the extrusion, out of the plane")
+    rib_angle: float = _parameter(
+        20.0,
+        -60,
+        60,
+        "deg",
+        "L_angle",
+        "Slope of the ribs from the front wall's normal, positive toward the tip",
+    )
+    tip_length: float = _parameter(
+        20.0, 1, 300, "mm", "L_tip", "Length of the solid tip, along the front face"
+    )
+    rib_count: int = _parameter(4, 0, 60, "", "N", "Number of ribs")
+    rib_thickness: float = _parameter(2.0, 0.2, 30, "mm", "t_rib", "Rib thickness, normal to the rib")
+    front_thickness: float = _parameter(2.0, 0.2, 30, "mm", "t_flex", "Thickness of the front (contact) wall")
+    back_thickness: float = _parameter(
+        2.0, 0.2, 30, "mm", "t_back", "Thickness of the back wall, normal to the back face"
+    )
+    base_thickness: float = _parameter(2.0, 0.2, 100, "mm", "", "Thickness of the wall at the clamped base")
+    fillet_radius: float = _parameter(
+        0.0, 0, 20, "mm", "", "Radius of the cavities' corners; 0 leaves them sharp"
+    )
+    contact_position: float | None = _parameter(
+        None, 0, 500, "mm", "", "Abscissa of the contact's middle; none means (height - tip_length) / 2"
+    )
+    contact_width: float = _parameter(
+        2.0, 0.1, 100, "mm", "", "Length of front face that the indenter touches"
+    )
+    marker_layout: Literal["front", "joints"] = Field(
+        default="front",
+        description="Markers on the centre line of the front wall, or at the rib-wall joints and in the tip",
+    )
+    marker_count: int = _parameter(9, 1, 60, "", "", "Number of markers of the layout `front`")
+    marker_diameter: float = _parameter(1.6, 0.1, 20, "mm", "", "Diameter of a marker")
+    marker_height: float = _parameter(
+        0.6, 0.05, 50, "mm", "", "How deep a marker is inlaid into the side face"
+    )
+
+    @property
+    def contact_abscissa(self) -> float:
+        """X of the contact's middle on the front face, mm."""
+        if self.contact_position is not None:
+            return self.contact_position
+        return (self.height - self.tip_length) / 2
+
+    @property
+    def contact_ends(self) -> tuple[float, float]:
+        """X of both ends of the contact, mm."""
+        return (
+            self.contact_abscissa - self.contact_width / 2,
+            self.contact_abscissa + self.contact_width / 2,
+        )
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 over everything but the name, in hexadecimal; equal for equal fingers."""
+        values = self.model_dump(exclude={"name"}) | {"contact_position": self.contact_abscissa}
+        return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
+
+
+def fact(name: str, key: Literal["unit", "symbol", "low", "high"]) -> Any:
+    """Unit, symbol or bound of the parameter `name`; an empty text where it has none."""
+    extra = Parameters.model_fields[name].json_schema_extra
+    return extra.get(key, "") if isinstance(extra, dict) else ""
+
+
+def with_unit(value: float, name: str) -> str:
+    """A value of the parameter `name` in words, such as `2.5 mm`."""
+    return f"{value:.6g} {fact(name, 'unit')}".rstrip()
+
+
+def title(name: str) -> str:
+    """The parameter's name with the paper's symbol, such as `rib_count (N)`."""
+    symbol = fact(name, "symbol")
+    return f"{name} ({symbol})" if symbol else name
+
+
+SYMBOLS = {fact(name, "symbol"): name for name in Parameters.model_fields if fact(name, "symbol")}
+"""From the paper's symbol to the parameter's name."""
