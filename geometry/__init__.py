@@ -1,6 +1,6 @@
-"""The finger: its design, its CAD model, its markers and the one mesh that every solver shares. Units: mm, degrees.
+"""The finger: design, CAD model, markers and the one mesh that every solver shares. Units: mm, degrees.
 
-The names below are imported on first use, so that `import geometry` is quick and needs neither CadQuery nor Gmsh.
+The names below are imported on first use: `import geometry` is quick and needs neither CadQuery nor Gmsh.
 """
 
 import importlib

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
+from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.parameters import Parameters, fact
 from geometry.rules import RULES, Rule
@@ -48,7 +49,7 @@ def obeys(parameters: Parameters, rules: Iterable[Rule] = RULES) -> bool:
 def admissible_range(
     parameters: Parameters, name: str, rules: Iterable[Rule] = RULES
 ) -> tuple[float, float] | None:
-    """The interval nearest to the present value in which every rule is obeyed, the other parameters unchanged.
+    """The interval nearest to the present value in which every rule is obeyed, the rest unchanged.
 
     Args:
         parameters: The finger, admissible or not.
@@ -87,12 +88,12 @@ def admissible_range(
     return (start, stop) if start <= stop and good(start) and good(stop) else None
 
 
-def _trial_values(low: float, high: float, present: float) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Values from `low` to `high`, evenly and, where the bounds span decades, also evenly in their logarithm."""
-    values = [np.linspace(low, high, SCAN), [present] if low <= present <= high else []]
+def _trial_values(low: float, high: float, present: float) -> FloatArray:
+    """Values from `low` to `high`, evenly and, where both are positive, also evenly in their logarithm."""
+    values = [np.linspace(low, high, SCAN), np.array([present])]
     if low > 0:
-        values.append(np.clip(np.geomspace(low, high, SCAN // 2), low, high))
-    return np.unique(np.concatenate(values))
+        values.append(np.geomspace(low, high, SCAN // 2))
+    return np.asarray(np.unique(np.clip(np.concatenate(values), low, high)), dtype=np.float64)
 
 
 def _edge(good: Callable[[float], bool], inside: float, outside: float) -> float:

@@ -48,7 +48,11 @@ def finger_mesh(
         UserError: If meshing fails or takes too long.
     """
     settings = settings or MeshSettings()
-    task = {"kind": "mesh", "what": f"meshing design {design.name!r}", "settings": settings.model_dump()}
+    task: dict[str, object] = {
+        "kind": "mesh",
+        "what": f"meshing design {design.name!r}",
+        "settings": settings.model_dump(),
+    }
     return _cached(design, task, ".npz", TriangleMesh.load, cache_dir, timeout_s)
 
 
@@ -78,7 +82,11 @@ def cad_files(
     unknown = sorted(set(formats) - set(CAD_FORMATS))
     if unknown:
         raise UserError(f"unknown CAD format {unknown[0]!r}; there are {', '.join(CAD_FORMATS)}")
-    task = {"kind": "cad", "what": f"CAD of design {design.name!r}", "formats": sorted(set(formats))}
+    task: dict[str, object] = {
+        "kind": "cad",
+        "what": f"CAD of design {design.name!r}",
+        "formats": sorted(set(formats)),
+    }
     contents = _cached(design, task, ".zip", _unpack, cache_dir, timeout_s)
     folder.mkdir(parents=True, exist_ok=True)
     return [_replace(folder / name, content) for name, content in contents.items()]
@@ -129,8 +137,8 @@ def _cached(
         scratch = tempfile.TemporaryDirectory(dir=folder, prefix=".making-", ignore_cleanup_errors=True)
     except OSError as error:
         raise UserError(
-            f"cannot write to the cache folder {folder} ({error.strerror}); set PINNRAY_CACHE to one that can be "
-            "written"
+            f"cannot write to the cache folder {folder} ({error.strerror}); "
+            "set PINNRAY_CACHE to a folder that can be written"
         ) from None
     with scratch as made_in:
         made = Path(made_in) / entry.name

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import cadquery as cq
+from cadquery.occ_impl.exporters.dxf import DxfDocument
 
 from geometry.arrays import FloatArray
 from geometry.markers import marker_positions
@@ -86,7 +87,7 @@ def write_dxf(parameters: Parameters, folder: Path) -> list[Path]:
         cq.Wire.makeCircle(parameters.marker_diameter / 2, cq.Vector(x, y, 0), cq.Vector(0, 0, 1))
         for x, y in marker_positions(parameters)
     ]
-    document = cq.exporters.DxfDocument(approx=None)
+    document = DxfDocument(approx=None)
     document.add_layer("outline", color=7)
     document.add_layer("markers", color=1)
     document.add_shape(cq.Workplane("XY").newObject([outer, *cells]), "outline")

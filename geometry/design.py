@@ -15,7 +15,7 @@ from geometry.parameters import SYMBOLS, Parameters, fact, title, with_unit
 class Design(Parameters):
     """A finger that can be made; a combination that cannot be is refused on construction.
 
-    Every parameter goes by its name or by the paper's symbol: `Design(rib_count=6)` and `Design(N=6)` are equal.
+    Every parameter goes by its name or by the paper's symbol: `Design(rib_count=6)` equals `Design(N=6)`.
 
     Raises:
         UserError: One line with the parameter, the value, the reason and what would be right.
@@ -87,7 +87,7 @@ def _sentence(problem: ErrorDetails, known: list[str]) -> str:
     if kind in ("float_parsing", "float_type", "finite_number"):
         return f"{what} = {value!r} is not a finite number; give one from {_bounds(name)}"
     if kind == "string_pattern_mismatch":
-        return f"{what} = {value!r} must start with a letter or digit and hold only letters, digits, '.', '_', '-'"
+        return f"{what} = {value!r} must be a letter or digit, then only letters, digits, '.', '_', '-'"
     return f"{what} = {value!r}: {problem['msg'].lower()}"
 
 

@@ -25,8 +25,8 @@ class TriangleMesh:
         points: Nodes, shape (n, 2), mm.
         triangles: Node numbers, shape (t, 3), counter-clockwise.
         boundaries: Named boundary edges as node numbers, each of shape (k, 2): `base` (clamped),
-            `front` (the whole contact face y = 0), `back`, and `contact` (the part of `front` that the indenter
-            touches).
+            `front` (the whole contact face y = 0), `back`, and `contact` (the part of `front` that the
+            indenter touches).
         marker_nodes: The node of every marker, shape (m,), ordered from base to tip.
         contact_node: The node in the middle of `contact`, where a point load acts.
 
@@ -63,7 +63,7 @@ class TriangleMesh:
             raise UserError(f"the mesh names a node outside 0..{len(self.points) - 1}")
         if (self.areas <= 0).any():
             raise UserError(
-                f"{int((self.areas <= 0).sum())} of {len(self.triangles)} triangles are degenerate or clockwise"
+                f"{int((self.areas <= 0).sum())} of {len(self.triangles)} triangles are flat or clockwise"
             )
 
     @cached_property

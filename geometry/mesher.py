@@ -30,8 +30,8 @@ TOLERANCE = 1e-7
 def build_mesh(design: Design, settings: MeshSettings) -> TriangleMesh:
     """Mesh the section of a finger.
 
-    The contact's ends and middle are nodes of the front face and every marker is a node. Boundary edges have the
-    body on their left. The result depends on the arguments and on Gmsh's version only.
+    The contact's ends and middle are nodes of the front face and every marker is a node. Boundary edges have
+    the body on their left. The result depends on the arguments and on Gmsh's version only.
 
     Args:
         design: The finger.
@@ -51,8 +51,8 @@ def build_mesh(design: Design, settings: MeshSettings) -> TriangleMesh:
             if elements_across(mesh) >= MIN_ACROSS:
                 return mesh
     raise UserError(
-        f"the mesh has only {elements_across(mesh)} elements across the thinnest place, {MIN_ACROSS} are needed; "
-        f"lower the mesh size below {settings.size:g} mm"
+        f"the mesh has only {elements_across(mesh)} elements across the thinnest place, {MIN_ACROSS} are "
+        f"needed; lower the mesh size below {settings.size:g} mm"
     )
 
 

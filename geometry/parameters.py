@@ -21,12 +21,12 @@ def _parameter(default: Any, low: float, high: float, unit: str, symbol: str, me
 class Parameters(BaseModel):
     """Numbers that describe a finger, each within its own bounds; `Design` also checks them together.
 
-    Frame: x runs from the base (0) to the tip (`height`); the front (contact) face is y = 0 and the body lies in
-    y <= 0. The base edge runs from (0, 0) to (0, -base_width) and is clamped; the back face is the straight line
-    from (0, -base_width) to the apex (height, 0). The section is extruded along z from 0 to `depth`.
+    Frame: x runs from the base (0) to the tip (`height`); the front (contact) face is y = 0 and the body
+    lies in y <= 0. The base edge runs from (0, 0) to (0, -base_width) and is clamped; the back face is the
+    line from (0, -base_width) to the apex (height, 0). The section is extruded along z from 0 to `depth`.
 
-    The first nine are the paper's; the paper does not give the base wall, the fillets and the marker layout, so
-    the values of the others are this project's.
+    `height` to `back_thickness` are the paper's nine. The paper does not give base wall, fillets, the
+    contact's width and the markers: those values are this project's.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

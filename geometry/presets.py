@@ -23,8 +23,8 @@ def load_design(name_or_path: str | Path = "default", overrides: Mapping[str, An
     """A preset, or the design in a TOML file, with some parameters overridden.
 
     Args:
-        name_or_path: Name of a preset, or path of a TOML file that gives parameters by name or symbol; those it
-            leaves out have their default value. Without `name`, the file's name is the design's.
+        name_or_path: Name of a preset, or path of a TOML file that gives parameters by name or symbol; those
+            it leaves out have their default value. Without `name`, the file's name is the design's.
         overrides: Parameters by name or symbol; values may be text, as from a command line.
 
     Raises:
@@ -75,6 +75,7 @@ def _path_of(name_or_path: str | Path) -> Path:
         return path
     if name_or_path not in preset_names():
         raise UserError(
-            f"there is no design {name_or_path!r}; the presets are {', '.join(preset_names())}, or give a .toml file"
+            f"there is no design {name_or_path!r}; the presets are {', '.join(preset_names())}, "
+            "or give the path of a .toml file"
         )
     return FOLDER / f"{name_or_path}.toml"

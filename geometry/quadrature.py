@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import roots_legendre
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
@@ -32,8 +33,8 @@ def triangle_rule(degree: int) -> tuple[FloatArray, FloatArray]:
     Raises:
         UserError: If no rule of that degree is held here.
 
-    Source: D. A. Dunavant, High degree efficient symmetrical Gaussian quadrature rules for the triangle, Int. J.
-    Numer. Meth. Engng 21 (1985) 1129-1148, appendix II, p = 1, 2, 4.
+    Source: D. A. Dunavant, High degree efficient symmetrical Gaussian quadrature rules for the triangle,
+    Int. J. Numer. Meth. Engng 21 (1985) 1129-1148, appendix II, p = 1, 2, 4.
     """
     if degree <= 1:
         return np.full((1, 3), 1 / 3), np.ones(1)
@@ -59,7 +60,7 @@ def edge_quadrature(mesh: TriangleMesh, name: str, points_per_edge: int = 4) -> 
     Returns:
         Points (q, 2), mm, and weights (q,), mm.
     """
-    abscissae, weights = np.polynomial.legendre.leggauss(points_per_edge)
+    abscissae, weights = roots_legendre(points_per_edge)
     start, end = (mesh.points[mesh.boundary(name)[:, k]] for k in range(2))
     points = start[:, None] + (0.5 * (1 + abscissae))[None, :, None] * (end - start)[:, None]
     lengths = np.linalg.norm(end - start, axis=1)

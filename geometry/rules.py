@@ -1,4 +1,4 @@
-"""What makes a finger possible: every rule gives a margin in mm, a sentence, and the parameters that can mend it."""
+"""What makes a finger possible: each rule gives a margin, a sentence, and the parameters that can mend it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from geometry.parameters import Parameters
 from geometry.section import back_offset_line, corner_angles, finger_section, polygon_sides, rib_pitch
 
 MIN_CAVITY = 0.5
-"""Least clear width of a cavity in any direction, mm: what a printer can leave open and a mesh can resolve."""
+"""Least clear width of a cavity, mm: what a printer can leave open and a mesh can resolve."""
 
 MIN_CONTACT_MARGIN = 0.5
 """Least distance of the contact from the clamped base and from the apex, mm."""
@@ -58,8 +58,8 @@ def cavity_length(p: Parameters) -> Finding:
     length = p.height - p.tip_length - p.base_thickness
     return Finding(
         length - MIN_CAVITY,
-        f"no room for a cavity: height {p.height:g} mm less tip_length {p.tip_length:g} mm and base_thickness "
-        f"{p.base_thickness:g} mm leaves {length:.3g} mm, at least {MIN_CAVITY} mm is needed",
+        f"no room for a cavity: height {p.height:g} mm less tip_length {p.tip_length:g} mm and "
+        f"base_thickness {p.base_thickness:g} mm leaves {length:.3g} mm, at least {MIN_CAVITY} mm is needed",
     )
 
 
@@ -70,8 +70,8 @@ def cavity_open(p: Parameters) -> Finding:
     return Finding(
         opening - MIN_CAVITY,
         f"walls close the cavity: front_thickness {p.front_thickness:g} mm and back_thickness "
-        f"{p.back_thickness:g} mm leave {opening:.3g} mm between them at the tip block, at least {MIN_CAVITY} mm "
-        "is needed",
+        f"{p.back_thickness:g} mm leave {opening:.3g} mm between them at the tip block, at least "
+        f"{MIN_CAVITY} mm is needed",
     )
 
 
@@ -113,8 +113,8 @@ def fillets_fit(p: Parameters) -> Finding:
         room = min(room, float((polygon_sides(cell) - tangents - np.roll(tangents, -1)).min()))
     return Finding(
         room - MIN_STRAIGHT,
-        f"fillets too large: two of fillet_radius {p.fillet_radius:g} mm need {-room:.3g} mm more than the shortest "
-        "side of a cavity has",
+        f"fillets too large: two of fillet_radius {p.fillet_radius:g} mm need {-room:.3g} mm more than the "
+        "shortest side of a cavity has",
     )
 
 
@@ -130,8 +130,8 @@ def markers_fit(p: Parameters) -> Finding:
     room = 2 * (margins[worst] - MIN_MARKER_WALL)
     return Finding(
         float(margins[worst] - MIN_MARKER_WALL - p.marker_diameter / 2),
-        f"marker {worst + 1} of layout {p.marker_layout!r} at ({x:.4g}, {y:.4g}) mm does not fit into the material: "
-        f"marker_diameter is {p.marker_diameter:g} mm, there is room for {max(room, 0):.3g} mm",
+        f"marker {worst + 1} of layout {p.marker_layout!r} at ({x:.4g}, {y:.4g}) mm does not fit into the "
+        f"material: marker_diameter is {p.marker_diameter:g} mm, there is room for {max(room, 0):.3g} mm",
     )
 
 
@@ -142,8 +142,8 @@ def markers_apart(p: Parameters) -> Finding:
     return Finding(
         nearest - p.marker_diameter - MIN_MARKER_WALL,
         f"markers overlap: {len(centres)} markers of layout {p.marker_layout!r} with marker_diameter "
-        f"{p.marker_diameter:g} mm are {nearest:.3g} mm apart, at least {p.marker_diameter + MIN_MARKER_WALL:g} mm "
-        "is needed",
+        f"{p.marker_diameter:g} mm are {nearest:.3g} mm apart, at least "
+        f"{p.marker_diameter + MIN_MARKER_WALL:g} mm is needed",
     )
 
 
@@ -180,8 +180,8 @@ def _cell_width(p: Parameters, which: int, what: str) -> Finding:
     wall, width = ("front", front) if front < back else ("back", back)
     return Finding(
         float(width) - MIN_CAVITY if p.rib_count else np.inf,
-        f"{what}: with {p.rib_count} ribs of {p.rib_thickness:g} mm at {p.rib_angle:g} deg the cavity between them "
-        f"is {width:.3g} mm wide at the {wall} wall, at least {MIN_CAVITY} mm is needed",
+        f"{what}: with {p.rib_count} ribs of {p.rib_thickness:g} mm at {p.rib_angle:g} deg the cavity between"
+        f" them is {width:.3g} mm wide at the {wall} wall, at least {MIN_CAVITY} mm is needed",
     )
 
 

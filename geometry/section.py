@@ -1,6 +1,7 @@
 """The finger's section in closed form: outline, cells, ribs, area and lengths; no CAD."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,7 +17,8 @@ class Section:
         outer: Corners (0, 0), (0, -base_width), (height, 0), shape (3, 2), mm; counter-clockwise.
         cells: The cavities from base to tip with sharp corners, each of shape (4, 2), mm, counter-clockwise:
             front and back corner nearer the base, back and front corner nearer the tip.
-        ribs: The ribs between the walls' inner faces, corners in the order of `cells`, each of shape (4, 2), mm.
+        ribs: The ribs between the walls' inner faces, corners in the order of `cells`, each of shape (4, 2),
+            mm.
         fillet_radius: Radius that rounds every corner of every cell, mm.
         contact: Both ends of the contact on the front face, shape (2, 2), mm.
     """
@@ -65,7 +67,7 @@ def finger_section(parameters: Parameters) -> Section:
     for foot in rib_feet(p):
         sides += [_rib_side(p, foot - half), _rib_side(p, foot + half)]
     sides.append(_wall_side(p, p.height - p.tip_length))
-    quads = [np.array([*left, *right[::-1]]) for left, right in zip(sides[:-1], sides[1:], strict=True)]
+    quads = [np.array([*left, *right[::-1]]) for left, right in pairwise(sides)]
     return Section(
         outer=np.array([[0, 0], [0, -p.base_width], [p.height, 0]], dtype=np.float64),
         cells=tuple(quads[::2]),
@@ -78,8 +80,8 @@ def finger_section(parameters: Parameters) -> Section:
 def rib_feet(parameters: Parameters) -> FloatArray:
     """Where the rib axes meet the front wall's inner face: x, shape (rib_count,), mm.
 
-    Equal pitch over the cavity's length there. The paper gives no spacing; this and `rib_direction` are the one
-    place that decides it.
+    Equal pitch over the cavity's length there. The paper gives no spacing; this and `rib_direction` are the
+    one place that decides it.
     """
     p = parameters
     pitch = rib_pitch(p)
@@ -102,7 +104,7 @@ def rib_direction(parameters: Parameters) -> FloatArray:
 
 
 def rib_axes(parameters: Parameters) -> FloatArray:
-    """Where each rib's axis meets the centre lines of the front and the back wall, shape (rib_count, 2, 2), mm."""
+    """Where each rib's axis meets the front and the back wall's centre line, shape (rib_count, 2, 2), mm."""
     p = parameters
     direction = rib_direction(p)
     axes = np.empty((p.rib_count, 2, 2))
@@ -114,7 +116,7 @@ def rib_axes(parameters: Parameters) -> FloatArray:
 
 
 def back_offset_line(parameters: Parameters, distance: float) -> tuple[float, float]:
-    """The line y = slope * x + intercept that lies `distance` mm inside the back face; slope and intercept, mm."""
+    """Slope and intercept, mm, of the line y = slope * x + intercept `distance` mm inside the back face."""
     p = parameters
     slope = p.base_width / p.height
     return slope, -p.base_width + distance * float(np.hypot(1, slope))

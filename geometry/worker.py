@@ -68,8 +68,8 @@ def perform(task: Mapping[str, Any]) -> None:
     """Do a task in this process.
 
     Args:
-        task: `kind` ("mesh" or "cad"), `design` and, for a mesh, `settings` as dictionaries, `output` as a path;
-            for CAD also `formats`.
+        task: `kind` ("mesh" or "cad"), `design` as a dictionary and `output` as a path; for a mesh also
+            `settings` as a dictionary, for CAD `formats`.
     """
     from geometry.design import Design
 
