@@ -1,0 +1,70 @@
+"""Every picture of a comparison.
+
+`draw_all` is the one entry; what it needs is imported when it runs, so that a run without pictures starts fast.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from compare.evaluation import Evaluation
+from geometry.mesh import TriangleMesh
+from geometry.observations import Observations
+from geometry.parameters import Parameters
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A picture that has been written.
+
+    Attributes:
+        path: The PNG file.
+        title: What it shows, in a few words.
+        caption: What a reader must know to read it, in sentences.
+    """
+
+    path: Path
+    title: str
+    caption: str
+
+
+def draw_all(
+    folder: Path,
+    *,
+    design: Parameters,
+    mesh: TriangleMesh,
+    evaluations: Sequence[Evaluation],
+    observations: Observations,
+    reference: Evaluation,
+    progress: Callable[[float, str], None] = lambda done, what: None,
+) -> list[Figure]:
+    """Draw every picture of a comparison, each written atomically as PNG.
+
+    Args:
+        folder: Where to write; created if it is missing.
+        design: The finger.
+        mesh: The mesh that the solvers shared.
+        evaluations: One for each solver, in the order of panels and colours.
+        observations: What the markers did.
+        reference: One of the evaluations, which the others are compared with.
+        progress: Called before every picture with the share done, from 0 to 1, and what comes next.
+
+    Returns:
+        The pictures in the order of a report.
+    """
+    from compare.figures.gallery import Gallery
+
+    gallery = Gallery(folder, design, mesh, tuple(evaluations), observations, reference)
+    tasks = gallery.tasks()
+    figures: list[Figure] = []
+    for number, (what, draw) in enumerate(tasks):
+        progress(number / len(tasks), what)
+        figures.extend(_drawn(draw))
+    progress(1.0, "pictures drawn")
+    return figures
+
+
+def _drawn(draw: Callable[[], Figure | None]) -> Iterator[Figure]:
+    figure = draw()
+    if figure is not None:
+        yield figure

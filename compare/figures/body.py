@@ -1,0 +1,108 @@
+"""What every picture of the body has in common: pixels, outline, clamped base, scale bar, colour bar."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+
+from compare.figures.canvas import Extent, Pixels
+from compare.figures.colours import Scale
+from compare.figures.style import INK, MUTED
+from geometry.arrays import FloatArray, IntArray
+from geometry.mesh import TriangleMesh
+
+PIXELS = 1800
+"""Pixels across a picture of the body; a printed panel has fewer, which smooths its edges."""
+
+
+def prepare(axes: Axes, extent: Extent) -> None:
+    """Axes without a frame that show `extent` at true proportions."""
+    axes.set_axis_off()
+    axes.set_xlim(extent.left, extent.right)
+    axes.set_ylim(extent.bottom, extent.top)
+    axes.set_aspect("equal", adjustable="box", anchor="W")
+
+
+def show(axes: Axes, pixels: Pixels, extent: Extent) -> None:
+    """Put a picture of a canvas where it belongs."""
+    axes.imshow(pixels, extent=extent, interpolation="hanning", zorder=1, aspect="equal")
+
+
+def boundary_edges(mesh: TriangleMesh) -> IntArray:
+    """The edges that belong to one triangle only, shape (b, 2)."""
+    pairs = np.sort(mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    unique, count = np.unique(pairs, axis=0, return_counts=True)
+    return np.asarray(unique[count == 1], dtype=np.int64)
+
+
+def outline(
+    axes: Axes,
+    edges: IntArray,
+    points: FloatArray,
+    *,
+    colour: str = INK,
+    width: float = 0.5,
+    zorder: float = 2,
+) -> None:
+    """Draw edges, shape (b, 2), of nodes at `points`, shape (n, 2), mm."""
+    lines = LineCollection(
+        list(points[edges]), colors=colour, linewidths=width, capstyle="round", zorder=zorder
+    )
+    axes.add_collection(lines, autolim=False)
+
+
+def clamp(axes: Axes, base: FloatArray, *, size: float = 1.6) -> None:
+    """Hatch the clamped base.
+
+    Args:
+        axes: Where to draw.
+        base: Nodes of the base, shape (k, 2), mm.
+        size: Length of the hatching, mm.
+    """
+    x, low, high = float(base[:, 0].min()), float(base[:, 1].min()), float(base[:, 1].max())
+    starts = np.linspace(low + size, high, max(int((high - low) / size), 2))
+    strokes = [((x, y), (x - size, y - size)) for y in starts]
+    axes.add_collection(LineCollection(strokes, colors=INK, linewidths=0.5, zorder=2), autolim=False)
+    axes.plot([x, x], [low, high], color=INK, linewidth=1.1, zorder=3, solid_capstyle="butt")
+
+
+def scale_bar(axes: Axes, extent: Extent, *, corner: str = "lower right") -> None:
+    """A bar of a round length, about an eighth of the picture, in a corner.
+
+    Args:
+        axes: Where to draw.
+        extent: What the axes show, mm.
+        corner: `lower right` or `lower left`.
+    """
+    length = round_length(extent.width / 8)
+    right = extent.right - 0.01 * extent.width
+    left = right - length if corner == "lower right" else extent.left + 0.01 * extent.width
+    y = extent.bottom + 0.02 * extent.width
+    axes.plot([left, left + length], [y, y], color=INK, linewidth=1.6, solid_capstyle="butt", zorder=6)
+    axes.text(
+        left + length / 2, y + 0.008 * extent.width, f"{length:g} mm", ha="center", va="bottom", size=7.5
+    )
+
+
+def round_length(wanted: float) -> float:
+    """The largest of 1, 2, 5, 10, 20, ... that is not above `wanted`."""
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(max(step * power for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
+
+
+def colour_bar(axes: Axes, scale: Scale, title: str, *, extend: str = "neither") -> None:
+    """A horizontal colour bar that fills `axes`.
+
+    Args:
+        axes: Axes for the bar alone.
+        scale: The shared scale.
+        title: Quantity and unit, set under the ticks.
+        extend: Which ends hold values beyond the scale: `neither`, `min`, `max` or `both`.
+    """
+    figure = axes.figure
+    bar = figure.colorbar(scale.mappable, cax=axes, orientation="horizontal", extend=extend, extendfrac=0.03)
+    bar.outline.set_linewidth(0.4)
+    bar.ax.tick_params(length=2, width=0.5, pad=1.5, labelsize=7.5, colors=INK)
+    bar.ax.locator_params(nbins=5)
+    bar.ax.ticklabel_format(scilimits=(-2, 3), useMathText=True)
+    bar.ax.xaxis.get_offset_text().set(size=7, color=MUTED)
+    bar.set_label(title, size=8, labelpad=2)

@@ -1,0 +1,115 @@
+"""Triangles to pixels: PyVista off the screen, colours and camera given exactly, no text.
+
+Type, axes and legends are matplotlib's; both use the same extent in mm, so that they fit to the pixel.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import TracebackType
+from typing import NamedTuple, Self
+
+import numpy as np
+import pyvista
+from numpy.typing import NDArray
+from vtkmodules.vtkCommonCore import vtkLogger
+
+from geometry.arrays import FloatArray
+from geometry.mesh import TriangleMesh
+
+Pixels = NDArray[np.uint8]
+
+
+class Extent(NamedTuple):
+    """A rectangle in the plane of the finger, mm."""
+
+    left: float
+    right: float
+    bottom: float
+    top: float
+
+    @classmethod
+    def around(cls, *clouds: FloatArray, margin: float) -> Self:
+        """The rectangle around points, each of shape (n, 2), with a margin, mm."""
+        points = np.concatenate(clouds)
+        low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+        return cls(float(low[0]), float(high[0]), float(low[1]), float(high[1]))
+
+    @property
+    def width(self) -> float:
+        """Width, mm."""
+        return self.right - self.left
+
+    @property
+    def height(self) -> float:
+        """Height, mm."""
+        return self.top - self.bottom
+
+
+class Canvas:
+    """A picture of a mesh that is coloured triangle by triangle, again and again; to be closed after use."""
+
+    def __init__(self, mesh: TriangleMesh, extent: Extent, *, width: int) -> None:
+        """Set the camera: `extent` fills a picture of `width` pixels, seen from the front."""
+        pyvista.OFF_SCREEN = True
+        self.extent = extent
+        self._count = len(mesh.triangles)
+        faces = np.column_stack([np.full(self._count, 3), mesh.triangles])
+        self._surface = pyvista.PolyData(_in_space(mesh.points), faces.ravel())
+        self._surface.cell_data["colour"] = np.zeros((self._count, 3), dtype=np.uint8)
+        size = (width, round(width * extent.height / extent.width))
+        with _without_warnings():
+            self._plotter = pyvista.Plotter(off_screen=True, window_size=list(size))
+            self._plotter.add_mesh(self._surface, scalars="colour", rgb=True, lighting=False)
+            self._aim()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._plotter.close()
+
+    def picture(self, colours: Pixels, points: FloatArray | None = None) -> Pixels:
+        """The mesh in those colours, transparent where it is not.
+
+        Args:
+            colours: Red, green and blue of every triangle, shape (t, 3).
+            points: Where the nodes are, shape (n, 2), mm, if not where the mesh has them.
+
+        Returns:
+            Red, green, blue and opacity, shape (height, width, 4).
+        """
+        if points is not None:
+            self._surface.points = _in_space(points)
+        self._surface.cell_data["colour"] = colours
+        self._surface.Modified()  # VTK would show the picture before
+        self._plotter.render()
+        with _without_warnings():
+            image = self._plotter.screenshot(None, transparent_background=True, return_img=True)
+        return np.array(image, dtype=np.uint8)
+
+    def _aim(self) -> None:
+        camera, extent = self._plotter.camera, self.extent
+        middle = ((extent.left + extent.right) / 2, (extent.bottom + extent.top) / 2)
+        camera.parallel_projection = True
+        camera.focal_point = (*middle, 0.0)
+        camera.position = (*middle, 100.0)
+        camera.up = (0.0, 1.0, 0.0)
+        camera.parallel_scale = extent.height / 2
+        camera.clipping_range = (50.0, 150.0)
+
+
+def _in_space(points: FloatArray) -> FloatArray:
+    return np.column_stack([points, np.zeros(len(points))])
+
+
+@contextmanager
+def _without_warnings() -> Iterator[None]:
+    """VTK tries an X server, then EGL, then OSMesa, and warns at each that is missing; one that works is enough."""
+    before = vtkLogger.GetCurrentVerbosityCutoff()
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
+    try:
+        yield
+    finally:
+        vtkLogger.SetStderrVerbosity(before)

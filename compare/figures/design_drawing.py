@@ -1,0 +1,147 @@
+"""The design with the paper's nine parameters, the clamped base, the contact and the markers."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, PathPatch, Polygon
+from matplotlib.path import Path as Outline
+
+from compare.figures import body
+from compare.figures.canvas import Extent
+from compare.figures.dimensions import Draughtsman
+from compare.figures.style import BODY, INK, MEASURED, WIDTH, axes_at, figure, heading
+from geometry.arrays import FloatArray
+from geometry.markers import marker_positions
+from geometry.parameters import Parameters
+from geometry.section import Section, corner_angles, finger_section, rib_direction
+
+CONTACT = "#d55e00"
+POINT = 8.5 / 72 / WIDTH
+"""Height of the type as a share of the drawing's width."""
+LEFT, RIGHT, ABOVE, BELOW = 5.0, 1.6, 7.2, 3.2
+"""Room around the body for dimensions, in heights of the type."""
+HEAD, FOOT = 0.28, 0.42
+
+
+def draw_design(path: Path, design: Parameters) -> None:
+    """Draw the section of a finger, to scale, with a dimension line for each of the paper's nine parameters."""
+    em = design.height * POINT / (1 - (LEFT + RIGHT) * POINT)
+    extent = Extent(-LEFT * em, design.height + RIGHT * em, -design.base_width - BELOW * em, ABOVE * em)
+    height = WIDTH * extent.height / extent.width
+    with figure(path, HEAD + height + FOOT) as drawn:
+        heading(drawn, f"Design {design.name!r}")
+        axes = axes_at(drawn, (0, HEAD, WIDTH, height))
+        body.prepare(axes, extent)
+        shape = finger_section(design)
+        _body(axes, shape)
+        body.clamp(axes, shape.outer[:2], size=0.8 * em)
+        pen = Draughtsman(axes, em)
+        pen.text((-0.6 * em, -design.base_width - 0.5 * em), "clamped base", va="top", ha="left")
+        _lengths(pen, design)
+        _contact(pen, design)
+        _ribs(pen, design, shape)
+        _markers(pen, design)
+        drawn.legend(
+            handles=[
+                Line2D([], [], ls="", marker="o", ms=4, color=MEASURED, label=f"{len(marker_positions(design))} markers, layout {design.marker_layout!r}"),
+                Line2D([], [], color=CONTACT, lw=3, label=f"contact, {design.contact_width:g} mm wide"),
+                Line2D([], [], ls="", label=rf"$N$ = {design.rib_count} ribs"),
+                Line2D([], [], ls="", label=rf"$W$ = {design.depth:g} mm (depth, out of the plane)"),
+            ],
+            loc="lower center", ncols=2, columnspacing=2.5, handletextpad=0.6, borderaxespad=0.3,
+        )  # fmt: skip
+
+
+def _body(axes: Axes, shape: Section) -> None:
+    axes.add_patch(Polygon(shape.outer, fc=BODY, ec=INK, lw=0.9, zorder=1))
+    for cell in shape.cells:
+        axes.add_patch(PathPatch(_rounded(cell, shape.fillet_radius), fc="white", ec=INK, lw=0.9, zorder=2))
+
+
+def _rounded(corners: FloatArray, radius: float) -> Outline:
+    """A convex polygon with its corners rounded."""
+    if radius == 0:
+        return Outline(np.concatenate([corners, corners[:1]]), closed=True)
+    vertices: list[FloatArray] = []
+    codes: list[int] = []
+    cuts = radius / np.tan(corner_angles(corners) / 2)
+    for corner, before, after, cut in zip(
+        corners, np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0), cuts, strict=True
+    ):
+        enter = corner + (before - corner) / np.linalg.norm(before - corner) * cut
+        leave = corner + (after - corner) / np.linalg.norm(after - corner) * cut
+        vertices += [enter, corner, leave]
+        codes += [Outline.LINETO if codes else Outline.MOVETO, Outline.CURVE3, Outline.CURVE3]
+    return Outline([*vertices, vertices[0]], [*codes, Outline.CLOSEPOLY])
+
+
+def _lengths(pen: Draughtsman, design: Parameters) -> None:
+    d, em = design, pen.em
+    first, second = np.array([0, 4.2 * em]), np.array([0, 6.2 * em])
+    pen.between((0, 0), (d.contact_abscissa, 0), first, f"contact at {d.contact_abscissa:g} mm")
+    pen.between(
+        (d.height - d.tip_length, 0), (d.height, 0), first, rf"$L_\mathrm{{tip}}$ = {d.tip_length:g} mm"
+    )
+    pen.between((0, 0), (d.height, 0), second, rf"$H$ = {d.height:g} mm")
+    pen.between((0, -d.base_width), (0, 0), (-3.2 * em, 0), rf"$L$ = {d.base_width:g} mm")
+
+
+def _contact(pen: Draughtsman, design: Parameters) -> None:
+    x, em = design.contact_abscissa, pen.em
+    pen.axes.plot(design.contact_ends, (0, 0), color=CONTACT, linewidth=3, solid_capstyle="butt", zorder=5)
+    shape = {
+        "arrowstyle": "-|>,head_width=0.25,head_length=0.5",
+        "color": CONTACT,
+        "lw": 1.8,
+        "shrinkA": 0,
+        "shrinkB": 2,
+    }
+    pen.axes.annotate("", xy=(x, 0), xytext=(x, 2.8 * em), arrowprops=shape, zorder=6)
+
+
+def _ribs(pen: Draughtsman, design: Parameters, shape: Section) -> None:
+    d, em = design, pen.em
+    cell = shape.cells[min(1, len(shape.cells) - 1)]
+    x = float(cell[[0, 3], 0].mean())
+    pen.thickness((x, 0), (x, -d.front_thickness), (x, 1.5 * em), rf"$t_\mathrm{{flex}}$ = {d.front_thickness:g} mm", side="center")  # fmt: skip
+    outward = np.array([d.base_width, -d.height]) / np.hypot(d.base_width, d.height)
+    inner = shape.cells[-1][1:3].mean(axis=0)
+    face = inner + outward * d.back_thickness
+    pen.thickness(
+        face,
+        inner,
+        face + outward * 2.6 * em + (0.8 * em, 0),
+        rf"$t_\mathrm{{back}}$ = {d.back_thickness:g} mm",
+    )
+    if not d.rib_count:
+        return
+    direction = rib_direction(d)
+    rib = shape.ribs[d.rib_count // 2]
+    along = 0.6
+    left, right = (rib[a] + (rib[b] - rib[a]) * along for a, b in ((0, 1), (3, 2)))
+    centre, normal = (left + right) / 2, np.array([-direction[1], direction[0]])
+    half = normal * d.rib_thickness / 2
+    elbow = centre + half + 1.3 * em * normal
+    below = np.array([elbow[0], -d.base_width * (1 - elbow[0] / d.height) - 2.4 * em])
+    pen.thickness(centre + half, centre - half, below, rf"$t_\mathrm{{rib}}$ = {d.rib_thickness:g} mm")
+    foot = shape.ribs[0][[0, 3]].mean(axis=0)
+    reach = float(np.linalg.norm(shape.ribs[0][[1, 2]].mean(axis=0) - foot)) + d.back_thickness + 1.2 * em
+    pen.angle(foot, (0.0, -1.0), direction, reach, rf"$L_\mathrm{{angle}}$ = {d.rib_angle:g}°")
+    if d.rib_count <= 15:
+        for number, corners in enumerate(shape.ribs, start=1):
+            where = 0.68 * corners[[0, 3]].mean(axis=0) + 0.32 * corners[[1, 2]].mean(axis=0)
+            pen.text(where, str(number), size=6.5, va="center")
+
+
+def _markers(pen: Draughtsman, design: Parameters) -> None:
+    points = marker_positions(design)
+    for number, (x, y) in enumerate(points, start=1):
+        pen.axes.add_patch(
+            Circle((x, y), design.marker_diameter / 2, fc=MEASURED, ec="white", lw=0.4, zorder=4)
+        )
+        inward = -1 if y > -design.base_width * (1 - x / design.height) / 2 else 1
+        gap = design.marker_diameter / 2 + 0.75 * pen.em
+        if len(points) <= 20:
+            pen.text((x, y + inward * gap), str(number), size=6.5, va="center", color=MEASURED)

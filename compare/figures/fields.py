@@ -1,0 +1,173 @@
+"""A scalar field of every solver on one colour scale, with the differences from the reference beside it."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as MplFigure
+
+from compare.evaluation import Evaluation
+from compare.figures import body
+from compare.figures.canvas import Canvas, Extent
+from compare.figures.colours import PERCENT, Scale, sequential, symmetric
+from compare.figures.labels import solver_label
+from compare.figures.style import MUTED, WIDTH, axes_at, figure, heading
+from compare.metrics import field_difference
+from geometry.arrays import FloatArray
+from geometry.mesh import TriangleMesh
+
+MARGIN = 0.1
+HEAD, PANEL_TITLE, FOOT = 0.3, 0.2, 0.55
+"""Heights in inches: heading; the name above a panel; the colour bars."""
+
+
+class Quantity(NamedTuple):
+    """A scalar field to draw.
+
+    Attributes:
+        name: File name without suffix.
+        title: What the heading calls it.
+        symbol: For the colour bar, in mathematical notation.
+        unit: `MPa`, or nothing for a strain.
+        signed: Whether its scale is symmetric about zero.
+        values: From an evaluation to the field at the quadrature points, shape (q,).
+    """
+
+    name: str
+    title: str
+    symbol: str
+    unit: str
+    signed: bool
+    values: Callable[[Evaluation], FloatArray]
+
+
+def max_principal(strain: FloatArray) -> FloatArray:
+    """The larger in-plane principal value of symmetric tensors of shape (q, 2, 2), shape (q,)."""
+    mean = (strain[:, 0, 0] + strain[:, 1, 1]) / 2
+    return np.asarray(mean + np.hypot((strain[:, 0, 0] - strain[:, 1, 1]) / 2, strain[:, 0, 1]))
+
+
+QUANTITIES = (
+    Quantity("von_mises", "Von Mises stress", r"$\sigma_\mathrm{vM}$", "MPa", False, lambda e: e.von_mises),
+    Quantity(
+        "strain_principal",
+        "Largest in-plane principal strain",
+        r"$\varepsilon_1$",
+        "",
+        True,
+        lambda e: max_principal(e.strain),
+    ),
+    Quantity(
+        "strain_xx", "Strain component xx", r"$\varepsilon_{xx}$", "", True, lambda e: e.strain[:, 0, 0]
+    ),
+    Quantity(
+        "strain_yy", "Strain component yy", r"$\varepsilon_{yy}$", "", True, lambda e: e.strain[:, 1, 1]
+    ),
+    Quantity(
+        "strain_xy", "Strain component xy", r"$\varepsilon_{xy}$", "", True, lambda e: e.strain[:, 0, 1]
+    ),
+)
+
+
+def field_scale(quantity: Quantity, reference: Evaluation) -> Scale:
+    """The scale that every solver's field is drawn on: it covers the percentile of the reference's area."""
+    values = quantity.values(reference)
+    return (
+        symmetric([values], reference.weights) if quantity.signed else sequential(values, reference.weights)
+    )
+
+
+def difference_scale(quantity: Quantity, evaluations: Sequence[Evaluation], reference: Evaluation) -> Scale:
+    """The scale of every difference: it covers the percentile in each solver that converged (in all if none did)."""
+    others = [evaluation for evaluation in evaluations if evaluation is not reference]
+    chosen = [evaluation for evaluation in others if evaluation.converged] or others
+    base = quantity.values(reference)
+    return symmetric([quantity.values(evaluation) - base for evaluation in chosen], reference.weights)
+
+
+def draw_field(
+    path: Path,
+    quantity: Quantity,
+    *,
+    canvas: Canvas,
+    mesh: TriangleMesh,
+    evaluations: Sequence[Evaluation],
+    reference: Evaluation,
+) -> None:
+    """Draw one quantity on the undeformed body: a row a solver, the difference from the reference to its right."""
+    ordered = [reference, *(evaluation for evaluation in evaluations if evaluation is not reference)]
+    columns = 1 if len(ordered) == 1 else 2
+    width = (WIDTH - MARGIN * (columns + 1)) / columns
+    height = width * canvas.extent.height / canvas.extent.width
+    scale = field_scale(quantity, reference)
+    differences = difference_scale(quantity, ordered, reference)
+    total = HEAD + len(ordered) * (PANEL_TITLE + height) + FOOT
+    edges = body.boundary_edges(mesh)
+    base = quantity.values(reference)
+    unit = f" {quantity.unit}" if quantity.unit else ""
+
+    def panel(row: int, column: int, colours: Scale, values: FloatArray, of: Evaluation) -> Axes:
+        left, top = MARGIN + column * (width + MARGIN), HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
+        axes = axes_at(drawn, (left, top, width, height))
+        body.prepare(axes, canvas.extent)
+        body.show(axes, canvas.picture(colours.paint(of.per_triangle(values))), canvas.extent)
+        body.outline(axes, edges, mesh.points, width=0.35)
+        return axes
+
+    with figure(path, total) as drawn:
+        heading(drawn, f"{quantity.title}, undeformed body")
+        for row, evaluation in enumerate(ordered):
+            values = quantity.values(evaluation)
+            axes = panel(row, 0, scale, values, evaluation)
+            axes.set_title(solver_label(evaluation), size=8.5, pad=2, weight="bold")
+            axes.set_title(f"max {np.abs(values).max():.3g}{unit}", size=7, pad=2, loc="right", color=MUTED)
+            if evaluation is not reference:
+                axes = panel(row, 1, differences, values - base, evaluation)
+                norm = field_difference(values, base, reference.weights).rel_l2
+                axes.set_title(f"minus {reference.solver}", size=8.5, pad=2)
+                axes.set_title(
+                    f"rel. $L^2$ {norm:.2%}".replace("%", r" %"), size=7, pad=2, loc="right", color=MUTED
+                )
+            elif columns == 2:
+                _explain(drawn, (2 * MARGIN + width, HEAD + PANEL_TITLE, width, height), reference)
+        body.scale_bar(axes, canvas.extent)
+        _bars(drawn, quantity, scale, differences, columns, width, total)
+
+
+def field_extent(mesh: TriangleMesh) -> Extent:
+    """What a panel of a field shows: the undeformed body."""
+    return Extent.around(mesh.points, margin=0.012 * float(np.ptp(mesh.points[:, 0])))
+
+
+def _explain(drawn: MplFigure, box: tuple[float, float, float, float], reference: Evaluation) -> None:
+    axes = axes_at(drawn, box)
+    axes.set_axis_off()
+    text = (
+        f"Reference: {reference.solver}\n"
+        f"Scales end at the {PERCENT:g} % point of the\narea (left: of the reference; right:\n"
+        "of the differences). Values beyond\ntake the end colours."
+    )
+    axes.text(0.02, 0.95, text, va="top", size=7, color=MUTED, linespacing=1.35, transform=axes.transAxes)
+
+
+def _bars(
+    drawn: MplFigure,
+    quantity: Quantity,
+    scale: Scale,
+    differences: Scale,
+    columns: int,
+    width: float,
+    total: float,
+) -> None:
+    unit = f", {quantity.unit}" if quantity.unit else ""
+    inset = 0.1 * width
+    for column, (colours, title) in enumerate(
+        [(scale, f"{quantity.symbol}{unit}"), (differences, f"difference of {quantity.symbol}{unit}")][
+            :columns
+        ]
+    ):
+        left = MARGIN + column * (width + MARGIN) + inset
+        axes = axes_at(drawn, (left, total - FOOT + 0.1, width - 2 * inset, 0.09))
+        body.colour_bar(axes, colours, title, extend="max" if column == 0 and not quantity.signed else "both")

@@ -1,0 +1,145 @@
+"""Which pictures there are, in which order, and what their captions say."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from compare.evaluation import Evaluation
+from compare.figures import Figure, body
+from compare.figures.canvas import Canvas
+from compare.figures.charts import draw_energy, draw_marker_errors
+from compare.figures.colours import PERCENT
+from compare.figures.design_drawing import draw_design
+from compare.figures.fields import QUANTITIES, Quantity, draw_field, field_extent
+from compare.figures.labels import solver_label
+from compare.figures.mesh_drawing import draw_mesh, mesh_numbers
+from compare.figures.overlay import draw_overlay
+from geometry.mesh import TriangleMesh
+from geometry.observations import Observations
+from geometry.parameters import Parameters
+
+Task = tuple[str, Callable[[], Figure | None]]
+
+
+@dataclass(frozen=True)
+class Gallery:
+    """The pictures of one comparison; the attributes are the arguments of `draw_all`."""
+
+    folder: Path
+    design: Parameters
+    mesh: TriangleMesh
+    evaluations: tuple[Evaluation, ...]
+    observations: Observations
+    reference: Evaluation
+
+    def tasks(self) -> list[Task]:
+        """What to say before drawing, and what draws, for every picture."""
+        fields: list[Task] = [
+            (f"picture of {quantity.name}", partial(self.field, quantity)) for quantity in QUANTITIES
+        ]
+        return [
+            ("picture of the deformed finger", self.overlay),
+            ("chart of the errors at the markers", self.marker_errors),
+            *fields,
+            ("chart of the energy", self.energy),
+            ("drawing of the design", self.drawing),
+            ("picture of the mesh", self.mesh_picture),
+        ]
+
+    def overlay(self) -> Figure:
+        """The deformed finger of every solver."""
+        path = self.folder / "overlay.png"
+        draw_overlay(path, mesh=self.mesh, evaluations=self.evaluations, observations=self.observations)
+        return Figure(
+            path,
+            "Deformed finger",
+            f"The deformed body of each solver, coloured by displacement magnitude on one scale; the displacement is "
+            f"not exaggerated. Circles: {self.observations.label} marker positions. Crosses: the solver's. Grey: the "
+            f"undeformed body. {self._simulated()}",
+        )
+
+    def marker_errors(self) -> Figure:
+        """Bars of the errors at the markers."""
+        path = self.folder / "marker_errors.png"
+        draw_marker_errors(path, evaluations=self.evaluations, observations=self.observations)
+        hidden = int((~self.observations.visible).sum())
+        unseen = (
+            f" {hidden} of {len(self.observations.visible)} markers were not seen and count nowhere."
+            if hidden
+            else ""
+        )
+        return Figure(
+            path,
+            "Errors at the markers",
+            f"Absolute difference between each solver's displacement and the {self.observations.label} one, for "
+            f"both components; markers are numbered from base to tip.{unseen} {self._simulated()}",
+        )
+
+    def field(self, quantity: Quantity) -> Figure:
+        """One scalar field of every solver."""
+        path = self.folder / f"{quantity.name}.png"
+        with Canvas(self.mesh, field_extent(self.mesh), width=body.PIXELS // 2) as canvas:
+            draw_field(
+                path,
+                quantity,
+                canvas=canvas,
+                mesh=self.mesh,
+                evaluations=self.evaluations,
+                reference=self.reference,
+            )
+        beside = (
+            f" Right: the field minus that of {solver_label(self.reference)}, point by point; its scale ends at the "
+            f"same share of the largest difference."
+            if len(self.evaluations) > 1
+            else ""
+        )
+        return Figure(
+            path,
+            quantity.title,
+            f"{quantity.title} of every solver on the undeformed body, each triangle in the colour of its mean, on one "
+            f"scale that ends where {PERCENT:g} % of the area of {self.reference.solver} lie below it (in absolute "
+            f"value).{beside}",
+        )
+
+    def energy(self) -> Figure | None:
+        """The record of every solver that kept one."""
+        path = self.folder / "energy.png"
+        if not draw_energy(path, evaluations=self.evaluations, reference=self.reference):
+            path.unlink(missing_ok=True)
+            return None
+        return Figure(
+            path,
+            "Energy",
+            f"Elastic energy per unit depth as each solver went on; the dashed line is that of "
+            f"{solver_label(self.reference)}. A solver that solves directly keeps no record.",
+        )
+
+    def drawing(self) -> Figure:
+        """The design with its dimensions."""
+        path = self.folder / "design.png"
+        draw_design(path, self.design)
+        return Figure(
+            path,
+            "Design",
+            f"The finger {self.design.name!r} with its dimensions under the paper's symbols, the clamped base, the "
+            f"contact and the markers (to scale).",
+        )
+
+    def mesh_picture(self) -> Figure:
+        """The shared mesh."""
+        path = self.folder / "mesh.png"
+        draw_mesh(path, self.mesh)
+        numbers = mesh_numbers(self.mesh)
+        return Figure(
+            path,
+            "Mesh",
+            f"The mesh that every solver shares: {numbers.nodes} nodes, {numbers.triangles} triangles, edges from "
+            f"{numbers.shortest:.3g} to {numbers.longest:.3g} mm. Quality is twice the ratio of the inscribed to the "
+            f"circumscribed radius (1 for an equilateral triangle): worst {numbers.worst:.2f}, mean {numbers.mean:.2f}.",
+        )
+
+    def _simulated(self) -> str:
+        if not self.observations.simulated:
+            return ""
+        return f"The marker positions are simulated, not measured: {self.observations.source.rstrip('.')}."

@@ -1,0 +1,132 @@
+"""A picture of the mesh: the whole, and close-ups where it is finest and where a rib meets a wall."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.patches import Rectangle
+
+from compare.figures import body
+from compare.figures.canvas import Extent
+from compare.figures.style import INK, MEASURED, WIDTH, axes_at, figure, heading
+from geometry.arrays import FloatArray
+from geometry.mesh import TriangleMesh
+
+MARGIN = 0.1
+HEAD, INSET_TITLE = 0.48, 0.24
+LINE = "#3d5a80"
+CONTACT = "#d55e00"
+
+
+class MeshNumbers(NamedTuple):
+    """Size and quality of a mesh.
+
+    Attributes:
+        nodes: Number of nodes.
+        triangles: Number of triangles.
+        shortest: Length of the shortest edge, mm.
+        longest: Length of the longest edge, mm.
+        worst: Smallest quality (`quality`) of a triangle.
+        mean: Mean quality.
+    """
+
+    nodes: int
+    triangles: int
+    shortest: float
+    longest: float
+    worst: float
+    mean: float
+
+
+def mesh_numbers(mesh: TriangleMesh) -> MeshNumbers:
+    """Size and quality of a mesh."""
+    ends = mesh.points[mesh.edges]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    good = quality(mesh)
+    return MeshNumbers(
+        nodes=len(mesh.points),
+        triangles=len(mesh.triangles),
+        shortest=float(length.min()),
+        longest=float(length.max()),
+        worst=float(good.min()),
+        mean=float(good.mean()),
+    )
+
+
+def quality(mesh: TriangleMesh) -> FloatArray:
+    """Twice the inscribed over the circumscribed radius of every triangle, shape (t,): one if equilateral, zero if flat."""
+    corners = mesh.points[mesh.triangles]
+    a, b, c = (np.linalg.norm(corners[:, i] - corners[:, (i + 1) % 3], axis=1) for i in range(3))
+    return np.asarray((b + c - a) * (c + a - b) * (a + b - c) / (a * b * c))
+
+
+def inner_corner(mesh: TriangleMesh, near: float) -> FloatArray:
+    """The re-entrant corner of a cavity with the abscissa nearest to `near`, shape (2,), mm.
+
+    Re-entrant means that the body fills more than a straight angle around the node; without one, the node nearest
+    to `near`.
+    """
+    corners = mesh.points[mesh.triangles]
+    angle = np.zeros(len(mesh.points))
+    for i in range(3):
+        ahead, behind = corners[:, (i + 1) % 3] - corners[:, i], corners[:, (i + 2) % 3] - corners[:, i]
+        cross = ahead[:, 0] * behind[:, 1] - ahead[:, 1] * behind[:, 0]
+        np.add.at(angle, mesh.triangles[:, i], np.arctan2(cross, (ahead * behind).sum(axis=1)))
+    boundary = np.unique(body.boundary_edges(mesh))
+    sharp = boundary[angle[boundary] > np.radians(200)]
+    candidates = mesh.points[sharp if len(sharp) else boundary]
+    return np.asarray(candidates[np.abs(candidates[:, 0] - near).argmin()])
+
+
+def draw_mesh(path: Path, mesh: TriangleMesh) -> None:
+    """Draw the whole mesh and two close-ups: the contact, and a joint of a rib and a wall."""
+    whole = Extent.around(mesh.points, margin=0.02 * float(np.ptp(mesh.points[:, 0])))
+    width = WIDTH - 2 * MARGIN
+    height = width * whole.height / whole.width
+    inset_width, inset_height = (WIDTH - 3 * MARGIN) / 2, 1.5
+    contact = mesh.points[np.unique(mesh.boundary("contact"))]
+    span = max(4 * float(np.ptp(contact[:, 0])), 0.06 * whole.width)
+    middle = contact.mean(axis=0)
+    joint = inner_corner(mesh, float(middle[0]) + 2 * span)
+    ratio = inset_height / inset_width
+    windows = [
+        ("A: contact", Extent(middle[0] - span / 2, middle[0] + span / 2, middle[1] - 0.9 * span * ratio, middle[1] + 0.1 * span * ratio)),
+        ("B: inner corner", Extent(joint[0] - span / 2, joint[0] + span / 2, joint[1] - span * ratio / 2, joint[1] + span * ratio / 2)),
+    ]  # fmt: skip
+    numbers = mesh_numbers(mesh)
+    note = (
+        f"{numbers.nodes} nodes, {numbers.triangles} triangles; edges {numbers.shortest:.3g} to "
+        f"{numbers.longest:.3g} mm; quality: worst {numbers.worst:.2f}, mean {numbers.mean:.2f}"
+    )
+    with figure(path, HEAD + height + INSET_TITLE + inset_height + MARGIN) as drawn:
+        heading(drawn, "Mesh, shared by every solver", note)
+        axes = axes_at(drawn, (MARGIN, HEAD, width, height))
+        _draw(axes, mesh, whole, 0.12)
+        body.clamp(axes, mesh.points[mesh.boundary("base").ravel()])
+        body.scale_bar(axes, whole)
+        for number, (title, window) in enumerate(windows):
+            axes.add_patch(Rectangle((window.left, window.bottom), window.width, window.height, fill=False, ec=MEASURED, lw=0.9, zorder=5))  # fmt: skip
+            axes.text(window.right + 0.5, window.bottom, title[0], color=MEASURED, weight="bold", zorder=6)
+            left = MARGIN + number * (inset_width + MARGIN)
+            inset = axes_at(drawn, (left, HEAD + height + INSET_TITLE, inset_width, inset_height))
+            _draw(inset, mesh, window, 0.4)
+            inset.set_axis_on()
+            inset.tick_params(bottom=False, left=False, labelbottom=False, labelleft=False)
+            for spine in inset.spines.values():
+                spine.set(visible=True, color=MEASURED, linewidth=0.9)
+            inset.set_title(title, size=8, pad=3)
+            body.scale_bar(inset, window)
+
+
+def _draw(axes: Axes, mesh: TriangleMesh, window: Extent, width: float) -> None:
+    body.prepare(axes, window)
+    ends = mesh.points[mesh.edges]
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    inside = (high[:, 0] > window.left) & (low[:, 0] < window.right) & (high[:, 1] > window.bottom) & (low[:, 1] < window.top)  # fmt: skip
+    axes.add_collection(LineCollection(list(ends[inside]), colors=LINE, linewidths=width), autolim=False)
+    body.outline(axes, body.boundary_edges(mesh), mesh.points, colour=INK, width=0.5 if width < 0.3 else 1.0)
+    body.outline(axes, mesh.boundary("contact"), mesh.points, colour=CONTACT, width=2.2, zorder=4)
+    axes.plot(*mesh.markers.T, "o", ms=2.5, mfc=MEASURED, mec="white", mew=0.5, zorder=4)
+    axes.set_facecolor("white")

@@ -1,0 +1,153 @@
+"""The deformed finger of every solver, with the markers where they were seen and where the solver puts them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as MplFigure
+from matplotlib.lines import Line2D
+
+from compare.evaluation import Evaluation
+from compare.figures import body
+from compare.figures.canvas import Canvas, Extent
+from compare.figures.colours import Scale
+from compare.figures.labels import markers_label, solver_label
+from compare.figures.style import INK, MEASURED, MUTED, WIDTH, axes_at, figure, heading
+from compare.metrics import marker_errors
+from geometry.arrays import FloatArray, IntArray
+from geometry.mesh import TriangleMesh
+from geometry.observations import Observations
+
+
+MARGIN = 0.12
+HEAD, PANEL_TITLE, FOOT = 0.62, 0.2, 0.48
+"""Heights in inches: heading and legend; the name above a panel; the colour bar."""
+
+
+def draw_overlay(
+    path: Path, *, mesh: TriangleMesh, evaluations: Sequence[Evaluation], observations: Observations
+) -> None:
+    """Draw every solver's deformed finger, one panel each, at true scale."""
+    extent = overlay_extent(mesh, evaluations, observations)
+    columns = 1 if len(evaluations) <= 3 else 2
+    rows = -(-len(evaluations) // columns)
+    width = (WIDTH - MARGIN * (columns + 1)) / columns
+    height = width * extent.height / extent.width
+    scale = displacement_scale(mesh, evaluations)
+    edges = body.boundary_edges(mesh)
+    total = HEAD + rows * (PANEL_TITLE + height) + FOOT
+    with figure(path, total) as drawn, Canvas(mesh, extent, width=body.PIXELS // columns) as canvas:
+        heading(drawn, "Deformed finger, true scale")
+        for number, evaluation in enumerate(evaluations):
+            row, column = divmod(number, columns)
+            left = MARGIN + column * (width + MARGIN)
+            top = HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
+            axes = axes_at(drawn, (left, top, width, height))
+            _panel(axes, canvas, scale, edges, mesh, evaluation, observations)
+            body.scale_bar(axes, extent)
+        body.colour_bar(
+            axes_at(drawn, (0.25 * WIDTH, total - FOOT + 0.06, 0.5 * WIDTH, 0.09)),
+            scale,
+            "displacement magnitude, mm",
+        )
+        _legend(drawn, observations)
+
+
+def displacement_scale(mesh: TriangleMesh, evaluations: Sequence[Evaluation]) -> Scale:
+    """From zero to the largest displacement magnitude of a triangle in any of the solutions, mm."""
+    high = max(float(_magnitude(mesh, evaluation).max()) for evaluation in evaluations)
+    return Scale(0.0, high or 1.0, mpl.colormaps["viridis"])
+
+
+def overlay_extent(
+    mesh: TriangleMesh, evaluations: Sequence[Evaluation], observations: Observations
+) -> Extent:
+    """What a panel shows: the body before and after in every solution, and all markers, mm."""
+    span = float(np.ptp(mesh.points[:, 0]))
+    seen = observations.visible
+    clouds = [mesh.points, observations.points[seen] + observations.displacements[seen]]
+    clouds += [
+        mesh.points + evaluation.node_displacement for evaluation in evaluations if evaluation.converged
+    ]
+    tight = Extent.around(*clouds, margin=0.03 * span)
+    return tight._replace(top=tight.top + 0.02 * span, bottom=tight.bottom - 0.02 * span)
+
+
+def _magnitude(mesh: TriangleMesh, evaluation: Evaluation) -> FloatArray:
+    size = np.linalg.norm(evaluation.node_displacement, axis=1)
+    return np.asarray(size[mesh.triangles].mean(axis=1))
+
+
+def _panel(
+    axes: Axes,
+    canvas: Canvas,
+    scale: Scale,
+    edges: IntArray,
+    mesh: TriangleMesh,
+    evaluation: Evaluation,
+    observations: Observations,
+) -> None:
+    extent = canvas.extent
+    deformed = mesh.points + evaluation.node_displacement
+    body.prepare(axes, extent)
+    body.outline(axes, edges, mesh.points, colour="#9a9a9a", width=0.6, zorder=0)
+    body.show(axes, canvas.picture(scale.paint(_magnitude(mesh, evaluation)), deformed), extent)
+    body.outline(axes, edges, deformed, width=0.4)
+    body.clamp(axes, mesh.points[mesh.boundary("base").ravel()])
+    _indenter(axes, mesh, evaluation)
+    seen = observations.visible
+    observed = observations.points[seen] + observations.displacements[seen]
+    computed = mesh.markers + evaluation.marker_displacement
+    axes.plot(*observed.T, "o", ms=5, mfc="none", mec="white", mew=2.0, zorder=4)
+    axes.plot(*observed.T, "o", ms=5, mfc="none", mec=MEASURED, mew=1.1, zorder=5)
+    axes.plot(*computed.T, "x", ms=4, color="white", mew=2.0, zorder=4)
+    axes.plot(*computed.T, "x", ms=4, color=INK, mew=0.9, zorder=5)
+    errors = marker_errors(evaluation, observations)
+    axes.set_title(solver_label(evaluation), size=9, pad=3, weight="bold")
+    note = f"MAE  u {errors.mae_u:.2f} mm,  v {errors.mae_v:.2f} mm"
+    axes.set_title(note, size=7.5, pad=3, loc="right", color=MUTED)
+
+
+def _indenter(axes: Axes, mesh: TriangleMesh, evaluation: Evaluation) -> None:
+    nodes = np.unique(mesh.boundary("contact"))
+    start = mesh.points[nodes].mean(axis=0)
+    end = start + evaluation.node_displacement[nodes].mean(axis=0)
+    arrow = {
+        "arrowstyle": "-|>,head_width=0.18,head_length=0.35",
+        "color": INK,
+        "lw": 1.0,
+        "shrinkA": 0,
+        "shrinkB": 0,
+    }
+    axes.annotate("", xy=tuple(end), xytext=tuple(start), arrowprops=arrow, zorder=6)
+
+
+def _legend(drawn: MplFigure, observations: Observations) -> None:
+    handles = [
+        Line2D(
+            [],
+            [],
+            ls="",
+            marker="o",
+            ms=5,
+            mfc="none",
+            mec=MEASURED,
+            mew=1.1,
+            label=markers_label(observations),
+        ),
+        Line2D([], [], ls="", marker="x", ms=4, color=INK, mew=0.9, label="markers, solver"),
+        Line2D([], [], color="#9a9a9a", lw=0.9, label="undeformed"),
+        Line2D([], [], color=INK, lw=1, marker=">", ms=3.5, markevery=[1], label="path of the indenter"),
+    ]
+    drawn.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(0.0, 1 - 0.24 / drawn.get_figheight()),
+        ncols=4,
+        columnspacing=1.4,
+        handletextpad=0.5,
+        borderaxespad=0.1,
+        handlelength=1.6,
+    )

@@ -1,0 +1,116 @@
+"""The numbers of a comparison as CSV files and as a table for the terminal."""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.table import Table
+
+from compare.atomic import atomic_path
+from compare.evaluation import Evaluation
+from compare.figures.labels import solver_label
+from compare.metrics import FieldDifference, marker_errors, reference_differences
+from geometry.observations import Observations
+
+Cell = str | int | float | bool
+
+
+def write_markers(path: Path, *, evaluations: Sequence[Evaluation], observations: Observations) -> None:
+    """Write a row a marker: where it was, how it moved, what each solver says and how far off that is.
+
+    The cells of observations and errors are empty at markers that were not seen.
+    """
+    rows: list[dict[str, Cell]] = []
+    errors = [marker_errors(evaluation, observations) for evaluation in evaluations]
+    for marker, (x, y) in enumerate(observations.points):
+        seen = bool(observations.visible[marker])
+        u, v = observations.displacements[marker]
+        row: dict[str, Cell] = {"marker": marker + 1, "x_mm": float(x), "y_mm": float(y)}
+        row |= {"observations": observations.label, "visible": int(seen)}
+        row |= {"observed_u_mm": float(u) if seen else "", "observed_v_mm": float(v) if seen else ""}
+        for evaluation, error in zip(evaluations, errors, strict=True):
+            name = evaluation.solver
+            own_u, own_v = (float(value) for value in evaluation.marker_displacement[marker])
+            row |= {f"{name}_u_mm": own_u, f"{name}_v_mm": own_v}
+            row[f"{name}_ae_u_mm"] = float(error.ae_u[marker]) if seen else ""
+            row[f"{name}_ae_v_mm"] = float(error.ae_v[marker]) if seen else ""
+        rows.append(row)
+    write_csv(path, rows)
+
+
+def write_summary(
+    path: Path, *, evaluations: Sequence[Evaluation], observations: Observations, reference: Evaluation
+) -> None:
+    """Write a row a solver: errors at the markers, differences from the reference, energy, reaction, status."""
+    write_csv(path, [_summary(evaluation, observations, reference) for evaluation in evaluations])
+
+
+def write_csv(path: Path, rows: Sequence[dict[str, Cell]]) -> None:
+    """Write rows with equal keys under a header, atomically; numbers keep all their digits."""
+    with atomic_path(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def mae_table(evaluations: Sequence[Evaluation], observations: Observations, reference: Evaluation) -> Table:
+    """Mean absolute errors at the markers and the distance from the reference, for the terminal."""
+    seen, count = int(observations.visible.sum()), len(observations.visible)
+    markers = f"{count} markers" if seen == count else f"{seen} of {count} markers"
+    table = Table(
+        title=f"Mean absolute error at {markers}, mm ({observations.label} displacements)",
+        caption=(
+            "sum: mean of |Δu| + |Δv| (the paper's text); rss: √(u² + v²) of the two means (its Table I).\n"
+            f"L²: relative difference of the displacement field from {solver_label(reference)}."
+        ),
+        title_justify="left",
+        caption_justify="left",
+    )
+    table.add_column("solver", no_wrap=True)
+    for heading in ("u", "v", "sum", "rss", "L², %", "energy\nN mm/mm", "time\ns"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for evaluation in evaluations:
+        errors = marker_errors(evaluation, observations)
+        distance = reference_differences(evaluation, reference).displacement.rel_l2
+        table.add_row(
+            solver_label(evaluation),
+            *(f"{value:.3f}" for value in (errors.mae_u, errors.mae_v, errors.mae_sum, errors.mae_rss)),
+            "reference" if evaluation is reference else f"{100 * distance:.3g}",
+            f"{evaluation.energy:.4g}",
+            seconds(evaluation),
+            style=None if evaluation.converged else "yellow",
+        )
+    return table
+
+
+def seconds(evaluation: Evaluation) -> str:
+    """How long the solver took, s, or a dash if it does not say."""
+    value = evaluation.stats.get("seconds")
+    return f"{value:.2f}" if isinstance(value, int | float) else "–"
+
+
+def _summary(evaluation: Evaluation, observations: Observations, reference: Evaluation) -> dict[str, Cell]:
+    errors, to = marker_errors(evaluation, observations), reference_differences(evaluation, reference)
+    row: dict[str, Cell] = {"solver": evaluation.solver, "converged": int(evaluation.converged)}
+    row |= {"observations": observations.label, "reference": reference.solver}
+    row |= {"mae_u_mm": errors.mae_u, "mae_v_mm": errors.mae_v}
+    row |= {"mae_sum_mm": errors.mae_sum, "mae_rss_mm": errors.mae_rss}
+    row |= _difference("displacement", to.displacement, "mm") | _difference("von_mises", to.von_mises, "MPa")
+    for name, difference in to.stress.items():
+        row |= _difference(f"stress_{name}", difference, "MPa")
+    for name, difference in to.strain.items():
+        row |= _difference(f"strain_{name}", difference, "1")
+    row |= {"to_reference_markers_mae_sum_mm": to.mae_markers, "to_reference_energy_rel": to.energy}
+    row |= {"energy_N_mm_per_mm": evaluation.energy}
+    row |= {f"reaction_{axis}_N_per_mm": float(evaluation.reaction[n]) for n, axis in enumerate("uv")}
+    row |= {"seconds_s": evaluation.stats.get("seconds", ""), "status": evaluation.message}
+    return row
+
+
+def _difference(name: str, difference: FieldDifference, unit: str) -> dict[str, Cell]:
+    """Three cells; dimensionless quantities carry the unit 1."""
+    return {
+        f"to_reference_{name}_rel_l2": difference.rel_l2,
+        f"to_reference_{name}_mean_{unit}": difference.mean,
+        f"to_reference_{name}_p95_{unit}": difference.p95,
+    }
