@@ -42,13 +42,14 @@ def run_task(task: Mapping[str, Any], timeout_s: float) -> None:
     what = task["what"]
     try:
         answer, noise = process.communicate(json.dumps({**task, "timeout_s": timeout_s}), timeout=timeout_s)
-    except subprocess.TimeoutExpired:
-        raise UserError(
-            f"{what} was ended after {timeout_s:g} s; use larger elements, or allow more time"
-        ) from None
-    finally:
+    except BaseException as error:  # a time-out, or Ctrl-C: leave no process behind
         process.kill()
         process.communicate()
+        if isinstance(error, subprocess.TimeoutExpired):
+            raise UserError(
+                f"{what} was ended after {timeout_s:g} s; use larger elements, or allow more time"
+            ) from None
+        raise
     if process.returncode == EXIT_REFUSED:
         raise UserError(json.loads(answer)["error"])
     if process.returncode != 0:

@@ -1,0 +1,191 @@
+"""Cache and worker: quick hits, damaged entries, time limits, one-line failures."""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from geometry import Design, MeshSettings, UserError, cad_files, finger_mesh
+from geometry.cache import cache_folder, cache_key
+from geometry.worker import child_environment, run_task
+
+COARSE = MeshSettings(size=1.5, coarsening=2)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("cache")
+    finger_mesh(Design(), settings=COARSE, cache_dir=folder)
+    return folder
+
+
+def entry_of(folder: Path) -> Path:
+    return next(folder.glob("mesh-*.npz"))
+
+
+def test_second_call_is_read_from_the_cache(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("geometry.cache.run_task", None)  # a second run would fail
+    begin = time.perf_counter()
+    mesh = finger_mesh(Design(name="another-name"), settings=COARSE, cache_dir=folder)
+    assert time.perf_counter() - begin < 0.2
+    assert len(mesh.markers) == 9
+
+
+def test_nothing_but_the_result_is_left_in_the_cache(folder: Path) -> None:
+    assert [path.suffix for path in folder.iterdir()] == [".npz"]
+
+
+def test_worker_gives_the_same_mesh_as_meshing_here(folder: Path) -> None:
+    from geometry.mesher import build_mesh
+
+    assert finger_mesh(Design(), settings=COARSE, cache_dir=folder).digest == build_mesh(Design(), COARSE).digest
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda content: b"",  # empty
+        lambda content: content[: len(content) // 2],  # cut off
+        lambda content: content[:3000] + bytes(64) + content[3064:],  # a few bytes lost
+        lambda content: b"not an archive at all",
+    ],
+)
+def test_damaged_entry_is_rebuilt_with_a_warning(folder: Path, damage, monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    entry = entry_of(folder)
+    good = entry.read_bytes()
+    rebuilt = []
+
+    def run(task, timeout_s):  # type: ignore[no-untyped-def]
+        rebuilt.append(task["kind"])
+        Path(task["output"]).write_bytes(good)
+
+    monkeypatch.setattr("geometry.cache.run_task", run)
+    entry.write_bytes(damage(good))
+    with pytest.warns(RuntimeWarning, match="rebuilding mesh-.* is damaged"):
+        finger_mesh(Design(), settings=COARSE, cache_dir=folder)
+    assert rebuilt == ["mesh"]
+    assert entry.read_bytes() == good
+
+
+def test_key_follows_everything_the_mesh_depends_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    def key(design: Design | None = None, **settings: float) -> str:
+        return cache_key(design or Design(), {"kind": "mesh", "settings": MeshSettings(**settings).model_dump()})
+
+    keys = {key(), key(Design(rib_angle=19)), key(size=0.3), key(corner_size=0.1)}
+    monkeypatch.setattr("geometry.cache._version", lambda package: "0")
+    keys.add(key())
+    assert len(keys) == 5
+    assert key(Design(name="x")) in keys
+
+
+def test_time_limit_ends_the_worker_with_advice(tmp_path: Path) -> None:
+    begin = time.perf_counter()
+    with pytest.raises(UserError, match=r"meshing design 'default' was ended after 0\.5 s; use larger"):
+        finger_mesh(Design(), settings=MeshSettings(size=0.02), cache_dir=tmp_path, timeout_s=0.5)
+    assert time.perf_counter() - begin < 5
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_refusal_in_the_worker_comes_back_as_its_own_line(tmp_path: Path) -> None:
+    task = {"kind": "mesh", "what": "meshing", "settings": {}, "output": str(tmp_path / "m.npz")}
+    with pytest.raises(UserError, match="ribs") as refused:
+        run_task({**task, "design": {"rib_count": 50}}, 60)
+    assert "\n" not in str(refused.value)
+
+
+def test_crash_in_the_worker_gives_one_line(tmp_path: Path) -> None:
+    task = {"kind": "mesh", "what": "meshing", "settings": {}, "design": {}}
+    with pytest.raises(UserError, match=r"meshing failed \(exit code 1\)") as refused:
+        run_task({**task, "output": str(tmp_path / "missing" / "m.npz")}, 60)
+    assert "\n" not in str(refused.value)
+
+
+def test_folder_that_cannot_be_written_gives_one_line(tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    with pytest.raises(UserError, match="PINNRAY_CACHE"):
+        finger_mesh(Design(), settings=COARSE, cache_dir=blocked / "cache")
+
+
+@pytest.mark.parametrize(
+    ("variables", "expected"),
+    [
+        ({"PINNRAY_CACHE": "/a", "XDG_CACHE_HOME": "/b"}, "/a"),  # ours wins
+        ({"XDG_CACHE_HOME": "/b"}, "/b/pinn-ray"),
+        ({"HOME": "/home/me"}, "/home/me/.cache/pinn-ray"),
+    ],
+)
+def test_cache_folder(variables: dict[str, str], expected: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("PINNRAY_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    assert cache_folder() == Path(expected)
+
+
+def test_worker_does_not_inherit_an_mpi_run() -> None:
+    kept = child_environment(
+        {"OMPI_COMM_WORLD_RANK": "1", "PMIX_RANK": "1", "PMI_RANK": "0", "PATH": "/bin", "PYTHONPATH": "/x"}
+    )
+    assert set(kept) == {"PATH", "PYTHONPATH"}
+    assert kept["PYTHONPATH"].endswith(os.pathsep + "/x")
+
+
+@pytest.mark.mpi
+def test_meshing_works_under_mpirun(tmp_path: Path) -> None:
+    mpirun = shutil.which("mpirun")
+    if mpirun is None:
+        pytest.skip("mpirun is not installed")
+    code = (
+        "from pathlib import Path; from geometry import *; import os\n"
+        "m = finger_mesh(Design(), settings=MeshSettings(size=2), "
+        "cache_dir=Path(os.environ['CACHE']) / os.environ.get('OMPI_COMM_WORLD_RANK', '0'))\n"
+        "print(m.digest)"
+    )
+    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "CACHE": str(tmp_path)}
+    done = subprocess.run(
+        [mpirun, "-n", "2", sys.executable, "-c", code],
+        env=child_environment(os.environ) | allowed,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    first, second = done.stdout.split()
+    assert first == second
+
+
+def test_cad_files_come_from_the_cache_the_second_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = cad_files(Design(), tmp_path / "one", formats=["svg"], cache_dir=tmp_path / "cache")
+    monkeypatch.setattr("geometry.cache.run_task", None)
+    second = cad_files(Design(), tmp_path / "two", formats=["svg"], cache_dir=tmp_path / "cache")
+    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
+    assert sorted(path.name for path in (tmp_path / "two").iterdir()) == ["section.svg"]
+
+
+def test_import_is_quick_and_needs_neither_cadquery_nor_gmsh() -> None:
+    code = (
+        "import sys, time; begin = time.perf_counter(); import geometry; print(time.perf_counter() - begin)\n"
+        "geometry.load_design('stiff'); geometry.finger_mesh\n"
+        "print(*({'cadquery', 'gmsh', 'OCP'} & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=child_environment(os.environ), capture_output=True, text=True, check=True
+    )
+    seconds, heavy = done.stdout.split("\n")[:2]
+    assert float(seconds) < 0.3
+    assert heavy == ""
+
+
+def test_every_public_name_can_be_imported() -> None:
+    import geometry
+
+    for name in geometry.__all__:
+        assert getattr(geometry, name) is not None
+    with pytest.raises(AttributeError, match="nothing"):
+        _ = geometry.nothing

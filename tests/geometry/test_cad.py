@@ -1,0 +1,117 @@
+"""CAD against the closed forms, and its files against an independent reader where there is one."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from geometry import Design, UserError, cad_files, finger_section, marker_positions
+
+cad = pytest.importorskip("geometry.cad")
+
+
+def test_face_has_the_area_and_the_holes_of_the_closed_form(design: Design) -> None:
+    face, section = cad.section_face(design), finger_section(design)
+    assert face.isValid()
+    assert face.Area() == pytest.approx(section.area, rel=1e-9)
+    assert len(face.innerWires()) == design.rib_count + 1
+    perimeter = sum(wire.Length() for wire in [face.outerWire(), *face.innerWires()])
+    assert perimeter == pytest.approx(section.perimeter, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "design",
+    [
+        Design(),  # sharp corners
+        Design(fillet_radius=1.0, depth=12, marker_layout="joints", marker_height=2),
+    ],
+)
+def test_body_and_markers_together_are_the_extruded_section(design: Design) -> None:
+    body, markers = cad.solids(design)
+    parts = [body, *markers]
+    volumes = np.array([part.Volume() for part in parts])
+    heights = np.array([part.Center().z for part in parts])
+    assert all(part.isValid() for part in parts)
+    assert volumes.sum() == pytest.approx(finger_section(design).area * design.depth, rel=1e-9)
+    assert (volumes * heights).sum() / volumes.sum() == pytest.approx(design.depth / 2, rel=1e-9)
+    disc = np.pi / 4 * design.marker_diameter**2 * design.marker_height
+    np.testing.assert_allclose(volumes[1:], disc, rtol=1e-9)
+
+
+def test_markers_are_inlaid_flush_with_the_side_face() -> None:
+    design = Design()
+    body, markers = cad.solids(design)
+    assert len(markers) == 9
+    for marker, (x, y) in zip(markers, marker_positions(design), strict=True):
+        box = marker.BoundingBox()
+        assert (box.zmin, box.zmax) == pytest.approx((design.depth - 0.6, design.depth), abs=1e-6)
+        assert (marker.Center().x, marker.Center().y) == pytest.approx((x, y), abs=1e-9)
+        assert marker.intersect(body).Volume() == pytest.approx(0, abs=1e-9)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("cad")
+    files = cad_files(Design(), folder / "out", cache_dir=folder / "cache")
+    return {file.name: file for file in files}
+
+
+def test_every_format_is_written(written: dict[str, Path]) -> None:
+    assert set(written) == {
+        "finger.step", "finger-body.stl", "finger-markers.stl", "section.dxf", "section.svg",
+    }  # fmt: skip
+
+
+def test_step_holds_body_and_markers_as_named_parts(written: dict[str, Path]) -> None:
+    import cadquery as cq
+
+    solids = cq.importers.importStep(str(written["finger.step"])).solids().vals()
+    assert len(solids) == 10
+    assert sum(solid.Volume() for solid in solids) == pytest.approx(finger_section(Design()).area * 20, rel=1e-9)
+    text = written["finger.step"].read_text()
+    assert all(f"'{name}'" in text for name in ("body", "marker-1", "marker-9"))
+
+
+def stl_volume(path: Path) -> float:
+    """Volume inside the facets by the divergence theorem, mm^3; binary or text STL."""
+    content = path.read_bytes()
+    if content[:5] == b"solid":
+        lines = [line.split()[1:] for line in content.decode().splitlines() if "vertex" in line]
+        corners = np.array(lines, dtype=float).reshape(-1, 3, 3)
+    else:
+        facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+        corners = np.frombuffer(content, dtype=facet, offset=84)["corners"].astype(float)
+    return float(np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6)
+
+
+def test_stl_files_enclose_the_volumes(written: dict[str, Path]) -> None:
+    discs = 9 * np.pi / 4 * 1.6**2 * 0.6
+    assert stl_volume(written["finger-markers.stl"]) == pytest.approx(discs, rel=0.01)  # facets of circles
+    assert stl_volume(written["finger-body.stl"]) == pytest.approx(
+        finger_section(Design()).area * 20 - discs, rel=1e-4
+    )
+
+
+def test_dxf_has_a_layer_for_the_outline_and_one_for_the_markers(written: dict[str, Path]) -> None:
+    ezdxf = pytest.importorskip("ezdxf")
+    entities = list(ezdxf.readfile(written["section.dxf"]).modelspace())
+    lines = [entity for entity in entities if entity.dxf.layer == "outline"]
+    circles = [entity for entity in entities if entity.dxf.layer == "markers"]
+    assert len(lines) == 3 + 4 * 5
+    length = sum((entity.dxf.end - entity.dxf.start).magnitude for entity in lines)
+    assert length == pytest.approx(finger_section(Design()).perimeter, rel=1e-9)
+    centres = sorted((circle.dxf.center.x, circle.dxf.center.y) for circle in circles)
+    np.testing.assert_allclose(centres, marker_positions(Design()), atol=1e-9)
+    assert {circle.dxf.radius for circle in circles} == {0.8}
+
+
+def test_svg_is_in_true_scale(written: dict[str, Path]) -> None:
+    text = written["section.svg"].read_text()
+    assert 'width="94mm" height="34mm"' in text
+    assert text.count("<circle") == 9
+    assert text.count(" Z") == 1 + 5
+
+
+def test_unknown_format_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"'obj'.*step, stl, dxf, svg"):
+        cad_files(Design(), tmp_path, formats=["obj"])

@@ -1,0 +1,166 @@
+"""Designs: names, symbols, one-line errors, and ranges that are true."""
+
+import re
+
+import numpy as np
+import pytest
+
+from geometry import Design, UserError
+from geometry.admissible import RULES, STEP, advice, obeys
+from geometry.parameters import SYMBOLS, Parameters, fact
+
+BAD_DESIGNS = [
+    # parameters, parameter that the message must give a range for, what it must say
+    ({"rib_count": 12, "rib_thickness": 6}, "rib_count", "ribs overlap"),
+    ({"rib_count": 30}, "rib_count", "ribs are too close"),
+    ({"rib_thickness": 13}, "rib_thickness", "ribs overlap"),
+    ({"rib_angle": -40}, "rib_angle", "runs into the base wall"),  # at the back wall
+    ({"rib_count": 1, "rib_thickness": 29, "rib_angle": 60}, "rib_thickness", "runs into the tip block"),
+    ({"tip_length": 100}, "tip_length", "no room for a cavity"),
+    ({"base_thickness": 75}, "base_thickness", "no room for a cavity"),
+    ({"front_thickness": 5}, "front_thickness", "walls close the cavity"),
+    ({"back_thickness": 5}, "back_thickness", "walls close the cavity"),
+    ({"base_width": 12}, "base_width", "walls close the cavity"),
+    ({"contact_position": 95}, "contact_position", "contact outside the front face"),
+    ({"contact_position": 0.2}, "contact_position", "contact outside the front face"),
+    ({"contact_width": 90}, "contact_width", "contact outside the front face"),
+    ({"marker_diameter": 2}, "marker_diameter", "does not fit"),
+    ({"marker_count": 40}, "marker_count", "does not fit"),  # the last one falls out at the apex
+    ({"front_thickness": 1.5}, "front_thickness", "does not fit"),
+    ({"marker_layout": "joints", "back_thickness": 1}, "back_thickness", "does not fit"),
+    ({"marker_layout": "joints", "rib_count": 40, "rib_thickness": 0.2}, "rib_count", "markers overlap"),
+    ({"marker_height": 25}, "marker_height", "goes through the finger"),
+    ({"fillet_radius": 4}, "fillet_radius", "fillets too large"),
+    ({"depth": 1, "marker_height": 1}, "depth", "goes through the finger"),
+]
+
+RANGE = re.compile(r"(\w+) (?:up to (-?[\d.]+)|at least (-?[\d.]+)|(-?[\d.]+) to (-?[\d.]+))")
+
+
+def message_of(values: dict[str, object]) -> str:
+    with pytest.raises(UserError) as refused:
+        Design(**values)
+    return str(refused.value)
+
+
+def printed_ranges(message: str) -> dict[str, tuple[float | None, float | None]]:
+    found = {}
+    for name, up_to, at_least, low, high in RANGE.findall(message.split("admissible with the rest unchanged")[-1]):
+        start, stop = low or at_least or None, high or up_to or None
+        found[name] = (float(start) if start else None, float(stop) if stop else None)
+    return found
+
+
+@pytest.mark.parametrize(("values", "name", "reason"), BAD_DESIGNS)
+def test_bad_design_gives_one_line_with_reason_and_range(
+    values: dict[str, object], name: str, reason: str
+) -> None:
+    message = message_of(values)
+    assert "\n" not in message
+    assert reason in message
+    assert name in printed_ranges(message)
+
+
+@pytest.mark.parametrize(("values", "name", "reason"), BAD_DESIGNS)
+def test_printed_ranges_are_true(values: dict[str, object], name: str, reason: str) -> None:
+    message = message_of(values)
+    assert "admissible with the rest unchanged" in message
+    for parameter, ends in printed_ranges(message).items():
+        low, high = fact(parameter, "low"), fact(parameter, "high")
+        start, stop = (low if ends[0] is None else ends[0]), (high if ends[1] is None else ends[1])
+        step = 1 if parameter in ("rib_count", "marker_count") else 2 * STEP
+        for value in (start, stop, (start + stop) // 2 if step == 1 else (start + stop) / 2):
+            assert obeys(Design.model_construct(**{**values, parameter: value})), (parameter, value)
+            assert Design(**{**values, parameter: value}) is not None
+        for value in (start - step, stop + step):
+            if low <= value <= high:
+                assert "admissible" in message_of({**values, parameter: value}), (parameter, value)
+
+
+def test_when_one_change_is_not_enough_the_message_says_so() -> None:
+    message = message_of({"tip_length": 100, "contact_position": 120})
+    assert "more than one parameter must change" in message
+    assert "tip_length" in message
+
+
+WRONG_VALUES = [
+    # parameters, texts that the message must hold
+    ({"height": 5}, ["height (H)", "5 mm", "10 to 500 mm"]),  # below the bound
+    ({"depth": -1}, ["depth (W)", "1 to 200 mm"]),  # negative
+    ({"rib_thickness": 0}, ["rib_thickness (t_rib)", "0.2 to 30 mm"]),  # zero
+    ({"rib_angle": 75}, ["rib_angle (L_angle)", "-60 to 60 deg"]),
+    ({"height": "long"}, ["height (H)", "'long'", "10 to 500 mm"]),  # not a number
+    ({"height": float("nan")}, ["height (H)", "finite"]),
+    ({"height": float("inf")}, ["height (H)", "finite"]),
+    ({"rib_count": 2.5}, ["rib_count (N)", "whole number", "0 to 60"]),
+    ({"N": "three"}, ["rib_count (N)", "whole number"]),
+    ({"hight": 90}, ["unknown parameter 'hight'", "did you mean height (H)"]),
+    ({"thickness": 2}, ["unknown parameter 'thickness'", "rib_thickness (t_rib)"]),
+    ({"zzz": 2}, ["unknown parameter 'zzz'", "there are", "height (H)"]),  # nothing near: the whole list
+    ({"marker_layout": "back"}, ["marker_layout", "'back'", "'front'"]),
+    ({"name": "../../etc"}, ["name", "letters"]),  # names become folders
+    ({"H": 90, "height": 80}, ["height (H)", "twice"]),
+    ({"height": 5, "depth": 0}, ["height (H)", "depth (W)"]),  # both are named
+]
+
+
+@pytest.mark.parametrize(("values", "texts"), WRONG_VALUES)
+def test_wrong_value_gives_one_line(values: dict[str, object], texts: list[str]) -> None:
+    message = message_of(values)
+    assert "\n" not in message
+    for text in texts:
+        assert text in message
+
+
+def test_default_is_the_papers_finger() -> None:
+    design = Design()
+    assert [getattr(design, SYMBOLS[symbol]) for symbol in ("H", "L", "W", "L_tip", "L_angle", "N")] == [
+        90, 30, 20, 20, 20, 4,
+    ]  # fmt: skip
+    assert [getattr(design, SYMBOLS[symbol]) for symbol in ("t_rib", "t_flex", "t_back")] == [2, 2, 2]
+    assert design.contact_abscissa == 35
+
+
+def test_symbols_are_aliases() -> None:
+    by_symbol = Design(H=100, L=32, W=18, L_angle=15, L_tip=22, N=5, t_rib=1.5, t_flex=2.2, t_back=2.1)
+    by_name = Design(
+        height=100, base_width=32, depth=18, rib_angle=15, tip_length=22, rib_count=5,
+        rib_thickness=1.5, front_thickness=2.2, back_thickness=2.1,
+    )  # fmt: skip
+    assert by_symbol == by_name
+
+
+def test_digest_follows_the_geometry_and_not_the_name() -> None:
+    assert Design(name="a").digest == Design(name="b").digest
+    assert Design(contact_position=35).digest == Design().digest  # the same place, said explicitly
+    changed = {"height": 91, "rib_count": 5, "marker_layout": "joints", "contact_width": 3, "depth": 21}
+    digests = {Design(**{name: value}).digest for name, value in changed.items()} | {Design().digest}
+    assert len(digests) == len(changed) + 1
+
+
+def test_replaced_is_a_checked_copy() -> None:
+    design = Design(name="base")
+    assert design.replaced(N=6, H=110) == Design(name="base", rib_count=6, height=110)
+    with pytest.raises(UserError, match="ribs"):
+        design.replaced(rib_count=40)
+
+
+def test_every_rule_can_fail() -> None:
+    rng = np.random.default_rng(1)
+    broken = set()
+    names = [name for name in Parameters.model_fields if fact(name, "high") != ""]
+    for _ in range(400):
+        values = {name: rng.uniform(fact(name, "low"), fact(name, "high")) for name in names}
+        values |= {name: int(values[name]) for name in ("rib_count", "marker_count")}
+        parameters = Parameters.model_construct(**values, marker_layout=rng.choice(["front", "joints"]))
+        broken |= {rule.check.__name__ for rule in RULES if rule.check(parameters).margin < 0}
+    assert broken == {rule.check.__name__ for rule in RULES}
+
+
+def test_advice_never_promises_a_range_that_breaks_another_rule() -> None:
+    bad = Parameters.model_construct(height=40, tip_length=45)
+    rule = next(rule for rule in RULES if rule.check(bad).margin < 0)
+    for name, (start, stop) in printed_ranges(advice(bad, rule)).items():
+        for value in (start, stop):
+            if value is not None:
+                assert obeys(bad.model_copy(update={name: value}))

@@ -1,0 +1,144 @@
+"""The mesh as a data type: checks, permutation, location, file."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shapely.geometry import Point, Polygon
+
+from geometry import Design, OutsideBodyError, ShapeError, TriangleMesh, UserError, finger_section
+
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+
+
+def square(**changes: object) -> TriangleMesh:
+    """The unit square as two triangles."""
+    parts: dict[str, object] = {
+        "points": SQUARE,
+        "triangles": [[0, 1, 2], [0, 2, 3]],
+        "boundaries": {"base": [[3, 0]], "front": [[2, 3]], "contact": [[2, 3]]},
+        "marker_nodes": [1, 2],
+        "contact_node": 2,
+    }
+    return TriangleMesh(**{**parts, **changes})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind", "text"),
+    [
+        ({"points": SQUARE[:, :1]}, ShapeError, "points"),  # one coordinate
+        ({"triangles": [[0, 1, 2, 3]]}, ShapeError, "triangles"),  # a quadrilateral
+        ({"triangles": [[0, 2, 1]]}, UserError, "clockwise"),
+        ({"triangles": [[0, 1, 1]]}, UserError, "flat"),
+        ({"triangles": [[0, 1, 7]]}, UserError, "outside 0..3"),
+        ({"marker_nodes": [4]}, UserError, "outside 0..3"),
+        ({"contact_node": -1}, UserError, "outside 0..3"),
+        ({"boundaries": {"base": [[0, 9]]}}, UserError, "outside 0..3"),
+        ({"points": np.full((4, 2), np.nan)}, UserError, "not finite"),
+    ],
+)
+def test_impossible_mesh_is_refused(changes: dict[str, object], kind: type[UserError], text: str) -> None:
+    with pytest.raises(kind, match=text):
+        square(**changes)
+
+
+def test_arrays_cannot_be_written() -> None:
+    mesh = square()
+    for array in (mesh.points, mesh.triangles, mesh.boundary("base")):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+
+
+def test_mesh_is_independent_of_the_arrays_it_was_made_from() -> None:
+    points = SQUARE.copy()
+    mesh = square(points=points)
+    points[0] = 99
+    assert mesh.points[0].tolist() == [0, 0]
+
+
+def test_unknown_boundary_lists_those_there_are() -> None:
+    with pytest.raises(UserError, match=r"no boundary 'top'; it has base, front, contact"):
+        square().boundary("top")
+
+
+def test_edges_of_the_square() -> None:
+    assert square().edges.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [2, 3]]
+
+
+def test_permutation_keeps_the_body_and_changes_the_numbering(default_mesh: TriangleMesh) -> None:
+    mesh, other = default_mesh, default_mesh.permuted(seed=3)
+    assert other.digest != mesh.digest
+    assert other.areas.sum() == pytest.approx(mesh.areas.sum(), rel=1e-14)
+    assert sorted(other.areas.round(12)) == sorted(mesh.areas.round(12))
+    assert (other.markers == mesh.markers).all()
+    assert (other.points[other.contact_node] == mesh.points[mesh.contact_node]).all()
+    for name in mesh.boundaries:
+        ends, same = (sorted(m.points[m.boundary(name)].reshape(-1, 4).tolist()) for m in (mesh, other))
+        assert ends == same
+    centroids, same = (sorted(m.at_centroids().points.round(9).tolist()) for m in (mesh, other))
+    assert centroids == same
+
+
+def test_saved_mesh_is_read_back_the_same(default_mesh: TriangleMesh, tmp_path: Path) -> None:
+    default_mesh.save(tmp_path / "mesh.npz")
+    assert TriangleMesh.load(tmp_path / "mesh.npz").digest == default_mesh.digest
+
+
+def test_random_points_in_triangles_are_found(mesh: TriangleMesh) -> None:
+    rng = np.random.default_rng(5)
+    cells = rng.integers(len(mesh.triangles), size=2000)
+    weights = rng.dirichlet([1, 1, 1], size=2000)
+    points = np.einsum("nc,ncx->nx", weights, mesh.points[mesh.triangles[cells]])
+    found = mesh.locate(points)
+    assert (found.cells == cells).mean() > 0.999  # a point on an edge may go to either side
+    np.testing.assert_allclose(
+        np.einsum("nc,ncx->nx", found.barycentric, mesh.points[mesh.triangles[found.cells]]), points, atol=1e-9
+    )
+    assert found.barycentric.min() >= -1e-9
+
+
+def test_every_node_is_found(mesh: TriangleMesh) -> None:
+    found = mesh.locate(mesh.points)
+    np.testing.assert_allclose(found.barycentric.max(axis=1), 1, atol=1e-9)
+
+
+def test_points_are_inside_exactly_where_the_section_is() -> None:
+    mesh = build_default()
+    section = finger_section(Design())
+    body = Polygon(section.outer, holes=section.cells)
+    rng = np.random.default_rng(6)
+    points = rng.uniform([-5, -35], [95, 5], size=(1500, 2))
+    for point in points:
+        inside = body.contains(Point(*point))
+        if body.exterior.distance(Point(*point)) < 1e-6:
+            continue
+        try:
+            mesh.locate(point[None])
+            located = True
+        except OutsideBodyError:
+            located = False
+        assert located == inside, point
+
+
+def build_default() -> TriangleMesh:
+    from geometry import MeshSettings
+    from geometry.mesher import build_mesh
+
+    return build_mesh(Design(), MeshSettings(size=1.0, coarsening=2))
+
+
+def test_point_in_a_cavity_is_named_in_the_error(default_mesh: TriangleMesh) -> None:
+    with pytest.raises(OutsideBodyError, match=r"1 of 2 points lie outside the body, the first at \(6, -10\) mm"):
+        default_mesh.locate([[1.0, -1.0], [6.0, -10.0]])
+
+
+def test_location_at_nodes_and_barycentric_points_agrees_with_search(default_mesh: TriangleMesh) -> None:
+    mesh = default_mesh
+    inner = mesh.at_barycentric([[0.6, 0.3, 0.1], [0.2, 0.2, 0.6]])
+    assert len(inner) == 2 * len(mesh.triangles)
+    found = mesh.locate(inner.points)
+    assert (found.cells == inner.cells).all()
+    np.testing.assert_allclose(found.barycentric, inner.barycentric, atol=1e-10)
+    nodes = mesh.at_nodes()
+    held = np.einsum("nc,ncx->nx", nodes.barycentric, mesh.points[mesh.triangles[nodes.cells]])
+    np.testing.assert_allclose(held, mesh.points, atol=1e-12)

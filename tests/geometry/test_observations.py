@@ -1,0 +1,45 @@
+"""Observations refuse what does not fit together."""
+
+import numpy as np
+import pytest
+
+from geometry import Observations, ShapeError, UserError
+
+
+def observations(**changes: object) -> Observations:
+    parts: dict[str, object] = {
+        "points": np.zeros((3, 2)),
+        "displacements": np.ones((3, 2)),
+        "standard_deviations": np.full((3, 2), 0.01),
+        "visible": [True, False, True],
+        "source": "a test",
+        "simulated": True,
+    }
+    return Observations(**{**parts, **changes})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind", "text"),
+    [
+        ({"points": np.zeros((2, 2))}, ShapeError, "points"),  # a marker is missing
+        ({"displacements": np.zeros((3, 3))}, ShapeError, "displacements"),  # three components
+        ({"standard_deviations": np.zeros(3)}, ShapeError, "standard_deviations"),
+        ({"standard_deviations": np.full((3, 2), -1.0)}, UserError, "zero or more"),
+        ({"displacements": np.full((3, 2), np.nan)}, UserError, "not finite"),
+        ({"visible": [False] * 3}, UserError, "none of the markers is visible"),
+    ],
+)
+def test_what_does_not_fit_is_refused(changes: dict[str, object], kind: type[UserError], text: str) -> None:
+    with pytest.raises(kind, match=text):
+        observations(**changes)
+
+
+def test_no_marker_at_all_is_refused() -> None:
+    empty = np.zeros((0, 2))
+    with pytest.raises(UserError, match="at least one"):
+        observations(points=empty, displacements=empty, standard_deviations=empty, visible=[])
+
+
+@pytest.mark.parametrize(("simulated", "label"), [(True, "simulated"), (False, "measured")])
+def test_label_says_where_the_numbers_come_from(simulated: bool, label: str) -> None:
+    assert observations(simulated=simulated).label == label

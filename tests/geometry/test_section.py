@@ -1,0 +1,110 @@
+"""Closed forms of the section, against shapely and against sums by hand."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from shapely.geometry import LineString, Point, Polygon
+
+from geometry import Design, finger_section, marker_positions
+from geometry.section import corner_area, polygon_area, rib_axes
+
+
+def as_shapely(design: Design) -> Polygon:
+    """The body, with fillets by shapely's own offsetting."""
+    section = finger_section(design)
+    body = Polygon(section.outer)
+    for corners in section.cells:
+        cell = Polygon(corners)
+        radius = section.fillet_radius
+        if radius:
+            cell = cell.buffer(-radius, join_style="mitre").buffer(radius, quad_segs=4000)
+        body = body.difference(cell)
+    return body
+
+
+def test_area_and_perimeter_agree_with_shapely(design: Design) -> None:
+    section, body = finger_section(design), as_shapely(design)
+    assert section.area == pytest.approx(body.area, rel=1e-7)
+    assert section.perimeter == pytest.approx(body.length, rel=1e-7)
+
+
+def test_section_has_one_cell_more_than_ribs_and_none_touches_another(design: Design) -> None:
+    section = finger_section(design)
+    assert len(section.cells) == len(section.ribs) + 1 == design.rib_count + 1
+    cells = [Polygon(corners) for corners in section.cells]
+    outer = Polygon(section.outer)
+    assert all(cell.is_valid and polygon_area(np.array(cell.exterior.coords[:-1])) > 0 for cell in cells)
+    assert all(outer.contains(cell) for cell in cells)
+    assert all(first.distance(second) > 0 for first, second in pairwise(cells))
+
+
+def test_walls_have_their_thickness_normal_to_their_faces(design: Design) -> None:
+    section = finger_section(design)
+    base, apex = (LineString(section.outer[[0, 1]]), LineString(section.outer[[1, 2]]))
+    front = LineString(section.outer[[2, 0]])
+    cells = [Polygon(corners) for corners in section.cells]
+    assert min(cell.distance(front) for cell in cells) == pytest.approx(design.front_thickness, rel=1e-12)
+    assert min(cell.distance(apex) for cell in cells) == pytest.approx(design.back_thickness, rel=1e-12)
+    assert min(cell.distance(base) for cell in cells) == pytest.approx(design.base_thickness, rel=1e-12)
+    for first, second in pairwise(cells):
+        assert first.distance(second) == pytest.approx(design.rib_thickness, rel=1e-9)
+
+
+def test_cavity_ends_where_the_tip_block_begins(design: Design) -> None:
+    section = finger_section(design)
+    assert max(corners[:, 0].max() for corners in section.cells) == pytest.approx(
+        design.height - design.tip_length
+    )
+
+
+@pytest.mark.parametrize(
+    ("angle", "leans"),
+    [
+        (20, 1),  # toward the tip: x grows from the front wall to the back wall
+        (-15, -1),
+        (0, 0),  # along the front wall's normal
+    ],
+)
+def test_ribs_slope_by_their_angle(angle: float, leans: int) -> None:
+    axes = rib_axes(Design(rib_angle=angle))
+    run, drop = axes[:, 1, 0] - axes[:, 0, 0], axes[:, 0, 1] - axes[:, 1, 1]
+    assert np.sign(np.round(run, 12)).tolist() == [leans] * 4
+    np.testing.assert_allclose(np.degrees(np.arctan2(run, drop)), angle, atol=1e-12)
+
+
+def test_ribs_are_evenly_spaced_along_the_front_wall() -> None:
+    feet = [corners[[0, 3], 0].mean() for corners in finger_section(Design()).ribs]
+    np.testing.assert_allclose(feet, 2 + 68 / 5 * np.arange(1, 5), rtol=1e-14)
+
+
+def test_boundary_lengths_of_the_papers_finger() -> None:
+    lengths = finger_section(Design()).boundary_lengths
+    assert lengths == pytest.approx({"base": 30, "front": 90, "back": np.hypot(90, 30), "contact": 2})
+
+
+def test_fillet_of_a_right_angle_leaves_a_square_less_a_quarter_circle() -> None:
+    assert corner_area(np.pi / 2, 2.0) == pytest.approx(4 - np.pi)
+
+
+def test_front_markers_are_evenly_spaced_on_the_centre_line() -> None:
+    markers = marker_positions(Design())
+    np.testing.assert_allclose(markers[:, 0], np.arange(9, 90, 9))
+    np.testing.assert_allclose(markers[:, 1], -1)
+
+
+def test_joint_markers_lie_on_ribs_and_centre_lines_and_the_last_on_the_bisector() -> None:
+    design = Design(marker_layout="joints")
+    markers = marker_positions(design)
+    assert markers.shape == (9, 2)
+    assert (np.diff(markers[:, 0]) > 0).all()
+    back = LineString([(0, -30), (90, 0)])
+    depths = np.array([min(-y, back.distance(Point(x, y))) for x, y in markers])
+    np.testing.assert_allclose(depths[:-1], 1, atol=1e-12)
+    assert -markers[-1, 1] == pytest.approx(back.distance(Point(*markers[-1])))
+
+
+def test_every_marker_lies_in_the_material(design: Design) -> None:
+    body = as_shapely(design)
+    for x, y in marker_positions(design):
+        assert body.contains(Point(x, y).buffer(design.marker_diameter / 2))
