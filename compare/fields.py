@@ -19,9 +19,9 @@ def write_vtu(path: Path, mesh: TriangleMesh, evaluation: Evaluation) -> None:
 
     At the nodes: `displacement_mm` (u, v, 0).
 
-    In the triangles, each the area-weighted mean over the triangle: `strain_xx`, `strain_yy`, `strain_xy` (the
-    tensor's component, half the engineering shear), `stress_MPa` (Cauchy; six components named XX to XZ, of which
-    YZ and XZ are zero), `stress_zz_MPa`, `von_mises_MPa`, `energy_density_MPa`.
+    In the triangles, each the area-weighted mean over the triangle: `strain_xx`, `strain_yy`, `strain_xy`
+    (the tensor's component, half the engineering shear), `stress_MPa` (Cauchy; six components named XX to XZ,
+    of which YZ and XZ are zero), `stress_zz_MPa`, `von_mises_MPa`, `energy_density_MPa`.
 
     For the whole: `solver`, `status`, `energy_N_mm_per_mm`, `reaction_N_per_mm`.
 

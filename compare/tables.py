@@ -41,7 +41,7 @@ def write_markers(path: Path, *, evaluations: Sequence[Evaluation], observations
 def write_summary(
     path: Path, *, evaluations: Sequence[Evaluation], observations: Observations, reference: Evaluation
 ) -> None:
-    """Write a row a solver: errors at the markers, differences from the reference, energy, reaction, status."""
+    """Write a row a solver: errors at the markers, distance from the reference, energy, reaction, status."""
     write_csv(path, [_summary(evaluation, observations, reference) for evaluation in evaluations])
 
 

@@ -1,9 +1,10 @@
 """Every picture of a comparison.
 
-`draw_all` is the one entry; what it needs is imported when it runs, so that a run without pictures starts fast.
+`draw_all` is the one entry; what it needs is imported when it runs, so that a run without pictures starts
+fast.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -59,12 +60,6 @@ def draw_all(
     figures: list[Figure] = []
     for number, (what, draw) in enumerate(tasks):
         progress(number / len(tasks), what)
-        figures.extend(_drawn(draw))
+        figures += [figure for figure in [draw()] if figure is not None]
     progress(1.0, "pictures drawn")
     return figures
-
-
-def _drawn(draw: Callable[[], Figure | None]) -> Iterator[Figure]:
-    figure = draw()
-    if figure is not None:
-        yield figure

@@ -74,9 +74,9 @@ def scale_bar(axes: Axes, extent: Extent, *, corner: str = "lower right") -> Non
         corner: `lower right` or `lower left`.
     """
     length = round_length(extent.width / 8)
-    right = extent.right - 0.01 * extent.width
-    left = right - length if corner == "lower right" else extent.left + 0.01 * extent.width
-    y = extent.bottom + 0.02 * extent.width
+    inset = 0.02 * extent.width
+    left = extent.right - inset - length if corner == "lower right" else extent.left + inset
+    y = extent.bottom + inset
     axes.plot([left, left + length], [y, y], color=INK, linewidth=1.6, solid_capstyle="butt", zorder=6)
     axes.text(
         left + length / 2, y + 0.008 * extent.width, f"{length:g} mm", ha="center", va="bottom", size=7.5

@@ -63,11 +63,13 @@ class Canvas:
             self._aim()
 
     def __enter__(self) -> Self:
+        """The canvas itself."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        """Free the graphics memory."""
         self._plotter.close()
 
     def picture(self, colours: Pixels, points: FloatArray | None = None) -> Pixels:
@@ -106,7 +108,7 @@ def _in_space(points: FloatArray) -> FloatArray:
 
 @contextmanager
 def _without_warnings() -> Iterator[None]:
-    """VTK tries an X server, then EGL, then OSMesa, and warns at each that is missing; one that works is enough."""
+    """VTK tries X, then EGL, then OSMesa, and warns at each that is missing; one that works is enough."""
     before = vtkLogger.GetCurrentVerbosityCutoff()
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     try:

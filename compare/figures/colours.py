@@ -14,7 +14,7 @@ from compare.metrics import weighted_percentile
 from geometry.arrays import FloatArray
 
 PERCENT = 99.5
-"""Share of the area that a colour scale covers: the peaks at re-entrant corners would leave the rest in one colour."""
+"""Share of the area within a colour scale; peaks at re-entrant corners would leave the rest in one colour."""
 
 _BLUE, _GREY, _RED = (0.42, -0.035, -0.145), (0.955, 0.0, 0.0), (0.45, 0.165, 0.075)
 
@@ -44,7 +44,7 @@ class Scale(NamedTuple):
 
 
 def sequential(values: FloatArray, weights: FloatArray) -> Scale:
-    """A scale from zero to the percentile of non-negative values, shape (q,), under area weights, shape (q,)."""
+    """A scale from zero to the percentile of values, shape (t,), under area weights, shape (t,)."""
     return Scale(0.0, _positive(weighted_percentile(values, weights, PERCENT)), mpl.colormaps["viridis"])
 
 
@@ -58,7 +58,8 @@ def symmetric(fields: Sequence[FloatArray], weights: FloatArray) -> Scale:
 def diverging() -> Colormap:
     """Blue, light grey, red along straight lines in OKLab: perceptually uniform on either side of zero.
 
-    Source: B. Ottosson, "A perceptual color space for image processing" (2020), the matrices from OKLab to linear sRGB.
+    Source: B. Ottosson, "A perceptual color space for image processing" (2020): the matrices from OKLab to
+    linear sRGB.
     """
     steps = np.linspace(0, 1, 128)[:, None]
     blue, grey, red = (np.array(colour) for colour in (_BLUE, _GREY, _RED))

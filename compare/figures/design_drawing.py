@@ -14,6 +14,7 @@ from compare.figures.dimensions import Draughtsman
 from compare.figures.style import BODY, INK, MEASURED, WIDTH, axes_at, figure, heading
 from geometry.arrays import FloatArray
 from geometry.markers import marker_positions
+from geometry.outline import fillet_points
 from geometry.parameters import Parameters
 from geometry.section import Section, corner_angles, finger_section, rib_direction
 
@@ -26,12 +27,12 @@ HEAD, FOOT = 0.28, 0.42
 
 
 def draw_design(path: Path, design: Parameters) -> None:
-    """Draw the section of a finger, to scale, with a dimension line for each of the paper's nine parameters."""
+    """Draw the section of a finger, to scale, with a dimension for each of the paper's nine parameters."""
     em = design.height * POINT / (1 - (LEFT + RIGHT) * POINT)
     extent = Extent(-LEFT * em, design.height + RIGHT * em, -design.base_width - BELOW * em, ABOVE * em)
     height = WIDTH * extent.height / extent.width
     with figure(path, HEAD + height + FOOT) as drawn:
-        heading(drawn, f"Design {design.name!r}")
+        heading(drawn, f"Design “{design.name}”")
         axes = axes_at(drawn, (0, HEAD, WIDTH, height))
         body.prepare(axes, extent)
         shape = finger_section(design)
@@ -43,9 +44,10 @@ def draw_design(path: Path, design: Parameters) -> None:
         _contact(pen, design)
         _ribs(pen, design, shape)
         _markers(pen, design)
+        markers = f"{len(marker_positions(design))} markers, layout “{design.marker_layout}”"
         drawn.legend(
             handles=[
-                Line2D([], [], ls="", marker="o", ms=4, color=MEASURED, label=f"{len(marker_positions(design))} markers, layout {design.marker_layout!r}"),
+                Line2D([], [], ls="", marker="o", ms=4, color=MEASURED, label=markers),
                 Line2D([], [], color=CONTACT, lw=3, label=f"contact, {design.contact_width:g} mm wide"),
                 Line2D([], [], ls="", label=rf"$N$ = {design.rib_count} ribs"),
                 Line2D([], [], ls="", label=rf"$W$ = {design.depth:g} mm (depth, out of the plane)"),
@@ -61,20 +63,24 @@ def _body(axes: Axes, shape: Section) -> None:
 
 
 def _rounded(corners: FloatArray, radius: float) -> Outline:
-    """A convex polygon with its corners rounded."""
+    """A convex polygon with its corners rounded: cubic curves, within 0.03 % of the radius of the arcs."""
     if radius == 0:
         return Outline(np.concatenate([corners, corners[:1]]), closed=True)
-    vertices: list[FloatArray] = []
-    codes: list[int] = []
-    cuts = radius / np.tan(corner_angles(corners) / 2)
-    for corner, before, after, cut in zip(
-        corners, np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0), cuts, strict=True
-    ):
-        enter = corner + (before - corner) / np.linalg.norm(before - corner) * cut
-        leave = corner + (after - corner) / np.linalg.norm(after - corner) * cut
-        vertices += [enter, corner, leave]
-        codes += [Outline.LINETO if codes else Outline.MOVETO, Outline.CURVE3, Outline.CURVE3]
-    return Outline([*vertices, vertices[0]], [*codes, Outline.CLOSEPOLY])
+    angles = corner_angles(corners)
+    pull = 4 / 3 * np.tan((np.pi - angles) / 4) * np.tan(angles / 2)
+    vertices = []
+    for which, corner in enumerate(corners):
+        enter, _, leave = fillet_points(corners, which, radius)
+        vertices += [
+            enter,
+            enter + (corner - enter) * pull[which],
+            leave + (corner - leave) * pull[which],
+            leave,
+        ]
+    codes = [Outline.LINETO, Outline.CURVE4, Outline.CURVE4, Outline.CURVE4] * len(corners)
+    return Outline(
+        np.array([*vertices, vertices[0]]), np.array([Outline.MOVETO, *codes[1:], Outline.CLOSEPOLY])
+    )
 
 
 def _lengths(pen: Draughtsman, design: Parameters) -> None:
@@ -105,7 +111,8 @@ def _ribs(pen: Draughtsman, design: Parameters, shape: Section) -> None:
     d, em = design, pen.em
     cell = shape.cells[min(1, len(shape.cells) - 1)]
     x = float(cell[[0, 3], 0].mean())
-    pen.thickness((x, 0), (x, -d.front_thickness), (x, 1.5 * em), rf"$t_\mathrm{{flex}}$ = {d.front_thickness:g} mm", side="center")  # fmt: skip
+    text = rf"$t_\mathrm{{flex}}$ = {d.front_thickness:g} mm"
+    pen.thickness((x, 0), (x, -d.front_thickness), (x, 1.5 * em), text, side="center")
     outward = np.array([d.base_width, -d.height]) / np.hypot(d.base_width, d.height)
     inner = shape.cells[-1][1:3].mean(axis=0)
     face = inner + outward * d.back_thickness

@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.patches import Arc
+from matplotlib.text import Text
 
 from compare.figures.style import INK
 from geometry.arrays import FloatArray
@@ -38,12 +40,11 @@ class Draughtsman:
             text: Symbol and value.
         """
         shift = np.asarray(away, dtype=np.float64)
-        beyond = shift * (1 + 0.4 * self.em / np.linalg.norm(shift))
+        length = float(np.linalg.norm(shift))
+        beyond = shift * (1 + 0.4 * self.em / length)
         tail, head = np.asarray(start) + shift, np.asarray(end) + shift
         for point in (start, end):
-            self._line(
-                np.asarray(point) + shift * min(0.3 * self.em / np.linalg.norm(shift), 1), point + beyond
-            )
+            self._line(np.asarray(point) + shift * (0.3 * self.em / length), point + beyond)
         self._arrow(tail, head, "<|-|>")
         along = head - tail
         angle = float(np.degrees(np.arctan2(along[1], along[0])))
@@ -93,12 +94,12 @@ class Draughtsman:
         middle = np.asarray(first) + np.asarray(second)
         self.text(centre + middle / np.linalg.norm(middle) * (radius + 1.2 * self.em), text, va="top")
 
-    def text(self, where: Point, text: str, **options: object) -> object:
+    def text(self, where: Point, text: str, **options: Any) -> Text:
         """Text with a white halo, in the drawing's type."""
-        settings = {"ha": "center", "color": INK, "zorder": 7, "path_effects": HALO} | options
+        settings: dict[str, Any] = {"ha": "center", "color": INK, "zorder": 7, "path_effects": HALO} | options
         return self.axes.text(float(where[0]), float(where[1]), text, **settings)
 
-    def _line(self, start: Point, end: Point, style: object = "-") -> None:
+    def _line(self, start: Point, end: Point, style: Any = "-") -> None:
         self.axes.plot(
             [start[0], end[0]], [start[1], end[1]], color=INK, linewidth=LINE, linestyle=style, zorder=5
         )

@@ -14,7 +14,7 @@ from compare.figures.canvas import Canvas, Extent
 from compare.figures.colours import PERCENT, Scale, sequential, symmetric
 from compare.figures.labels import solver_label
 from compare.figures.style import MUTED, WIDTH, axes_at, figure, heading
-from compare.metrics import field_difference
+from compare.metrics import COMPONENTS, field_difference
 from geometry.arrays import FloatArray
 from geometry.mesh import TriangleMesh
 
@@ -29,9 +29,9 @@ class Quantity(NamedTuple):
     Attributes:
         name: File name without suffix.
         title: What the heading calls it.
-        symbol: For the colour bar, in mathematical notation.
-        unit: `MPa`, or nothing for a strain.
-        signed: Whether its scale is symmetric about zero.
+        symbol: For the colour bar, in mathematical notation without the dollar signs.
+        unit: `MPa` or `%`.
+        signed: Whether its scale is symmetric about zero; else it starts there.
         values: From an evaluation to the field at the quadrature points, shape (q,).
     """
 
@@ -49,42 +49,47 @@ def max_principal(strain: FloatArray) -> FloatArray:
     return np.asarray(mean + np.hypot((strain[:, 0, 0] - strain[:, 1, 1]) / 2, strain[:, 0, 1]))
 
 
+def strain_percent(component: str) -> Callable[[Evaluation], FloatArray]:
+    """The function that gives one strain component, `xx`, `yy` or `xy`, in percent."""
+    row, column = COMPONENTS[component]
+    return lambda evaluation: 100 * evaluation.strain[:, row, column]
+
+
 QUANTITIES = (
-    Quantity("von_mises", "Von Mises stress", r"$\sigma_\mathrm{vM}$", "MPa", False, lambda e: e.von_mises),
+    Quantity("von_mises", "Von Mises stress", r"\sigma_\mathrm{vM}", "MPa", False, lambda e: e.von_mises),
     Quantity(
         "strain_principal",
         "Largest in-plane principal strain",
-        r"$\varepsilon_1$",
-        "",
-        True,
-        lambda e: max_principal(e.strain),
+        r"\varepsilon_1",
+        "%",
+        False,
+        lambda e: 100 * max_principal(e.strain),
     ),
-    Quantity(
-        "strain_xx", "Strain component xx", r"$\varepsilon_{xx}$", "", True, lambda e: e.strain[:, 0, 0]
-    ),
-    Quantity(
-        "strain_yy", "Strain component yy", r"$\varepsilon_{yy}$", "", True, lambda e: e.strain[:, 1, 1]
-    ),
-    Quantity(
-        "strain_xy", "Strain component xy", r"$\varepsilon_{xy}$", "", True, lambda e: e.strain[:, 0, 1]
-    ),
+    Quantity("strain_xx", "Strain component xx", r"\varepsilon_{xx}", "%", True, strain_percent("xx")),
+    Quantity("strain_yy", "Strain component yy", r"\varepsilon_{yy}", "%", True, strain_percent("yy")),
+    Quantity("strain_xy", "Strain component xy", r"\varepsilon_{xy}", "%", True, strain_percent("xy")),
 )
 
 
-def field_scale(quantity: Quantity, reference: Evaluation) -> Scale:
+def triangle_values(quantity: Quantity, evaluation: Evaluation) -> FloatArray:
+    """What is drawn: the mean of the quantity over each triangle, shape (t,)."""
+    return evaluation.per_triangle(quantity.values(evaluation))
+
+
+def field_scale(quantity: Quantity, mesh: TriangleMesh, reference: Evaluation) -> Scale:
     """The scale that every solver's field is drawn on: it covers the percentile of the reference's area."""
-    values = quantity.values(reference)
-    return (
-        symmetric([values], reference.weights) if quantity.signed else sequential(values, reference.weights)
-    )
+    values = triangle_values(quantity, reference)
+    return symmetric([values], mesh.areas) if quantity.signed else sequential(values, mesh.areas)
 
 
-def difference_scale(quantity: Quantity, evaluations: Sequence[Evaluation], reference: Evaluation) -> Scale:
-    """The scale of every difference: it covers the percentile in each solver that converged (in all if none did)."""
+def difference_scale(
+    quantity: Quantity, mesh: TriangleMesh, evaluations: Sequence[Evaluation], reference: Evaluation
+) -> Scale:
+    """The scale of every difference: it covers the percentile in each solver that converged (or in all)."""
     others = [evaluation for evaluation in evaluations if evaluation is not reference]
     chosen = [evaluation for evaluation in others if evaluation.converged] or others
-    base = quantity.values(reference)
-    return symmetric([quantity.values(evaluation) - base for evaluation in chosen], reference.weights)
+    base = triangle_values(quantity, reference)
+    return symmetric([triangle_values(quantity, evaluation) - base for evaluation in chosen], mesh.areas)
 
 
 def draw_field(
@@ -96,17 +101,17 @@ def draw_field(
     evaluations: Sequence[Evaluation],
     reference: Evaluation,
 ) -> None:
-    """Draw one quantity on the undeformed body: a row a solver, the difference from the reference to its right."""
+    """Draw a quantity on the undeformed body: a row a solver, its difference from the reference beside it."""
     ordered = [reference, *(evaluation for evaluation in evaluations if evaluation is not reference)]
     columns = 1 if len(ordered) == 1 else 2
     width = (WIDTH - MARGIN * (columns + 1)) / columns
     height = width * canvas.extent.height / canvas.extent.width
-    scale = field_scale(quantity, reference)
-    differences = difference_scale(quantity, ordered, reference)
+    scale = field_scale(quantity, mesh, reference)
+    differences = difference_scale(quantity, mesh, ordered, reference)
     total = HEAD + len(ordered) * (PANEL_TITLE + height) + FOOT
     edges = body.boundary_edges(mesh)
     base = quantity.values(reference)
-    unit = f" {quantity.unit}" if quantity.unit else ""
+    size = f"$|{quantity.symbol}|$" if quantity.signed else f"${quantity.symbol}$"
 
     def panel(row: int, column: int, colours: Scale, values: FloatArray, of: Evaluation) -> Axes:
         left, top = MARGIN + column * (width + MARGIN), HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
@@ -122,11 +127,17 @@ def draw_field(
             values = quantity.values(evaluation)
             axes = panel(row, 0, scale, values, evaluation)
             axes.set_title(solver_label(evaluation), size=8.5, pad=2, weight="bold")
-            axes.set_title(f"max {np.abs(values).max():.3g}{unit}", size=7, pad=2, loc="right", color=MUTED)
+            axes.set_title(
+                f"max {size} = {np.abs(values).max():.3g} {quantity.unit}",
+                size=7,
+                pad=2,
+                loc="right",
+                color=MUTED,
+            )
             if evaluation is not reference:
                 axes = panel(row, 1, differences, values - base, evaluation)
                 norm = field_difference(values, base, reference.weights).rel_l2
-                axes.set_title(f"minus {reference.solver}", size=8.5, pad=2)
+                axes.set_title(f"minus {solver_label(reference)}", size=8.5, pad=2)
                 axes.set_title(
                     f"rel. $L^2$ {norm:.2%}".replace("%", r" %"), size=7, pad=2, loc="right", color=MUTED
                 )
@@ -145,7 +156,7 @@ def _explain(drawn: MplFigure, box: tuple[float, float, float, float], reference
     axes = axes_at(drawn, box)
     axes.set_axis_off()
     text = (
-        f"Reference: {reference.solver}\n"
+        f"Reference: {solver_label(reference)}\n"
         f"Scales end at the {PERCENT:g} % point of the\narea (left: of the reference; right:\n"
         "of the differences). Values beyond\ntake the end colours."
     )
@@ -161,12 +172,12 @@ def _bars(
     width: float,
     total: float,
 ) -> None:
-    unit = f", {quantity.unit}" if quantity.unit else ""
     inset = 0.1 * width
     for column, (colours, title) in enumerate(
-        [(scale, f"{quantity.symbol}{unit}"), (differences, f"difference of {quantity.symbol}{unit}")][
-            :columns
-        ]
+        [
+            (scale, f"${quantity.symbol}$, {quantity.unit}"),
+            (differences, f"difference of ${quantity.symbol}$, {quantity.unit}"),
+        ][:columns]
     ):
         left = MARGIN + column * (width + MARGIN) + inset
         axes = axes_at(drawn, (left, total - FOOT + 0.1, width - 2 * inset, 0.09))

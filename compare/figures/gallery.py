@@ -8,11 +8,12 @@ from pathlib import Path
 from compare.evaluation import Evaluation
 from compare.figures import Figure, body
 from compare.figures.canvas import Canvas
-from compare.figures.charts import draw_energy, draw_marker_errors
 from compare.figures.colours import PERCENT
 from compare.figures.design_drawing import draw_design
+from compare.figures.energy_chart import draw_energy
 from compare.figures.fields import QUANTITIES, Quantity, draw_field, field_extent
 from compare.figures.labels import solver_label
+from compare.figures.marker_chart import draw_marker_errors
 from compare.figures.mesh_drawing import draw_mesh, mesh_numbers
 from compare.figures.overlay import draw_overlay
 from geometry.mesh import TriangleMesh
@@ -54,9 +55,9 @@ class Gallery:
         return Figure(
             path,
             "Deformed finger",
-            f"The deformed body of each solver, coloured by displacement magnitude on one scale; the displacement is "
-            f"not exaggerated. Circles: {self.observations.label} marker positions. Crosses: the solver's. Grey: the "
-            f"undeformed body. {self._simulated()}",
+            f"The deformed body of each solver, coloured by displacement magnitude on one scale; the "
+            f"displacement is not exaggerated. Circles: {self.observations.label} marker positions. Crosses: "
+            f"the solver’s. Grey: the undeformed body. {self._simulated()}",
         )
 
     def marker_errors(self) -> Figure:
@@ -72,8 +73,8 @@ class Gallery:
         return Figure(
             path,
             "Errors at the markers",
-            f"Absolute difference between each solver's displacement and the {self.observations.label} one, for "
-            f"both components; markers are numbered from base to tip.{unseen} {self._simulated()}",
+            f"Absolute difference between each solver’s displacement and the {self.observations.label} one, "
+            f"for both components; markers are numbered from base to tip.{unseen} {self._simulated()}",
         )
 
     def field(self, quantity: Quantity) -> Figure:
@@ -89,17 +90,17 @@ class Gallery:
                 reference=self.reference,
             )
         beside = (
-            f" Right: the field minus that of {solver_label(self.reference)}, point by point; its scale ends at the "
-            f"same share of the largest difference."
+            f" Right: the field minus that of {solver_label(self.reference)}, point by point; the scale ends "
+            f"at the same share of the area of the solver that is farthest from it."
             if len(self.evaluations) > 1
             else ""
         )
         return Figure(
             path,
             quantity.title,
-            f"{quantity.title} of every solver on the undeformed body, each triangle in the colour of its mean, on one "
-            f"scale that ends where {PERCENT:g} % of the area of {self.reference.solver} lie below it (in absolute "
-            f"value).{beside}",
+            f"{quantity.title} of every solver on the undeformed body, each triangle in the colour of its "
+            f"mean. One scale for all: {PERCENT:g} % of the area of {solver_label(self.reference)} lie "
+            f"within it, the peaks at the corners take the end colours.{beside}",
         )
 
     def energy(self) -> Figure | None:
@@ -111,8 +112,9 @@ class Gallery:
         return Figure(
             path,
             "Energy",
-            f"Elastic energy per unit depth as each solver went on; the dashed line is that of "
-            f"{solver_label(self.reference)}. A solver that solves directly keeps no record.",
+            f"Elastic energy per unit depth as each solver went on and, beside it, its relative distance "
+            f"from that of {solver_label(self.reference)} (dashed line). A solver that solves directly "
+            f"keeps no record.",
         )
 
     def drawing(self) -> Figure:
@@ -122,8 +124,8 @@ class Gallery:
         return Figure(
             path,
             "Design",
-            f"The finger {self.design.name!r} with its dimensions under the paper's symbols, the clamped base, the "
-            f"contact and the markers (to scale).",
+            f"The finger “{self.design.name}”, to scale, with its dimensions under the paper’s symbols, the "
+            f"clamped base, the contact and the markers.",
         )
 
     def mesh_picture(self) -> Figure:
@@ -134,9 +136,10 @@ class Gallery:
         return Figure(
             path,
             "Mesh",
-            f"The mesh that every solver shares: {numbers.nodes} nodes, {numbers.triangles} triangles, edges from "
-            f"{numbers.shortest:.3g} to {numbers.longest:.3g} mm. Quality is twice the ratio of the inscribed to the "
-            f"circumscribed radius (1 for an equilateral triangle): worst {numbers.worst:.2f}, mean {numbers.mean:.2f}.",
+            f"The mesh that every solver shares: {numbers.nodes} nodes, {numbers.triangles} triangles, edges "
+            f"from {numbers.shortest:.3g} to {numbers.longest:.3g} mm. Quality is twice the ratio of the "
+            f"inscribed to the circumscribed radius (1 for an equilateral triangle): worst "
+            f"{numbers.worst:.2f}, mean {numbers.mean:.2f}. Orange: the contact. Dots: the markers.",
         )
 
     def _simulated(self) -> str:

@@ -56,7 +56,10 @@ def mesh_numbers(mesh: TriangleMesh) -> MeshNumbers:
 
 
 def quality(mesh: TriangleMesh) -> FloatArray:
-    """Twice the inscribed over the circumscribed radius of every triangle, shape (t,): one if equilateral, zero if flat."""
+    """Twice the inscribed over the circumscribed radius of every triangle, shape (t,).
+
+    One for an equilateral triangle, zero for a flat one.
+    """
     corners = mesh.points[mesh.triangles]
     a, b, c = (np.linalg.norm(corners[:, i] - corners[:, (i + 1) % 3], axis=1) for i in range(3))
     return np.asarray((b + c - a) * (c + a - b) * (a + b - c) / (a * b * c))
@@ -65,8 +68,8 @@ def quality(mesh: TriangleMesh) -> FloatArray:
 def inner_corner(mesh: TriangleMesh, near: float) -> FloatArray:
     """The re-entrant corner of a cavity with the abscissa nearest to `near`, shape (2,), mm.
 
-    Re-entrant means that the body fills more than a straight angle around the node; without one, the node nearest
-    to `near`.
+    Re-entrant means that the body fills more than a straight angle around the node; where there is none, any
+    node of the boundary will do.
     """
     corners = mesh.points[mesh.triangles]
     angle = np.zeros(len(mesh.points))
@@ -87,14 +90,14 @@ def draw_mesh(path: Path, mesh: TriangleMesh) -> None:
     height = width * whole.height / whole.width
     inset_width, inset_height = (WIDTH - 3 * MARGIN) / 2, 1.5
     contact = mesh.points[np.unique(mesh.boundary("contact"))]
-    span = max(4 * float(np.ptp(contact[:, 0])), 0.06 * whole.width)
+    span = max(2.6 * float(np.ptp(contact[:, 0])), 0.055 * whole.width)
     middle = contact.mean(axis=0)
     joint = inner_corner(mesh, float(middle[0]) + 2 * span)
     ratio = inset_height / inset_width
     windows = [
-        ("A: contact", Extent(middle[0] - span / 2, middle[0] + span / 2, middle[1] - 0.9 * span * ratio, middle[1] + 0.1 * span * ratio)),
-        ("B: inner corner", Extent(joint[0] - span / 2, joint[0] + span / 2, joint[1] - span * ratio / 2, joint[1] + span * ratio / 2)),
-    ]  # fmt: skip
+        ("A: contact", _window(middle - (0, 0.33 * span * ratio), span, ratio)),
+        ("B: inner corner", _window(joint, span, ratio)),
+    ]
     numbers = mesh_numbers(mesh)
     note = (
         f"{numbers.nodes} nodes, {numbers.triangles} triangles; edges {numbers.shortest:.3g} to "
@@ -107,7 +110,10 @@ def draw_mesh(path: Path, mesh: TriangleMesh) -> None:
         body.clamp(axes, mesh.points[mesh.boundary("base").ravel()])
         body.scale_bar(axes, whole)
         for number, (title, window) in enumerate(windows):
-            axes.add_patch(Rectangle((window.left, window.bottom), window.width, window.height, fill=False, ec=MEASURED, lw=0.9, zorder=5))  # fmt: skip
+            corner = (window.left, window.bottom)
+            axes.add_patch(
+                Rectangle(corner, window.width, window.height, fill=False, ec=MEASURED, lw=0.9, zorder=5)
+            )
             axes.text(window.right + 0.5, window.bottom, title[0], color=MEASURED, weight="bold", zorder=6)
             left = MARGIN + number * (inset_width + MARGIN)
             inset = axes_at(drawn, (left, HEAD + height + INSET_TITLE, inset_width, inset_height))
@@ -120,13 +126,21 @@ def draw_mesh(path: Path, mesh: TriangleMesh) -> None:
             body.scale_bar(inset, window)
 
 
+def _window(middle: FloatArray, width: float, ratio: float) -> Extent:
+    """A rectangle around a point, `ratio` times as high as wide, mm."""
+    half = np.array([width, width * ratio]) / 2
+    (left, bottom), (right, top) = middle - half, middle + half
+    return Extent(float(left), float(right), float(bottom), float(top))
+
+
 def _draw(axes: Axes, mesh: TriangleMesh, window: Extent, width: float) -> None:
     body.prepare(axes, window)
     ends = mesh.points[mesh.edges]
-    low, high = ends.min(axis=1), ends.max(axis=1)
-    inside = (high[:, 0] > window.left) & (low[:, 0] < window.right) & (high[:, 1] > window.bottom) & (low[:, 1] < window.top)  # fmt: skip
+    beyond = (ends.max(axis=1) < (window.left, window.bottom)) | (
+        ends.min(axis=1) > (window.right, window.top)
+    )
+    inside = ~beyond.any(axis=1)
     axes.add_collection(LineCollection(list(ends[inside]), colors=LINE, linewidths=width), autolim=False)
     body.outline(axes, body.boundary_edges(mesh), mesh.points, colour=INK, width=0.5 if width < 0.3 else 1.0)
     body.outline(axes, mesh.boundary("contact"), mesh.points, colour=CONTACT, width=2.2, zorder=4)
     axes.plot(*mesh.markers.T, "o", ms=2.5, mfc=MEASURED, mec="white", mew=0.5, zorder=4)
-    axes.set_facecolor("white")

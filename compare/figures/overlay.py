@@ -1,4 +1,4 @@
-"""The deformed finger of every solver, with the markers where they were seen and where the solver puts them."""
+"""The deformed finger of every solver, with its markers and those that were seen."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,7 +19,6 @@ from compare.metrics import marker_errors
 from geometry.arrays import FloatArray, IntArray
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
-
 
 MARGIN = 0.12
 HEAD, PANEL_TITLE, FOOT = 0.62, 0.2, 0.48
@@ -72,7 +71,7 @@ def overlay_extent(
         mesh.points + evaluation.node_displacement for evaluation in evaluations if evaluation.converged
     ]
     tight = Extent.around(*clouds, margin=0.03 * span)
-    return tight._replace(top=tight.top + 0.02 * span, bottom=tight.bottom - 0.02 * span)
+    return tight._replace(bottom=tight.bottom - 0.02 * span)
 
 
 def _magnitude(mesh: TriangleMesh, evaluation: Evaluation) -> FloatArray:
@@ -96,7 +95,7 @@ def _panel(
     body.show(axes, canvas.picture(scale.paint(_magnitude(mesh, evaluation)), deformed), extent)
     body.outline(axes, edges, deformed, width=0.4)
     body.clamp(axes, mesh.points[mesh.boundary("base").ravel()])
-    _indenter(axes, mesh, evaluation)
+    _contact_path(axes, mesh, evaluation)
     seen = observations.visible
     observed = observations.points[seen] + observations.displacements[seen]
     computed = mesh.markers + evaluation.marker_displacement
@@ -110,7 +109,7 @@ def _panel(
     axes.set_title(note, size=7.5, pad=3, loc="right", color=MUTED)
 
 
-def _indenter(axes: Axes, mesh: TriangleMesh, evaluation: Evaluation) -> None:
+def _contact_path(axes: Axes, mesh: TriangleMesh, evaluation: Evaluation) -> None:
     nodes = np.unique(mesh.boundary("contact"))
     start = mesh.points[nodes].mean(axis=0)
     end = start + evaluation.node_displacement[nodes].mean(axis=0)
@@ -137,16 +136,18 @@ def _legend(drawn: MplFigure, observations: Observations) -> None:
             mew=1.1,
             label=markers_label(observations),
         ),
-        Line2D([], [], ls="", marker="x", ms=4, color=INK, mew=0.9, label="markers, solver"),
+        Line2D([], [], ls="", marker="x", ms=4, color=INK, mew=0.9, label="solver’s markers"),
         Line2D([], [], color="#9a9a9a", lw=0.9, label="undeformed"),
-        Line2D([], [], color=INK, lw=1, marker=">", ms=3.5, markevery=[1], label="path of the indenter"),
+        Line2D(
+            [], [], color=INK, lw=1, marker=">", ms=3.5, markevery=[1], label="displacement of the contact"
+        ),
     ]
     drawn.legend(
         handles=handles,
         loc="upper left",
         bbox_to_anchor=(0.0, 1 - 0.24 / drawn.get_figheight()),
         ncols=4,
-        columnspacing=1.4,
+        columnspacing=1.2,
         handletextpad=0.5,
         borderaxespad=0.1,
         handlelength=1.6,

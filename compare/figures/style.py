@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -11,6 +11,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as MplFigure
 
 from compare.atomic import atomic_path
+
+if TYPE_CHECKING:
+    from matplotlib.typing import RcKeyType
 
 WIDTH = 5.5
 """Width of every figure, inches: type stays readable when a journal prints it in one column of 88 mm."""
@@ -24,9 +27,9 @@ MEASURED = "#d1006c"
 """Colour of measurements: occurs in none of the colour maps and for no solver."""
 
 SOLVER_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#56b4e9", "#d55e00", "#000000", "#8c6bb1")
-"""Okabe and Ito's palette, told apart by readers who see colours differently, without its pink (`MEASURED`)."""
+"""Okabe and Ito's palette, safe for colour-blind readers, without its pink (see `MEASURED`)."""
 
-_RC: dict[str, Any] = {
+_RC: "dict[RcKeyType, Any]" = {
     "font.family": "DejaVu Sans",
     "font.size": 8.5,
     "axes.titlesize": 9,
@@ -50,7 +53,7 @@ _RC: dict[str, Any] = {
 
 @contextmanager
 def figure(path: Path, height: float) -> Iterator[MplFigure]:
-    """A figure of `WIDTH` by `height` inches that is written atomically when the block ends without an error."""
+    """A figure of `WIDTH` by `height` inches, written atomically when the block ends without an error."""
     with mpl.rc_context(_RC):
         drawn = MplFigure(figsize=(WIDTH, height), facecolor="white")
         FigureCanvasAgg(drawn)

@@ -1,0 +1,123 @@
+"""Energy on the way to the solution, from the record that a solver keeps."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from compare.evaluation import Evaluation
+from compare.figures.labels import solver_label
+from compare.figures.style import INK, WIDTH, axes_at, figure, heading, solver_colour
+from geometry.arrays import FloatArray
+
+LOG_RATIO = 20.0
+"""An axis is logarithmic where the largest value exceeds the smallest by this factor."""
+HEAD, HEIGHT, FOOT, LEFT, GAP = 0.5, 1.6, 0.5, 0.65, 0.75
+ENERGY = "energy"
+
+Group = tuple[str, str]
+
+
+def recorded(evaluations: Sequence[Evaluation]) -> dict[Group, list[Evaluation]]:
+    """The evaluations that have a record, by its abscissa (the first column) and the column to draw over it.
+
+    That is `energy` where there is one, else the second column.
+    """
+    groups: dict[Group, list[Evaluation]] = {}
+    for evaluation in evaluations:
+        abscissa, *others = list(evaluation.history) or [""]
+        if others and len(evaluation.history[abscissa]):
+            column = ENERGY if ENERGY in others else others[0]
+            groups.setdefault((abscissa, column), []).append(evaluation)
+    return groups
+
+
+def approaches_reference(group: Group) -> bool:
+    """Whether the reference's energy is where the record should end.
+
+    The record of a load that grows is a path through other problems, and other columns are no energies.
+    """
+    abscissa, column = group
+    return column == ENERGY and not abscissa.startswith("load")
+
+
+def draw_energy(path: Path, *, evaluations: Sequence[Evaluation], reference: Evaluation) -> bool:
+    """Draw every solver's record, a row for each kind; beside it how far the energy is from the reference's.
+
+    Returns:
+        Whether there was a record to draw.
+    """
+    groups = recorded(evaluations)
+    colours = {evaluation.solver: solver_colour(number) for number, evaluation in enumerate(evaluations)}
+    if not groups:
+        return False
+    with figure(path, len(groups) * (HEAD + HEIGHT + FOOT)) as drawn:
+        heading(drawn, "Energy on the way to the solution")
+        for row, (group, members) in enumerate(groups.items()):
+            others = [evaluation for evaluation in members if evaluation is not reference]
+            compared = others if approaches_reference(group) else []
+            columns = 2 if compared else 1
+            width = (WIDTH - LEFT - 0.15 - (columns - 1) * GAP) / columns
+            top = HEAD + row * (HEAD + HEIGHT + FOOT)
+            axes = axes_at(drawn, (LEFT, top, width, HEIGHT))
+            _records(axes, group, members, colours)
+            if compared:
+                label = f"{solver_label(reference)} {reference.energy:.4g}"
+                dashes = (0, (4, 2))
+                axes.axhline(reference.energy, color=INK, lw=0.9, ls=dashes, label=label, zorder=1)
+                beside = axes_at(drawn, (LEFT + width + GAP, top, width, HEIGHT))
+                _distances(beside, group, compared, colours, reference)
+            drawn.legend(
+                *axes.get_legend_handles_labels(),
+                loc="upper left",
+                bbox_to_anchor=(0.0, 1 - (top - HEAD + 0.24) / drawn.get_figheight()),
+                ncols=2,
+                borderaxespad=0.1,
+            )
+    return True
+
+
+def _records(axes: Axes, group: Group, members: Sequence[Evaluation], colours: dict[str, str]) -> None:
+    abscissa, column = group
+    for evaluation in members:
+        y = evaluation.history[column]
+        label = f"{solver_label(evaluation)}, ends at {y[-1]:.4g}"
+        _line(axes, evaluation.history[abscissa], y, colours[evaluation.solver], label)
+    _scale(axes, group, [evaluation.history[column] for evaluation in members], members)
+    axes.set_ylabel(readable(column))
+
+
+def _distances(
+    axes: Axes, group: Group, members: Sequence[Evaluation], colours: dict[str, str], reference: Evaluation
+) -> None:
+    distances = [np.abs(evaluation.history[ENERGY] / reference.energy - 1) for evaluation in members]
+    for evaluation, distance in zip(members, distances, strict=True):
+        _line(axes, evaluation.history[group[0]], distance, colours[evaluation.solver], None)
+    _scale(axes, group, distances, members)
+    axes.set_ylabel(rf"$|E / E_\mathrm{{{reference.solver.replace('-', '–')}}} - 1|$")
+
+
+def _line(axes: Axes, x: FloatArray, y: FloatArray, colour: str, label: str | None) -> None:
+    marker = "o" if len(x) <= 40 else ""
+    axes.plot(x, y, color=colour, linewidth=1.2, marker=marker, markersize=3, label=label, zorder=2)
+
+
+def _scale(axes: Axes, group: Group, ordinates: Sequence[FloatArray], members: Sequence[Evaluation]) -> None:
+    axes.set_xlabel(readable(group[0]))
+    if wants_log(np.concatenate([evaluation.history[group[0]] for evaluation in members])):
+        axes.set_xscale("log")
+    if wants_log(np.concatenate(ordinates)):
+        axes.set_yscale("log")
+    axes.grid(color="#dddddd", linewidth=0.5)
+
+
+def wants_log(values: FloatArray) -> bool:
+    """Whether a logarithmic axis helps: all values are positive and they span more than `LOG_RATIO`."""
+    finite = values[np.isfinite(values)]
+    return bool(finite.size and finite.min() > 0 and finite.max() > LOG_RATIO * finite.min())
+
+
+def readable(name: str) -> str:
+    """A column's name for an axis: with its unit where it has one, without underscores."""
+    return {"seconds": "time, s", ENERGY: "energy, N mm/mm"}.get(name, name.replace("_", " "))

@@ -1,0 +1,95 @@
+"""Words and numbers of the report."""
+
+import base64
+from collections.abc import Mapping
+from pathlib import Path
+
+from markupsafe import Markup
+
+from geometry.parameters import Parameters, fact
+from solvers.problem import Load, Material
+
+
+def design_rows(design: Parameters) -> list[tuple[str, str, str]]:
+    """The design's parameters as meaning, the paper's symbol, and value with unit."""
+    rows = []
+    for name, described in type(design).model_fields.items():
+        if name in ("name", "contact_position"):
+            continue
+        value = getattr(design, name)
+        meaning = (described.description or name).split(" [")[0].replace("`", "")
+        rows.append((meaning, str(fact(name, "symbol")), _value(value, str(fact(name, "unit")))))
+    return [*rows, ("Abscissa of the contact's middle", "", _value(design.contact_abscissa, "mm"))]
+
+
+def _value(value: object, unit: str) -> str:
+    number = f"{value:g}" if isinstance(value, int | float) else str(value)
+    return number + {"": "", "deg": "°"}.get(unit, f" {unit}")
+
+
+def material_rows(material: Material) -> list[tuple[str, str]]:
+    """The material in words."""
+    law = {"linear": "linear elastic (Hooke)", "neo-hookean": "neo-Hookean, finite strain"}[material.law]
+    constants = f"E = {material.young:g} MPa, Poisson’s ratio {material.poisson:g}"
+    return [("Material", f"{law}, plane {material.plane}; {constants}")]
+
+
+def load_sentence(load: Load, design: Parameters) -> str:
+    """What the indenter does, in a sentence."""
+    width = f"{design.contact_width:g} mm wide contact"
+    where = {
+        "mean": f"The weighted mean displacement of the {width} is prescribed",
+        "point": "The displacement of one point, the contact’s middle, is prescribed",
+        "patch": f"Every point of the {width} has the prescribed displacement",
+    }[load.kind]
+    parts = [
+        f"{name} is free" if value is None else f"{name} = {number(value)} mm"
+        for name, value in zip("uv", load.displacement, strict=True)
+    ]
+    about = f"about x = {design.contact_abscissa:g} mm on the front face"
+    return f"{where}: {', '.join(parts)}, {about} (load “{load.kind}”)."
+
+
+def grouped(provenance: Mapping[str, object]) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Provenance as groups of lines; what is not in a mapping comes first, in a group without a title."""
+    loose = [(key, str(value)) for key, value in provenance.items() if not isinstance(value, Mapping)]
+    groups = [("", loose)] if loose else []
+    for key, value in provenance.items():
+        if isinstance(value, Mapping):
+            groups.append((key, [(str(inner), str(entry)) for inner, entry in value.items()]))
+    return groups
+
+
+def embedded(path: Path) -> str:
+    """A PNG file as a data URL."""
+    return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
+
+
+def symbol(name: str) -> Markup:
+    """A symbol of the paper, such as `L_tip`, with its index set as one."""
+    letter, _, index = name.partition("_")
+    return (
+        Markup("<i>{}</i><sub>{}</sub>").format(letter, index)
+        if index
+        else Markup("<i>{}</i>").format(letter)
+    )
+
+
+def stat(value: object) -> str:
+    """A number of a solver's record: whole numbers in full, others with four digits."""
+    return number(value) if isinstance(value, float) else str(value)
+
+
+def sentence(text: str) -> str:
+    """The text with a capital at its start and one full stop at its end."""
+    return text[:1].upper() + text[1:].rstrip(". ") + "."
+
+
+def number(value: float, digits: int = 4) -> str:
+    """A number with so many significant digits, with a typographic minus."""
+    return f"{value:.{digits}g}".replace("-", "−")
+
+
+def percent(value: float) -> str:
+    """A share as a percentage with three significant digits."""
+    return f"{100 * value:.3g} %".replace("-", "−")
