@@ -10,7 +10,8 @@ cd "$(dirname "$0")/.."
 say() { printf 'setup: %s\n' "$*"; }
 stop() { printf 'setup: cannot go on: %s\n' "$*" >&2; exit 1; }
 elsewhere='Ways on that need neither root nor Debian:
-  container  docker build -t pinn-ray . && mkdir -p out && docker run --rm --user "$(id -u)" -v "$PWD/out:/out" pinn-ray
+  container  docker build -t pinn-ray . && mkdir -p out &&
+             docker run --rm --user "$(id -u)" -v "$PWD/out:/out" pinn-ray
   conda      conda create -n pinn-ray -c conda-forge python=3.12 fenics-dolfinx && conda activate pinn-ray &&
              pip install -e ".[dev]", then call compare and pytest instead of make'
 
