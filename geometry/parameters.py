@@ -7,8 +7,8 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 
-def _parameter(default: Any, low: float, high: float, unit: str, symbol: str, meaning: str) -> Any:
-    """A bounded number, described once for validation, messages and help texts."""
+def bounded(default: Any, low: float, high: float, unit: str, symbol: str, meaning: str) -> Any:
+    """A bounded number of a model, described once for validation, messages and help texts."""
     return Field(
         default=default,
         ge=low,
@@ -36,10 +36,10 @@ class Parameters(BaseModel):
         pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$",
         description="What files and reports call the design; no part of the geometry",
     )
-    height: float = _parameter(90.0, 10, 500, "mm", "H", "Length from the base to the tip")
-    base_width: float = _parameter(30.0, 3, 200, "mm", "L", "Width of the base, in the plane")
-    depth: float = _parameter(20.0, 1, 200, "mm", "W", "Depth of the extrusion, out of the plane")
-    rib_angle: float = _parameter(
+    height: float = bounded(90.0, 10, 500, "mm", "H", "Length from the base to the tip")
+    base_width: float = bounded(30.0, 3, 200, "mm", "L", "Width of the base, in the plane")
+    depth: float = bounded(20.0, 1, 200, "mm", "W", "Depth of the extrusion, out of the plane")
+    rib_angle: float = bounded(
         20.0,
         -60,
         60,
@@ -47,34 +47,28 @@ class Parameters(BaseModel):
         "L_angle",
         "Slope of the ribs from the front wall's normal, positive toward the tip",
     )
-    tip_length: float = _parameter(
-        20.0, 1, 300, "mm", "L_tip", "Length of the solid tip, along the front face"
-    )
-    rib_count: int = _parameter(4, 0, 60, "", "N", "Number of ribs")
-    rib_thickness: float = _parameter(2.0, 0.2, 30, "mm", "t_rib", "Rib thickness, normal to the rib")
-    front_thickness: float = _parameter(2.0, 0.2, 30, "mm", "t_flex", "Thickness of the front (contact) wall")
-    back_thickness: float = _parameter(
+    tip_length: float = bounded(20.0, 1, 300, "mm", "L_tip", "Length of the solid tip, along the front face")
+    rib_count: int = bounded(4, 0, 60, "", "N", "Number of ribs")
+    rib_thickness: float = bounded(2.0, 0.2, 30, "mm", "t_rib", "Rib thickness, normal to the rib")
+    front_thickness: float = bounded(2.0, 0.2, 30, "mm", "t_flex", "Thickness of the front (contact) wall")
+    back_thickness: float = bounded(
         2.0, 0.2, 30, "mm", "t_back", "Thickness of the back wall, normal to the back face"
     )
-    base_thickness: float = _parameter(2.0, 0.2, 100, "mm", "", "Thickness of the wall at the clamped base")
-    fillet_radius: float = _parameter(
+    base_thickness: float = bounded(2.0, 0.2, 100, "mm", "", "Thickness of the wall at the clamped base")
+    fillet_radius: float = bounded(
         0.0, 0, 20, "mm", "", "Radius of the cavities' corners; 0 leaves them sharp"
     )
-    contact_position: float | None = _parameter(
+    contact_position: float | None = bounded(
         None, 0, 500, "mm", "", "Abscissa of the contact's middle; none means (height - tip_length) / 2"
     )
-    contact_width: float = _parameter(
-        2.0, 0.1, 100, "mm", "", "Length of front face that the indenter touches"
-    )
+    contact_width: float = bounded(2.0, 0.1, 100, "mm", "", "Length of front face that the indenter touches")
     marker_layout: Literal["front", "joints"] = Field(
         default="front",
         description="Markers on the centre line of the front wall, or at the rib-wall joints and in the tip",
     )
-    marker_count: int = _parameter(9, 1, 60, "", "", "Number of markers of the layout `front`")
-    marker_diameter: float = _parameter(1.6, 0.1, 20, "mm", "", "Diameter of a marker")
-    marker_height: float = _parameter(
-        0.6, 0.05, 50, "mm", "", "How deep a marker is inlaid into the side face"
-    )
+    marker_count: int = bounded(9, 1, 60, "", "", "Number of markers of the layout `front`")
+    marker_diameter: float = bounded(1.6, 0.1, 20, "mm", "", "Diameter of a marker")
+    marker_height: float = bounded(0.6, 0.05, 50, "mm", "", "How deep a marker is inlaid into the side face")
 
     @property
     def contact_abscissa(self) -> float:
@@ -98,20 +92,22 @@ class Parameters(BaseModel):
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
 
-def fact(name: str, key: Literal["unit", "symbol", "low", "high"]) -> Any:
-    """Unit, symbol or bound of the parameter `name`; an empty text where it has none."""
-    extra = Parameters.model_fields[name].json_schema_extra
+def fact(
+    name: str, key: Literal["unit", "symbol", "low", "high"], model: type[BaseModel] = Parameters
+) -> Any:
+    """Unit, symbol or bound of a model's parameter; an empty text where it has none."""
+    extra = model.model_fields[name].json_schema_extra
     return extra.get(key, "") if isinstance(extra, dict) else ""
 
 
-def with_unit(value: float, name: str) -> str:
+def with_unit(value: float, name: str, model: type[BaseModel] = Parameters) -> str:
     """A value of the parameter `name` in words, such as `2.5 mm`."""
-    return f"{value:.6g} {fact(name, 'unit')}".rstrip()
+    return f"{value:.6g} {fact(name, 'unit', model)}".rstrip()
 
 
-def title(name: str) -> str:
+def title(name: str, model: type[BaseModel] = Parameters) -> str:
     """The parameter's name with the paper's symbol, such as `rib_count (N)`."""
-    symbol = fact(name, "symbol")
+    symbol = fact(name, "symbol", model)
     return f"{name} ({symbol})" if symbol else name
 
 

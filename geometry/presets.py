@@ -5,8 +5,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from geometry.design import Design, by_name, unknown_parameter
+from geometry.design import Design, by_name
 from geometry.errors import UserError
+from geometry.messages import unknown_parameter
 from geometry.parameters import SYMBOLS, Parameters, title
 
 FOLDER = Path(__file__).parent / "designs"
@@ -59,7 +60,7 @@ def parse_overrides(settings: Sequence[str]) -> dict[str, Any]:
         if not (equals and key and value):
             raise UserError(f"cannot read {setting!r}; write parameter=value, such as rib_count=6")
         if name not in Parameters.model_fields:
-            raise UserError(unknown_parameter(key, list(Parameters.model_fields)))
+            raise UserError(unknown_parameter(key, Parameters))
         if name in overrides:
             raise UserError(f"{title(name)} is set twice; set it once")
         overrides[name] = None if name == "contact_position" and value.lower() == "none" else value

@@ -2,10 +2,11 @@
 
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
-from geometry.design import one_line
 from geometry.errors import UserError
+from geometry.messages import one_line
+from geometry.parameters import bounded
 
 
 class MeshSettings(BaseModel):
@@ -20,27 +21,16 @@ class MeshSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    size: float = Field(default=0.25, ge=0.02, le=20, description="Element size in the walls and ribs [mm]")
-    coarsening: float = Field(
-        default=4.0,
-        ge=1,
-        le=20,
-        description="How many times larger elements may grow in solid parts such as the tip",
+    size: float = bounded(0.25, 0.02, 20, "mm", "", "Largest element in the walls and ribs")
+    coarsening: float = bounded(
+        4.0, 1, 20, "", "", "How many times larger elements may grow in solid parts such as the tip"
     )
-    growth: float = Field(
-        default=0.2,
-        ge=0.02,
-        le=2,
-        description="Growth of the element size per distance from where it is fine",
+    growth: float = bounded(0.2, 0.02, 2, "", "", "Growth of the element size per distance")
+    contact_size: float | None = bounded(
+        None, 1e-4, 20, "mm", "", "Element size at the contact's ends and middle; none: no grading"
     )
-    contact_size: float | None = Field(
-        default=None, ge=1e-4, le=20, description="Element size at the contact's ends and middle [mm]"
-    )
-    corner_size: float | None = Field(
-        default=None,
-        ge=1e-4,
-        le=20,
-        description="Element size at the re-entrant corners and at both ends of the clamped base [mm]",
+    corner_size: float | None = bounded(
+        None, 1e-4, 20, "mm", "", "Element size at re-entrant corners and the base's ends; none: no grading"
     )
 
     def __init__(self, **values: Any) -> None:

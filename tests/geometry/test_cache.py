@@ -42,7 +42,9 @@ def test_nothing_but_the_result_is_left_in_the_cache(folder: Path) -> None:
 def test_worker_gives_the_same_mesh_as_meshing_here(folder: Path) -> None:
     from geometry.mesher import build_mesh
 
-    assert finger_mesh(Design(), settings=COARSE, cache_dir=folder).digest == build_mesh(Design(), COARSE).digest
+    assert (
+        finger_mesh(Design(), settings=COARSE, cache_dir=folder).digest == build_mesh(Design(), COARSE).digest
+    )
 
 
 @pytest.mark.parametrize(
@@ -73,7 +75,9 @@ def test_damaged_entry_is_rebuilt_with_a_warning(folder: Path, damage, monkeypat
 
 def test_key_follows_everything_the_mesh_depends_on(monkeypatch: pytest.MonkeyPatch) -> None:
     def key(design: Design | None = None, **settings: float) -> str:
-        return cache_key(design or Design(), {"kind": "mesh", "settings": MeshSettings(**settings).model_dump()})
+        return cache_key(
+            design or Design(), {"kind": "mesh", "settings": MeshSettings(**settings).model_dump()}
+        )
 
     keys = {key(), key(Design(rib_angle=19)), key(size=0.3), key(corner_size=0.1)}
     monkeypatch.setattr("geometry.cache._version", lambda package: "0")
@@ -160,7 +164,9 @@ def test_meshing_works_under_mpirun(tmp_path: Path) -> None:
     assert first == second
 
 
-def test_cad_files_come_from_the_cache_the_second_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cad_files_come_from_the_cache_the_second_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     first = cad_files(Design(), tmp_path / "one", formats=["svg"], cache_dir=tmp_path / "cache")
     monkeypatch.setattr("geometry.cache.run_task", None)
     second = cad_files(Design(), tmp_path / "two", formats=["svg"], cache_dir=tmp_path / "cache")
@@ -175,7 +181,11 @@ def test_import_is_quick_and_needs_neither_cadquery_nor_gmsh() -> None:
         "print(*({'cadquery', 'gmsh', 'OCP'} & set(sys.modules)))"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], env=child_environment(os.environ), capture_output=True, text=True, check=True
+        [sys.executable, "-c", code],
+        env=child_environment(os.environ),
+        capture_output=True,
+        text=True,
+        check=True,
     )
     seconds, heavy = done.stdout.split("\n")[:2]
     assert float(seconds) < 0.3

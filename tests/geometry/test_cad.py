@@ -67,7 +67,9 @@ def test_step_holds_body_and_markers_as_named_parts(written: dict[str, Path]) ->
 
     solids = cq.importers.importStep(str(written["finger.step"])).solids().vals()
     assert len(solids) == 10
-    assert sum(solid.Volume() for solid in solids) == pytest.approx(finger_section(Design()).area * 20, rel=1e-9)
+    assert sum(solid.Volume() for solid in solids) == pytest.approx(
+        finger_section(Design()).area * 20, rel=1e-9
+    )
     text = written["finger.step"].read_text()
     assert all(f"'{name}'" in text for name in ("body", "marker-1", "marker-9"))
 

@@ -92,7 +92,9 @@ def test_random_points_in_triangles_are_found(mesh: TriangleMesh) -> None:
     found = mesh.locate(points)
     assert (found.cells == cells).mean() > 0.999  # a point on an edge may go to either side
     np.testing.assert_allclose(
-        np.einsum("nc,ncx->nx", found.barycentric, mesh.points[mesh.triangles[found.cells]]), points, atol=1e-9
+        np.einsum("nc,ncx->nx", found.barycentric, mesh.points[mesh.triangles[found.cells]]),
+        points,
+        atol=1e-9,
     )
     assert found.barycentric.min() >= -1e-9
 
@@ -128,7 +130,9 @@ def build_default() -> TriangleMesh:
 
 
 def test_point_in_a_cavity_is_named_in_the_error(default_mesh: TriangleMesh) -> None:
-    with pytest.raises(OutsideBodyError, match=r"1 of 2 points lie outside the body, the first at \(6, -10\) mm"):
+    with pytest.raises(
+        OutsideBodyError, match=r"1 of 2 points lie outside the body, the first at \(6, -10\) mm"
+    ):
         default_mesh.locate([[1.0, -1.0], [6.0, -10.0]])
 
 

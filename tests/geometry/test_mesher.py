@@ -1,5 +1,7 @@
 """The mesh against closed forms: area, boundaries, topology, thickness, markers, contact."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -77,7 +79,7 @@ def test_walls_and_ribs_measure_their_thickness(design: Design, mesh: TriangleMe
     assert over_back.min() == pytest.approx(design.back_thickness, rel=1e-12)
     angle = np.radians(design.rib_angle)
     across = mesh.points @ [np.cos(angle), np.sin(angle)]  # coordinate normal to the ribs
-    for lower, upper in zip(cells[:-1], cells[1:], strict=True):
+    for lower, upper in pairwise(cells):
         assert across[upper].min() - across[lower].max() == pytest.approx(design.rib_thickness, rel=1e-9)
 
 
@@ -169,7 +171,7 @@ def random_design(seed: int) -> Design:
     rng = np.random.default_rng(seed)
     ranges = {
         "height": (40, 160), "base_width": (15, 60), "rib_angle": (-40, 50), "tip_length": (5, 60),
-        "rib_thickness": (0.4, 5), "front_thickness": (0.5, 5), "back_thickness": (0.5, 5),
+        "rib_thickness": (0.6, 5), "front_thickness": (0.8, 5), "back_thickness": (0.8, 5),
         "base_thickness": (0.5, 8), "fillet_radius": (0, 1.5), "contact_position": (2, 100),
         "contact_width": (0.2, 12), "marker_diameter": (0.3, 2),
     }  # fmt: skip

@@ -39,7 +39,7 @@ def test_weights_over_the_body_sum_to_its_area(mesh: TriangleMesh) -> None:
 
 
 def test_body_integral_of_a_polynomial_is_that_of_its_boundary(default_mesh: TriangleMesh) -> None:
-    # Divergence theorem: the integral of x^3 y over the body is that of x^4 y / 4 times n_x over its boundary.
+    # Divergence theorem: the integral of x^3 y over the body is that of x^4 y / 4 n_x over its boundary.
     from geometry.across import boundary_edges
 
     rule = body_quadrature(default_mesh, 4)
