@@ -95,6 +95,7 @@ def render(content: ReportContent) -> str:
         paper_rows=[(symbol, value) for _, symbol, value in text.design_rows(content.design) if symbol],
         material_rows=text.material_rows(content.material),
         load_sentence=text.load_sentence(content.load, content.design),
+        source=text.source_sentence(content.observations),
         provenance=text.grouped(content.provenance),
     )
 

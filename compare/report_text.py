@@ -6,6 +6,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from geometry.observations import Observations
 from geometry.parameters import Parameters, fact
 from solvers.problem import Load, Material
 
@@ -43,11 +44,20 @@ def load_sentence(load: Load, design: Parameters) -> str:
         "patch": f"Every point of the {width} has the prescribed displacement",
     }[load.kind]
     parts = [
-        f"{name} is free" if value is None else f"{name} = {number(value)} mm"
+        f"{name} is free"
+        if value is None
+        else f"{name} = {value:g} mm".replace("-", "−").replace(" ", "\N{NO-BREAK SPACE}")
         for name, value in zip("uv", load.displacement, strict=True)
     ]
+    moved = ", ".join(parts).replace(" ", "\N{NO-BREAK SPACE}").replace(",\N{NO-BREAK SPACE}", ", ")
     about = f"about x = {design.contact_abscissa:g} mm on the front face"
-    return f"{where}: {', '.join(parts)}, {about} (load “{load.kind}”)."
+    return f"{where}: {moved}, {about} (load “{load.kind}”)."
+
+
+def source_sentence(observations: Observations) -> str:
+    """Where the marker displacements come from, opened by `Simulated` or `Measured`."""
+    said = observations.source.lower().startswith(observations.label)
+    return sentence(observations.source if said else f"{observations.label}: {observations.source}")
 
 
 def grouped(provenance: Mapping[str, object]) -> list[tuple[str, list[tuple[str, str]]]]:
@@ -87,9 +97,9 @@ def sentence(text: str) -> str:
 
 def number(value: float, digits: int = 4) -> str:
     """A number with so many significant digits, with a typographic minus."""
-    return f"{value:.{digits}g}".replace("-", "−")
+    return f"{value:#.{digits}g}".rstrip(".").replace("-", "−")
 
 
 def percent(value: float) -> str:
     """A share as a percentage with three significant digits."""
-    return f"{100 * value:.3g} %".replace("-", "−")
+    return f"{number(100 * value, 3)} %"

@@ -6,7 +6,7 @@ from matplotlib.collections import LineCollection
 
 from compare.figures.canvas import Extent, Pixels
 from compare.figures.colours import Scale
-from compare.figures.style import INK, MUTED
+from compare.figures.style import HALO, INK, MUTED
 from geometry.arrays import FloatArray, IntArray
 from geometry.mesh import TriangleMesh
 
@@ -77,10 +77,11 @@ def scale_bar(axes: Axes, extent: Extent, *, corner: str = "lower right") -> Non
     inset = 0.02 * extent.width
     left = extent.right - inset - length if corner == "lower right" else extent.left + inset
     y = extent.bottom + inset
-    axes.plot([left, left + length], [y, y], color=INK, linewidth=1.6, solid_capstyle="butt", zorder=6)
-    axes.text(
-        left + length / 2, y + 0.008 * extent.width, f"{length:g} mm", ha="center", va="bottom", size=7.5
-    )
+    ends = ([left, left + length], [y, y])
+    axes.plot(*ends, color=INK, lw=1.6, solid_capstyle="butt", path_effects=HALO, zorder=6)
+    label = {"ha": "center", "va": "bottom", "size": 7.5, "path_effects": HALO, "zorder": 6}
+    middle = (left + length / 2, y)
+    axes.annotate(f"{length:g} mm", middle, xytext=(0, 2.5), textcoords="offset points", **label)
 
 
 def round_length(wanted: float) -> float:

@@ -16,12 +16,12 @@ from geometry.arrays import FloatArray
 from geometry.markers import marker_positions
 from geometry.outline import fillet_points
 from geometry.parameters import Parameters
-from geometry.section import Section, corner_angles, finger_section, rib_direction
+from geometry.section import Section, corner_angles, finger_section, rib_direction, rib_pitch
 
 CONTACT = "#d55e00"
 POINT = 8.5 / 72 / WIDTH
 """Height of the type as a share of the drawing's width."""
-LEFT, RIGHT, ABOVE, BELOW = 5.0, 1.6, 7.2, 3.2
+LEFT, RIGHT, ABOVE, BELOW = 5.2, 1.6, 7.2, 3.2
 """Room around the body for dimensions, in heights of the type."""
 HEAD, FOOT = 0.28, 0.42
 
@@ -39,7 +39,7 @@ def draw_design(path: Path, design: Parameters) -> None:
         _body(axes, shape)
         body.clamp(axes, shape.outer[:2], size=0.8 * em)
         pen = Draughtsman(axes, em)
-        pen.text((-0.6 * em, -design.base_width - 0.5 * em), "clamped base", va="top", ha="left")
+        pen.text((-1.7 * em, -design.base_width / 2), "clamped", va="center", rotation=90)
         _lengths(pen, design)
         _contact(pen, design)
         _ribs(pen, design, shape)
@@ -91,7 +91,7 @@ def _lengths(pen: Draughtsman, design: Parameters) -> None:
         (d.height - d.tip_length, 0), (d.height, 0), first, rf"$L_\mathrm{{tip}}$ = {d.tip_length:g} mm"
     )
     pen.between((0, 0), (d.height, 0), second, rf"$H$ = {d.height:g} mm")
-    pen.between((0, -d.base_width), (0, 0), (-3.2 * em, 0), rf"$L$ = {d.base_width:g} mm")
+    pen.between((0, -d.base_width), (0, 0), (-3.8 * em, 0), rf"$L$ = {d.base_width:g} mm")
 
 
 def _contact(pen: Draughtsman, design: Parameters) -> None:
@@ -109,8 +109,7 @@ def _contact(pen: Draughtsman, design: Parameters) -> None:
 
 def _ribs(pen: Draughtsman, design: Parameters, shape: Section) -> None:
     d, em = design, pen.em
-    cell = shape.cells[min(1, len(shape.cells) - 1)]
-    x = float(cell[[0, 3], 0].mean())
+    x = _free_abscissa(design, shape, em)
     text = rf"$t_\mathrm{{flex}}$ = {d.front_thickness:g} mm"
     pen.thickness((x, 0), (x, -d.front_thickness), (x, 1.5 * em), text, side="center")
     outward = np.array([d.base_width, -d.height]) / np.hypot(d.base_width, d.height)
@@ -135,11 +134,25 @@ def _ribs(pen: Draughtsman, design: Parameters, shape: Section) -> None:
     pen.thickness(centre + half, centre - half, below, rf"$t_\mathrm{{rib}}$ = {d.rib_thickness:g} mm")
     foot = shape.ribs[0][[0, 3]].mean(axis=0)
     reach = float(np.linalg.norm(shape.ribs[0][[1, 2]].mean(axis=0) - foot)) + d.back_thickness + 1.2 * em
-    pen.angle(foot, (0.0, -1.0), direction, reach, rf"$L_\mathrm{{angle}}$ = {d.rib_angle:g}°")
-    if d.rib_count <= 15:
+    text = rf"$L_\mathrm{{angle}}$ = {d.rib_angle:g}°".replace("-", "−")
+    pen.angle(foot, (0.0, -1.0), direction, reach, text, side="right" if d.rib_count == 1 else "center")
+    if rib_pitch(d) > 5 * em:
         for number, corners in enumerate(shape.ribs, start=1):
             where = 0.68 * corners[[0, 3]].mean(axis=0) + 0.32 * corners[[1, 2]].mean(axis=0)
             pen.text(where, str(number), size=6.5, va="center")
+
+
+def _free_abscissa(design: Parameters, shape: Section, em: float) -> float:
+    """Where the front wall has most room for a dimension: off contact, markers and the cavities' ends, mm."""
+    places = np.array([cell[[0, 3], 0] @ (1 - s, s) for cell in shape.cells for s in (0.3, 0.5, 0.7)])
+    end = design.height - design.tip_length
+    room = [
+        np.abs(places - design.contact_abscissa) / (4.5 * em),
+        np.abs(places[:, None] - marker_positions(design)[:, 0]).min(axis=1) / em,
+        places / (3.8 * em),
+        (end - places) / (3.8 * em),
+    ]
+    return float(places[np.min(room, axis=0).argmax()])
 
 
 def _markers(pen: Draughtsman, design: Parameters) -> None:

@@ -5,17 +5,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.patches import Arc
 from matplotlib.text import Text
 
-from compare.figures.style import INK
+from compare.figures.style import HALO, INK
 from geometry.arrays import FloatArray
 
 Point = Sequence[float] | FloatArray
 LINE = 0.6
-HALO = [patheffects.withStroke(linewidth=2.5, foreground="white")]
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,9 @@ class Draughtsman:
         vertical = ("bottom" if up else "top") if side == "center" else "center"
         self.text((elbow[0] + gap, elbow[1]), text, ha=side, va=vertical)
 
-    def angle(self, corner: Point, first: Point, second: Point, radius: float, text: str) -> None:
+    def angle(
+        self, corner: Point, first: Point, second: Point, radius: float, text: str, *, side: str = "center"
+    ) -> None:
         """The angle between two directions, as an arc at a distance from their corner.
 
         Args:
@@ -81,6 +81,7 @@ class Draughtsman:
             second: Unit vector.
             radius: From the corner to the arc, mm.
             text: Symbol and value, set beyond the arc.
+            side: Which edge of the text is there: `left`, `right` or `center`.
         """
         centre = np.asarray(corner, dtype=np.float64)
         for direction in (first, second):
@@ -92,7 +93,9 @@ class Draughtsman:
             Arc(tuple(centre), 2 * radius, 2 * radius, theta1=low, theta2=high, color=INK, lw=LINE, zorder=5)
         )
         middle = np.asarray(first) + np.asarray(second)
-        self.text(centre + middle / np.linalg.norm(middle) * (radius + 1.2 * self.em), text, va="top")
+        self.text(
+            centre + middle / np.linalg.norm(middle) * (radius + 1.2 * self.em), text, va="top", ha=side
+        )
 
     def text(self, where: Point, text: str, **options: Any) -> Text:
         """Text with a white halo, in the drawing's type."""

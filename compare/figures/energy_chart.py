@@ -13,7 +13,7 @@ from geometry.arrays import FloatArray
 
 LOG_RATIO = 20.0
 """An axis is logarithmic where the largest value exceeds the smallest by this factor."""
-HEAD, HEIGHT, FOOT, LEFT, GAP = 0.5, 1.6, 0.5, 0.65, 0.75
+HEAD, HEIGHT, FOOT, LEFT, GAP = 0.5, 1.6, 0.42, 0.65, 0.75
 ENERGY = "energy"
 
 Group = tuple[str, str]

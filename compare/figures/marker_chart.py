@@ -58,5 +58,14 @@ def _bars(axes: Axes, columns: Sequence[FloatArray], labels: Sequence[str], visi
     ceiling = max(float(np.nanmax(values)) for values in columns) or 1.0
     axes.set_ylim(0, ceiling * (1.02 + 0.13 * -(-len(labels) // 2)))
     axes.legend(
-        loc="upper left", ncols=2, handlelength=1.0, handletextpad=0.5, columnspacing=1.2, borderaxespad=0.1
+        loc="upper left",
+        ncols=2,
+        handlelength=1.0,
+        handletextpad=0.5,
+        columnspacing=1.2,
+        borderaxespad=0.1,
+        frameon=True,
+        facecolor="white",
+        edgecolor="none",
+        framealpha=0.85,
     )

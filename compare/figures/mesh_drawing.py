@@ -96,7 +96,7 @@ def draw_mesh(path: Path, mesh: TriangleMesh) -> None:
     ratio = inset_height / inset_width
     windows = [
         ("A: contact", _window(middle - (0, 0.33 * span * ratio), span, ratio)),
-        ("B: inner corner", _window(joint, span, ratio)),
+        ("B: inner corner", _window(joint, 1.4 * span, ratio)),
     ]
     numbers = mesh_numbers(mesh)
     note = (

@@ -138,9 +138,7 @@ def _legend(drawn: MplFigure, observations: Observations) -> None:
         ),
         Line2D([], [], ls="", marker="x", ms=4, color=INK, mew=0.9, label="solver’s markers"),
         Line2D([], [], color="#9a9a9a", lw=0.9, label="undeformed"),
-        Line2D(
-            [], [], color=INK, lw=1, marker=">", ms=3.5, markevery=[1], label="displacement of the contact"
-        ),
+        Line2D([], [], color=INK, lw=1, marker=">", ms=3.5, markevery=[1], label="contact’s motion"),
     ]
     drawn.legend(
         handles=handles,

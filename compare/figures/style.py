@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
+from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as MplFigure
@@ -25,6 +26,9 @@ MUTED = "#767676"
 BODY = "#e4e4e4"
 MEASURED = "#d1006c"
 """Colour of measurements: occurs in none of the colour maps and for no solver."""
+
+HALO = [patheffects.withStroke(linewidth=2.5, foreground="white")]
+"""Keeps type and lines legible on anything."""
 
 SOLVER_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#56b4e9", "#d55e00", "#000000", "#8c6bb1")
 """Okabe and Ito's palette, safe for colour-blind readers, without its pink (see `MEASURED`)."""
