@@ -79,9 +79,17 @@ def scale_bar(axes: Axes, extent: Extent, *, corner: str = "lower right") -> Non
     y = extent.bottom + inset
     ends = ([left, left + length], [y, y])
     axes.plot(*ends, color=INK, lw=1.6, solid_capstyle="butt", path_effects=HALO, zorder=6)
-    label = {"ha": "center", "va": "bottom", "size": 7.5, "path_effects": HALO, "zorder": 6}
-    middle = (left + length / 2, y)
-    axes.annotate(f"{length:g} mm", middle, xytext=(0, 2.5), textcoords="offset points", **label)
+    axes.annotate(
+        f"{length:g} mm",
+        (left + length / 2, y),
+        xytext=(0, 2.5),
+        textcoords="offset points",
+        ha="center",
+        va="bottom",
+        size=7.5,
+        path_effects=HALO,
+        zorder=6,
+    )
 
 
 def round_length(wanted: float) -> float:

@@ -48,8 +48,17 @@ def _bars(axes: Axes, columns: Sequence[FloatArray], labels: Sequence[str], visi
         x = np.arange(1, count + 1) + (number - (len(columns) - 1) / 2) * width
         axes.bar(x[visible], values[visible], width * 0.94, color=solver_colour(number), label=label)
     for marker in np.flatnonzero(~visible) + 1:
-        axes.text(marker, 0.02, "not seen", rotation=90, size=7, color=MUTED, ha="center", va="bottom",
-                  transform=axes.get_xaxis_transform())  # fmt: skip
+        axes.text(
+            marker,
+            0.02,
+            "not seen",
+            rotation=90,
+            size=7,
+            color=MUTED,
+            ha="center",
+            va="bottom",
+            transform=axes.get_xaxis_transform(),
+        )
     axes.set_xticks(range(1, count + 1) if count <= 20 else range(1, count + 1, 5))
     axes.set_xlim(0.4, count + 0.6)
     axes.margins(y=0.02)
