@@ -47,7 +47,8 @@ $elsewhere"
     say "installing Debian packages: ${missing[*]}"
     if ! install >/dev/null 2>&1; then # as a rule the package lists are absent or old
         say "updating the package lists"
-        apt_get update && install >/dev/null || stop "apt-get could not install ${missing[*]}; its own message is above."
+        output=$({ apt_get update && install; } 2>&1) || stop "apt-get could not install ${missing[*]}:
+$output"
     fi
 fi
 
