@@ -58,6 +58,7 @@ class SolverEntry:
     evaluation: Evaluation
     errors: MarkerErrors
     differences: ReferenceDifferences
+    reaction: tuple[float, float]
     seconds: str
 
 
@@ -108,5 +109,6 @@ def _entry(evaluation: Evaluation, content: ReportContent) -> SolverEntry:
         evaluation=evaluation,
         errors=marker_errors(evaluation, content.observations),
         differences=reference_differences(evaluation, content.reference),
+        reaction=text.without_rounding(evaluation.reaction),
         seconds=seconds(evaluation),
     )

@@ -4,8 +4,10 @@ import base64
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
 from markupsafe import Markup
 
+from geometry.arrays import FloatArray
 from geometry.observations import Observations
 from geometry.parameters import Parameters, fact
 from solvers.problem import Load, Material
@@ -98,6 +100,13 @@ def sentence(text: str) -> str:
 def number(value: float, digits: int = 4) -> str:
     """A number with so many significant digits, with a typographic minus."""
     return f"{value:#.{digits}g}".rstrip(".").replace("-", "−")
+
+
+def without_rounding(force: FloatArray) -> tuple[float, float]:
+    """A force of shape (2,) without the component that rounding left, 1e-9 of the other or less."""
+    size = np.abs(force).max()
+    u, v = (float(component) if abs(component) > 1e-9 * size else 0.0 for component in force)
+    return u, v
 
 
 def percent(value: float) -> str:
