@@ -1,0 +1,1 @@
+"""Physics-informed neural networks that minimise the potential energy, in PyTorch."""
