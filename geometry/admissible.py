@@ -38,7 +38,10 @@ def advice(parameters: Parameters, broken: Rule) -> str:
     if ranges:
         return f"admissible with the rest unchanged: {', or '.join(ranges[:3])}"
     ranges = _ranges(parameters, broken.mends, [broken])
-    return f"more than one parameter must change; this rule alone asks for {', or '.join(ranges[:3])}"
+    alone = (
+        f"this rule alone asks for {', or '.join(ranges[:3])}" if ranges else f"try {', '.join(broken.mends)}"
+    )
+    return f"more than one parameter must change; {alone}"
 
 
 def obeys(parameters: Parameters, rules: Iterable[Rule] = RULES) -> bool:

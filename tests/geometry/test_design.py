@@ -8,6 +8,7 @@ import pytest
 from geometry import Design, UserError
 from geometry.admissible import RULES, STEP, advice, obeys
 from geometry.parameters import SYMBOLS, Parameters, fact
+from geometry.rules import Finding, Rule
 
 BAD_DESIGNS = [
     # parameters, parameter that the message must give a range for, what it must say
@@ -147,6 +148,12 @@ def test_replaced_is_a_checked_copy() -> None:
     assert design.replaced(N=6, H=110) == Design(name="base", rib_count=6, height=110)
     with pytest.raises(UserError, match="ribs"):
         design.replaced(rib_count=40)
+
+
+def test_when_no_range_mends_even_the_rule_itself_the_message_names_the_parameters() -> None:
+    unmendable = Rule(lambda parameters: Finding(-1.0, "never right"), ("height", "depth"))
+    bad = Parameters.model_construct(tip_length=300, contact_position=500)
+    assert advice(bad, unmendable) == "more than one parameter must change; try height, depth"
 
 
 def test_every_rule_can_fail() -> None:

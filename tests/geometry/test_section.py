@@ -93,9 +93,9 @@ def test_front_markers_are_evenly_spaced_on_the_centre_line() -> None:
     np.testing.assert_allclose(markers[:, 1], -1)
 
 
-def test_joint_markers_lie_on_ribs_and_centre_lines_and_the_last_on_the_bisector() -> None:
-    design = Design(marker_layout="joints")
-    markers = marker_positions(design)
+@pytest.mark.parametrize("angle", [20, -15])  # the back joint of a rib lies nearer the tip, nearer the base
+def test_joint_markers_lie_on_centre_lines_in_order_and_the_last_on_the_bisector(angle: float) -> None:
+    markers = marker_positions(Design(marker_layout="joints", rib_angle=angle))
     assert markers.shape == (9, 2)
     assert (np.diff(markers[:, 0]) > 0).all()
     back = LineString([(0, -30), (90, 0)])
