@@ -73,7 +73,7 @@ def mae_table(evaluations: Sequence[Evaluation], observations: Observations, ref
         errors = marker_errors(evaluation, observations)
         distance = reference_differences(evaluation, reference).displacement.rel_l2
         table.add_row(
-            solver_label(evaluation),
+            solver_label(evaluation).replace(" (", "\n("),
             *(f"{value:.3f}" for value in (errors.mae_u, errors.mae_v, errors.mae_sum, errors.mae_rss)),
             "reference" if evaluation is reference else f"{100 * distance:.3g}",
             f"{evaluation.energy:.4g}",

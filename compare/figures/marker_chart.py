@@ -13,7 +13,7 @@ from compare.metrics import marker_errors
 from geometry.arrays import BoolArray, FloatArray
 from geometry.observations import Observations
 
-BAR_LEFT, BAR_HEIGHT = 0.55, 1.45
+BAR_LEFT, BAR_HEIGHT = 0.66, 1.45
 
 
 def draw_marker_errors(path: Path, *, evaluations: Sequence[Evaluation], observations: Observations) -> None:
@@ -61,7 +61,7 @@ def _bars(axes: Axes, columns: Sequence[FloatArray], labels: Sequence[str], visi
         )
     axes.set_xticks(range(1, count + 1) if count <= 20 else range(1, count + 1, 5))
     axes.set_xlim(0.4, count + 0.6)
-    axes.margins(y=0.02)
+    axes.ticklabel_format(axis="y", scilimits=(-2, 3), useMathText=True)
     axes.grid(axis="y", color="#dddddd", linewidth=0.5)
     axes.set_axisbelow(True)
     ceiling = max(float(np.nanmax(values)) for values in columns) or 1.0

@@ -114,7 +114,17 @@ def draw_mesh(path: Path, mesh: TriangleMesh) -> None:
             axes.add_patch(
                 Rectangle(corner, window.width, window.height, fill=False, ec=MEASURED, lw=0.9, zorder=5)
             )
-            axes.text(window.right + 0.5, window.bottom, title[0], color=MEASURED, weight="bold", zorder=6)
+            crowded = window.right > whole.right - 0.04 * whole.width
+            axes.annotate(
+                title[0],
+                (window.left if crowded else window.right, window.bottom),
+                xytext=(-2 if crowded else 2, 0),
+                textcoords="offset points",
+                ha="right" if crowded else "left",
+                color=MEASURED,
+                weight="bold",
+                zorder=6,
+            )
             left = MARGIN + number * (inset_width + MARGIN)
             inset = axes_at(drawn, (left, HEAD + height + INSET_TITLE, inset_width, inset_height))
             _draw(inset, mesh, window, 0.4)

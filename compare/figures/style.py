@@ -51,7 +51,7 @@ _RC: "dict[RcKeyType, Any]" = {
     "legend.frameon": False,
     "figure.titlesize": 10,
     "mathtext.fontset": "dejavusans",
-    "savefig.dpi": DPI,
+    "savefig.dpi": "figure",
 }
 
 
@@ -59,11 +59,11 @@ _RC: "dict[RcKeyType, Any]" = {
 def figure(path: Path, height: float) -> Iterator[MplFigure]:
     """A figure of `WIDTH` by `height` inches, written atomically when the block ends without an error."""
     with mpl.rc_context(_RC):
-        drawn = MplFigure(figsize=(WIDTH, height), facecolor="white")
+        drawn = MplFigure(figsize=(WIDTH, height), dpi=DPI, facecolor="white")
         FigureCanvasAgg(drawn)
         yield drawn
         with atomic_path(path) as partial:
-            drawn.savefig(partial, dpi=DPI, pil_kwargs={"compress_level": 3})
+            drawn.savefig(partial, pil_kwargs={"compress_level": 3})
 
 
 def heading(drawn: MplFigure, text: str, note: str = "") -> None:

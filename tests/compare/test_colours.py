@@ -1,0 +1,78 @@
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compare.evaluation import Evaluation
+from compare.figures.colours import Scale, diverging, sequential, symmetric
+from compare.figures.fields import QUANTITIES, difference_scale, field_scale, max_principal
+from geometry.mesh import TriangleMesh
+
+VON_MISES, XY = QUANTITIES[0], QUANTITIES[-1]
+
+
+def test_a_sequential_scale_leaves_out_the_last_half_percent_of_the_area() -> None:
+    values, weights = np.array([7.0, 100.0, 3.0]), np.array([0.5, 0.004, 0.496])
+    assert sequential(values, weights)[:2] == (0.0, 7.0)
+    assert sequential(values, np.array([0.5, 0.006, 0.494]))[:2] == (0.0, 100.0)
+
+
+def test_a_symmetric_scale_takes_absolute_values_and_the_widest_field() -> None:
+    weights = np.ones(3)
+    assert symmetric([np.array([1.0, -4.0, 2.0]), np.array([3.0, 0.0, 0.0])], weights)[:2] == (-4.0, 4.0)
+
+
+def test_a_field_of_zeros_can_be_drawn() -> None:
+    scale = symmetric([np.zeros(3)], np.ones(3))
+    assert scale.low < 0 < scale.high
+    assert np.ptp(scale.paint(np.zeros(3)), axis=1).max() <= 4  # the grey in the middle
+
+
+def test_values_beyond_the_scale_take_the_end_colours() -> None:
+    scale = Scale(0.0, 1.0, diverging())
+    painted = scale.paint(np.array([-5.0, 0.0, 1.0, 5.0]))
+    np.testing.assert_array_equal(painted[[0, 3]], painted[[1, 2]])
+
+
+def test_the_diverging_map_darkens_evenly_on_both_sides_of_a_light_grey() -> None:
+    colours = diverging()(np.linspace(0, 1, 256))[:, :3]
+    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+    lightness = np.cbrt(linear @ [0.2126, 0.7152, 0.0722])
+    assert lightness[127] > 0.93
+    assert (np.diff(lightness[:128]) > 0).all()
+    assert (np.diff(lightness[128:]) < 0).all()
+    steps = np.diff(lightness[:128])
+    assert steps.max() < 2 * steps.min()
+
+
+def test_every_solver_is_drawn_on_the_scale_of_the_reference(fem: Evaluation, mesh: TriangleMesh) -> None:
+    peak = fem.von_mises.copy()
+    peak[:3] = 1e6  # one triangle of 384: 0.26 % of the area
+    scale = field_scale(VON_MISES, mesh, replace(fem, von_mises=peak))
+    without = np.sort(fem.per_triangle(fem.von_mises))
+    assert without[-3] <= scale.high <= without[-1]
+
+
+def test_the_scale_of_a_signed_quantity_is_symmetric(fem: Evaluation, mesh: TriangleMesh) -> None:
+    scale = field_scale(XY, mesh, fem)
+    assert scale.low == -scale.high
+    assert scale.high == pytest.approx(100 * np.abs(fem.strain[:, 0, 1]).max(), rel=0.05)
+
+
+def test_differences_share_the_scale_of_the_farthest_solver_that_converged(
+    fem: Evaluation,
+    pinn: Evaluation,
+    failed: Evaluation,
+    evaluate: Callable[..., Evaluation],
+    mesh: TriangleMesh,
+) -> None:
+    near, base = evaluate("near", 1.01), field_scale(VON_MISES, mesh, fem).high
+    assert difference_scale(VON_MISES, mesh, [fem, near, pinn], fem).high == pytest.approx(0.1 * base)
+    assert difference_scale(VON_MISES, mesh, [fem, near, pinn, failed], fem).high == pytest.approx(0.1 * base)
+    assert difference_scale(VON_MISES, mesh, [fem, failed], fem).high == pytest.approx(2 * base)
+
+
+def test_the_largest_principal_strain_by_hand() -> None:
+    tensors = np.array([[[3.0, 0.0], [0.0, -1.0]], [[0.0, 2.0], [2.0, 0.0]], [[1.0, 2.0], [2.0, 4.0]]])
+    np.testing.assert_allclose(max_principal(tensors), [3.0, 2.0, 5.0])

@@ -1,0 +1,89 @@
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compare.evaluation import Evaluation
+from compare.metrics import (
+    field_difference,
+    marker_errors,
+    pick_reference,
+    reference_differences,
+    weighted_percentile,
+)
+from geometry.observations import Observations
+
+
+@pytest.mark.parametrize(
+    ("percent", "expected"),
+    [
+        (5, 1.0),  # the smallest value holds a tenth of the weight
+        (50, 2.0),  # the heavy one
+        (90, 2.0),  # exactly where the heavy one ends
+        (95, 3.0),  # in the last tenth
+        (100, 3.0),  # all of it
+    ],
+)
+def test_weighted_percentile_of_three_values(percent: float, expected: float) -> None:
+    values, weights = np.array([3.0, 1.0, 2.0]), np.array([1.0, 1.0, 8.0])
+    assert weighted_percentile(values, weights, percent) == expected
+
+
+def test_errors_at_the_markers_by_hand(fem: Evaluation, observe: Callable[..., Observations]) -> None:
+    moved = replace(fem, marker_displacement=np.array([[1.0, -2.0], [50.0, 50.0], [-5.0, 6.0]]))
+    errors = marker_errors(moved, observe(np.zeros((3, 2)), hidden=(1,)))
+    np.testing.assert_array_equal(errors.ae_u, [1, np.nan, 5])
+    np.testing.assert_array_equal(errors.ae_v, [2, np.nan, 6])
+    assert errors[2:] == (3.0, 4.0, 7.0, 5.0)
+
+
+def test_both_displacement_errors_of_the_paper(fem: Evaluation, observe: Callable[..., Observations]) -> None:
+    errors = marker_errors(fem, observe(fem.marker_displacement + np.array([1.41, -0.39])))
+    assert errors.mae_rss == pytest.approx(1.463, abs=5e-4)  # Table I, row disp
+    assert errors.mae_sum == pytest.approx(1.80)  # what the text defines
+
+
+@pytest.mark.parametrize(
+    ("values", "reference", "expected"),
+    [
+        ([2.0, 0.0], [1.0, 0.0], (1.0, 0.25, 1.0)),  # off by one on a quarter of the area
+        ([0.0, 3.0], [0.0, 2.0], (0.5, 0.75, 1.0)),  # off by one on three quarters
+        ([1.0, 1.0], [1.0, 1.0], (0.0, 0.0, 0.0)),  # equal
+        ([[3.0, 4.0], [0.0, 0.0]], [[0.0, 0.0], [5.0, 0.0]], (2 / 3**0.5, 5.0, 5.0)),  # vectors, by length
+    ],
+)
+def test_difference_of_fields_by_hand(
+    values: list[float], reference: list[float], expected: tuple[float, float, float]
+) -> None:
+    difference = field_difference(np.array(values), np.array(reference), np.array([1.0, 3.0]))
+    assert difference == pytest.approx(expected)
+
+
+def test_a_reference_of_zeros_has_no_relative_difference() -> None:
+    assert np.isnan(field_difference(np.ones(2), np.zeros(2), np.ones(2)).rel_l2)
+
+
+def test_a_tenth_more_everywhere(pinn: Evaluation, fem: Evaluation) -> None:
+    differences = reference_differences(pinn, fem)
+    for difference in (differences.displacement, differences.von_mises, differences.stress["xy"]):
+        assert difference.rel_l2 == pytest.approx(0.1)
+    assert differences.energy == pytest.approx(0.21)
+    assert differences.mae_markers == pytest.approx(0.1 * np.abs(fem.marker_displacement).sum(axis=1).mean())
+
+
+def test_strain_differences_tell_components_apart(fem: Evaluation) -> None:
+    strain = fem.strain.copy()
+    strain[:, 0, 0] += 0.5
+    differences = reference_differences(replace(fem, strain=strain), fem)
+    assert {name: d.mean for name, d in differences.strain.items()} == pytest.approx(
+        {"xx": 0.5, "yy": 0, "xy": 0}
+    )
+
+
+def test_the_reference_is_the_wanted_solver_then_fem_then_the_first(
+    fem: Evaluation, pinn: Evaluation, failed: Evaluation
+) -> None:
+    assert pick_reference([failed, pinn, fem], "pinn-std") is pinn
+    assert pick_reference([failed, pinn, fem]) is fem
+    assert pick_reference([failed, pinn]) is failed

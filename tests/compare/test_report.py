@@ -1,0 +1,189 @@
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from compare.evaluation import Evaluation
+from compare.figures import Figure
+from compare.report import ReportContent, render, write_report
+from compare.report_text import number, percent, sentence
+from geometry.design import Design
+from geometry.mesh import TriangleMesh
+from geometry.observations import Observations
+from solvers.problem import Load, Material
+
+VOID = {"meta", "img", "br", "link", "hr", "input"}
+
+
+class Page(HTMLParser):
+    """Text, attributes and unbalanced tags of an HTML page."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.unbalanced: list[str] = []
+        self.attributes: list[tuple[str, str, str]] = []
+        self.pieces: list[str] = []
+        self.feed(html)
+        self.close()
+        self.text = re.sub(r"\s+", " ", " ".join(self.pieces))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.attributes += [(tag, name, value or "") for name, value in attrs]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if not self.open or self.open.pop() != tag:
+            self.unbalanced.append(tag)
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] != "style":
+            self.pieces.append(data)
+
+    def values(self, wanted: str) -> list[str]:
+        return [value for _, name, value in self.attributes if name == wanted]
+
+
+@pytest.fixture
+def content(
+    tmp_path: Path, mesh: TriangleMesh, fem: Evaluation, pinn: Evaluation, observations: Observations
+) -> ReportContent:
+    Image.new("RGB", (4, 3), "red").save(tmp_path / "overlay.png")
+    return ReportContent(
+        design=Design(),
+        material=Material(),
+        load=Load(),
+        mesh=mesh,
+        observations=observations,
+        evaluations=[fem, pinn],
+        reference=fem,
+        figures=[Figure(tmp_path / "overlay.png", "Deformed finger", "Two fingers.")],
+        provenance={"seed": 17, "versions": {"numpy": "1.26.4"}},
+    )
+
+
+def test_the_page_is_balanced_and_whole(content: ReportContent) -> None:
+    page = Page(render(content))
+    assert page.unbalanced == []
+    assert page.open == []
+
+
+def test_it_asks_for_nothing_from_outside(content: ReportContent) -> None:
+    html = render(content)
+    assert "<script" not in html
+    assert "<link" not in html
+    assert re.findall(r"url\(|@import|https?://", html) == []
+    assert [source[:22] for source in Page(html).values("src")] == ["data:image/png;base64,"]
+    assert Page(html).values("href") == []
+
+
+def test_it_holds_the_errors_under_both_definitions(content: ReportContent) -> None:
+    text = Page(render(content)).text
+    for expected in ("0.300", "0.400", "0.700", "0.500", "disp, sum", "disp, rss", "Table I"):
+        assert expected in text
+
+
+def test_it_compares_with_the_reference(content: ReportContent) -> None:
+    text = Page(render(content)).text
+    assert "Comparison with fem" in text
+    assert "10.0 %" in text  # relative L2 of a solution that is a tenth larger
+    assert "21.0 %" in text  # its energy
+    assert "−0.5500" in text  # its reaction
+
+
+def test_it_says_what_was_compared_and_how_it_came_about(content: ReportContent) -> None:
+    text = Page(render(content)).text
+    for expected in (
+        "90 mm",
+        "E = 11.4 MPa",
+        "plane strain",
+        "v = −10 mm",
+        "17",
+        "1.26.4",
+        "Solved directly.",
+    ):
+        assert expected in text.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_every_picture_has_its_caption(content: ReportContent) -> None:
+    page = Page(render(content))
+    assert "Figure 1. Deformed finger. Two fingers." in page.text
+    assert page.values("alt") == ["Deformed finger"]
+
+
+def test_simulated_displacements_are_warned_of(content: ReportContent) -> None:
+    page = Page(render(content))
+    assert "simulated" in page.values("id")
+    assert "Simulated by another solver." in page.text
+
+
+def test_measured_displacements_are_not(
+    content: ReportContent, observe: Callable[..., Observations], fem: Evaluation
+) -> None:
+    seen = observe(fem.marker_displacement, simulated=False, hidden=(0,))
+    page = Page(render(replace(content, observations=seen)))
+    assert "simulated" not in page.values("id")
+    assert "simulated" not in page.text.lower()
+    assert "Measured by camera A. 2 of 3 markers seen." in page.text
+
+
+@pytest.mark.parametrize(("kind", "warned"), [("point", True), ("mean", False)])
+def test_a_point_load_is_said_to_have_no_limit(content: ReportContent, kind: str, warned: bool) -> None:
+    page = Page(render(replace(content, load=Load(kind=kind))))
+    assert ("point-load" in page.values("id")) is warned
+
+
+@pytest.mark.parametrize(("names", "warned"), [({"pinn-std"}, True), (set(), False)])
+def test_errors_on_assimilated_markers_are_training_errors(
+    content: ReportContent, names: set[str], warned: bool
+) -> None:
+    page = Page(render(replace(content, assimilating=frozenset(names))))
+    assert ("in-sample" in page.values("id")) is warned
+    assert ("pinn-std †" in page.text) is warned
+
+
+def test_a_solver_that_failed_is_marked_everywhere(content: ReportContent, failed: Evaluation) -> None:
+    page = Page(render(replace(content, evaluations=[*content.evaluations, failed])))
+    assert "fem-nonlinear did not converge. Stopped after 20 steps; try more load_steps." in page.text
+    bare = re.findall(r"fem-nonlinear(?! \(not converged\)| did not converge)", page.text)
+    assert bare == []
+
+
+def test_a_single_solver_is_compared_with_nothing(content: ReportContent, fem: Evaluation) -> None:
+    text = Page(render(replace(content, evaluations=[fem]))).text
+    assert "nothing to compare it with" in text
+
+
+def test_foreign_text_stays_text(
+    content: ReportContent, observe: Callable[..., Observations], fem: Evaluation
+) -> None:
+    seen = observe(fem.marker_displacement, source='simulated <script>alert("x")</script>')
+    assert "<script" not in render(replace(content, observations=seen, provenance={"<b>": "<script>"}))
+
+
+def test_it_is_written_atomically(content: ReportContent, tmp_path: Path) -> None:
+    write_report(tmp_path / "out" / "report.html", content)
+    assert (tmp_path / "out" / "report.html").read_text(encoding="utf-8") == render(content)
+    assert len(list((tmp_path / "out").iterdir())) == 1
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        (-0.25, "−0.2500"),  # a typographic minus, and the digits that it has
+        (1234.0, "1234"),  # no full stop after a whole number
+        (0.0, "0.000"),
+    ],
+)
+def test_numbers_are_set_with_four_digits(value: float, expected: str) -> None:
+    assert number(value) == expected
+
+
+def test_small_words() -> None:
+    assert percent(-0.0123) == "−1.23 %"
+    assert sentence("solved directly; no more.") == "Solved directly; no more."

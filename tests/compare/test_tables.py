@@ -1,0 +1,105 @@
+import csv
+from collections.abc import Callable
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+from rich.table import Table
+
+from compare.evaluation import Evaluation
+from compare.metrics import marker_errors, reference_differences
+from compare.tables import mae_table, write_markers, write_summary
+from geometry.mesh import TriangleMesh
+from geometry.observations import Observations
+
+Rows = list[dict[str, str]]
+UNITS = ("_mm", "_MPa", "_1", "_N_mm_per_mm", "_N_per_mm", "_s", "_rel_l2", "_rel")
+WITHOUT_UNIT = {"marker", "observations", "visible", "solver", "converged", "reference", "status"}
+
+
+def read(path: Path) -> Rows:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def printed(table: Table, *, width: int) -> str:
+    stream = StringIO()
+    Console(file=stream, width=width).print(table)
+    return stream.getvalue()
+
+
+@pytest.fixture
+def markers(tmp_path: Path, fem: Evaluation, pinn: Evaluation, observe: Callable[..., Observations]) -> Rows:
+    seen = observe(fem.marker_displacement + np.array([0.3, -0.4]), hidden=(1,))
+    write_markers(tmp_path / "markers.csv", evaluations=[fem, pinn], observations=seen)
+    return read(tmp_path / "markers.csv")
+
+
+@pytest.fixture
+def summary(tmp_path: Path, fem: Evaluation, failed: Evaluation, observations: Observations) -> Rows:
+    write_summary(
+        tmp_path / "summary.csv", evaluations=[fem, failed], observations=observations, reference=fem
+    )
+    return read(tmp_path / "summary.csv")
+
+
+@pytest.mark.parametrize("table", ["markers", "summary"])
+def test_every_number_has_its_unit_in_the_header(table: str, request: pytest.FixtureRequest) -> None:
+    headers = set(request.getfixturevalue(table)[0])
+    assert {header for header in headers - WITHOUT_UNIT if not header.endswith(UNITS)} == set()
+
+
+def test_numbers_come_back_to_the_last_digit(markers: Rows, pinn: Evaluation, mesh: TriangleMesh) -> None:
+    got = [[float(row[f"pinn-std_{axis}_mm"]) for axis in "uv"] for row in markers]
+    assert got == pinn.marker_displacement.tolist()
+    assert [[float(row["x_mm"]), float(row["y_mm"])] for row in markers] == mesh.markers.tolist()
+
+
+def test_errors_are_against_the_observations(markers: Rows) -> None:
+    assert float(markers[0]["fem_ae_u_mm"]) == pytest.approx(0.3)
+    assert float(markers[2]["fem_ae_v_mm"]) == pytest.approx(0.4)
+
+
+def test_a_marker_that_was_not_seen_has_no_observation_and_no_error(markers: Rows) -> None:
+    empty = {name for name, cell in markers[1].items() if cell == ""}
+    errors = {f"{solver}_ae_{axis}_mm" for solver in ("fem", "pinn-std") for axis in "uv"}
+    assert empty == errors | {"observed_u_mm", "observed_v_mm"}
+    assert [row["visible"] for row in markers] == ["1", "0", "1"]
+
+
+def test_every_row_says_that_the_observations_are_simulated(markers: Rows, summary: Rows) -> None:
+    assert {row["observations"] for row in markers + summary} == {"simulated"}
+
+
+def test_the_summary_holds_the_metrics(
+    summary: Rows, fem: Evaluation, failed: Evaluation, observations: Observations
+) -> None:
+    row, errors = summary[1], marker_errors(failed, observations)
+    differences = reference_differences(failed, fem)
+    assert float(row["mae_sum_mm"]) == errors.mae_sum
+    assert float(row["mae_rss_mm"]) == errors.mae_rss
+    assert float(row["to_reference_displacement_rel_l2"]) == differences.displacement.rel_l2
+    assert float(row["to_reference_von_mises_p95_MPa"]) == differences.von_mises.p95
+    assert float(row["to_reference_stress_xy_mean_MPa"]) == differences.stress["xy"].mean
+    assert float(row["to_reference_strain_xy_rel_l2"]) == differences.strain["xy"].rel_l2
+    assert float(row["reaction_v_N_per_mm"]) == -1.5
+    assert (row["converged"], row["status"]) == ("0", failed.message)
+
+
+def test_the_terminal_table_names_numbers_reference_failure_and_source(
+    fem: Evaluation, failed: Evaluation, observations: Observations
+) -> None:
+    text = printed(mae_table([fem, failed], observations, fem), width=120)
+    for expected in ("0.300", "0.400", "0.700", "0.500", "reference", "not converged", "simulated", "1.25"):
+        assert expected in text
+
+
+def test_the_terminal_table_fits_eighty_columns(
+    fem: Evaluation, failed: Evaluation, observations: Observations
+) -> None:
+    text = printed(mae_table([fem, failed], observations, fem), width=80)
+    assert "fem-nonlinear" in text
+    assert "…" not in text
+    assert max(map(len, text.splitlines())) <= 80
