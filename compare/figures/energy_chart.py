@@ -8,12 +8,22 @@ from matplotlib.axes import Axes
 
 from compare.evaluation import Evaluation
 from compare.figures.labels import solver_label
-from compare.figures.style import INK, WIDTH, axes_at, figure, heading, solver_colour
+from compare.figures.style import (
+    INK,
+    WIDTH,
+    axes_at,
+    figure,
+    heading,
+    legend_above,
+    legend_height,
+    solver_colour,
+)
 from geometry.arrays import FloatArray
 
 LOG_RATIO = 20.0
 """An axis is logarithmic where the largest value exceeds the smallest by this factor."""
-HEAD, HEIGHT, FOOT, LEFT, GAP = 0.5, 1.6, 0.42, 0.65, 0.75
+HEAD, HEIGHT, FOOT, LEFT, GAP = 0.3, 1.6, 0.45, 0.65, 0.75
+"""Heights, the left margin and the gap between charts, inches."""
 ENERGY = "energy"
 
 Group = tuple[str, str]
@@ -52,38 +62,40 @@ def draw_energy(path: Path, *, evaluations: Sequence[Evaluation], reference: Eva
     colours = {evaluation.solver: solver_colour(number) for number, evaluation in enumerate(evaluations)}
     if not groups:
         return False
-    with figure(path, len(groups) * (HEAD + HEIGHT + FOOT)) as drawn:
+    line = f"{solver_label(reference)} {reference.energy:.4g}"
+    heights = [
+        legend_height([*map(record_label, members), *([line] if approaches_reference(group) else [])])
+        for group, members in groups.items()
+    ]
+    with figure(path, HEAD + sum(heights) + len(groups) * (HEIGHT + FOOT)) as drawn:
         heading(drawn, "Energy on the way to the solution")
         for row, (group, members) in enumerate(groups.items()):
             others = [evaluation for evaluation in members if evaluation is not reference]
             compared = others if approaches_reference(group) else []
             columns = 2 if compared else 1
             width = (WIDTH - LEFT - 0.15 - (columns - 1) * GAP) / columns
-            top = HEAD + row * (HEAD + HEIGHT + FOOT)
+            top = HEAD + sum(heights[: row + 1]) + row * (HEIGHT + FOOT)
             axes = axes_at(drawn, (LEFT, top, width, HEIGHT))
             _records(axes, group, members, colours)
             if compared:
-                label = f"{solver_label(reference)} {reference.energy:.4g}"
                 dashes = (0, (4, 2))
-                axes.axhline(reference.energy, color=INK, lw=0.9, ls=dashes, label=label, zorder=1)
+                axes.axhline(reference.energy, color=INK, lw=0.9, ls=dashes, label=line, zorder=1)
                 beside = axes_at(drawn, (LEFT + width + GAP, top, width, HEIGHT))
                 _distances(beside, group, compared, colours, reference)
-            drawn.legend(
-                *axes.get_legend_handles_labels(),
-                loc="upper left",
-                bbox_to_anchor=(0.0, 1 - (top - HEAD + 0.24) / drawn.get_figheight()),
-                ncols=2,
-                borderaxespad=0.1,
-            )
+            legend_above(axes)
     return True
+
+
+def record_label(evaluation: Evaluation) -> str:
+    """The solver and the energy of its result."""
+    return f"{solver_label(evaluation)} {evaluation.energy:.4g}"
 
 
 def _records(axes: Axes, group: Group, members: Sequence[Evaluation], colours: dict[str, str]) -> None:
     abscissa, column = group
     for evaluation in members:
         y = evaluation.history[column]
-        label = f"{solver_label(evaluation)}, ends at {y[-1]:.4g}"
-        _line(axes, evaluation.history[abscissa], y, colours[evaluation.solver], label)
+        _line(axes, evaluation.history[abscissa], y, colours[evaluation.solver], record_label(evaluation))
     _scale(axes, group, [evaluation.history[column] for evaluation in members], members)
     axes.set_ylabel(readable(column))
 
@@ -95,7 +107,7 @@ def _distances(
     for evaluation, distance in zip(members, distances, strict=True):
         _line(axes, evaluation.history[group[0]], distance, colours[evaluation.solver], None)
     _scale(axes, group, distances, members)
-    axes.set_ylabel(rf"$|E / E_\mathrm{{{reference.solver.replace('-', '–')}}} - 1|$")
+    axes.set_ylabel(f"|E / E({reference.solver}) − 1|")
 
 
 def _line(axes: Axes, x: FloatArray, y: FloatArray, colour: str, label: str | None) -> None:

@@ -8,37 +8,45 @@ from matplotlib.axes import Axes
 
 from compare.evaluation import Evaluation
 from compare.figures.labels import solver_label
-from compare.figures.style import MUTED, WIDTH, axes_at, figure, heading, solver_colour
+from compare.figures.style import (
+    MUTED,
+    WIDTH,
+    axes_at,
+    figure,
+    heading,
+    legend_above,
+    legend_height,
+    solver_colour,
+)
 from compare.metrics import marker_errors
 from geometry.arrays import BoolArray, FloatArray
 from geometry.observations import Observations
 
-BAR_LEFT, BAR_HEIGHT = 0.66, 1.45
+HEAD, HEIGHT, FOOT, LEFT = 0.32, 1.45, 0.42, 0.72
+"""Heights and the left margin, inches."""
 
 
 def draw_marker_errors(path: Path, *, evaluations: Sequence[Evaluation], observations: Observations) -> None:
     """Bars of |du| and |dv| at every marker, grouped by marker, one colour a solver (Fig. 6 of the paper)."""
     errors = [marker_errors(evaluation, observations) for evaluation in evaluations]
     names = [solver_label(evaluation) for evaluation in evaluations]
-    head, gap = 0.52, 0.45
-    with figure(path, head + 2 * (BAR_HEIGHT + gap) + 0.05) as drawn:
-        heading(
-            drawn,
-            f"Absolute error at the markers, against {observations.label} displacements",
-            "marker 1 is nearest the base",
-        )
-        for row, (symbol, columns, means) in enumerate(
-            [
-                ("u", [error.ae_u for error in errors], [error.mae_u for error in errors]),
-                ("v", [error.ae_v for error in errors], [error.mae_v for error in errors]),
-            ]
-        ):
-            top = head + row * (BAR_HEIGHT + gap)
-            axes = axes_at(drawn, (BAR_LEFT, top, WIDTH - BAR_LEFT - 0.1, BAR_HEIGHT))
-            labels = [f"{name}, mean {mean:.3g} mm" for name, mean in zip(names, means, strict=True)]
-            _bars(axes, columns, labels, observations.visible)
+    charts = {
+        "u": ([error.ae_u for error in errors], [error.mae_u for error in errors]),
+        "v": ([error.ae_v for error in errors], [error.mae_v for error in errors]),
+    }
+    legends = {
+        symbol: [f"{name}, mean {mean:.3g} mm" for name, mean in zip(names, means, strict=True)]
+        for symbol, (_, means) in charts.items()
+    }
+    heights = [legend_height(labels) for labels in legends.values()]
+    with figure(path, HEAD + sum(heights) + 2 * (HEIGHT + FOOT)) as drawn:
+        heading(drawn, f"Absolute error at the markers, against {observations.label} displacements")
+        for row, (symbol, (columns, _)) in enumerate(charts.items()):
+            top = HEAD + sum(heights[: row + 1]) + row * (HEIGHT + FOOT)
+            axes = axes_at(drawn, (LEFT, top, WIDTH - LEFT - 0.1, HEIGHT))
+            _bars(axes, columns, legends[symbol], observations.visible)
             axes.set_ylabel(rf"$|\Delta {symbol}|$, mm")
-        axes.set_xlabel("marker")
+        axes.set_xlabel("marker (1 is nearest the base)")
 
 
 def _bars(axes: Axes, columns: Sequence[FloatArray], labels: Sequence[str], visible: BoolArray) -> None:
@@ -61,20 +69,9 @@ def _bars(axes: Axes, columns: Sequence[FloatArray], labels: Sequence[str], visi
         )
     axes.set_xticks(range(1, count + 1) if count <= 20 else range(1, count + 1, 5))
     axes.set_xlim(0.4, count + 0.6)
-    axes.ticklabel_format(axis="y", scilimits=(-2, 3), useMathText=True)
+    axes.yaxis.set_major_formatter("{x:g}")
     axes.grid(axis="y", color="#dddddd", linewidth=0.5)
     axes.set_axisbelow(True)
     ceiling = max(float(np.nanmax(values)) for values in columns) or 1.0
-    axes.set_ylim(0, ceiling * (1.02 + 0.13 * -(-len(labels) // 2)))
-    axes.legend(
-        loc="upper left",
-        ncols=2,
-        handlelength=1.0,
-        handletextpad=0.5,
-        columnspacing=1.2,
-        borderaxespad=0.1,
-        frameon=True,
-        facecolor="white",
-        edgecolor="none",
-        framealpha=0.85,
-    )
+    axes.set_ylim(0, 1.04 * ceiling)
+    legend_above(axes)

@@ -88,6 +88,38 @@ def axes_at(drawn: MplFigure, box: Sequence[float]) -> Axes:
     )
 
 
+LEGEND_LINE = 0.17
+"""Height of a line of a legend, inches."""
+
+
+def legend_columns(labels: Sequence[str]) -> int:
+    """Two columns where they fit the width of the page, else one."""
+    return 2 if max(map(len, labels)) <= 30 else 1
+
+
+def legend_height(labels: Sequence[str]) -> float:
+    """How much room `legend_above` needs for these labels, inches."""
+    return LEGEND_LINE * -(-len(labels) // legend_columns(labels))
+
+
+def legend_above(axes: Axes) -> None:
+    """A legend above axes, at their left end."""
+    handles, labels = axes.get_legend_handles_labels()
+    axes.legend(
+        handles,
+        labels,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.01),
+        ncols=legend_columns(labels),
+        handlelength=1.4,
+        handletextpad=0.5,
+        columnspacing=1.2,
+        borderaxespad=0.0,
+        borderpad=0.1,
+        labelspacing=0.35,
+    )
+
+
 def solver_colour(number: int) -> str:
     """Colour of the solver with that number in the run's order."""
     return SOLVER_COLOURS[number % len(SOLVER_COLOURS)]

@@ -61,9 +61,9 @@ class Page(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def pages() -> Iterator[dict[str, Page]]:
-    """Every matplotlib figure that was drawn, by the name of its file."""
-    seen: dict[str, Page] = {}
+def pages() -> Iterator[dict[Path, Page]]:
+    """Every matplotlib figure that was drawn, by its file."""
+    seen: dict[Path, Page] = {}
     words: list[tuple[str, Bbox]] = []
     draw = Text.draw
 
@@ -83,7 +83,7 @@ def pages() -> Iterator[dict[str, Page]]:
                 words.clear()
                 with original(path, height) as drawn:
                     yield drawn
-                seen[path.stem] = Page(drawn, list(words))
+                seen[path] = Page(drawn, list(words))
 
             patch.setattr(module, "figure", watched)
         yield seen
@@ -96,7 +96,7 @@ def said() -> list[tuple[float, str]]:
 
 @pytest.fixture(scope="module")
 def figures(
-    pages: dict[str, Page],
+    pages: dict[Path, Page],
     said: list[tuple[float, str]],
     tmp_path_factory: pytest.TempPathFactory,
     mesh: TriangleMesh,
@@ -137,33 +137,56 @@ def test_the_file_is_an_image_of_the_width_of_a_page_that_is_not_blank(
 
 @pytest.mark.parametrize("name", ALL)
 def test_no_text_leaves_the_page_or_runs_into_another(
-    name: str, figures: dict[str, Figure], pages: dict[str, Page]
+    name: str, figures: dict[str, Figure], pages: dict[Path, Page]
 ) -> None:
     assert figures[name].caption.endswith(".")
-    assert pages[name].cut_off() == []
-    assert pages[name].overlaps() == []
+    assert pages[figures[name].path].cut_off() == []
+    assert pages[figures[name].path].overlaps() == []
+
+
+def test_six_solvers_find_room_too(
+    pages: dict[Path, Page],
+    tmp_path: Path,
+    mesh: TriangleMesh,
+    fem: Evaluation,
+    pinn: Evaluation,
+    failed: Evaluation,
+    observations: Observations,
+) -> None:
+    more = [replace(pinn, solver=f"pinn-{name}", converged=name != "asm") for name in ("local", "asm", "x")]
+    draw_all(
+        tmp_path,
+        design=Design(),
+        mesh=mesh,
+        evaluations=[fem, pinn, failed, *more],
+        observations=observations,
+        reference=fem,
+    )
+    for name in ("overlay", "marker_errors", "von_mises", "energy"):
+        page = pages[tmp_path / f"{name}.png"]
+        assert (name, page.cut_off(), page.overlaps()) == (name, [], [])
 
 
 @pytest.mark.parametrize("name", ["overlay", "marker_errors", *(quantity.name for quantity in QUANTITIES)])
 def test_a_solver_that_failed_is_marked(
-    name: str, figures: dict[str, Figure], pages: dict[str, Page]
+    name: str, figures: dict[str, Figure], pages: dict[Path, Page]
 ) -> None:
-    assert "fem-nonlinear (not converged)" in pages[name].text
+    assert "fem-nonlinear (not converged)" in pages[figures[name].path].text
 
 
 @pytest.mark.parametrize("name", ["overlay", "marker_errors"])
 def test_simulated_markers_are_called_simulated(
-    name: str, figures: dict[str, Figure], pages: dict[str, Page]
+    name: str, figures: dict[str, Figure], pages: dict[Path, Page]
 ) -> None:
-    assert "simulated" in pages[name].text
+    assert "simulated" in pages[figures[name].path].text
     assert "simulated by another solver" in figures[name].caption
 
 
-def test_a_marker_that_was_not_seen_has_no_bar(figures: dict[str, Figure], pages: dict[str, Page]) -> None:
-    for axes in pages["marker_errors"].figure.axes:
+def test_a_marker_that_was_not_seen_has_no_bar(figures: dict[str, Figure], pages: dict[Path, Page]) -> None:
+    for axes in pages[figures["marker_errors"].path].figure.axes:
         middles = {round(bar.get_x() + bar.get_width() / 2) for bar in axes.patches}
         assert middles == {1, 3}
-    assert pages["marker_errors"].text.count("not seen") == 2
+    assert pages[figures["marker_errors"].path].text.count("not seen") == 2
 
 
 def test_progress_goes_from_none_to_all(figures: dict[str, Figure], said: list[tuple[float, str]]) -> None:
@@ -221,8 +244,8 @@ def test_without_a_record_there_is_no_chart_of_energy(fem: Evaluation, tmp_path:
     assert not (tmp_path / "energy.png").exists()
 
 
-def test_the_reference_energy_is_a_line(figures: dict[str, Figure], pages: dict[str, Page]) -> None:
-    energies, distances = pages["energy"].figure.axes
+def test_the_reference_energy_is_a_line(figures: dict[str, Figure], pages: dict[Path, Page]) -> None:
+    energies, distances = pages[figures["energy"].path].figure.axes
     assert [2.0, 2.0] in [list(line.get_ydata()) for line in energies.get_lines()]
     np.testing.assert_allclose(distances.get_lines()[0].get_ydata(), [44.0, 1.0, 0.21])
 
@@ -258,10 +281,10 @@ DESIGNS = {
 
 @pytest.mark.parametrize("design", DESIGNS.values(), ids=DESIGNS)
 def test_a_drawing_has_every_dimension_and_none_overlaps(
-    design: Parameters, pages: dict[str, Page], tmp_path: Path
+    design: Parameters, pages: dict[Path, Page], tmp_path: Path
 ) -> None:
     draw_design(tmp_path / "drawing.png", design)
-    text = pages["drawing"].text
+    text = pages[tmp_path / "drawing.png"].text
     expected = [
         rf"$H$ = {design.height:g} mm",
         rf"$L$ = {design.base_width:g} mm",
@@ -275,5 +298,5 @@ def test_a_drawing_has_every_dimension_and_none_overlaps(
         expected += [rf"$t_\mathrm{{rib}}$ = {design.rib_thickness:g} mm", r"$L_\mathrm{angle}$"]
     assert [dimension for dimension in expected if dimension not in text] == []
     numerals = {str(number) for number in range(1, 100)}
-    assert pages["drawing"].cut_off() == []
-    assert [pair for pair in pages["drawing"].overlaps() if not numerals & set(pair)] == []
+    assert pages[tmp_path / "drawing.png"].cut_off() == []
+    assert [pair for pair in pages[tmp_path / "drawing.png"].overlaps() if not numerals & set(pair)] == []
