@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from compare.atomic import atomic_path
 from geometry.arrays import FloatArray
@@ -62,8 +63,14 @@ class Evaluation:
     energy_density: FloatArray
 
     @classmethod
-    def of(cls, solution: Solution, mesh: TriangleMesh) -> "Evaluation":
-        """Sample a solution on the nodes and quadrature points of `mesh` and at its markers."""
+    def of(cls, solution: Solution, mesh: TriangleMesh, markers: ArrayLike | None = None) -> "Evaluation":
+        """Sample a solution on the nodes and quadrature points of `mesh` and at the markers.
+
+        Args:
+            solution: What to sample.
+            mesh: The shared mesh.
+            markers: Marker positions, shape (m, 2), mm; those of the mesh if None.
+        """
         quadrature = body_quadrature(mesh, QUADRATURE_DEGREE)
         state = solution.state(quadrature.location)
         return cls(
@@ -74,7 +81,7 @@ class Evaluation:
             reaction=np.asarray(solution.reaction, dtype=np.float64),
             stats=dict(solution.stats),
             history={name: np.asarray(column) for name, column in solution.history.items()},
-            marker_displacement=solution.displacement(mesh.markers),
+            marker_displacement=solution.displacement(mesh.markers if markers is None else markers),
             node_displacement=solution.displacement(mesh.at_nodes()),
             weights=quadrature.weights,
             displacement=solution.displacement(quadrature.location),

@@ -30,7 +30,7 @@ def write_vtu(path: Path, mesh: TriangleMesh, evaluation: Evaluation) -> None:
         mesh: The mesh of n nodes and t triangles that the evaluation was made on.
         evaluation: The solver's result.
     """
-    grid = pyvista.UnstructuredGrid({pyvista.CellType.TRIANGLE: mesh.triangles}, in_space(mesh.points))
+    grid = _grid(mesh)
     grid.point_data["displacement_mm"] = in_space(evaluation.node_displacement)
     strain = evaluation.per_triangle(evaluation.strain)
     for name, (row, column) in {"xx": (0, 0), "yy": (1, 1), "xy": (0, 1)}.items():
@@ -51,6 +51,22 @@ def write_vtu(path: Path, mesh: TriangleMesh, evaluation: Evaluation) -> None:
     grid.field_data["reaction_N_per_mm"] = evaluation.reaction[None]
     with atomic_path(path) as partial:
         grid.save(partial)
+
+
+def write_mesh(path: Path, mesh: TriangleMesh) -> None:
+    """Write the mesh atomically; the point data `boundary_NAME` and `marker` (its number, else 0) say what is where."""
+    grid = _grid(mesh)
+    for name, edges in mesh.boundaries.items():
+        grid.point_data[f"boundary_{name}"] = np.isin(np.arange(len(mesh.points)), edges).astype(np.uint8)
+    marker = np.zeros(len(mesh.points), dtype=np.int32)
+    marker[mesh.marker_nodes] = np.arange(1, len(mesh.marker_nodes) + 1)
+    grid.point_data["marker"] = marker
+    with atomic_path(path) as partial:
+        grid.save(partial)
+
+
+def _grid(mesh: TriangleMesh) -> pyvista.UnstructuredGrid:
+    return pyvista.UnstructuredGrid({pyvista.CellType.TRIANGLE: mesh.triangles}, in_space(mesh.points))
 
 
 def in_space(vectors: FloatArray) -> FloatArray:

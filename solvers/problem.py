@@ -9,7 +9,6 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from geometry.arrays import FloatArray
-from geometry.errors import UserError
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
 from geometry.quadrature import edge_quadrature
@@ -104,13 +103,6 @@ class Problem:
             for name in ("points", "displacements", "standard_deviations", "visible"):
                 sha.update(getattr(self.observations, name).tobytes())
         return sha.hexdigest()
-
-    def refuse_unless(self, solver: str, *, law: str, kinds: tuple[str, ...]) -> None:
-        """Raise a `UserError` if the material law or the kind of load is not one that `solver` has."""
-        if self.material.law != law:
-            raise UserError(f"{solver} solves the {law} law, not {self.material.law!r}")
-        if self.load.kind not in kinds:
-            raise UserError(f"{solver} takes the loads {', '.join(kinds)}, not {self.load.kind!r}")
 
 
 def contact_extent(mesh: TriangleMesh) -> tuple[float, float]:

@@ -1,10 +1,14 @@
 """Solvers by name: ours, loaded when asked for, and those of other packages (entry-point group `pinnray.solvers`)."""
 
 import warnings
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
 from importlib import import_module
 from importlib.metadata import entry_points
-from typing import Any
+from typing import Any, get_type_hints
+
+from pydantic import TypeAdapter, ValidationError
 
 from geometry.errors import UserError
 from solvers.solver import Solver
@@ -42,9 +46,9 @@ def make_solver(name: str, **settings: Any) -> Solver:
             factory = found[0].load()
         except Exception as error:
             raise UserError(f"solver {name!r} ({found[0].value}) cannot be loaded: {error}") from error
-    solver = factory(**settings)
+    solver = factory(**_typed(name, factory, settings))
     if not isinstance(solver, Solver):
-        raise UserError(f"solver {name!r} does not have the interface: name, solve(problem, progress), settings()")
+        raise UserError(f"solver {name!r} does not have the interface: name, laws, loads, solve(problem, progress), settings()")
     return solver
 
 
@@ -57,3 +61,20 @@ def usable_solvers() -> dict[str, Solver]:
         except (UserError, ImportError) as error:
             warnings.warn(f"solver {name!r} is left out: {error}", stacklevel=2)
     return solvers
+
+
+def _typed(name: str, factory: Any, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings with the types of the solver's dataclass fields; text, as from a command line, is converted."""
+    if not is_dataclass(factory):
+        return dict(settings)
+    hints = get_type_hints(factory)
+    known = [entry.name for entry in fields(factory) if entry.init]
+    typed = {}
+    for key, value in settings.items():
+        if key not in known:
+            raise UserError(f"{name} has no setting {key!r}; it has {', '.join(known)}")
+        try:
+            typed[key] = TypeAdapter(hints[key]).validate_python(value)
+        except ValidationError as error:
+            raise UserError(f"{name}: {key} = {value!r}: {error.errors()[0]['msg'].lower()}") from None
+    return typed

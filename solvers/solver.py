@@ -3,7 +3,10 @@
 from collections.abc import Callable
 from typing import Protocol, runtime_checkable
 
-from solvers.problem import Problem
+from pydantic import ValidationError
+
+from geometry.errors import UserError
+from solvers.problem import Material, Problem
 from solvers.solution import Solution
 
 Progress = Callable[[float, str], None]
@@ -18,10 +21,17 @@ def silent(fraction: float, text: str) -> None:
 class Solver(Protocol):
     """Something that solves a `Problem`.
 
-    A solver is made without arguments for its defaults; `name` is what it is called by on the command line.
+    A solver is made without arguments for its defaults.
+
+    Attributes:
+        name: What it is called by on the command line.
+        laws: Material laws that it has (`Material.law`), the usual one first.
+        loads: Kinds of load that it takes (`Load.kind`).
     """
 
     name: str
+    laws: tuple[str, ...]
+    loads: tuple[str, ...]
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve `problem`.
@@ -34,3 +44,24 @@ class Solver(Protocol):
     def settings(self) -> dict[str, object]:
         """Every setting that changes the result, as JSON-ready values; recorded with the result."""
         ...
+
+
+def check_problem(solver: Solver, problem: Problem) -> None:
+    """Raise a `UserError` if the problem's law or kind of load is not one that the solver has."""
+    if problem.material.law not in solver.laws:
+        raise UserError(f"{solver.name} has the law {' or '.join(solver.laws)}, not {problem.material.law}")
+    if problem.load.kind not in solver.loads:
+        raise UserError(f"{solver.name} takes the loads {', '.join(solver.loads)}, not {problem.load.kind!r}")
+
+
+def with_law(material: Material, solver: Solver) -> Material:
+    """The material with a law that the solver has: its own if it can, else the solver's usual one.
+
+    Raises:
+        UserError: If that law does not exist for the material's plane state.
+    """
+    law = material.law if material.law in solver.laws else solver.laws[0]
+    try:
+        return Material(**{**material.model_dump(), "law": law})
+    except ValidationError as error:
+        raise UserError(f"{solver.name}: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from None

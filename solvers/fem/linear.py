@@ -14,7 +14,7 @@ from solvers.fem.bridge import DistributedSpace, Factorisation
 from solvers.fem.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem, contact_functional
 from solvers.solution import Solution, Status
-from solvers.solver import Progress, silent
+from solvers.solver import Progress, check_problem, silent
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,8 @@ class FemSolver:
 
     degree: int = 2
     name: ClassVar[str] = "fem"
+    laws: ClassVar[tuple[str, ...]] = ("linear",)
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
 
     def __post_init__(self) -> None:
         if self.degree not in (1, 2):
@@ -41,7 +43,7 @@ class FemSolver:
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve the linear problem; see `Solver`."""
-        problem.refuse_unless(self.name, law="linear", kinds=("mean", "point", "patch"))
+        check_problem(self, problem)
         started = time.perf_counter()
         space = LagrangeSpace(problem.mesh, self.degree)
         system = LinearSystem.of(problem, space)

@@ -22,7 +22,7 @@ from solvers.fem.linear import (
 )
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
-from solvers.solver import Progress, silent
+from solvers.solver import Progress, check_problem, silent
 
 QUADRATURE_DEGREE = 4
 """Of the energy's integral: exact for quadratic elements with the quadratic part of the law."""
@@ -51,6 +51,8 @@ class FemNonlinearSolver:
     tolerance: float = 1e-8
     max_iterations: int = 12
     name: ClassVar[str] = "fem-nonlinear"
+    laws: ClassVar[tuple[str, ...]] = ("neo-hookean",)
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
 
     def __post_init__(self) -> None:
         if self.degree not in (1, 2):
@@ -64,7 +66,7 @@ class FemNonlinearSolver:
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve the finite-strain problem; see `Solver`. The material law must be neo-Hookean."""
-        problem.refuse_unless(self.name, law="neo-hookean", kinds=("mean", "point", "patch"))
+        check_problem(self, problem)
         started = time.perf_counter()
         space = LagrangeSpace(problem.mesh, self.degree)
         newton = _Newton(self, problem, space)

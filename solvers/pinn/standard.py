@@ -15,7 +15,7 @@ from solvers.pinn.gated_units import GatedUnits
 from solvers.pinn.trial_space import BaseFactor, NetworkField, TrialUnits
 from solvers.problem import Problem, contact_functional
 from solvers.solution import Solution, State, Status
-from solvers.solver import Progress, silent
+from solvers.solver import Progress, check_problem, silent
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,8 @@ class PinnStdSolver:
     base_length: float = 5.0
     seed: int = 0
     name: ClassVar[str] = "pinn-std"
+    laws: ClassVar[tuple[str, ...]] = ("linear",)
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point")
 
     def __post_init__(self) -> None:
         if self.units < 1 or self.rounds < 2:
@@ -63,7 +65,7 @@ class PinnStdSolver:
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Train the network on the linear problem; see `Solver`."""
-        problem.refuse_unless(self.name, law="linear", kinds=("mean", "point"))
+        check_problem(self, problem)
         started = time.perf_counter()
         rng = np.random.default_rng(self.seed)
         factor = BaseFactor.of(problem.mesh, self.base_length)

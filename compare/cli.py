@@ -1,0 +1,220 @@
+"""The command line: `compare`, the one-shot main job, and `pinnray` with every verb."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import App, CycloptsError, Group, Parameter
+from rich.console import Console
+
+from compare.options import FingerOptions, PhysicsOptions, existing, read_solvers
+from geometry.errors import UserError
+
+BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 2, 3, 130
+EXIT_CODES = (
+    "Exit codes: 0 all well; 2 bad input, with one line that says what and how to mend it; "
+    "3 done, but a solver did not converge; 130 interrupted."
+)
+OUTPUT = Group("Output", sort_key=3)
+
+pinnray = App(
+    name="pinnray",
+    help="Can a physics-informed neural network stand in for finite elements on a real Fin Ray finger?",
+    help_epilogue=EXIT_CODES,
+    result_action="return_value",
+)
+
+
+@pinnray.command(help_epilogue=EXIT_CODES)
+def compare(
+    finger: FingerOptions = FingerOptions(),
+    physics: PhysicsOptions = PhysicsOptions(),
+    *,
+    solvers: Annotated[str, Parameter(help="Names with commas between; `pinnray solvers` lists them.")] = "fem,pinn-std",
+    solver_set: Annotated[
+        tuple[str, ...],
+        Parameter(negative="", help="Change a solver's setting, as in --solver-set pinn-std.units=300; may be repeated."),
+    ] = (),
+    seed: Annotated[int, Parameter(help="Of every solver that draws random numbers.")] = 0,
+    measurements: Annotated[
+        Path | None,
+        Parameter(
+            help="CSV file of marker displacements (x_mm, y_mm, u_mm, v_mm). Without it they are simulated by "
+            "a finite-strain run, and everything that shows them says so."
+        ),
+    ] = None,
+    reference: Annotated[
+        str | None, Parameter(help="Solver that the others are compared with; fem, else the first.")
+    ] = None,
+    out: Annotated[Path | None, Parameter(group=OUTPUT, help="Output folder; out/DESIGN if not given.")] = None,
+    resume: Annotated[
+        bool, Parameter(group=OUTPUT, negative="", help="Take over solutions that an earlier run finished.")
+    ] = False,
+    quiet: Annotated[bool, Parameter(group=OUTPUT, negative="", help="No progress, no table.")] = False,
+    json_: Annotated[
+        bool, Parameter(name="--json", group=OUTPUT, negative="", help="Print metrics.json and nothing else.")
+    ] = False,
+) -> int:
+    """Solve one finger with several solvers and compare them at the markers and on the shared mesh.
+
+    Draws the finger, meshes it once, solves it with every solver, and writes a report with tables, pictures and
+    fields. Examples:
+
+    - compare --design default
+    - compare --design slender --solvers fem
+    - compare --set rib_count=6 --set height=110 --measurements markers.csv
+    """
+    from compare.pipeline import Job, run
+    from compare.stages import Stages
+    from compare.tables import mae_table
+
+    design, mesh = finger.read()
+    material, load = physics.read()
+    job = Job(
+        design=design,
+        solvers=read_solvers(solvers, solver_set, seed),
+        mesh=mesh,
+        material=material,
+        load=load,
+        measurements=existing(measurements),
+        reference=reference,
+        out=out or Path("out") / design.name,
+        resume=resume,
+    )
+    with Stages(Console(stderr=True), quiet=quiet or json_) as stages:
+        outcome = run(job, stages)
+    if json_:
+        print((job.out / "metrics.json").read_text(encoding="utf-8"), end="")
+    elif not quiet:
+        console = Console()
+        console.print(mae_table(outcome.evaluations, outcome.observations, outcome.reference))
+        console.print(f"report: {job.out / 'report.html'}", soft_wrap=True, highlight=False)
+    unconverged = [evaluation for evaluation in outcome.evaluations if not evaluation.converged]
+    for evaluation in unconverged:
+        _say(f"{evaluation.solver} did not converge: {evaluation.message}")
+    return NOT_CONVERGED if unconverged else 0
+
+
+@pinnray.command
+def design(
+    finger: FingerOptions = FingerOptions(),
+    *,
+    out: Annotated[Path, Parameter(help="Folder for the files.")] = Path("out/cad"),
+    formats: Annotated[str, Parameter(help="Some of step, stl, dxf, svg, with commas.")] = "step,stl,dxf,svg",
+) -> int:
+    """Draw the finger: CAD files of the solid with its markers as separate bodies, and a dimensioned picture."""
+    from compare.figures.design_drawing import draw_design
+    from geometry.cache import cad_files
+
+    chosen, _ = finger.read()
+    paths = cad_files(chosen, out, formats=[name.strip() for name in formats.split(",") if name.strip()])
+    picture = out / "design.png"
+    draw_design(picture, chosen)
+    for path in [*paths, picture]:
+        print(path)
+    return 0
+
+
+@pinnray.command
+def mesh(
+    finger: FingerOptions = FingerOptions(),
+    *,
+    out: Annotated[Path, Parameter(help="Folder for the files.")] = Path("out/mesh"),
+) -> int:
+    """Mesh the finger: the shared mesh as a VTU and a NumPy file, and a picture of it."""
+    from compare.fields import write_mesh
+    from compare.figures.mesh_drawing import draw_mesh
+    from geometry.cache import finger_mesh
+
+    chosen, settings = finger.read()
+    triangles = finger_mesh(chosen, settings=settings)
+    out.mkdir(parents=True, exist_ok=True)
+    write_mesh(out / "mesh.vtu", triangles)
+    triangles.save(out / "mesh.npz")
+    draw_mesh(out / "mesh.png", triangles)
+    print(f"{len(triangles.points)} nodes, {len(triangles.triangles)} triangles, area {triangles.areas.sum():.4f} mm^2")
+    for name in ("mesh.vtu", "mesh.npz", "mesh.png"):
+        print(out / name)
+    return 0
+
+
+@pinnray.command(help_epilogue=EXIT_CODES)
+def solve(
+    solver: Annotated[str, Parameter(help="Name of the solver; `pinnray solvers` lists them.")],
+    finger: FingerOptions = FingerOptions(),
+    physics: PhysicsOptions = PhysicsOptions(),
+    *,
+    solver_set: Annotated[
+        tuple[str, ...], Parameter(negative="", help="Change a setting, as in --solver-set fem.degree=1; may be repeated.")
+    ] = (),
+    seed: Annotated[int, Parameter(help="Of a solver that draws random numbers.")] = 0,
+    out: Annotated[Path, Parameter(help="The VTU file for the fields.")] = Path("out/solution.vtu"),
+) -> int:
+    """Solve one finger with one solver and write its fields, without comparing anything."""
+    from compare.evaluation import Evaluation
+    from compare.fields import write_vtu
+    from compare.stages import Stages
+    from geometry.cache import finger_mesh
+    from solvers.problem import Problem
+    from solvers.solver import with_law
+
+    chosen, settings = finger.read()
+    material, load = physics.read()
+    (made,) = read_solvers(solver, solver_set, seed)
+    with Stages(Console(stderr=True)) as stages:
+        with stages.stage("mesh"):
+            triangles = finger_mesh(chosen, settings=settings)
+        with stages.stage(made.name) as progress:
+            solution = made.solve(Problem(triangles, with_law(material, made), load), progress)
+        write_vtu(out, triangles, Evaluation.of(solution, triangles))
+    print(f"{solution.solver}: {solution.status.message}")
+    print(f"energy {solution.energy:.6g} N mm/mm, reaction ({solution.reaction[0]:.6g}, {solution.reaction[1]:.6g}) N/mm")
+    print(out)
+    return 0 if solution.status.converged else NOT_CONVERGED
+
+
+@pinnray.command
+def solvers() -> int:
+    """List the solvers, with the material laws and loads that each has and its settings."""
+    from rich.table import Table
+
+    from solvers.registry import usable_solvers
+
+    table = Table("solver", "laws", "loads", "settings")
+    for name, solver in usable_solvers().items():
+        settings = ", ".join(f"{key}={value}" for key, value in solver.settings().items())
+        table.add_row(name, ", ".join(solver.laws), ", ".join(solver.loads), settings)
+    Console().print(table)
+    return 0
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Entry of `pinnray`."""
+    return _guarded(lambda: pinnray(arguments, exit_on_error=False, print_error=False))
+
+
+def compare_main(arguments: list[str] | None = None) -> int:
+    """Entry of `compare`: the same as `pinnray compare`."""
+    given = sys.argv[1:] if arguments is None else arguments
+    return main(["compare", *given])
+
+
+def _guarded(command: Callable[[], Any]) -> int:
+    """Run a command; what a user can mend becomes one line and exit code 2."""
+    try:
+        return int(command() or 0)
+    except (UserError, CycloptsError) as error:
+        _say(" ".join(str(error).split()))
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        _say("interrupted; what was complete is kept, and --resume goes on from it")
+        return INTERRUPTED
+
+
+def _say(message: str) -> None:
+    print(f"error: {message}" if not message.startswith("interrupted") else message, file=sys.stderr)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,254 @@
+"""The main job: mesh, measure, solve, evaluate, draw, report.
+
+Everything is written into `NAME.partial` beside the output folder `NAME`, which is replaced as a whole at the end: a killed run
+leaves the last complete result as it was and, in the partial folder, the solutions that it had finished, from which a resumed
+run goes on.
+"""
+
+import json
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from hashlib import sha256
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from compare.atomic import atomic_path
+from compare.evaluation import Evaluation
+from compare.fields import write_vtu
+from compare.figures import draw_all
+from compare.metrics import pick_reference
+from compare.provenance import file_digest, machine, package_versions
+from compare.report import ReportContent, write_report
+from compare.results import metrics
+from compare.stages import Stages
+from compare.tables import write_markers, write_summary
+from compare.virtual_experiment import virtual_experiment
+from geometry.cache import finger_mesh
+from geometry.design import Design
+from geometry.errors import OutsideBodyError, UserError
+from geometry.observations import Observations
+from geometry.settings import MeshSettings
+from solvers.problem import Load, Material, Problem
+from solvers.solver import Solver, with_law
+from vision.measurements import read_measurements, write_measurements
+
+RUN_FILE = "run.json"
+
+
+@dataclass(frozen=True)
+class Job:
+    """What to compare.
+
+    Attributes:
+        design: The finger.
+        solvers: The solvers, in the order of tables and pictures.
+        mesh: Element sizes.
+        material: The elastic constants; each solver takes the law that it has.
+        load: What moves the finger.
+        measurements: CSV file of marker displacements; None for a virtual experiment.
+        reference: Name of the solver that the others are compared with; `fem`, else the first, if None.
+        out: Output folder.
+        resume: Whether to take over solutions that an earlier run of the same job finished.
+    """
+
+    design: Design
+    solvers: Sequence[Solver]
+    mesh: MeshSettings = field(default_factory=MeshSettings)
+    material: Material = field(default_factory=Material)
+    load: Load = field(default_factory=Load)
+    measurements: Path | None = None
+    reference: str | None = None
+    out: Path = Path("out/default")
+    resume: bool = False
+
+    @property
+    def partial(self) -> Path:
+        """The folder where the run works."""
+        return self.out.with_name(self.out.name + ".partial")
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """A finished comparison; its files are in the job's output folder.
+
+    Attributes:
+        metrics: The content of `metrics.json`.
+        evaluations: One for each solver.
+        observations: What they were compared with.
+        reference: One of the evaluations.
+    """
+
+    metrics: dict[str, Any]
+    evaluations: Sequence[Evaluation]
+    observations: Observations
+    reference: Evaluation
+
+
+def run(job: Job, stages: Stages) -> Outcome:
+    """Run the comparison and write its output folder.
+
+    Raises:
+        UserError: If the job cannot be done; nothing is left half written in the output folder.
+    """
+    started = datetime.now(UTC)
+    _check(job)
+    given = read_measurements(job.measurements) if job.measurements else None
+    with _partial_folder(job) as folder:
+        with stages.stage("mesh"):
+            mesh = finger_mesh(job.design, settings=job.mesh)
+        problem = Problem(mesh, job.material, job.load)
+        with stages.stage("measurements") as progress:
+            observations = given or virtual_experiment(problem, progress)
+            _check_inside(observations, problem)
+            write_measurements(folder / "observations.csv", observations)
+        evaluations = [_evaluate(job, solver, problem, observations, folder, stages) for solver in job.solvers]
+        reference = pick_reference(evaluations, job.reference)
+        with stages.stage("pictures") as progress:
+            figures = draw_all(
+                folder / "figures",
+                design=job.design,
+                mesh=mesh,
+                evaluations=evaluations,
+                observations=observations,
+                reference=reference,
+                progress=progress,
+            )
+        with stages.stage("report"):
+            for evaluation in evaluations:
+                write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", mesh, evaluation)
+            write_markers(folder / "markers.csv", evaluations=evaluations, observations=observations)
+            write_summary(
+                folder / "summary.csv", evaluations=evaluations, observations=observations, reference=reference
+            )
+            numbers = metrics(
+                design=job.design,
+                material=job.material,
+                load=job.load,
+                observations=observations,
+                evaluations=evaluations,
+                reference=reference,
+            )
+            _write_json(folder / "metrics.json", numbers)
+            provenance = {
+                "started": started.isoformat(timespec="seconds"),
+                "seconds": {name: round(seconds, 2) for name, seconds in stages.seconds.items()},
+                "design_sha256": job.design.digest,
+                "mesh_sha256": mesh.digest,
+                "problem_sha256": problem.digest,
+                "mesh": job.mesh.model_dump(),
+                "measurements_sha256": file_digest(folder / "observations.csv"),
+                "solvers": {solver.name: solver.settings() for solver in job.solvers},
+                "versions": package_versions(),
+                "machine": machine(),
+            }
+            write_report(
+                folder / "report.html",
+                ReportContent(
+                    design=job.design,
+                    material=job.material,
+                    load=job.load,
+                    mesh=mesh,
+                    observations=observations,
+                    evaluations=evaluations,
+                    reference=reference,
+                    figures=figures,
+                    provenance=provenance,
+                ),
+            )
+            files = {
+                path.relative_to(folder).as_posix(): file_digest(path)
+                for path in sorted(folder.rglob("*"))
+                if path.is_file() and path.name != RUN_FILE
+            }
+            _write_json(folder / RUN_FILE, {"schema": 1, **provenance, "files_sha256": files})
+    return Outcome(numbers, evaluations, observations, reference)
+
+
+def _check(job: Job) -> None:
+    """Refuse what cannot be done before anything is computed."""
+    if not job.solvers:
+        raise UserError("no solver was asked for; name at least one")
+    names = [solver.name for solver in job.solvers]
+    if len(set(names)) < len(names):
+        raise UserError(f"a solver is named twice: {', '.join(names)}")
+    if job.reference is not None and job.reference not in names:
+        raise UserError(f"the reference {job.reference!r} is not among the solvers {', '.join(names)}")
+    for solver in job.solvers:
+        if job.load.kind not in solver.loads:
+            raise UserError(
+                f"{solver.name} takes the loads {', '.join(solver.loads)}, not {job.load.kind!r}"
+            )
+        with_law(job.material, solver)
+    if job.out.exists() and not (job.out / RUN_FILE).is_file() and any(job.out.iterdir()):
+        raise UserError(f"{job.out} holds files that are not a comparison's; name another folder with --out")
+
+
+def _evaluate(
+    job: Job, solver: Solver, problem: Problem, observations: Observations, folder: Path, stages: Stages
+) -> Evaluation:
+    """Solve and sample, or take over what an earlier run finished."""
+    own = Problem(problem.mesh, with_law(job.material, solver), job.load)
+    key = _key(solver, own, observations)
+    kept = folder / "solutions" / f"{solver.name}.npz"
+    with stages.stage(solver.name) as progress:
+        if job.resume:
+            for place in (kept, job.out / "solutions" / kept.name):
+                if (evaluation := Evaluation.load(place, key)) is not None:
+                    progress(1.0, "taken over from an earlier run")
+                    evaluation.save(kept, key)
+                    return evaluation
+        solution = solver.solve(own, progress)
+        evaluation = Evaluation.of(solution, problem.mesh, observations.points)
+        evaluation.save(kept, key)
+    return evaluation
+
+
+def _key(solver: Solver, problem: Problem, observations: Observations) -> str:
+    """SHA-256 over everything that a solution's samples depend on."""
+    settings = json.dumps([solver.name, solver.settings(), package_versions()], sort_keys=True, default=str)
+    return sha256((settings + problem.digest).encode() + observations.points.tobytes()).hexdigest()
+
+
+def _check_inside(observations: Observations, problem: Problem) -> None:
+    try:
+        problem.mesh.locate(observations.points)
+    except OutsideBodyError as error:
+        raise UserError(
+            f"the measurements are not of this finger: {error}; positions are those before loading, in the finger's frame"
+        ) from None
+
+
+@contextmanager
+def _partial_folder(job: Job) -> Iterator[Path]:
+    """The folder where the run works; it takes the place of the output folder when all went well."""
+    if job.partial.exists() and not job.resume:
+        shutil.rmtree(job.partial)
+    try:
+        job.partial.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"cannot write to {job.partial}: {error.strerror}") from None
+    yield job.partial
+    old = job.out.with_name(job.out.name + ".old")
+    if job.out.exists():
+        job.out.replace(old)
+    job.partial.replace(job.out)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def _write_json(path: Path, content: dict[str, Any]) -> None:
+    text = json.dumps(_without_nan(content), indent=2, allow_nan=False)
+    with atomic_path(path) as partial:
+        partial.write_text(text + "\n", encoding="utf-8")
+
+
+def _without_nan(value: Any) -> Any:
+    """The same content with null where a number is not finite, which JSON cannot hold."""
+    if isinstance(value, dict):
+        return {key: _without_nan(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(entry) for entry in value]
+    return None if isinstance(value, float) and not isfinite(value) else value

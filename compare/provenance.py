@@ -1,0 +1,51 @@
+"""What a result depends on: versions, machine, hashes."""
+
+import hashlib
+import os
+import platform
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+PACKAGES = (
+    "pinn-ray",
+    "numpy",
+    "scipy",
+    "torch",
+    "fenics-dolfinx",
+    "fenics-ufl",
+    "petsc4py",
+    "mpi4py",
+    "gmsh",
+    "cadquery",
+    "pyvista",
+    "vtk",
+    "opencv-python-headless",
+)
+
+
+def package_versions() -> dict[str, str]:
+    """Version of every package that has a part in the numbers or pictures."""
+    versions = {"python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            module = sys.modules.get({"fenics-dolfinx": "dolfinx", "fenics-ufl": "ufl"}.get(package, package))
+            versions[package] = str(getattr(module, "__version__", "not loaded"))
+    return versions
+
+
+def machine() -> dict[str, str | int]:
+    """Where the run took place."""
+    return {
+        "system": platform.platform(),
+        "processor": platform.machine(),
+        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1,
+    }
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file, in hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,85 @@
+"""`metrics.json`: the numbers of a comparison, in a form that scripts can rely on. Units: mm, MPa, N/mm, s."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from compare.evaluation import Evaluation
+from compare.metrics import FieldDifference, marker_errors, reference_differences
+from geometry.design import Design
+from geometry.observations import Observations
+from solvers.problem import Load, Material
+
+SCHEMA = 1
+"""Keys may be added to a schema; a key that is renamed or removed makes a new one."""
+
+
+def metrics(
+    *,
+    design: Design,
+    material: Material,
+    load: Load,
+    observations: Observations,
+    evaluations: Sequence[Evaluation],
+    reference: Evaluation,
+    assimilating: frozenset[str] = frozenset(),
+) -> dict[str, Any]:
+    """Everything that `metrics.json` holds.
+
+    `markers` compares with every marker that was seen. `held_out` compares with markers that the solver was not given: those
+    same markers for a solver that was given none, null for the solvers named in `assimilating`. Markers that were not seen are NaN.
+    """
+    return {
+        "schema": SCHEMA,
+        "design": design.model_dump(),
+        "material": material.model_dump(),
+        "load": load.model_dump(),
+        "measurements": {
+            "source": observations.label,
+            "description": observations.source,
+            "markers": int(observations.visible.sum()),
+        },
+        "reference": reference.solver,
+        "solvers": {
+            evaluation.solver: _solver(
+                evaluation, observations, reference, assimilates=evaluation.solver in assimilating
+            )
+            for evaluation in evaluations
+        },
+    }
+
+
+def _solver(
+    evaluation: Evaluation, observations: Observations, reference: Evaluation, *, assimilates: bool
+) -> dict[str, Any]:
+    errors = marker_errors(evaluation, observations)
+    differences = reference_differences(evaluation, reference)
+    means = {name: getattr(errors, name) for name in ("mae_u", "mae_v", "mae_sum", "mae_rss")}
+    return {
+        "status": "converged" if evaluation.converged else "not converged",
+        "message": evaluation.message,
+        "seconds": float(evaluation.stats.get("seconds", math.nan)),
+        "energy": evaluation.energy,
+        "reaction": evaluation.reaction.tolist(),
+        "stats": dict(evaluation.stats),
+        "markers": {
+            "ae_u": errors.ae_u.tolist(),
+            "ae_v": errors.ae_v.tolist(),
+            **means,
+        },
+        "held_out": None if assimilates else means,
+        "to_reference": {
+            "rel_l2_displacement": differences.displacement.rel_l2,
+            "rel_l2_von_mises": differences.von_mises.rel_l2,
+            "mae_markers": differences.mae_markers,
+            "rel_energy": differences.energy,
+            "displacement": differences.displacement._asdict(),
+            "von_mises": differences.von_mises._asdict(),
+            "stress": _by_component(differences.stress),
+            "strain": _by_component(differences.strain),
+        },
+    }
+
+
+def _by_component(differences: Mapping[str, FieldDifference]) -> dict[str, dict[str, float]]:
+    return {name: difference._asdict() for name, difference in differences.items()}

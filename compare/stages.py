@@ -1,0 +1,56 @@
+"""The stages of a run: their progress and how long each took."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from solvers.solver import Progress as Report
+
+
+class Stages:
+    """Shows a line for every stage, with time left where the stage tells how far it is.
+
+    Attributes:
+        seconds: Duration of every finished stage, s.
+    """
+
+    def __init__(self, console: Console, *, quiet: bool = False) -> None:
+        self.seconds: dict[str, float] = {}
+        self._progress = Progress(
+            TextColumn("{task.description:<24}"),
+            BarColumn(bar_width=24),
+            TaskProgressColumn(),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(compact=True),
+            TextColumn("[dim]{task.fields[note]}"),
+            console=console,
+            disable=quiet,
+        )
+
+    def __enter__(self) -> Self:
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._progress.stop()
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[Report]:
+        """Run a stage; what it yields takes the fraction done and a short note."""
+        started = time.perf_counter()
+        task = self._progress.add_task(name, total=1.0, note="")
+
+        def report(fraction: float, note: str) -> None:
+            self._progress.update(task, completed=fraction, note=note)
+
+        yield report
+        self._progress.update(task, completed=1.0)
+        self.seconds[name] = time.perf_counter() - started
