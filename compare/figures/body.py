@@ -81,10 +81,10 @@ def scale_bar(axes: Axes, extent: Extent, *, corner: str = "lower right") -> Non
     axes.plot(*ends, color=INK, lw=1.6, solid_capstyle="butt", path_effects=HALO, zorder=6)
     axes.annotate(
         f"{length:g} mm",
-        (left + length / 2, y),
+        (left + length, y),
         xytext=(0, 2.5),
         textcoords="offset points",
-        ha="center",
+        ha="right",
         va="bottom",
         size=7.5,
         path_effects=HALO,
