@@ -64,12 +64,23 @@ def source_sentence(observations: Observations) -> str:
 
 def grouped(provenance: Mapping[str, object]) -> list[tuple[str, list[tuple[str, str]]]]:
     """Provenance as groups of lines; what is not in a mapping comes first, in a group without a title."""
-    loose = [(key, str(value)) for key, value in provenance.items() if not isinstance(value, Mapping)]
-    groups = [("", loose)] if loose else []
-    for key, value in provenance.items():
-        if isinstance(value, Mapping):
-            groups.append((key, [(str(inner), str(entry)) for inner, entry in value.items()]))
-    return groups
+    groups = {"": {key: value for key, value in provenance.items() if not isinstance(value, Mapping)}}
+    groups |= {key: dict(value) for key, value in provenance.items() if isinstance(value, Mapping)}
+    return [
+        (
+            title.replace("_", " "),
+            [(str(key).replace("_", " "), in_words(value)) for key, value in lines.items()],
+        )
+        for title, lines in groups.items()
+        if lines
+    ]
+
+
+def in_words(value: object) -> str:
+    """A value of any kind; a mapping as `name value` pairs."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {in_words(inner)}" for key, inner in value.items()) or "defaults"
+    return "–" if value is None else str(value)
 
 
 def embedded(path: Path) -> str:

@@ -21,7 +21,7 @@ from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
 
 MARGIN = 0.12
-HEAD, PANEL_TITLE, FOOT = 0.62, 0.2, 0.48
+HEAD, PANEL_TITLE, FOOT = 0.55, 0.27, 0.48
 """Heights in inches: heading and legend; the name above a panel; the colour bar."""
 
 
