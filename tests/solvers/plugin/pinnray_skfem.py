@@ -1,0 +1,54 @@
+"""A researcher's own solver: everything that pinn-ray asks of one, in a file of its own package."""
+
+import time
+
+import numpy as np
+import skfem
+from skfem.models.elasticity import linear_elasticity
+
+from solvers.fem.lagrange import LagrangeField, LagrangeSpace
+from solvers.problem import contact_functional
+from solvers.solution import Solution, Status
+from solvers.solver import check_problem, silent
+
+
+class SkfemSolver:
+    """Linear triangles assembled by scikit-fem, the load by its two influence functions."""
+
+    name = "skfem-p1"
+    laws = ("linear",)
+    loads = ("mean", "point")
+
+    def settings(self):
+        return {}
+
+    def solve(self, problem, progress=silent):
+        check_problem(self, problem)
+        started = time.perf_counter()
+        mesh, lame = problem.mesh, problem.material.lame
+        element = skfem.ElementVector(skfem.ElementTriP1())
+        basis = skfem.Basis(skfem.MeshTri(mesh.points.T.copy(), mesh.triangles.T.copy()), element)
+        stiffness = skfem.asm(linear_elasticity(lame.λ, lame.μ), basis)
+        space = LagrangeSpace(mesh, 1)
+        points, weights = contact_functional(problem)
+        at_nodes = space.shape_functions(mesh.locate(points)).T @ weights
+        loads = np.zeros((stiffness.shape[0], len(problem.load.prescribed)))
+        for column, axis in enumerate(problem.load.prescribed):
+            loads[basis.nodal_dofs[axis], column] = at_nodes
+        clamped = basis.nodal_dofs[:, np.unique(mesh.boundary("base"))].ravel()
+        influence = np.column_stack(
+            [skfem.solve(*skfem.condense(stiffness, load, D=clamped)) for load in loads.T]
+        )
+        forces = np.linalg.solve(loads.T @ influence, problem.load.values)
+        dofs = influence @ forces
+        reaction = np.zeros(2)
+        reaction[problem.load.prescribed] = forces
+        return Solution(
+            solver=self.name,
+            problem=problem,
+            field=LagrangeField(space, dofs[basis.nodal_dofs].T),
+            energy=0.5 * float(dofs @ (stiffness @ dofs)),
+            reaction=reaction,
+            status=Status(True, "solved directly"),
+            stats={"seconds": time.perf_counter() - started, "unknowns": len(dofs)},
+        )

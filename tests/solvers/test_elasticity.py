@@ -1,0 +1,104 @@
+"""The constitutive laws against closed forms and finite differences."""
+
+import numpy as np
+import pytest
+import torch
+
+from solvers.elasticity import (
+    Plane,
+    lame_constants,
+    linear_energy_density,
+    linear_stress,
+    neo_hookean_energy_density,
+    neo_hookean_stress,
+    small_strain,
+    von_mises,
+)
+from solvers.problem import Material
+
+YOUNG, POISSON = 11.4, 0.45
+
+
+def test_printed_constants_of_the_paper_are_plane_stress():
+    assert lame_constants(YOUNG, POISSON, "stress").λ == pytest.approx(6.43, abs=5e-3)
+    assert lame_constants(YOUNG, POISSON, "strain").λ == pytest.approx(35.38, abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("plane", "modulus", "stress_zz"),
+    [
+        ("stress", YOUNG, 0.0),  # sigma = E eps, nothing out of plane
+        ("strain", YOUNG / (1 - POISSON**2), POISSON),  # E / (1 - nu^2), sigma_zz = nu sigma_xx
+    ],
+)
+def test_uniaxial_tension(plane, modulus, stress_zz):
+    lame = lame_constants(YOUNG, POISSON, plane)
+    contraction = POISSON if plane == "stress" else POISSON / (1 - POISSON)
+    stress = linear_stress(np.array([[[0.01, 0.0], [0.0, -contraction * 0.01]]]), lame)
+    assert stress.xx[0] == pytest.approx(modulus * 0.01, rel=1e-12)
+    assert stress.yy[0] == pytest.approx(0.0, abs=1e-14)
+    assert stress.zz[0] == pytest.approx(stress_zz * stress.xx[0], abs=1e-14)
+
+
+def test_plane_stress_thickness_strain_is_that_of_uniaxial_tension():
+    lame = lame_constants(YOUNG, POISSON, "stress")
+    strain = small_strain(np.array([[[0.01, 0.0], [0.0, -POISSON * 0.01]]]), lame)
+    assert strain.zz[0] == pytest.approx(-POISSON * 0.01, rel=1e-12)
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_linear_energy_is_half_stress_times_strain(plane):
+    gradient = np.random.default_rng(0).normal(size=(50, 2, 2))
+    lame = lame_constants(YOUNG, POISSON, plane)
+    stress, strain = linear_stress(gradient, lame), small_strain(gradient, lame)
+    work = 0.5 * (stress.xx * strain.xx + stress.yy * strain.yy + 2 * stress.xy * strain.xy)
+    np.testing.assert_allclose(linear_energy_density(gradient, lame), work, rtol=1e-12)
+
+
+def test_infinitesimal_rotation_has_no_stress():
+    stress = linear_stress(np.array([[[0.0, -0.3], [0.3, 0.0]]]), lame_constants(YOUNG, POISSON, "strain"))
+    assert max(abs(component).max() for component in stress) == 0.0
+
+
+@pytest.mark.parametrize("angle", [0.3, 2.0, 3.1])
+def test_finite_rotation_has_no_stress_in_the_neo_hookean_law(angle):
+    rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    stress = neo_hookean_stress(rotation[None] - np.eye(2), lame_constants(YOUNG, POISSON, "strain"), np.log)
+    assert max(abs(component).max() for component in stress) < 1e-13
+
+
+def test_neo_hookean_stress_is_the_derivative_of_its_energy():
+    lame = lame_constants(YOUNG, POISSON, "strain")
+    gradient = torch.tensor(np.random.default_rng(1).uniform(-0.2, 0.2, (20, 2, 2)), requires_grad=True)
+    neo_hookean_energy_density(gradient, lame, torch.log).sum().backward()
+    deformation = np.eye(2) + gradient.detach().numpy()
+    # Cauchy stress = P F^T / J with the first Piola stress P = dψ/dF.
+    cauchy = gradient.grad.numpy() @ deformation.transpose(0, 2, 1)
+    cauchy /= np.linalg.det(deformation)[:, None, None]
+    stress = neo_hookean_stress(gradient.detach().numpy(), lame, np.log)
+    np.testing.assert_allclose(stress.xx, cauchy[:, 0, 0], rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(stress.yy, cauchy[:, 1, 1], rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(stress.xy, cauchy[:, 0, 1], rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(stress.xy, cauchy[:, 1, 0], rtol=1e-10, atol=1e-12)
+
+
+def test_neo_hookean_law_tends_to_hooke():
+    lame = lame_constants(YOUNG, POISSON, "strain")
+    gradient = 1e-6 * np.random.default_rng(2).normal(size=(20, 2, 2))
+    linear, finite = linear_stress(gradient, lame), neo_hookean_stress(gradient, lame, np.log)
+    for a, b in zip(linear, finite, strict=True):
+        np.testing.assert_allclose(b, a, atol=1e-9)
+
+
+def test_von_mises_needs_the_out_of_plane_stress():
+    xx, yy, xy = 2.0, 0.5, 0.7
+    zz = POISSON * (xx + yy)
+    tensor = np.array([[xx, xy, 0], [xy, yy, 0], [0, 0, zz]])
+    deviator = tensor - np.trace(tensor) / 3 * np.eye(3)
+    expected = np.sqrt(1.5 * (deviator**2).sum())
+    assert von_mises(Plane(*map(np.array, (xx, yy, xy, zz))), np.sqrt) == pytest.approx(expected, rel=1e-12)
+
+
+def test_neo_hookean_plane_stress_is_refused():
+    with pytest.raises(ValueError, match="plane strain only"):
+        Material(plane="stress", law="neo-hookean")

@@ -1,0 +1,177 @@
+"""`fem` against exact solutions, another program, refinement and itself on two ranks."""
+
+import json
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import skfem
+from skfem.models.elasticity import linear_elasticity
+
+from geometry.cache import finger_mesh
+from geometry.design import Design
+from geometry.errors import UserError
+from geometry.settings import MeshSettings
+from solvers.elasticity import Plane, linear_stress
+from solvers.fem.lagrange import LagrangeSpace
+from solvers.fem.linear import FemSolver, load_functionals
+from solvers.problem import Load, Material, Problem
+from tests.solvers.conftest import bar_mesh
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_patch_test(degree, plane):
+    """A bar without lateral contraction, pulled at its end, has the same strain in every element of any shape."""
+    mesh = bar_mesh(8.0, 3.0, 8, 3, contact=(0.0, 8.0))
+    mesh = replace(mesh, boundaries={**mesh.boundaries, "contact": mesh.boundaries["end"]}, _cache={})
+    problem = Problem(mesh, Material(poisson=0.0, plane=plane), Load(kind="patch", displacement=(0.1, 0.0)))
+    solution = FemSolver(degree=degree).solve(problem)
+    expected = np.broadcast_to([[0.1 / 8, 0], [0, 0]], (len(mesh.triangles), 2, 2))
+    np.testing.assert_allclose(solution.gradient(mesh.at_centroids()), expected, atol=1e-13)
+    force = problem.material.young * 0.1 / 8 * 3.0
+    np.testing.assert_allclose(solution.reaction, [force, 0.0], atol=1e-12)
+    assert solution.energy == pytest.approx(0.5 * force * 0.1, rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["mean", "point"])
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_scikit_fem_finds_the_same_solution(coarse_mesh, kind, plane):
+    """Quadratic elements assembled and solved by another program: only the load's functional is shared."""
+    problem = Problem(coarse_mesh, Material(plane=plane), Load(kind=kind))
+    solution = FemSolver().solve(problem)
+    space = LagrangeSpace(coarse_mesh, 2)
+    basis = skfem.Basis(
+        skfem.MeshTri(coarse_mesh.points.T.copy(), coarse_mesh.triangles.T.copy()),
+        skfem.ElementVector(skfem.ElementTriP2()),
+    )
+    lame = problem.material.lame
+    stiffness = skfem.asm(linear_elasticity(lame.λ, lame.μ), basis)
+    # The two programs number the middles of edges differently: match the nodes by position.
+    dofs = np.zeros((len(space.nodes), 2), dtype=int)
+    for axis in range(2):
+        of_axis = np.concatenate([basis.nodal_dofs[axis], basis.facet_dofs[axis]])
+        order = {tuple(np.round(basis.doflocs[:, dof], 9)): dof for dof in of_axis}
+        dofs[:, axis] = [order[tuple(position)] for position in np.round(space.nodes, 9)]
+    loads = np.zeros((stiffness.shape[0], 2))
+    for column, functional in enumerate(load_functionals(problem, space)):
+        loads[dofs.ravel(), column] = functional.ravel()
+    clamped = dofs[space.boundary_nodes("base")].ravel()
+    influence = np.column_stack([skfem.solve(*skfem.condense(stiffness, load, D=clamped)) for load in loads.T])
+    forces = np.linalg.solve(loads.T @ influence, problem.load.values)
+    expected = (influence @ forces)[dofs]
+    assert np.linalg.norm(solution.field.values - expected) / np.linalg.norm(expected) < 1e-8
+    np.testing.assert_allclose(solution.reaction, forces, rtol=1e-8)
+
+
+def test_equilibrium_of_stress_and_traction_free_surface(medium_fem, medium_mesh):
+    """The stress that the solution reports is that of Hooke's law with sigma_zz = nu (sigma_xx + sigma_yy)."""
+    state = medium_fem.state(medium_mesh.at_centroids())
+    in_plane = state.stress[:, 0, 0] + state.stress[:, 1, 1]
+    np.testing.assert_allclose(state.stress_zz, 0.45 * in_plane, atol=1e-12)
+    tensor = np.zeros((len(in_plane), 3, 3))
+    tensor[:, :2, :2] = state.stress
+    tensor[:, 2, 2] = state.stress_zz
+    deviator = tensor - np.trace(tensor, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
+    np.testing.assert_allclose(state.von_mises, np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2))), rtol=1e-10)
+
+
+@pytest.mark.slow
+def test_marker_displacements_have_converged():
+    """h = 0.25 mm against h = 0.125 mm within the measured 0.002 and 0.005 mm, for the default and the point load."""
+    for kind in ("mean", "point"):
+        coarse, fine = (
+            FemSolver().solve(
+                Problem(finger_mesh(Design(), settings=MeshSettings(size=size)), load=Load(kind=kind))
+            )
+            for size in (0.25, 0.125)
+        )
+        markers = coarse.problem.mesh.markers
+        difference = np.abs(coarse.displacement(markers) - fine.displacement(markers)).mean(axis=0)
+        assert difference[0] <= 0.003 and difference[1] <= 0.0055, (kind, difference)
+
+
+def test_energy_falls_under_refinement(coarse_mesh, medium_mesh, medium_fem):
+    """The discrete energy of a displacement-driven problem is never below that of a finer space."""
+    linear = FemSolver(degree=1).solve(Problem(coarse_mesh)).energy
+    quadratic = FemSolver(degree=2).solve(Problem(coarse_mesh)).energy
+    assert linear > quadratic > medium_fem.energy > 0.98 * quadratic
+
+
+def test_plane_state_matters_little_for_displacement_and_much_for_stress(medium_mesh, medium_fem):
+    """0.004 mm at the markers, about a quarter of the stress."""
+    other = FemSolver().solve(Problem(medium_mesh, Material(plane="stress")))
+    moved = np.abs(other.displacement(medium_mesh.markers) - medium_fem.displacement(medium_mesh.markers)).mean(axis=0)
+    assert moved.max() < 0.01
+    a, b = (solution.state(medium_mesh.at_centroids()).von_mises for solution in (medium_fem, other))
+    assert 0.1 < np.abs(a - b).sum() / a.sum() < 0.4
+
+
+def test_free_component_has_no_force(coarse_mesh):
+    solution = FemSolver().solve(Problem(coarse_mesh, load=Load(displacement=(None, -10.0))))
+    assert abs(solution.reaction[0]) < 1e-10 * abs(solution.reaction[1])
+
+
+def test_young_cancels_from_the_displacement(coarse_mesh):
+    soft, stiff = (
+        FemSolver().solve(Problem(coarse_mesh, Material(young=young))).displacement(coarse_mesh.markers)
+        for young in (1.0, 100.0)
+    )
+    np.testing.assert_allclose(soft, stiff, rtol=1e-8)
+
+
+def test_degree_three_is_refused():
+    with pytest.raises(UserError, match="degree 1 and 2, not 3"):
+        FemSolver(degree=3)
+
+
+def test_part_without_support_is_reported(coarse_mesh):
+    """Two fingers, of which one is not clamped."""
+    count = len(coarse_mesh.points)
+    twice = replace(
+        coarse_mesh,
+        points=np.concatenate([coarse_mesh.points, coarse_mesh.points - [0.0, 100.0]]),
+        triangles=np.concatenate([coarse_mesh.triangles, coarse_mesh.triangles + count]),
+        _cache={},
+    )
+    with pytest.raises(UserError, match="not connected to the base"):
+        FemSolver().solve(Problem(twice))
+
+
+@pytest.mark.mpi
+def test_two_ranks_give_the_same_numbers(coarse_mesh, tmp_path):
+    launcher = shutil.which("mpirun")
+    assert launcher, "mpirun comes with DOLFINx"
+    coarse_mesh.save(tmp_path / "mesh.npz")
+    code = (
+        "import json, sys\n"
+        "from pathlib import Path\n"
+        "from mpi4py import MPI\n"
+        "from geometry.mesh import TriangleMesh\n"
+        "from solvers.fem.linear import FemSolver\n"
+        "from solvers.problem import Problem\n"
+        "mesh = TriangleMesh.load(Path(sys.argv[1]))\n"
+        "solution = FemSolver().solve(Problem(mesh))\n"
+        "if MPI.COMM_WORLD.rank == 0:\n"
+        "    print(json.dumps([solution.energy, solution.displacement(mesh.markers).tolist()]))\n"
+    )
+    done = subprocess.run(
+        [launcher, "--allow-run-as-root", "--oversubscribe", "-n", "2", sys.executable, "-c", code]
+        + [str(tmp_path / "mesh.npz")],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    energy, displacement = json.loads(done.stdout.splitlines()[-1])
+    alone = FemSolver().solve(Problem(coarse_mesh))
+    assert energy == pytest.approx(alone.energy, rel=1e-10)
+    np.testing.assert_allclose(displacement, alone.displacement(coarse_mesh.markers), atol=1e-8)
+
+
+def test_stress_helper_is_the_one_law():
+    """The tensor components of a known state, so that a change of the law cannot go unseen."""
+    lame = Material(young=1.0, poisson=0.25).lame
+    assert linear_stress(np.array([[0.0, 0.2], [0.0, 0.0]]), lame) == Plane(0.0, 0.0, pytest.approx(0.08), 0.0)

@@ -1,0 +1,54 @@
+"""Solvers by name, from here and from other packages."""
+
+import pytest
+
+from geometry.errors import UserError
+from solvers.registry import make_solver, solver_names, usable_solvers
+
+
+def test_settings_are_converted_from_text():
+    assert make_solver("fem", degree="1").settings() == {"degree": 1}
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "message"),
+    [
+        ("fen", {}, r"no solver is called 'fen'; did you mean 'fem'\? \(there are: fem, "),
+        ("comsol", {}, "no solver is called 'comsol' "),  # nothing near: no guess
+        ("fem", {"order": 2}, "fem has no setting 'order'; it has degree"),
+        ("fem", {"degree": "two"}, "fem: degree = 'two': input should be a valid integer"),
+        ("pinn-std", {"units": 1.5}, "pinn-std: units = 1.5: "),
+    ],
+)
+def test_mistakes_are_one_line(name, settings, message):
+    with pytest.raises(UserError, match=message):
+        make_solver(name, **settings)
+
+
+def test_a_package_adds_a_solver_by_its_entry_point(plugin_folder, monkeypatch):
+    assert "skfem-p1" not in solver_names()
+    monkeypatch.syspath_prepend(str(plugin_folder))
+    assert solver_names()[-1] == "skfem-p1"
+    assert make_solver("skfem-p1").name == "skfem-p1"
+
+
+def test_a_broken_package_warns_and_the_rest_goes_on(tmp_path, monkeypatch):
+    info = tmp_path / "broken-0.1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 0.1\n")
+    (info / "entry_points.txt").write_text("[pinnray.solvers]\nbroken = no_such_module:Solver\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.warns(UserWarning, match="solver 'broken' is left out: .*no_such_module"):
+        assert "fem" in usable_solvers()
+    with pytest.raises(UserError, match="cannot be loaded"):
+        make_solver("broken")
+
+
+def test_an_object_without_the_interface_is_refused(tmp_path, monkeypatch):
+    info = tmp_path / "odd-0.1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: odd\nVersion: 0.1\n")
+    (info / "entry_points.txt").write_text("[pinnray.solvers]\nodd = collections:OrderedDict\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(UserError, match="does not have the interface"):
+        make_solver("odd")
