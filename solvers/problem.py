@@ -7,8 +7,11 @@ from typing import Literal, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from geometry.arrays import FloatArray
+from geometry.errors import UserError
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
 from geometry.quadrature import edge_quadrature
@@ -87,12 +90,27 @@ class Problem:
         material: The elastic law.
         load: What moves the finger.
         observations: Marker displacements, for the solvers that assimilate them.
+
+    Raises:
+        UserError: If part of the mesh is not connected to the base, so that it could move freely.
     """
 
     mesh: TriangleMesh
     material: Material = Material()
     load: Load = Load()
     observations: Observations | None = None
+
+    def __post_init__(self) -> None:
+        count = len(self.mesh.points)
+        first, second = self.mesh.edges.T
+        graph = coo_matrix((np.ones(len(first)), (first, second)), shape=(count, count))
+        _, part = connected_components(graph, directed=False)
+        free = ~np.isin(part, part[self.mesh.boundary("base").ravel()])
+        if free.any():
+            x, y = self.mesh.points[free][0]
+            raise UserError(
+                f"part of the mesh is not connected to the base: {int(free.sum())} nodes, one at ({x:.6g}, {y:.6g}) mm"
+            )
 
     @property
     def digest(self) -> str:

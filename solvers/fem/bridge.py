@@ -150,7 +150,7 @@ class Factorisation:
             self._ksp.setUp()
         except PETSc.Error as error:
             raise UserError(
-                "the stiffness matrix cannot be factorised: is part of the mesh not connected to the base?"
+                "MUMPS cannot factorise the stiffness matrix: is there enough memory, and is no element nearly flat?"
             ) from error
 
     def solve(self, nodal: FloatArray) -> FloatArray:
