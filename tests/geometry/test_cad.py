@@ -1,11 +1,13 @@
 """CAD against the closed forms, and its files against an independent reader where there is one."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from geometry import Design, UserError, cad_files, finger_section, marker_positions
+from geometry.svg import section_svg
 
 cad = pytest.importorskip("geometry.cad")
 
@@ -112,6 +114,25 @@ def test_svg_is_in_true_scale(written: dict[str, Path]) -> None:
     assert 'width="94mm" height="34mm"' in text
     assert text.count("<circle") == 9
     assert text.count(" Z") == 1 + 5
+
+
+def test_svg_arcs_cut_the_corners_of_the_cells() -> None:
+    design = Design(fillet_radius=1.0)
+    path = re.search(r'<path d="([^"]+)"', section_svg(design))
+    assert path is not None
+    area = 0.0
+    for ring in path[1].split("Z")[:-1]:
+        points = np.array(re.findall(r"(-?[\d.]+),(-?[\d.]+)", ring), dtype=float)
+        following = np.roll(points, -1, axis=0)
+        ring_area = 0.5 * (points[:, 0] * following[:, 1] - points[:, 1] * following[:, 0]).sum()
+        for chord, sweep in zip(
+            (following - points)[::2], re.findall(r"A 1 1 0 0 (\d) ", ring), strict=False
+        ):
+            half = np.arcsin(np.hypot(*chord) / 2)
+            segment = half - np.sin(2 * half) / 2  # between a unit circle's arc and its chord
+            ring_area += segment if sweep == "1" else -segment
+        area = area - ring_area if area else ring_area
+    assert area == pytest.approx(finger_section(design).area, rel=1e-6)
 
 
 def test_unknown_format_is_refused(tmp_path: Path) -> None:

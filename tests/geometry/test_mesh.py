@@ -99,6 +99,19 @@ def test_random_points_in_triangles_are_found(mesh: TriangleMesh) -> None:
     assert found.barycentric.min() >= -1e-9
 
 
+def test_points_are_found_where_large_triangles_adjoin_many_small_ones() -> None:
+    fine = 400  # a fan of slivers below one large triangle
+    x = np.linspace(0, 1, fine + 1)
+    points = np.concatenate([np.stack([x, np.zeros_like(x)], axis=1), [[0.5, 5.0], [0.5, -0.01]]])
+    fan = [[k + 1, k, fine + 2] for k in range(fine)]
+    upper = [[k, k + 1, fine + 1] for k in range(fine)]
+    mesh = square(points=points, triangles=upper + fan, boundaries={}, marker_nodes=[], contact_node=0)
+    rng = np.random.default_rng(8)
+    cells = rng.integers(len(mesh.triangles), size=300)
+    where = np.einsum("nc,ncx->nx", rng.dirichlet([1, 1, 1], size=300), points[mesh.triangles[cells]])
+    assert (mesh.locate(where).cells == cells).all()
+
+
 def test_every_node_is_found(mesh: TriangleMesh) -> None:
     found = mesh.locate(mesh.points)
     np.testing.assert_allclose(found.barycentric.max(axis=1), 1, atol=1e-9)
