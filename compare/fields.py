@@ -54,7 +54,7 @@ def write_vtu(path: Path, mesh: TriangleMesh, evaluation: Evaluation) -> None:
 
 
 def write_mesh(path: Path, mesh: TriangleMesh) -> None:
-    """Write the mesh atomically; the point data `boundary_NAME` and `marker` (its number, else 0) say what is where."""
+    """Write the mesh atomically; point data `boundary_NAME` and `marker` (number or 0) say what is where."""
     grid = _grid(mesh)
     for name, edges in mesh.boundaries.items():
         grid.point_data[f"boundary_{name}"] = np.isin(np.arange(len(mesh.points)), edges).astype(np.uint8)

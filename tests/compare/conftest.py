@@ -1,9 +1,11 @@
 """A small body with a known solution, and how to make evaluations of it; units mm and MPa."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
+from drawn_pages import Page, watching
 
 from compare.evaluation import Evaluation
 from geometry.arrays import FloatArray
@@ -131,3 +133,10 @@ def observe(mesh: TriangleMesh) -> Callable[..., Observations]:
 def observations(observe: Callable[..., Observations], fem: Evaluation) -> Observations:
     """Simulated: 0.3 mm more in u and 0.4 mm less in v than the reference, at all three markers."""
     return observe(fem.marker_displacement + np.array([0.3, -0.4]))
+
+
+@pytest.fixture(scope="module")
+def pages() -> Iterator[dict[Path, Page]]:
+    """Every matplotlib figure that the module's tests have drawn so far, by its file."""
+    with watching() as drawn:
+        yield drawn

@@ -6,7 +6,7 @@ import pytest
 import pyvista
 
 from compare.evaluation import Evaluation
-from compare.fields import write_vtu
+from compare.fields import write_mesh, write_vtu
 from geometry.mesh import TriangleMesh
 
 
@@ -61,3 +61,11 @@ def test_it_says_whose_result_it_is(grid: pyvista.UnstructuredGrid, sheared: Eva
     assert list(grid.field_data["solver"]) == ["fem"]
     assert list(grid.field_data["status"]) == ["solved directly"]
     np.testing.assert_array_equal(np.ravel(grid.field_data["reaction_N_per_mm"]), sheared.reaction)
+
+
+def test_a_mesh_file_says_where_boundaries_and_markers_are(mesh: TriangleMesh, tmp_path: Path) -> None:
+    write_mesh(tmp_path / "mesh.vtu", mesh)
+    data = pyvista.read(tmp_path / "mesh.vtu").point_data
+    np.testing.assert_array_equal(data["boundary_base"], mesh.points[:, 0] == 0)
+    assert data["marker"][mesh.marker_nodes].tolist() == [1, 2, 3]
+    assert np.count_nonzero(data["marker"]) == 3

@@ -1,92 +1,24 @@
 """Pictures as a whole: their files, their colours, and type that neither overlaps nor leaves the page."""
 
-import itertools
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
 import pytest
-from matplotlib.backend_bases import RendererBase
-from matplotlib.figure import Figure as MplFigure
-from matplotlib.text import Text
-from matplotlib.transforms import Bbox
+from drawn_pages import Page
 from PIL import Image
 
 from compare.evaluation import Evaluation
 from compare.figures import Figure, draw_all
 from compare.figures.canvas import Canvas
-from compare.figures.design_drawing import draw_design
-from compare.figures.energy_chart import approaches_reference, draw_energy, readable, recorded, wants_log
 from compare.figures.fields import QUANTITIES, draw_field, field_extent
 from compare.figures.overlay import overlay_extent
 from compare.figures.style import DPI, WIDTH
 from geometry.design import Design
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
-from geometry.parameters import Parameters
-from geometry.presets import load_design, preset_names
-
-MODULES = ("overlay", "marker_chart", "fields", "energy_chart", "design_drawing", "mesh_drawing")
-
-
-class Page(NamedTuple):
-    """A matplotlib figure and what it wrote where, in pixels, when it was drawn."""
-
-    figure: MplFigure
-    words: list[tuple[str, Bbox]]
-
-    @property
-    def text(self) -> str:
-        return "\n".join(word for word, _ in self.words)
-
-    def overlaps(self) -> list[tuple[str, str]]:
-        """Pairs of words that cover each other by more than a pixel."""
-        return [
-            (a, b)
-            for (a, one), (b, two) in itertools.combinations(self.words, 2)
-            if min(one.x1, two.x1) - max(one.x0, two.x0) > 1 and min(one.y1, two.y1) - max(one.y0, two.y0) > 1
-        ]
-
-    def cut_off(self) -> list[str]:
-        """Words that leave the page."""
-        page = self.figure.bbox
-        return [
-            a for a, box in self.words if box.x0 < 0 or box.y0 < 0 or box.x1 > page.x1 or box.y1 > page.y1
-        ]
-
-
-@pytest.fixture(scope="module")
-def pages() -> Iterator[dict[Path, Page]]:
-    """Every matplotlib figure that was drawn, by its file."""
-    seen: dict[Path, Page] = {}
-    words: list[tuple[str, Bbox]] = []
-    draw = Text.draw
-
-    def noted(text: Text, renderer: RendererBase) -> None:
-        draw(text, renderer)
-        if text.get_visible() and text.get_text().strip():
-            words.append((text.get_text(), text.get_window_extent(renderer)))
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Text, "draw", noted)
-        for module in map(import_module, (f"compare.figures.{name}" for name in MODULES)):
-
-            @contextmanager
-            def watched(
-                path: Path, height: float, original: Callable[..., Any] = module.figure
-            ) -> Iterator[MplFigure]:
-                words.clear()
-                with original(path, height) as drawn:
-                    yield drawn
-                seen[path] = Page(drawn, list(words))
-
-            patch.setattr(module, "figure", watched)
-        yield seen
 
 
 @pytest.fixture(scope="module")
@@ -226,77 +158,7 @@ def test_the_overlay_shows_the_whole_of_every_solution_that_converged(
     assert extent.top > 0
 
 
-def test_records_are_grouped_by_their_first_column(
-    fem: Evaluation, pinn: Evaluation, evaluate: Callable[..., Evaluation]
-) -> None:
-    steps = np.array([0.0, 1.0])
-    other = evaluate("other", history={"load_fraction": steps, "reaction": steps, "energy": steps})
-    loss = evaluate("loss", history={"seconds": steps, "loss": steps})
-    assert recorded([fem, pinn, other, loss]) == {
-        ("units", "energy"): [pinn],
-        ("load_fraction", "energy"): [other],
-        ("seconds", "loss"): [loss],
-    }
-
-
-def test_without_a_record_there_is_no_chart_of_energy(fem: Evaluation, tmp_path: Path) -> None:
-    assert not draw_energy(tmp_path / "energy.png", evaluations=[fem], reference=fem)
-    assert not (tmp_path / "energy.png").exists()
-
-
 def test_the_reference_energy_is_a_line(figures: dict[str, Figure], pages: dict[Path, Page]) -> None:
     energies, distances = pages[figures["energy"].path].figure.axes
     assert [2.0, 2.0] in [list(line.get_ydata()) for line in energies.get_lines()]
     np.testing.assert_allclose(distances.get_lines()[0].get_ydata(), [44.0, 1.0, 0.21])
-
-
-@pytest.mark.parametrize(
-    ("values", "expected"),
-    [
-        ([1.0, 30.0], True),  # more than a factor of twenty
-        ([1.0, 10.0], False),  # less
-        ([0.0, 30.0], False),  # zero has no logarithm
-        ([-1.0, 30.0], False),  # nor has a negative number
-        ([np.nan, 1.0, 30.0], True),  # gaps do not count
-    ],
-)
-def test_axes_are_logarithmic_where_that_helps(values: list[float], expected: bool) -> None:
-    assert wants_log(np.array(values)) is expected
-
-
-def test_a_growing_load_does_not_approach_the_reference() -> None:
-    assert approaches_reference(("units", "energy"))
-    assert not approaches_reference(("load_fraction", "energy"))
-    assert not approaches_reference(("units", "loss"))
-    assert readable("newton_iterations") == "newton iterations"
-
-
-DESIGNS = {
-    **{name: load_design(name) for name in preset_names()},
-    "joints": Design(marker_layout="joints", rib_angle=-15, fillet_radius=1.2),
-    "without ribs": Design(rib_count=0),
-    "one rib": Design(rib_count=1, rib_angle=0, tip_length=40),
-}
-
-
-@pytest.mark.parametrize("design", DESIGNS.values(), ids=DESIGNS)
-def test_a_drawing_has_every_dimension_and_none_overlaps(
-    design: Parameters, pages: dict[Path, Page], tmp_path: Path
-) -> None:
-    draw_design(tmp_path / "drawing.png", design)
-    text = pages[tmp_path / "drawing.png"].text
-    expected = [
-        rf"$H$ = {design.height:g} mm",
-        rf"$L$ = {design.base_width:g} mm",
-        rf"$W$ = {design.depth:g} mm",
-        rf"$L_\mathrm{{tip}}$ = {design.tip_length:g} mm",
-        rf"$t_\mathrm{{flex}}$ = {design.front_thickness:g} mm",
-        rf"$t_\mathrm{{back}}$ = {design.back_thickness:g} mm",
-        rf"$N$ = {design.rib_count} ribs",
-    ]
-    if design.rib_count:
-        expected += [rf"$t_\mathrm{{rib}}$ = {design.rib_thickness:g} mm", r"$L_\mathrm{angle}$"]
-    assert [dimension for dimension in expected if dimension not in text] == []
-    numerals = {str(number) for number in range(1, 100)}
-    assert pages[tmp_path / "drawing.png"].cut_off() == []
-    assert [pair for pair in pages[tmp_path / "drawing.png"].overlaps() if not numerals & set(pair)] == []

@@ -1,0 +1,71 @@
+"""Watch matplotlib draw: which figure, and which words where."""
+
+import itertools
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from matplotlib.backend_bases import RendererBase
+from matplotlib.figure import Figure as MplFigure
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
+
+MODULES = ("overlay", "marker_chart", "fields", "energy_chart", "design_drawing", "mesh_drawing")
+
+
+class Page(NamedTuple):
+    """A matplotlib figure and what it wrote where, in pixels, when it was drawn."""
+
+    figure: MplFigure
+    words: list[tuple[str, Bbox]]
+
+    @property
+    def text(self) -> str:
+        return "\n".join(word for word, _ in self.words)
+
+    def overlaps(self) -> list[tuple[str, str]]:
+        """Pairs of words that cover each other by more than a pixel."""
+        return [
+            (a, b)
+            for (a, one), (b, two) in itertools.combinations(self.words, 2)
+            if min(one.x1, two.x1) - max(one.x0, two.x0) > 1 and min(one.y1, two.y1) - max(one.y0, two.y0) > 1
+        ]
+
+    def cut_off(self) -> list[str]:
+        """Words that leave the page."""
+        page = self.figure.bbox
+        return [
+            a for a, box in self.words if box.x0 < 0 or box.y0 < 0 or box.x1 > page.x1 or box.y1 > page.y1
+        ]
+
+
+@contextmanager
+def watching() -> Iterator[dict[Path, Page]]:
+    """Every matplotlib figure that is drawn meanwhile, by its file."""
+    seen: dict[Path, Page] = {}
+    words: list[tuple[str, Bbox]] = []
+    draw = Text.draw
+
+    def noted(text: Text, renderer: RendererBase) -> None:
+        draw(text, renderer)
+        if text.get_visible() and text.get_text().strip():
+            words.append((text.get_text(), text.get_window_extent(renderer)))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Text, "draw", noted)
+        for module in map(import_module, (f"compare.figures.{name}" for name in MODULES)):
+
+            @contextmanager
+            def watched(
+                path: Path, height: float, original: Callable[..., Any] = module.figure
+            ) -> Iterator[MplFigure]:
+                words.clear()
+                with original(path, height) as drawn:
+                    yield drawn
+                seen[path] = Page(drawn, list(words))
+
+            patch.setattr(module, "figure", watched)
+        yield seen

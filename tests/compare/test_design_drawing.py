@@ -1,0 +1,39 @@
+from pathlib import Path
+
+import pytest
+from drawn_pages import Page
+
+from compare.figures.design_drawing import draw_design
+from geometry.design import Design
+from geometry.parameters import Parameters
+from geometry.presets import load_design, preset_names
+
+DESIGNS = {
+    **{name: load_design(name) for name in preset_names()},
+    "joints": Design(marker_layout="joints", rib_angle=-15, fillet_radius=1.2),
+    "without ribs": Design(rib_count=0),
+    "one rib": Design(rib_count=1, rib_angle=0, tip_length=40),
+}
+
+
+@pytest.mark.parametrize("design", DESIGNS.values(), ids=DESIGNS)
+def test_a_drawing_has_every_dimension_and_none_overlaps(
+    design: Parameters, pages: dict[Path, Page], tmp_path: Path
+) -> None:
+    draw_design(tmp_path / "drawing.png", design)
+    text = pages[tmp_path / "drawing.png"].text
+    expected = [
+        rf"$H$ = {design.height:g} mm",
+        rf"$L$ = {design.base_width:g} mm",
+        rf"$W$ = {design.depth:g} mm",
+        rf"$L_\mathrm{{tip}}$ = {design.tip_length:g} mm",
+        rf"$t_\mathrm{{flex}}$ = {design.front_thickness:g} mm",
+        rf"$t_\mathrm{{back}}$ = {design.back_thickness:g} mm",
+        rf"$N$ = {design.rib_count} ribs",
+    ]
+    if design.rib_count:
+        expected += [rf"$t_\mathrm{{rib}}$ = {design.rib_thickness:g} mm", r"$L_\mathrm{angle}$"]
+    assert [dimension for dimension in expected if dimension not in text] == []
+    numerals = {str(number) for number in range(1, 100)}
+    assert pages[tmp_path / "drawing.png"].cut_off() == []
+    assert [pair for pair in pages[tmp_path / "drawing.png"].overlaps() if not numerals & set(pair)] == []

@@ -1,0 +1,47 @@
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compare.evaluation import Evaluation
+from compare.figures.energy_chart import approaches_reference, draw_energy, readable, recorded, wants_log
+
+
+def test_records_are_grouped_by_their_first_column(
+    fem: Evaluation, pinn: Evaluation, evaluate: Callable[..., Evaluation]
+) -> None:
+    steps = np.array([0.0, 1.0])
+    other = evaluate("other", history={"load_fraction": steps, "reaction": steps, "energy": steps})
+    loss = evaluate("loss", history={"seconds": steps, "loss": steps})
+    assert recorded([fem, pinn, other, loss]) == {
+        ("units", "energy"): [pinn],
+        ("load_fraction", "energy"): [other],
+        ("seconds", "loss"): [loss],
+    }
+
+
+def test_without_a_record_there_is_no_chart_of_energy(fem: Evaluation, tmp_path: Path) -> None:
+    assert not draw_energy(tmp_path / "energy.png", evaluations=[fem], reference=fem)
+    assert not (tmp_path / "energy.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ([1.0, 30.0], True),  # more than a factor of twenty
+        ([1.0, 10.0], False),  # less
+        ([0.0, 30.0], False),  # zero has no logarithm
+        ([-1.0, 30.0], False),  # nor has a negative number
+        ([np.nan, 1.0, 30.0], True),  # gaps do not count
+    ],
+)
+def test_axes_are_logarithmic_where_that_helps(values: list[float], expected: bool) -> None:
+    assert wants_log(np.array(values)) is expected
+
+
+def test_a_growing_load_does_not_approach_the_reference() -> None:
+    assert approaches_reference(("units", "energy"))
+    assert not approaches_reference(("load_fraction", "energy"))
+    assert not approaches_reference(("units", "loss"))
+    assert readable("newton_iterations") == "newton iterations"
