@@ -1,6 +1,7 @@
 """A solution sampled on the shared mesh and at the markers: all that metrics, pictures and reports look at.
 
-It is an archive of NumPy arrays, so that a run can be resumed, and a result compared again, without any solver.
+It is an archive of NumPy arrays, so that a run can be resumed, and a result compared again, without any
+solver.
 """
 
 import json
@@ -24,7 +25,7 @@ HISTORY_PREFIX = "history_"
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """One solver's result on the shared mesh of t triangles, n nodes, m markers and q = 3 t quadrature points.
+    """One solver's result on the shared mesh: t triangles, n nodes, m markers, q = 3 t quadrature points.
 
     Attributes:
         solver: Name of the solver.
@@ -93,13 +94,11 @@ class Evaluation:
         )
 
     def per_triangle(self, values: FloatArray) -> FloatArray:
-        """Area-weighted mean over each triangle of values at the quadrature points, shape (q, ...) to (t, ...)."""
+        """Area-weighted mean over each triangle: values at the quadrature points (q, ...) to (t, ...)."""
         points = 3
         weights = self.weights.reshape(-1, points)
         grouped = values.reshape(-1, points, *values.shape[1:])
-        return np.asarray(
-            np.einsum("tq,tq...->t...", weights / weights.sum(axis=1, keepdims=True), grouped)
-        )
+        return np.asarray(np.einsum("tq,tq...->t...", weights / weights.sum(axis=1, keepdims=True), grouped))
 
     def save(self, path: Path, key: str) -> None:
         """Write the evaluation atomically under a key that says what it is the result of."""

@@ -1,9 +1,10 @@
 """The constitutive laws, once, for NumPy arrays, torch tensors and UFL expressions alike.
 
-Every function takes the displacement gradient `H[..., i, j] = du_i/dx_j` and uses nothing but arithmetic and indexing
-on it, so that any of the three libraries can be passed. Linear elasticity is Hooke's law for the plane states (Timoshenko
-and Goodier, Theory of Elasticity, 3rd ed., sections 10 and 16-17); the neo-Hookean law is the compressible one of Bonet and
-Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed., eqs 6.27-6.29, in plane strain.
+Every function takes the displacement gradient `H[..., i, j] = du_i/dx_j` and uses nothing but arithmetic and
+indexing on it, so that any of the three libraries can be passed. Linear elasticity is Hooke's law for the
+plane states (Timoshenko and Goodier, Theory of Elasticity, 3rd ed., chapter 2); the neo-Hookean law is the
+compressible one of Bonet and Wood (Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed.,
+section 6.4.3), in plane strain.
 """
 
 from collections.abc import Callable
@@ -49,7 +50,8 @@ def small_strain(gradient: Field, lame: Lame) -> Plane:
     """Infinitesimal strain, tensor components (the shear is half the engineering shear)."""
     xx, yy = gradient[..., 0, 0], gradient[..., 1, 1]
     xy = 0.5 * (gradient[..., 0, 1] + gradient[..., 1, 0])
-    # Plane stress: sigma_zz = 0 fixes eps_zz; there the reduced λ = 2 λ3 μ/(λ3 + 2 μ) gives eps_zz = -λ/(2 μ) (xx + yy).
+    # Plane stress: sigma_zz = 0 fixes eps_zz; there the reduced λ = 2 λ3 μ/(λ3 + 2 μ) gives eps_zz = -λ/(2 μ)
+    # (xx + yy).
     zz = 0 * xx if lame.λ_out else (-lame.λ / (2 * lame.μ)) * (xx + yy)
     return Plane(xx, yy, xy, zz)
 
@@ -91,7 +93,7 @@ def green_lagrange_strain(gradient: Field) -> Plane:
 
 
 def neo_hookean_energy_density(gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> Field:
-    """ψ = μ/2 (tr C - 3) - μ ln J + λ/2 (ln J)^2 per reference volume, MPa; `log` is that of the library in use."""
+    """ψ = μ/2 (tr C - 3) - μ ln J + λ/2 (ln J)^2 per reference volume, MPa; `log` is the library's own."""
     strain = green_lagrange_strain(gradient)
     log_j = log(deformation_jacobian(gradient))
     return lame.μ * (strain.xx + strain.yy) - lame.μ * log_j + 0.5 * lame.λ * log_j * log_j
@@ -113,6 +115,4 @@ def neo_hookean_stress(gradient: Field, lame: Lame, log: Callable[[Field], Field
 def von_mises(stress: Plane, sqrt: Callable[[Field], Field]) -> Field:
     """Von Mises stress, MPa, with the out-of-plane stress that plane strain needs."""
     xx, yy, xy, zz = stress
-    return sqrt(
-        0.5 * ((xx - yy) * (xx - yy) + (yy - zz) * (yy - zz) + (zz - xx) * (zz - xx)) + 3 * xy * xy
-    )
+    return sqrt(0.5 * ((xx - yy) * (xx - yy) + (yy - zz) * (yy - zz) + (zz - xx) * (zz - xx)) + 3 * xy * xy)

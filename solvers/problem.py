@@ -53,9 +53,10 @@ class Load(BaseModel):
     """What the indenter does to the boundary `contact`; a component that is None is free of force.
 
     Attributes:
-        kind: `mean`: the weighted mean displacement over the contact is prescribed (`contact_weight`); well posed, the
-            default. `point`: the displacement of the contact's middle node is prescribed, as in the paper; its limit
-            under mesh refinement does not exist. `patch`: every point of the contact has the displacement.
+        kind: `mean`: the weighted mean displacement over the contact is prescribed (`contact_weight`); well
+            posed, the default. `point`: the displacement of the contact's middle node is prescribed, as in
+            the paper; its limit under mesh refinement does not exist. `patch`: every point of the contact has
+            the displacement.
         displacement: Prescribed (u, v), mm.
     """
 
@@ -109,7 +110,8 @@ class Problem:
         if free.any():
             x, y = self.mesh.points[free][0]
             raise UserError(
-                f"part of the mesh is not connected to the base: {int(free.sum())} nodes, one at ({x:.6g}, {y:.6g}) mm"
+                f"part of the mesh is not connected to the base: {int(free.sum())} nodes, "
+                f"one of them at ({x:.6g}, {y:.6g}) mm"
             )
 
     @property
@@ -130,10 +132,11 @@ def contact_extent(mesh: TriangleMesh) -> tuple[float, float]:
 
 
 def contact_functional(problem: Problem) -> tuple[FloatArray, FloatArray]:
-    """The linear functional of the load: prescribed displacement = sum of weights times displacement at the points.
+    """The linear functional of the load: prescribed = sum of weights times displacement at points.
 
     For `mean` the weight along the contact of width b, at distance s from its middle, is the raised cosine
-    (1 + cos(2 pi s / b)) / b: smooth, zero at both ends, with integral one. For `point` it is the middle node.
+    (1 + cos(2 pi s / b)) / b: smooth, zero at both ends, with integral one. For `point` it is the middle
+    node.
 
     Returns:
         Points (q, 2), mm, and weights (q,) that sum to one.

@@ -1,4 +1,4 @@
-"""Solvers by name: ours, loaded when asked for, and those of other packages (entry-point group `pinnray.solvers`)."""
+"""Solvers by name: ours, and those of other packages by the entry-point group `pinnray.solvers`."""
 
 import warnings
 from collections.abc import Mapping
@@ -48,7 +48,10 @@ def make_solver(name: str, **settings: Any) -> Solver:
             raise UserError(f"solver {name!r} ({found[0].value}) cannot be loaded: {error}") from error
     solver = factory(**_typed(name, factory, settings))
     if not isinstance(solver, Solver):
-        raise UserError(f"solver {name!r} does not have the interface: name, laws, loads, solve(problem, progress), settings()")
+        raise UserError(
+            f"solver {name!r} does not have the interface: "
+            "name, laws, loads, solve(problem, progress), settings()"
+        )
     return solver
 
 
@@ -64,7 +67,7 @@ def usable_solvers() -> dict[str, Solver]:
 
 
 def _typed(name: str, factory: Any, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings with the types of the solver's dataclass fields; text, as from a command line, is converted."""
+    """Settings in the types of the solver's dataclass fields; text from a command line is converted."""
     if not is_dataclass(factory):
         return dict(settings)
     hints = get_type_hints(factory)

@@ -1,7 +1,7 @@
 """What every solver returns, and everything that follows from the displacement gradient, derived once."""
 
+import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -34,7 +34,7 @@ class DisplacementField(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True)
 class Status:
     """How the solve ended.
 
@@ -47,7 +47,7 @@ class Status:
     message: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Solution:
     """A displacement field with its problem and how it was found.
 
@@ -69,7 +69,7 @@ class Solution:
     reaction: FloatArray
     status: Status
     stats: Mapping[str, float | int | str]
-    history: Mapping[str, FloatArray] = field(default_factory=dict)
+    history: Mapping[str, FloatArray] = dataclasses.field(default_factory=dict)
 
     def displacement(self, points: ArrayLike | Location) -> FloatArray:
         """Displacement at points of shape (n, 2), mm: shape (n, 2), mm.
@@ -95,12 +95,13 @@ class Solution:
         return points if isinstance(points, Location) else self.problem.mesh.locate(points)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False)
 class State:
     """Strain and stress at n points.
 
     Attributes:
-        strain: In-plane strain tensor, shape (n, 2, 2): infinitesimal for the linear law, Green-Lagrange for finite strain.
+        strain: In-plane strain tensor, shape (n, 2, 2): infinitesimal for the linear law, Green-Lagrange for
+            finite strain.
         stress: In-plane Cauchy stress, shape (n, 2, 2), MPa.
         stress_zz: Out-of-plane Cauchy stress, shape (n,), MPa; zero in plane stress.
         von_mises: Shape (n,), MPa.

@@ -21,17 +21,23 @@ def silent(fraction: float, text: str) -> None:
 class Solver(Protocol):
     """Something that solves a `Problem`.
 
-    A solver is made without arguments for its defaults.
-
-    Attributes:
-        name: What it is called by on the command line.
-        laws: Material laws that it has (`Material.law`), the usual one first.
-        loads: Kinds of load that it takes (`Load.kind`).
+    A solver is made without arguments for its defaults; the three properties may be plain class attributes.
     """
 
-    name: str
-    laws: tuple[str, ...]
-    loads: tuple[str, ...]
+    @property
+    def name(self) -> str:
+        """What it is called by on the command line."""
+        ...
+
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """Material laws that it has (`Material.law`), the usual one first."""
+        ...
+
+    @property
+    def loads(self) -> tuple[str, ...]:
+        """Kinds of load that it takes (`Load.kind`)."""
+        ...
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve `problem`.

@@ -6,6 +6,7 @@ It offers a vector space on the shared mesh, with a map between its degrees of f
 
 import inspect
 from collections.abc import Sequence
+from typing import Any
 
 import dolfinx
 import dolfinx.fem.petsc
@@ -15,12 +16,12 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.spatial import cKDTree
 
-from geometry.arrays import FloatArray, IntArray
+from geometry.arrays import BoolArray, FloatArray, IntArray
 from geometry.errors import UserError
 from solvers.fem.lagrange import LagrangeSpace
 
 
-def _vector_element() -> object:
+def _vector_element() -> Any:
     if hasattr(ufl, "VectorElement"):  # until 0.6
         return ufl.VectorElement("Lagrange", "triangle", 1)
     import basix.ufl
@@ -28,7 +29,7 @@ def _vector_element() -> object:
     return basix.ufl.element("Lagrange", "triangle", 1, shape=(2,))
 
 
-def _create_mesh(comm: MPI.Comm, cells: IntArray, points: FloatArray) -> object:
+def _create_mesh(comm: MPI.Comm, cells: IntArray, points: FloatArray) -> Any:
     domain = ufl.Mesh(_vector_element())
     names = inspect.signature(dolfinx.mesh.create_mesh).parameters
     return dolfinx.mesh.create_mesh(
@@ -36,7 +37,7 @@ def _create_mesh(comm: MPI.Comm, cells: IntArray, points: FloatArray) -> object:
     )
 
 
-def _vector_space(mesh: object, degree: int) -> object:
+def _vector_space(mesh: Any, degree: int) -> Any:
     if hasattr(dolfinx.fem, "functionspace"):  # from 0.7
         return dolfinx.fem.functionspace(mesh, ("Lagrange", degree, (2,)))
     return dolfinx.fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
@@ -68,15 +69,15 @@ class DistributedSpace:
             )
         self._owned = self.dolfinx_space.dofmap.index_map.size_local
 
-    def constant(self, value: float) -> object:
+    def constant(self, value: float) -> Any:
         """A number that can change without compiling the form again."""
         return dolfinx.fem.Constant(self.domain, PETSc.ScalarType(value))
 
-    def form(self, expression: object) -> object:
+    def form(self, expression: Any) -> Any:
         """Compile a UFL form."""
         return dolfinx.fem.form(expression)
 
-    def clamp(self, nodes: IntArray, axes: Sequence[int] = (0, 1)) -> list[object]:
+    def clamp(self, nodes: IntArray, axes: Sequence[int] = (0, 1)) -> list[Any]:
         """Homogeneous Dirichlet conditions on components of nodes."""
         dofs = np.flatnonzero(np.isin(self._node_of_dof, nodes)).astype(np.int32)
         conditions = []
@@ -88,19 +89,19 @@ class DistributedSpace:
             )
         return conditions
 
-    def assemble_matrix(self, form: object, conditions: Sequence[object]) -> PETSc.Mat:
+    def assemble_matrix(self, form: Any, conditions: Sequence[Any]) -> PETSc.Mat:
         """Matrix with rows and columns of clamped components replaced by the identity."""
         matrix = dolfinx.fem.petsc.assemble_matrix(form, bcs=list(conditions))
         matrix.assemble()
         return matrix
 
-    def assemble_nodal(self, form: object) -> FloatArray:
+    def assemble_nodal(self, form: Any) -> FloatArray:
         """A linear form on every shape function, shape (N, 2)."""
         vector = dolfinx.fem.petsc.assemble_vector(form)
         vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         return self.gather(vector)
 
-    def assemble_scalar(self, form: object) -> float:
+    def assemble_scalar(self, form: Any) -> float:
         """An integral over the whole body."""
         return float(self.comm.allreduce(dolfinx.fem.assemble_scalar(form), op=MPI.SUM))
 
@@ -132,7 +133,7 @@ class Factorisation:
     """
 
     def __init__(
-        self, space: DistributedSpace, matrix: PETSc.Mat, clamped: FloatArray, *, positive_definite: bool
+        self, space: DistributedSpace, matrix: PETSc.Mat, clamped: BoolArray, *, positive_definite: bool
     ) -> None:
         self._space = space
         self._clamped = clamped
@@ -150,7 +151,8 @@ class Factorisation:
             self._ksp.setUp()
         except PETSc.Error as error:
             raise UserError(
-                "MUMPS cannot factorise the stiffness matrix: is there enough memory, and is no element nearly flat?"
+                "MUMPS cannot factorise the stiffness matrix: "
+                "is there enough memory, and is no element nearly flat?"
             ) from error
 
     def solve(self, nodal: FloatArray) -> FloatArray:

@@ -1,7 +1,7 @@
 """Continuous Lagrange elements on the shared mesh, in NumPy: nodes, shape functions, functionals, evaluation.
 
-DOLFINx assembles and PETSc solves; nodes here are matched to its degrees of freedom by position, so that a finite-element
-solution is an array that outlives both, and no code depends on how they number things.
+DOLFINx assembles and PETSc solves; nodes here are matched to its degrees of freedom by position, so that a
+finite-element solution is an array that outlives both, and no code depends on how they number things.
 """
 
 from dataclasses import dataclass

@@ -2,7 +2,7 @@
 
 import time
 from dataclasses import asdict, dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import ufl
@@ -21,8 +21,9 @@ from solvers.solver import Progress, check_problem, silent
 class FemSolver:
     """Lagrange elements of degree 1 or 2 on exactly the shared mesh, factorised by MUMPS.
 
-    A `mean` or `point` load is one linear functional b_k per prescribed component: K x_k = b_k is solved once for each
-    and the forces f follow from (b_i . x_j) f_j = prescribed displacement. A `patch` is a Dirichlet condition.
+    A `mean` or `point` load is one linear functional b_k per prescribed component: K x_k = b_k is solved once
+    for each, and the forces f follow from (b_i . x_j) f_j = prescribed displacement. A `patch` is a Dirichlet
+    condition.
 
     Attributes:
         degree: Degree of the elements, 1 or 2.
@@ -72,7 +73,7 @@ class LinearSystem:
 
     problem: Problem
     distributed: DistributedSpace
-    forms: dict[str, object] = field(default_factory=dict)
+    forms: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, problem: Problem, space: LagrangeSpace) -> "LinearSystem":
@@ -122,11 +123,11 @@ class LinearSystem:
 
 
 def held_components(problem: Problem, space: LagrangeSpace) -> BoolArray:
-    """Which nodal components a Dirichlet condition prescribes, shape (N, 2): the base and, for a `patch`, the contact."""
+    """Nodal components that a Dirichlet condition prescribes, (N, 2): base and, for a `patch`, contact."""
     held = np.zeros((len(space.nodes), 2), dtype=bool)
     held[space.boundary_nodes("base")] = True
     if problem.load.kind == "patch":
-        held[np.ix_(space.boundary_nodes("contact"), problem.load.prescribed)] = True
+        held[np.ix_(space.boundary_nodes("contact"), np.array(problem.load.prescribed))] = True
     return held
 
 
@@ -134,7 +135,7 @@ def patch_displacement(problem: Problem, space: LagrangeSpace) -> FloatArray:
     """Nodal displacements that are the load on the contact and zero elsewhere, shape (N, 2), mm."""
     values = np.zeros((len(space.nodes), 2))
     nodes = space.boundary_nodes("contact")
-    values[np.ix_(nodes, problem.load.prescribed)] = problem.load.values
+    values[np.ix_(nodes, np.array(problem.load.prescribed))] = problem.load.values
     return values
 
 
@@ -151,8 +152,8 @@ def load_functionals(problem: Problem, space: LagrangeSpace) -> FloatArray:
 def reaction_by_residual_work(space: LagrangeSpace, residual: FloatArray) -> FloatArray:
     """Force of the indenter on the finger, shape (2,), N/mm: the work of the residual on a unit translation.
 
-    The translation is one everywhere but at the base, where the clamp's own force works. Exact for the discrete solution,
-    unlike an integral of stresses along the boundary.
+    The translation is one everywhere but at the base, where the clamp's own force works. Exact for the
+    discrete solution, unlike an integral of stresses along the boundary.
     """
     moved = np.ones(len(space.nodes), dtype=bool)
     moved[space.boundary_nodes("base")] = False

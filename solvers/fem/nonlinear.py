@@ -32,8 +32,9 @@ QUADRATURE_DEGREE = 4
 class FemNonlinearSolver:
     """Neo-Hookean plane strain by Newton's method, the load applied in adaptive steps.
 
-    Every step starts from the last two states extrapolated; the first from the linear solution. A step whose Newton
-    iteration fails, or turns an element inside out, is halved. A `patch` whose tangential component is free slides.
+    Every step starts from the last two states extrapolated; the first from the linear solution. A step whose
+    Newton iteration fails, or turns an element inside out, is halved. A `patch` whose tangential component is
+    free slides.
 
     Attributes:
         degree: Degree of the elements, 1 or 2.
@@ -87,7 +88,9 @@ class FemNonlinearSolver:
             step = min(self.max_step, step * (2 if taken <= 4 else 1))
         last = path[-1]
         complete = last.fraction >= 1
-        residuals = [np.zeros_like(entry.nodal) if entry.residual is None else entry.residual for entry in path]
+        residuals = [
+            np.zeros_like(entry.nodal) if entry.residual is None else entry.residual for entry in path
+        ]
         reactions = np.array([reaction_by_residual_work(space, residual) for residual in residuals])
         return Solution(
             solver=self.name,
@@ -121,7 +124,7 @@ class FemNonlinearSolver:
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """A state of equilibrium at a fraction of the load; the residual is the internal force, shape (N, 2), N/mm."""
+    """Equilibrium at a fraction of the load; the residual is the internal force, shape (N, 2), N/mm."""
 
     fraction: float
     nodal: FloatArray
@@ -141,9 +144,9 @@ def _extrapolate(path: Sequence[_Step], fraction: float) -> FloatArray:
 class _Newton:
     """Newton's method on the equilibrium with the load's conditions as constraints.
 
-    A `mean` or `point` load is a constraint b_k . u = prescribed, whose multiplier is the force; a `patch` holds nodal
-    components. With K the tangent, y = K^-1 (-r) and x_k = K^-1 b_k, the step is y + f_k x_k where f makes it meet the
-    constraints.
+    A `mean` or `point` load is a constraint b_k . u = prescribed, whose multiplier is the force; a `patch`
+    holds nodal components. With K the tangent, y = K^-1 (-r) and x_k = K^-1 b_k, the step is y + f_k x_k
+    where f makes it meet the constraints.
     """
 
     def __init__(self, settings: FemNonlinearSolver, problem: Problem, space: LagrangeSpace) -> None:
@@ -165,9 +168,7 @@ class _Newton:
         energy = neo_hookean_energy_density(ufl.grad(u), constants, ufl.ln) * measure
         residual = ufl.derivative(energy, u, ufl.TestFunction(u.function_space))
         tangent = ufl.derivative(residual, u, ufl.TrialFunction(u.function_space))
-        self._energy, self._residual, self._tangent = map(
-            self._distributed.form, (energy, residual, tangent)
-        )
+        self._energy, self._residual, self._tangent = map(self._distributed.form, (energy, residual, tangent))
         self._conditions = [
             condition
             for axis in (0, 1)
@@ -183,7 +184,8 @@ class _Newton:
         """Equilibrium at a fraction of the load.
 
         Returns:
-            Nodal displacements, internal forces (both (N, 2); None if the iteration failed) and the iterations taken.
+            Nodal displacements and internal forces, both (N, 2), the forces None if the iteration failed; and
+            the iterations taken.
         """
         nodal = guess.copy()
         held = self._clamped & (self._held != 0)

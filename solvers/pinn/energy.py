@@ -27,9 +27,11 @@ class Minimum(NamedTuple):
 class QuadraticEnergy:
     """U(c) = 1/2 c^T K c over the output weights c of units that both displacement components share.
 
-    With weighted derivatives X = sqrt(w) d/dx and Y = sqrt(w) d/dy of the units at the quadrature points, K has the blocks
-    K_uu = (λ + 2 μ) X^T X + μ Y^T Y, K_vv = (λ + 2 μ) Y^T Y + μ X^T X, K_uv = λ X^T Y + μ Y^T X. Units can be added; the
-    products of those that are there already are kept.
+    With weighted derivatives X = sqrt(w) d/dx and Y = sqrt(w) d/dy of the units at the quadrature points,
+
+        K_uu = (λ + 2 μ) X^T X + μ Y^T Y    K_vv = (λ + 2 μ) Y^T Y + μ X^T X    K_uv = λ X^T Y + μ Y^T X
+
+    Units can be added; the products of those that are there already are kept.
     """
 
     def __init__(self, weights: torch.Tensor, lame: Lame) -> None:
@@ -40,7 +42,7 @@ class QuadraticEnergy:
         self._xx = self._yy = self._xy = weights.new_empty(0, 0)
 
     def add(self, derivative_x: torch.Tensor, derivative_y: torch.Tensor) -> None:
-        """Add units by their derivatives at the quadrature points, each (q, U_new); the arrays are taken over."""
+        """Add units by their derivatives at the quadrature points, each (q, U_new), which are overwritten."""
         x, y = derivative_x.mul_(self._root), derivative_y.mul_(self._root)
         self._x.append(x)
         self._y.append(y)
@@ -98,7 +100,7 @@ def _bordered(old: torch.Tensor, right: torch.Tensor, left: torch.Tensor) -> tor
 
 
 def _regularised_cholesky(matrix: torch.Tensor) -> tuple[torch.Tensor, float]:
-    """Cholesky factor of a matrix with unit diagonal plus the least power of ten, from 1e-14, that makes it definite."""
+    """Cholesky factor of a matrix with unit diagonal, plus the least power of ten that makes it definite."""
     for exponent in range(-14, -5):
         shifted = matrix + 10.0**exponent * torch.eye(len(matrix), dtype=matrix.dtype)
         factor, failed = torch.linalg.cholesky_ex(shifted)

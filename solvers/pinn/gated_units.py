@@ -1,15 +1,15 @@
 """The hidden layers of a modified MLP with one gate, and their exact derivatives.
 
-The network of Wang, Teng and Perdikaris (Understanding and mitigating gradient flow pathologies in physics-informed neural
-networks, SIAM J. Sci. Comput. 43 (2021) A3055-A3081, eqs 43-46), which the paper uses, mixes two encoders A and B of the
-input by a gate Z: H' = (1 - Z) A + Z B. Here every unit j has two encoders, a hidden layer of four neurons of its own, and a
-gate:
+The network of Wang, Teng and Perdikaris (Understanding and mitigating gradient flow pathologies in
+physics-informed neural networks, SIAM J. Sci. Comput. 43 (2021) A3055-A3081), which the paper uses, mixes two
+encoders A and B of the input by a gate Z: H' = (1 - Z) A + Z B. Here every unit j has two encoders, a hidden
+layer of four neurons of its own, and a gate:
 
     A_j = tanh(X w_A + b_A)    B_j = tanh(X w_B + b_B)    h_jk = tanh(X w_k + b_k), k = 1..4
     Z_j = tanh(sum_k v_k h_jk + c_j)                      H_j = (1 - Z_j) A_j + Z_j B_j
 
-They start where geometry says: the four neurons are two crossed strips around a point of the body, so that the gate opens
-there and closes away from it, and the encoders are a ridge and its mirror image through a point nearby.
+They start where geometry says: the four neurons are two crossed strips around a point of the body, so that
+the gate opens there and closes away from it; the encoders are a ridge across that point and its negative.
 """
 
 from collections.abc import Sequence

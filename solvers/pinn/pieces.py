@@ -1,7 +1,8 @@
 """Evaluate many points in pieces that stay in a core's cache, one piece a thread.
 
-Elementwise operations on large arrays are bound by memory, and torch's own threads meet at a barrier after each of them; with
-pieces there is one barrier in all. On two busy cores this was measured to be three to eight times as fast.
+Elementwise operations on large arrays are bound by memory, and torch's own threads meet at a barrier after
+each of them; with pieces there is one barrier in all. On two busy cores this was measured to be three to
+eight times as fast.
 """
 
 from collections.abc import Callable
@@ -14,7 +15,7 @@ PIECE = 2**14
 
 
 def in_pieces(task: Callable[[slice], None], points: int, units: int) -> None:
-    """Call `task` with slices that cut `points` rows of `units` numbers into pieces, in torch's number of threads."""
+    """Call `task` with slices that cut `points` rows of `units` numbers into pieces, on every thread."""
     size = max(PIECE // units, 8)
     slices = [slice(start, min(start + size, points)) for start in range(0, points, size)]
     threads = torch.get_num_threads()

@@ -22,10 +22,10 @@ from solvers.solver import Progress, check_problem, silent
 class PinnStdSolver:
     """A gated modified MLP that grows in rounds, its output layer solved exactly in each.
 
-    The energy is quadratic in the output layer, so that its minimiser under the load's conditions is one Cholesky
-    factorisation; the clamp is a factor of the network. Every round adds hidden units around points drawn with a density that
-    is the square root of the present solution's energy density (uniform at first), and stops when a round changes the
-    displacement by less than `tolerance`.
+    The energy is quadratic in the output layer, so that its minimiser under the load's conditions is one
+    Cholesky factorisation; the clamp is a factor of the network. Every round adds hidden units around points
+    drawn with a density that is the square root of the present solution's energy density (uniform at first),
+    and stops when a round changes the displacement by less than `tolerance`.
 
     Attributes:
         units: Hidden units added in a round.
@@ -54,8 +54,17 @@ class PinnStdSolver:
 
     def __post_init__(self) -> None:
         if self.units < 1 or self.rounds < 2:
-            raise UserError("pinn-std needs at least 1 unit a round and 2 rounds, to see whether it has converged")
-        for setting in ("tolerance", "gate_width", "width_ratio", "encoder_slope", "gate_steepness", "base_length"):
+            raise UserError(
+                "pinn-std needs at least 1 unit a round and 2 rounds, to see whether it has converged"
+            )
+        for setting in (
+            "tolerance",
+            "gate_width",
+            "width_ratio",
+            "encoder_slope",
+            "gate_steepness",
+            "base_length",
+        ):
             if not getattr(self, setting) > 0:
                 raise UserError(f"pinn-std: {setting} must be positive, got {getattr(self, setting)}")
 
@@ -118,7 +127,10 @@ class PinnStdSolver:
         reaction[problem.load.prescribed] = best.forces.numpy()
         change = float(history[-1, 2])
         converged = change <= self.tolerance
-        message = f"the last {self.units} units changed the displacement by {change:.2%} (criterion {self.tolerance:.2%})"
+        message = (
+            f"the last {self.units} units changed the displacement by {change:.2%} "
+            f"(criterion {self.tolerance:.2%})"
+        )
         if not converged:
             message += "; not converged: take more rounds or more units"
         return Solution(

@@ -1,4 +1,4 @@
-"""Displacements that a network can have: its hidden units times a factor that vanishes on the clamped base."""
+"""Displacements that a network can have: its hidden units times a factor that vanishes on the base."""
 
 from dataclasses import dataclass
 
@@ -12,9 +12,10 @@ from geometry.mesh import TriangleMesh
 from solvers.pinn.gated_units import GatedUnits
 from solvers.pinn.pieces import in_pieces
 
+
 @dataclass(frozen=True)
 class BaseFactor:
-    """The factor d / (d + length) of the distance d to the base: u = 0 holds there exactly, whatever the weights.
+    """The factor d / (d + length) of the distance d to the base, where u = 0 then holds whatever the weights.
 
     Attributes:
         abscissa: Where the base is, mm.
@@ -33,7 +34,9 @@ class BaseFactor:
         """
         x = mesh.points[np.unique(mesh.boundary("base")), 0]
         if np.ptp(x) > 1e-9 or mesh.points[:, 0].min() < x.min() - 1e-9:
-            raise UserError("the network's hard condition needs a base on a line x = constant, left of the body")
+            raise UserError(
+                "the network's hard condition needs a base on a line x = constant, left of the body"
+            )
         return cls(float(x.mean()), length)
 
     def at(self, points: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:

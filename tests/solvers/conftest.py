@@ -40,15 +40,19 @@ def plugin_folder(tmp_path_factory) -> Path:
     """A folder where pip has installed the solver package that lives in the tests."""
     folder = tmp_path_factory.mktemp("site")
     subprocess.run(
-        [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation"]
-        + ["--target", str(folder), str(PLUGIN)],
+        [
+            *(sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation"),
+            *("--target", str(folder), str(PLUGIN)),
+        ],
         check=True,
         capture_output=True,
     )
     return folder
 
 
-def bar_mesh(length: float, height: float, columns: int, rows: int, *, contact: tuple[float, float]) -> TriangleMesh:
+def bar_mesh(
+    length: float, height: float, columns: int, rows: int, *, contact: tuple[float, float]
+) -> TriangleMesh:
     """A bar 0 <= x <= length, -height <= y <= 0, with inner nodes moved at random and the contact on its top.
 
     Args:
@@ -65,7 +69,9 @@ def bar_mesh(length: float, height: float, columns: int, rows: int, *, contact: 
     points[inner] += jitter[inner]
     number = np.arange(len(points)).reshape(columns + 1, rows + 1)
     a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
-    triangles = np.concatenate([np.stack(corners, axis=-1).reshape(-1, 3) for corners in ((a, b, c), (a, c, d))])
+    triangles = np.concatenate(
+        [np.stack(corners, axis=-1).reshape(-1, 3) for corners in ((a, b, c), (a, c, d))]
+    )
     top = np.column_stack([number[:-1, -1], number[1:, -1]])
     middles = points[top, 0].mean(axis=1)
     return TriangleMesh(

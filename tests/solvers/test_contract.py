@@ -17,7 +17,7 @@ QUICK = {"pinn-std": {"units": 300, "rounds": 2, "gate_width": 6.0, "tolerance":
 """Settings that make a solver quick enough for the tests."""
 
 ACCURACY = {"fem": 1e-8, "fem-nonlinear": 1e-6, "skfem-p1": 1e-8, "pinn-std": 0.1}
-"""Relative L2 error that two solutions of the same problem may differ by: rounding, Newton's tolerance, or training."""
+"""Relative difference that two solutions of one problem may have: rounding, Newton's tolerance, training."""
 
 
 @pytest.fixture(scope="module", params=["fem", "fem-nonlinear", "pinn-std", "skfem-p1"])
@@ -60,11 +60,13 @@ def test_energy_is_the_integral_of_its_density(solution, coarse_mesh):
     rule = body_quadrature(coarse_mesh, 4)
     total = (rule.weights * solution.state(rule.location).energy_density).sum()
     # The network's energy was integrated by a rule of degree 2.
-    assert total == pytest.approx(solution.energy, rel=0.02 if "quadrature_points" in solution.stats else 1e-7)
+    assert total == pytest.approx(
+        solution.energy, rel=0.02 if "quadrature_points" in solution.stats else 1e-7
+    )
 
 
 def test_reaction_does_the_work(solution):
-    """Clapeyron: the energy is half the force times the travel; exact for a linear law, nearly so for a small travel."""
+    """Clapeyron: half the force times the travel; exact for a linear law, nearly so for a small travel."""
     work = 0.5 * solution.reaction @ [0.0, -2.0]
     linear = solution.problem.material.law == "linear"
     assert solution.energy == pytest.approx(work, rel=1e-6 if linear else 0.1)
@@ -74,7 +76,8 @@ def test_reaction_does_the_work(solution):
 def test_twice_the_travel_is_twice_the_displacement(solver, solution, coarse_mesh):
     if solution.problem.material.law != "linear":
         small, large = (
-            solver.solve(problem_of(solver, coarse_mesh, (0.0, -travel))).displacement(coarse_mesh.markers) / travel
+            solver.solve(problem_of(solver, coarse_mesh, (0.0, -travel))).displacement(coarse_mesh.markers)
+            / travel
             for travel in (0.01, 0.02)
         )
         assert relative(large - small, small) < 0.01
@@ -105,7 +108,9 @@ def test_gradient_is_the_derivative_of_the_displacement(solution, coarse_mesh):
     step = 1e-5
     for axis in range(2):
         shift = step * np.eye(2)[axis]
-        difference = (solution.displacement(centroids + shift) - solution.displacement(centroids - shift)) / (2 * step)
+        difference = (solution.displacement(centroids + shift) - solution.displacement(centroids - shift)) / (
+            2 * step
+        )
         np.testing.assert_allclose(solution.gradient(centroids)[:, :, axis], difference, atol=1e-6)
 
 
@@ -116,7 +121,9 @@ def test_points_outside_the_body_are_refused(solution):
 
 def test_one_point_and_many_points_agree(solution, coarse_mesh):
     many = solution.displacement(coarse_mesh.markers)
-    np.testing.assert_allclose(solution.displacement(coarse_mesh.markers[4:5]), many[4:5], rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(
+        solution.displacement(coarse_mesh.markers[4:5]), many[4:5], rtol=1e-12, atol=1e-14
+    )
 
 
 def test_settings_are_json_and_status_is_a_sentence(solver, solution):
@@ -139,7 +146,9 @@ def test_cantilever_against_beam_theory(solver):
     length, height, middle = 40.0, 4.0, 39.0
     mesh = bar_mesh(length, height, 80, 8, contact=(38.0, 40.0))
     material = Material(young=10.0, poisson=0.3)
-    problem = replace(problem_of(solver, mesh), material=with_law(material, solver), load=Load(displacement=(None, -0.1)))
+    problem = replace(
+        problem_of(solver, mesh), material=with_law(material, solver), load=Load(displacement=(None, -0.1))
+    )
     solution = solver.solve(problem)
     modulus = material.young / (1 - material.poisson**2)
     shear = material.young / (2 * (1 + material.poisson))

@@ -12,7 +12,9 @@ def test_polynomials_of_the_degree_are_reproduced_with_their_gradient(coarse_mes
     space = LagrangeSpace(coarse_mesh.permuted(3), degree)
     x, y = space.nodes.T
     curved = degree - 1
-    field = LagrangeField(space, np.column_stack([1 + 2 * x - y + curved * x * y, 3 * y - x + curved * (x**2 - 2 * y**2)]))
+    field = LagrangeField(
+        space, np.column_stack([1 + 2 * x - y + curved * x * y, 3 * y - x + curved * (x**2 - 2 * y**2)])
+    )
     location = body_quadrature(space.mesh, 4).location
     x, y = location.points.T
     expected = np.column_stack([1 + 2 * x - y + curved * x * y, 3 * y - x + curved * (x**2 - 2 * y**2)])

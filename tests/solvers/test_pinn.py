@@ -44,7 +44,8 @@ def test_gate_is_open_at_its_centre_and_closed_far_away():
 
     def gate(points):
         hidden = sum(
-            units.gate[k] * torch.tanh(points @ units.strips[:2, :, k] + units.strips[2, :, k]) for k in range(4)
+            units.gate[k] * torch.tanh(points @ units.strips[:2, :, k] + units.strips[2, :, k])
+            for k in range(4)
         )
         return torch.tanh(hidden + units.gate[4])
 
@@ -69,7 +70,9 @@ def test_the_quadratic_form_is_the_energy(trial, coarse_mesh):
     np.testing.assert_allclose(gradient, energy.gradient(best.output).numpy(), atol=1e-9)
     integral = (rule.weights * linear_energy_density(gradient, lame)).sum()
     assert best.energy == pytest.approx(integral, rel=1e-9)
-    assert best.energy == pytest.approx(0.5 * float(best.forces @ torch.tensor([0.5, -1.0]).double()), rel=1e-6)
+    assert best.energy == pytest.approx(
+        0.5 * float(best.forces @ torch.tensor([0.5, -1.0]).double()), rel=1e-6
+    )
     np.testing.assert_allclose((functionals @ best.output).numpy(), [0.5, -1.0], atol=1e-9)
     # A minimum: moving along a direction that keeps the load's condition costs energy.
     direction = torch.randn(40, 2, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
@@ -99,7 +102,8 @@ def test_same_seed_same_network_other_seed_other_network(coarse_mesh):
     problem = Problem(coarse_mesh)
     quick = {"units": 100, "rounds": 2}
     first, again, other = (
-        PinnStdSolver(**quick, seed=seed).solve(problem).displacement(coarse_mesh.markers) for seed in (1, 1, 2)
+        PinnStdSolver(**quick, seed=seed).solve(problem).displacement(coarse_mesh.markers)
+        for seed in (1, 1, 2)
     )
     np.testing.assert_allclose(first, again, rtol=1e-9)
     assert np.abs(first - other).max() > 1e-3
