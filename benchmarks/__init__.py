@@ -1,0 +1,1 @@
+"""Speed and accuracy against peers, as ratios within one run: absolute times differ by machine."""
