@@ -3,14 +3,18 @@
 Type, axes and legends are matplotlib's; both use the same extent in mm, so that they fit to the pixel.
 """
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import TracebackType
 from typing import NamedTuple, Self
 
 import numpy as np
-import pyvista
 from numpy.typing import NDArray
+
+# Draw without a display: VTK otherwise complains of a missing X server before it does so anyway.
+os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+import pyvista
 from vtkmodules.vtkCommonCore import vtkLogger
 
 from geometry.arrays import FloatArray
