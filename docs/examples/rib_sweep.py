@@ -1,7 +1,7 @@
 """Does the tip bend toward the indenter? The Fin Ray effect against the number of ribs.
 
-The front face is pressed by 10 mm along -y. A finger that wraps around the object has a tip that moves the other
-way, along +y.
+The front face is pressed by 10 mm along -y. A finger that wraps around the object has a tip that moves the
+other way, along +y.
 """
 
 from geometry import MeshSettings, finger_mesh, load_design
