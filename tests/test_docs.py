@@ -1,0 +1,347 @@
+"""The documentation against the program: examples, code blocks, command lines, tables and links."""
+
+import csv
+import json
+import re
+import runpy
+import shlex
+import tomllib
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from geometry.cache import CAD_FORMATS
+from geometry.markers import marker_positions
+from geometry.parameters import Parameters, fact
+from geometry.presets import FOLDER, load_design, preset_names
+from geometry.settings import MeshSettings
+
+ROOT = Path(__file__).parent.parent
+DOCS = ROOT / "docs"
+GUIDE, OWN_SOLVER = DOCS / "guide.md", DOCS / "own-solver.md"
+PAGES = sorted([*DOCS.glob("*.md"), *ROOT.glob("*.md")])
+PLUGIN = ROOT / "tests" / "solvers" / "plugin"
+
+PLACEHOLDERS = ("COMPONENT", "DIFFERENCE", "FIELD", "NAME", "PARAMETER", "STAT", "UNIT")
+"""Words of the tables that stand for any name."""
+
+
+class Block(NamedTuple):
+    """A fenced block: where it is, its language and its text."""
+
+    page: Path
+    line: int
+    language: str
+    text: str
+
+
+def blocks(page: Path) -> list[Block]:
+    text = page.read_text(encoding="utf-8")
+    return [
+        Block(page, text[: match.start()].count("\n") + 1, match[1], match[2])
+        for match in re.finditer(r"^```(\w*)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    ]
+
+
+def without_blocks(text: str) -> str:
+    return re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
+
+
+def id_of(value: object) -> str:
+    if isinstance(value, Block):
+        return f"{value.page.name}:{value.line}"
+    return value.name if isinstance(value, Path) else str(value)
+
+
+def is_plugin(block: Block) -> bool:
+    return block.text in {path.read_text(encoding="utf-8") for path in PLUGIN.glob("*.*") if path.is_file()}
+
+
+ALL_BLOCKS = [block for page in PAGES for block in blocks(page)]
+TO_RUN = [block for block in ALL_BLOCKS if block.language == "python" and not is_plugin(block)]
+
+
+def table(page: Path, first_column: str, after: str = "") -> list[list[str]]:
+    """Cells of the first table whose header starts with `first_column`, after some text."""
+    text = page.read_text(encoding="utf-8")
+    lines = iter(text[text.index(after) :].splitlines())
+    assert any(line.startswith(f"| {first_column} |") for line in lines), f"no table of {first_column}"
+    next(lines)
+    rows = []
+    for line in lines:
+        if not line.startswith("|"):
+            break
+        rows.append([cell.strip() for cell in line.strip("|").split(" | ")])
+    return rows
+
+
+def names(rows: list[list[str]]) -> list[str]:
+    """The first column without its backquotes."""
+    return [row[0].strip("`") for row in rows]
+
+
+def assert_same(documented: list[str], actual: list[str]) -> None:
+    """Every actual name is documented, by itself or with placeholders, and nothing else is."""
+    patterns = {
+        name: re.compile(re.sub("|".join(PLACEHOLDERS), r"[A-Za-z0-9_-]+?", re.escape(name)))
+        for name in documented
+    }
+    undocumented = [
+        name for name in actual if not any(pattern.fullmatch(name) for pattern in patterns.values())
+    ]
+    absent = [
+        name for name, pattern in patterns.items() if not any(pattern.fullmatch(other) for other in actual)
+    ]
+    assert (undocumented, absent) == ([], [])
+
+
+@pytest.fixture(scope="module")
+def run_folder(tmp_path_factory) -> Path:
+    """The output of a small comparison."""
+    from compare.cli import compare_main
+
+    out = tmp_path_factory.mktemp("docs") / "run"
+    options = "--mesh-size 1 --solver-set pinn-std.units=60 --solver-set pinn-std.rounds=2 --quiet"
+    assert compare_main([*options.split(), "--out", str(out)]) in (
+        0,
+        3,
+    )  # so short a training may not converge
+    return out
+
+
+@pytest.mark.parametrize("path", sorted((DOCS / "examples").glob("*.py")), ids=id_of)
+def test_examples_run_and_find_their_number(path, capsys):
+    runpy.run_path(str(path), run_name="__main__")
+    assert capsys.readouterr().out
+
+
+@pytest.mark.parametrize("path", sorted((DOCS / "examples").glob("*.py")), ids=id_of)
+def test_examples_pin_a_number(path):
+    assert re.search(r"^    assert abs\(.+\) < [\d.]+$", path.read_text(encoding="utf-8"), re.MULTILINE)
+
+
+@pytest.mark.parametrize("block", TO_RUN, ids=id_of)
+def test_python_in_the_docs_runs(block, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    padded = "\n" * block.line + block.text  # so that a traceback names the page's own line
+    exec(compile(padded, str(block.page), "exec"), {"__name__": "__docs__"})
+
+
+@pytest.mark.parametrize("name", ["pinnray_skfem.py", "pyproject.toml"])
+def test_the_plug_in_in_the_docs_is_the_one_that_is_tested(name):
+    source = (PLUGIN / name).read_text(encoding="utf-8")
+    assert source in [block.text for block in blocks(OWN_SOLVER)]
+
+
+def test_every_block_says_its_language():
+    assert [block for block in ALL_BLOCKS if not block.language] == []
+
+
+def command_lines() -> list[tuple[str, str]]:
+    """Every `compare ...` and `pinnray ...` of the pages, in blocks and in running text, with its page."""
+    found = []
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        candidates = [
+            line for block in blocks(page) if block.language == "sh" for line in block.text.splitlines()
+        ]
+        prose = without_blocks(text)
+        candidates += re.findall(r"^    (\S.*)$", prose, re.MULTILINE) + re.findall(r"`([^`\n]+)`", prose)
+        for candidate in candidates:
+            line = candidate.strip().removeprefix("$ ").removeprefix(".venv/bin/")
+            if made := re.match(r'make compare ARGS="(.*)"$', line):
+                line = f"compare {made[1]}"
+            if line.startswith(("docker run", ".ci/container")) and " compare " in line:
+                line = "compare " + line.split(" compare ", 1)[1]
+            if re.match(r"(compare|pinnray) \S", line):
+                found.append((page.name, line))
+    return sorted(set(found))
+
+
+@pytest.mark.parametrize(("page", "line"), command_lines())
+def test_command_lines_parse(page, line):
+    from compare.cli import pinnray
+
+    tokens = shlex.split(line, comments=True)
+    tokens = tokens[1:] if tokens[0] == "pinnray" else tokens
+    if len(tokens) == 1:  # the name of a command
+        assert tokens[0] in set(pinnray)
+        return
+    _, bound, _ = pinnray.parse_args(tokens, exit_on_error=False, print_error=False)
+    given = bound.arguments
+    if (finger := given.get("finger")) is not None and not finger.design.endswith(".toml"):
+        finger.read()
+    if "physics" in given:
+        given["physics"].read()
+
+
+def test_command_lines_are_found():
+    found = command_lines()
+    assert len(found) > 12
+    assert ("guide.md", "compare --design slender --solvers fem") in found  # in make's ARGS and docker's line
+
+
+@pytest.mark.parametrize("page", PAGES, ids=id_of)
+def test_relative_links_lead_somewhere(page):
+    text = without_blocks(page.read_text(encoding="utf-8"))
+    broken = []
+    for target in re.findall(r"\]\(([^)\s]+)\)", text) + re.findall(r'(?:src|href)="([^"]+)"', text):
+        if re.match(r"[a-z]+:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        other = (page.parent / path) if path else page
+        if not other.exists() or (anchor and anchor not in anchors(other)):
+            broken.append(target)
+    assert broken == []
+
+
+def anchors(page: Path) -> set[str]:
+    """What GitHub makes of a page's headings."""
+    text = without_blocks(page.read_text(encoding="utf-8"))
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in headings}
+
+
+def described(model: type[Parameters] | type[MeshSettings], *, symbols: bool) -> list[str]:
+    """The rows that the guide must have for a model's fields."""
+    rows = []
+    for name, field in model.model_fields.items():
+        symbol, unit, low, high = (fact(name, key, model) for key in ("symbol", "unit", "low", "high"))
+        default = "none" if field.default is None else field.default
+        cells = [
+            f"`{name}`",
+            *([f"`{symbol}`" if symbol else "–"] if symbols else []),
+            unit or "–",
+            f"{default:g}" if isinstance(default, int | float) else default,
+            "–" if low == "" else f"{low:g} to {high:g}",
+            (field.description or "").split(" [")[0],
+        ]
+        rows.append("| " + " | ".join(cells) + " |")
+    return rows
+
+
+def test_the_guide_has_every_parameter_as_it_is():
+    lines = GUIDE.read_text(encoding="utf-8").splitlines()
+    expected = described(Parameters, symbols=True)
+    assert [row for row in expected if row not in lines] == []
+    assert names(table(GUIDE, "parameter")) == list(Parameters.model_fields)
+
+
+def test_the_guide_has_every_mesh_setting_as_it_is():
+    lines = GUIDE.read_text(encoding="utf-8").splitlines()
+    expected = described(MeshSettings, symbols=False)
+    assert [row for row in expected if row not in lines] == []
+    assert names(table(GUIDE, "setting")) == list(MeshSettings.model_fields)
+
+
+def test_the_guide_has_every_preset_as_it_is():
+    rows = table(GUIDE, "preset")
+    assert sorted(names(rows)) == sorted(preset_names())
+    for name, text in zip(names(rows), (row[1] for row in rows), strict=True):
+        values = tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
+        changed = {
+            key: value for key, value in values.items() if value != Parameters.model_fields[key].default
+        }
+        said = {key: float(value) for key, value in re.findall(r"`(\w+)` ([\d.]+)", text)}
+        assert said == changed, name
+
+
+def test_the_guide_has_every_solver_setting_as_it_is():
+    from solvers.registry import BUILT_IN, make_solver
+
+    actual = {
+        f"{name}.{key}": value for name in BUILT_IN for key, value in make_solver(name).settings().items()
+    }
+    rows = table(GUIDE, "setting", after="## Solvers")
+    assert {name: float(row[1]) for name, row in zip(names(rows), rows, strict=True)} == actual
+
+
+def test_the_guide_has_every_solver_with_its_loads():
+    from solvers.registry import BUILT_IN, make_solver
+
+    rows = table(GUIDE, "solver")
+    assert names(rows) == list(BUILT_IN)
+    for name, row in zip(names(rows), rows, strict=True):
+        assert re.findall(r"`(\w+)`", row[2]) == list(make_solver(name).loads), name
+
+
+def test_the_guide_has_every_column_of_measurements():
+    from vision.measurements import OPTIONAL, REQUIRED
+
+    rows = table(GUIDE, "column")
+    assert [(name, row[1]) for name, row in zip(names(rows), rows, strict=True)] == [
+        *((name, "yes") for name in REQUIRED),
+        *((name, "no") for name in OPTIONAL),
+    ]
+
+
+def test_the_measurements_in_the_guide_can_be_read(tmp_path):
+    from vision.measurements import read_measurements
+
+    (block,) = [block for block in blocks(GUIDE) if block.language == "csv"]
+    path = tmp_path / "markers.csv"
+    path.write_text(block.text, encoding="utf-8")
+    observations = read_measurements(path)
+    assert observations.label == "measured"
+    assert list(observations.visible) == [True, True, False]
+    assert observations.points.tolist() == marker_positions(load_design())[:3].tolist()
+
+
+def test_the_guide_has_every_exit_code():
+    from compare import cli
+
+    codes = {int(name) for name in names(table(GUIDE, "code"))}
+    assert codes == {0, 1, cli.BAD_INPUT, cli.NOT_CONVERGED, cli.INTERRUPTED}
+
+
+def test_the_guide_has_every_command():
+    from compare.cli import pinnray
+
+    commands = {name for name in pinnray if not name.startswith("-")}
+    said = {name.split()[-1] if "SOLVER" not in name else "solve" for name in names(table(GUIDE, "command"))}
+    assert said == commands
+
+
+def test_the_guide_has_every_cad_file(tmp_path):
+    from compare.cli import main
+
+    assert main(["design", "--out", str(tmp_path), "--formats", ",".join(CAD_FORMATS)]) == 0
+    assert_same(names(table(GUIDE, "file", after="### CAD")), [path.name for path in tmp_path.iterdir()])
+
+
+def test_the_guide_has_every_output_file(run_folder):
+    actual = [path.relative_to(run_folder).as_posix() for path in run_folder.rglob("*") if path.is_file()]
+    assert_same(names(table(GUIDE, "file", after="## Output")), actual)
+
+
+def test_the_guide_has_every_key_of_metrics(run_folder):
+    def paths(value: object, prefix: str = "") -> list[str]:
+        if not isinstance(value, dict):
+            return [prefix]
+        return [path for key, inner in value.items() for path in paths(inner, f"{prefix}.{key}".strip("."))]
+
+    actual = paths(json.loads((run_folder / "metrics.json").read_text(encoding="utf-8")))
+    assert_same(names(table(GUIDE, "key")), actual)
+
+
+def test_the_guide_has_every_field(run_folder):
+    import pyvista
+
+    grid = pyvista.read(run_folder / "fields" / "fem.vtu")
+    text = GUIDE.read_text(encoding="utf-8").partition("In the VTU files")[2].partition("\n\n")[0]
+    assert set(re.findall(r"`(\w+)`", text)) == {*grid.point_data.keys(), *grid.cell_data.keys()}
+
+
+def test_observations_of_a_run_are_measurements(run_folder):
+    with (run_folder / "observations.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    assert set(rows[0]) == {"marker", *names(table(GUIDE, "column"))}
+
+
+def test_the_contract_in_the_docs_is_the_one_that_is_tested():
+    source = (ROOT / "tests" / "solvers" / "test_contract.py").read_text(encoding="utf-8")
+    tests = [
+        test for test in re.findall(r"^def (test_\w+)", source, re.MULTILINE) if "registered" not in test
+    ]
+    assert names(table(OWN_SOLVER, "test")) == tests
