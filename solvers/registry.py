@@ -19,6 +19,7 @@ BUILT_IN = {
     "fem": "solvers.fem.linear:FemSolver",
     "fem-nonlinear": "solvers.fem.nonlinear:FemNonlinearSolver",
     "pinn-std": "solvers.pinn.standard:PinnStdSolver",
+    "pinn-local": "solvers.pinn.local:PinnLocalSolver",
 }
 
 

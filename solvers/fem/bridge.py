@@ -5,7 +5,9 @@ It offers a vector space on the shared mesh, with a map between its degrees of f
 """
 
 import inspect
-from collections.abc import Sequence
+import logging
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import dolfinx
@@ -43,6 +45,17 @@ def _vector_space(mesh: Any, degree: int) -> Any:
     return dolfinx.fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
 
 
+@contextmanager
+def _quiet_compiler() -> Iterator[None]:
+    """Compile forms without the build log that distutils would print through the root logger."""
+    before = logging.root.manager.disable
+    logging.disable(logging.INFO)
+    try:
+        yield
+    finally:
+        logging.disable(before)
+
+
 class DistributedSpace:
     """A DOLFINx vector space on the shared mesh, distributed over the ranks of a communicator.
 
@@ -59,7 +72,8 @@ class DistributedSpace:
         self.space = space
         self.comm = comm
         self.domain = _create_mesh(comm, mesh.triangles[share], np.array(mesh.points[share]))
-        self.dolfinx_space = _vector_space(self.domain, space.degree)
+        with _quiet_compiler():
+            self.dolfinx_space = _vector_space(self.domain, space.degree)
         self.function = dolfinx.fem.Function(self.dolfinx_space)
         positions = self.dolfinx_space.tabulate_dof_coordinates()[:, :2]
         distance, self._node_of_dof = cKDTree(space.nodes).query(positions)
@@ -75,7 +89,8 @@ class DistributedSpace:
 
     def form(self, expression: Any) -> Any:
         """Compile a UFL form."""
-        return dolfinx.fem.form(expression)
+        with _quiet_compiler():
+            return dolfinx.fem.form(expression)
 
     def clamp(self, nodes: IntArray, axes: Sequence[int] = (0, 1)) -> list[Any]:
         """Homogeneous Dirichlet conditions on components of nodes."""

@@ -1,6 +1,7 @@
 """Displacements that a network can have: its hidden units times a factor that vanishes on the base."""
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import torch
@@ -11,6 +12,8 @@ from geometry.locate import Location
 from geometry.mesh import TriangleMesh
 from solvers.pinn.gated_units import GatedUnits
 from solvers.pinn.pieces import in_pieces
+
+Points = TypeVar("Points", torch.Tensor, FloatArray)
 
 
 @dataclass(frozen=True)
@@ -39,8 +42,8 @@ class BaseFactor:
             )
         return cls(float(x.mean()), length)
 
-    def at(self, points: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """The factor and its slope along x, 1/mm, at points (n, 2), mm; each (n, 1)."""
+    def at(self, points: Points) -> tuple[Points, Points]:
+        """The factor and its slope along x, 1/mm, at points (n, 2), mm, each (n, 1): tensors or arrays."""
         distance = points[:, :1] - self.abscissa
         return distance / (distance + self.length), self.length / (distance + self.length) ** 2
 

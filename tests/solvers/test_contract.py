@@ -13,14 +13,17 @@ from solvers.registry import make_solver, solver_names, usable_solvers
 from solvers.solver import Solver, with_law
 from tests.solvers.conftest import bar_mesh
 
-QUICK = {"pinn-std": {"units": 300, "rounds": 2, "gate_width": 6.0, "tolerance": 0.1}}
+QUICK = {
+    "pinn-std": {"units": 300, "rounds": 2, "gate_width": 6.0, "tolerance": 0.1},
+    "pinn-local": {"wall_spacing": 0.8, "corner_spacing": 0.2, "ridges": 4},
+}
 """Settings that make a solver quick enough for the tests."""
 
-ACCURACY = {"fem": 1e-8, "fem-nonlinear": 1e-6, "skfem-p1": 1e-8, "pinn-std": 0.1}
+ACCURACY = {"fem": 1e-8, "fem-nonlinear": 1e-6, "skfem-p1": 1e-8, "pinn-std": 0.1, "pinn-local": 0.02}
 """Relative difference that two solutions of one problem may have: rounding, Newton's tolerance, training."""
 
 
-@pytest.fixture(scope="module", params=["fem", "fem-nonlinear", "pinn-std", "skfem-p1"])
+@pytest.fixture(scope="module", params=["fem", "fem-nonlinear", "pinn-std", "pinn-local", "skfem-p1"])
 def solver(request, plugin_folder):
     sys.path.insert(0, str(plugin_folder))
     yield make_solver(request.param, **QUICK.get(request.param, {}))
