@@ -1,28 +1,24 @@
 """The command line: `compare`, the one-shot main job, and `pinnray` with every verb."""
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-from cyclopts import App, CycloptsError, Group, Parameter
+from cyclopts import App, Group, Parameter
 from rich.console import Console
 
+from compare.exits import EXIT_CODES, NOT_CONVERGED, guarded, say
 from compare.options import FingerOptions, PhysicsOptions, existing, read_solvers
 from geometry.errors import UserError
 
-BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 2, 3, 130
-EXIT_CODES = (
-    "Exit codes: 0 all well; 2 bad input, with one line that says what and how to mend it; "
-    "3 done, but a solver did not converge; 130 interrupted."
-)
-OUTPUT = Group("Output", sort_key=3)
+OUTPUT = Group("Output", sort_key=3, default_parameter=Parameter(negative="", show_default=False))
 
 pinnray = App(
     name="pinnray",
     help="Can a physics-informed neural network stand in for finite elements on a real Fin Ray finger?",
     help_epilogue=EXIT_CODES,
     result_action="return_value",
+    suppress_keyboard_interrupt=False,
 )
 
 
@@ -31,35 +27,43 @@ def compare(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     *,
-    solvers: Annotated[str, Parameter(help="Names with commas between; `pinnray solvers` lists them.")] = "fem,pinn-std",
+    solvers: Annotated[
+        str, Parameter(help="Names with commas between; `pinnray solvers` lists them.")
+    ] = "fem,pinn-std",
     solver_set: Annotated[
         tuple[str, ...],
-        Parameter(negative="", help="Change a solver's setting, as in --solver-set pinn-std.units=300; may be repeated."),
+        Parameter(
+            negative="",
+            show_default=False,
+            help="Change a solver's setting, as in --solver-set pinn-std.units=300; may be repeated.",
+        ),
     ] = (),
     seed: Annotated[int, Parameter(help="Of every solver that draws random numbers.")] = 0,
     measurements: Annotated[
         Path | None,
         Parameter(
-            help="CSV file of marker displacements (x_mm, y_mm, u_mm, v_mm). Without it they are simulated by "
-            "a finite-strain run, and everything that shows them says so."
+            help="CSV file of marker displacements (x_mm, y_mm, u_mm, v_mm). Without it they are simulated "
+            "by a finite-strain run, and everything that shows them says so."
         ),
     ] = None,
     reference: Annotated[
         str | None, Parameter(help="Solver that the others are compared with; fem, else the first.")
     ] = None,
-    out: Annotated[Path | None, Parameter(group=OUTPUT, help="Output folder; out/DESIGN if not given.")] = None,
+    out: Annotated[
+        Path | None, Parameter(group=OUTPUT, help="Output folder; out/DESIGN if not given.")
+    ] = None,
     resume: Annotated[
-        bool, Parameter(group=OUTPUT, negative="", help="Take over solutions that an earlier run finished.")
+        bool, Parameter(group=OUTPUT, help="Take over solutions that an earlier run finished.")
     ] = False,
-    quiet: Annotated[bool, Parameter(group=OUTPUT, negative="", help="No progress, no table.")] = False,
+    quiet: Annotated[bool, Parameter(group=OUTPUT, help="No progress, no table.")] = False,
     json_: Annotated[
-        bool, Parameter(name="--json", group=OUTPUT, negative="", help="Print metrics.json and nothing else.")
+        bool, Parameter(name="--json", group=OUTPUT, help="Print metrics.json and nothing else.")
     ] = False,
 ) -> int:
     """Solve one finger with several solvers and compare them at the markers and on the shared mesh.
 
-    Draws the finger, meshes it once, solves it with every solver, and writes a report with tables, pictures and
-    fields. Examples:
+    Draws the finger, meshes it once, solves it with every solver, and writes a report with tables, pictures
+    and fields. Examples:
 
     - compare --design default
     - compare --design slender --solvers fem
@@ -82,8 +86,11 @@ def compare(
         out=out or Path("out") / design.name,
         resume=resume,
     )
-    with Stages(Console(stderr=True), quiet=quiet or json_) as stages:
-        outcome = run(job, stages)
+    try:
+        with Stages(Console(stderr=True), quiet=quiet or json_) as stages:
+            outcome = run(job, stages)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt("what was finished is kept; --resume goes on from it") from None
     if json_:
         print((job.out / "metrics.json").read_text(encoding="utf-8"), end="")
     elif not quiet:
@@ -92,7 +99,7 @@ def compare(
         console.print(f"report: {job.out / 'report.html'}", soft_wrap=True, highlight=False)
     unconverged = [evaluation for evaluation in outcome.evaluations if not evaluation.converged]
     for evaluation in unconverged:
-        _say(f"{evaluation.solver} did not converge: {evaluation.message}")
+        say(f"error: {evaluation.solver} did not converge: {evaluation.message}")
     return NOT_CONVERGED if unconverged else 0
 
 
@@ -103,7 +110,7 @@ def design(
     out: Annotated[Path, Parameter(help="Folder for the files.")] = Path("out/cad"),
     formats: Annotated[str, Parameter(help="Some of step, stl, dxf, svg, with commas.")] = "step,stl,dxf,svg",
 ) -> int:
-    """Draw the finger: CAD files of the solid with its markers as separate bodies, and a dimensioned picture."""
+    """Draw the finger: CAD files of the solid, its markers separate bodies, and a dimensioned picture."""
     from compare.figures.design_drawing import draw_design
     from geometry.cache import cad_files
 
@@ -133,7 +140,8 @@ def mesh(
     write_mesh(out / "mesh.vtu", triangles)
     triangles.save(out / "mesh.npz")
     draw_mesh(out / "mesh.png", triangles)
-    print(f"{len(triangles.points)} nodes, {len(triangles.triangles)} triangles, area {triangles.areas.sum():.4f} mm^2")
+    nodes, area = len(triangles.points), triangles.areas.sum()
+    print(f"{nodes} nodes, {len(triangles.triangles)} triangles, area {area:.4f} mm^2")
     for name in ("mesh.vtu", "mesh.npz", "mesh.png"):
         print(out / name)
     return 0
@@ -146,7 +154,12 @@ def solve(
     physics: PhysicsOptions = PhysicsOptions(),
     *,
     solver_set: Annotated[
-        tuple[str, ...], Parameter(negative="", help="Change a setting, as in --solver-set fem.degree=1; may be repeated.")
+        tuple[str, ...],
+        Parameter(
+            negative="",
+            show_default=False,
+            help="Change a setting, as in --solver-set fem.degree=1; may be repeated.",
+        ),
     ] = (),
     seed: Annotated[int, Parameter(help="Of a solver that draws random numbers.")] = 0,
     out: Annotated[Path, Parameter(help="The VTU file for the fields.")] = Path("out/solution.vtu"),
@@ -161,7 +174,12 @@ def solve(
 
     chosen, settings = finger.read()
     material, load = physics.read()
-    (made,) = read_solvers(solver, solver_set, seed)
+    if out.suffix != ".vtu":
+        raise UserError(f"--out {out}: the fields are a VTU file; give a name that ends in .vtu")
+    chosen_solvers = read_solvers(solver, solver_set, seed)
+    if len(chosen_solvers) != 1:
+        raise UserError(f"name one solver, not {solver!r}; `compare` takes several")
+    (made,) = chosen_solvers
     with Stages(Console(stderr=True)) as stages:
         with stages.stage("mesh"):
             triangles = finger_mesh(chosen, settings=settings)
@@ -169,7 +187,8 @@ def solve(
             solution = made.solve(Problem(triangles, with_law(material, made), load), progress)
         write_vtu(out, triangles, Evaluation.of(solution, triangles))
     print(f"{solution.solver}: {solution.status.message}")
-    print(f"energy {solution.energy:.6g} N mm/mm, reaction ({solution.reaction[0]:.6g}, {solution.reaction[1]:.6g}) N/mm")
+    u, v = solution.reaction
+    print(f"energy {solution.energy:.6g} N mm/mm, reaction ({u:.6g}, {v:.6g}) N/mm")
     print(out)
     return 0 if solution.status.converged else NOT_CONVERGED
 
@@ -191,29 +210,13 @@ def solvers() -> int:
 
 def main(arguments: list[str] | None = None) -> int:
     """Entry of `pinnray`."""
-    return _guarded(lambda: pinnray(arguments, exit_on_error=False, print_error=False))
+    return guarded(lambda: pinnray(arguments, exit_on_error=False, print_error=False))
 
 
 def compare_main(arguments: list[str] | None = None) -> int:
     """Entry of `compare`: the same as `pinnray compare`."""
     given = sys.argv[1:] if arguments is None else arguments
     return main(["compare", *given])
-
-
-def _guarded(command: Callable[[], Any]) -> int:
-    """Run a command; what a user can mend becomes one line and exit code 2."""
-    try:
-        return int(command() or 0)
-    except (UserError, CycloptsError) as error:
-        _say(" ".join(str(error).split()))
-        return BAD_INPUT
-    except KeyboardInterrupt:
-        _say("interrupted; what was complete is kept, and --resume goes on from it")
-        return INTERRUPTED
-
-
-def _say(message: str) -> None:
-    print(f"error: {message}" if not message.startswith("interrupted") else message, file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -76,11 +76,11 @@ class Evaluation:
         state = solution.state(quadrature.location)
         return cls(
             solver=solution.solver,
-            converged=solution.status.converged,
+            converged=bool(solution.status.converged),
             message=solution.status.message,
-            energy=solution.energy,
+            energy=float(solution.energy),
             reaction=np.asarray(solution.reaction, dtype=np.float64),
-            stats=dict(solution.stats),
+            stats={name: _plain(value) for name, value in solution.stats.items()},
             history={name: np.asarray(column) for name, column in solution.history.items()},
             marker_displacement=solution.displacement(mesh.markers if markers is None else markers),
             node_displacement=solution.displacement(mesh.at_nodes()),
@@ -130,3 +130,8 @@ class Evaluation:
             if name.startswith(HISTORY_PREFIX)
         }
         return cls(history=history, **header, **arrays)
+
+
+def _plain(value: float | int | str) -> float | int | str:
+    """A NumPy number as Python's own, which JSON takes."""
+    return value.item() if isinstance(value, np.generic) else value

@@ -1,6 +1,7 @@
 """Options that several commands share, and the objects that they stand for."""
 
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -27,13 +28,21 @@ class FingerOptions:
     design: Annotated[str, Parameter(help="A preset (default, slender, ...) or a .toml file.")] = "default"
     set: Annotated[
         tuple[str, ...],
-        Parameter(negative="", help="Change a parameter, as in --set rib_count=6 or N=6; may be repeated."),
+        Parameter(
+            negative="",
+            show_default=False,
+            help="Change a parameter, as in --set rib_count=6 or N=6; may be repeated.",
+        ),
     ] = ()
     mesh_size: Annotated[float, Parameter(help="Largest element in walls and ribs, mm.")] = 0.25
 
     def read(self) -> tuple[Design, MeshSettings]:
         """The design and the mesh settings."""
-        return load_design(self.design, parse_overrides(self.set)), MeshSettings(size=self.mesh_size)
+        design = load_design(self.design, parse_overrides(self.set))
+        try:
+            return design, MeshSettings(size=self.mesh_size)
+        except UserError as error:
+            raise UserError(f"--mesh-{error}") from None
 
 
 @Parameter(name="*", group=PHYSICS)
@@ -57,8 +66,10 @@ class PhysicsOptions:
 
     def read(self) -> tuple[Material, Load]:
         """The material and the load."""
-        if self.stroke == 0:
-            raise UserError("--stroke is 0: the finger would not move; give the indenter's travel in mm")
+        if not 0 < self.stroke < inf:
+            raise UserError(f"--stroke {self.stroke:g}: the indenter presses; give its travel, above 0 mm")
+        if self.young == inf:
+            raise UserError("--young inf: a rigid finger does not bend; give a finite Young's modulus, MPa")
         try:
             return (
                 Material(young=self.young, poisson=self.poisson, plane=self.plane),
@@ -75,21 +86,30 @@ def read_solvers(names: str, settings: tuple[str, ...], seed: int) -> list[Solve
     Raises:
         UserError: If a solver or setting does not exist or a text cannot be read.
     """
+    if seed < 0:
+        raise UserError(f"--seed {seed}: give a whole number from 0")
     chosen = [name.strip() for name in names.split(",") if name.strip()]
     given: dict[str, dict[str, object]] = {name: {} for name in chosen}
     for setting in settings:
         target, dot, rest = setting.partition(".")
         key, equals, value = rest.partition("=")
         if not (dot and equals and key and value):
-            raise UserError(f"cannot read {setting!r}; write solver.setting=value, such as pinn-std.units=300")
+            raise UserError(
+                f"cannot read {setting!r}; write solver.setting=value, such as pinn-std.units=300"
+            )
         if target not in given:
             raise UserError(f"{setting!r} is for {target!r}, which is not among the solvers {names}")
+        if key in given[target]:
+            raise UserError(f"{target}.{key} is set twice; set it once")
         given[target][key] = value
     solvers = []
     for name in chosen:
-        solver = make_solver(name, **given[name])
-        if "seed" in solver.settings() and "seed" not in given[name]:
-            solver = make_solver(name, **given[name], seed=seed)
+        try:
+            solver = make_solver(name, **given[name])
+            if "seed" in solver.settings() and "seed" not in given[name]:
+                solver = make_solver(name, **given[name], seed=seed)
+        except ImportError as error:
+            raise UserError(f"solver {name!r} cannot be loaded: {error}") from None
         solvers.append(solver)
     return solvers
 

@@ -1,15 +1,8 @@
-"""The main job: mesh, measure, solve, evaluate, draw, report.
-
-Everything is written into `NAME.partial` beside the output folder `NAME`, which is replaced as a whole at the end: a killed run
-leaves the last complete result as it was and, in the partial folder, the solutions that it had finished, from which a resumed
-run goes on.
-"""
+"""The main job: mesh, measure, solve, evaluate, draw, report."""
 
 import json
-import shutil
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from hashlib import sha256
 from math import isfinite
@@ -21,7 +14,8 @@ from compare.evaluation import Evaluation
 from compare.fields import write_vtu
 from compare.figures import draw_all
 from compare.metrics import pick_reference
-from compare.provenance import file_digest, machine, package_versions
+from compare.output_folder import RUN_FILE, SOLUTIONS, check_output, replaced_folder
+from compare.provenance import file_digest, machine, package_versions, sources_digest
 from compare.report import ReportContent, write_report
 from compare.results import metrics
 from compare.stages import Stages
@@ -30,13 +24,12 @@ from compare.virtual_experiment import virtual_experiment
 from geometry.cache import finger_mesh
 from geometry.design import Design
 from geometry.errors import OutsideBodyError, UserError
+from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
 from geometry.settings import MeshSettings
 from solvers.problem import Load, Material, Problem
 from solvers.solver import Solver, with_law
 from vision.measurements import read_measurements, write_measurements
-
-RUN_FILE = "run.json"
 
 
 @dataclass(frozen=True)
@@ -65,11 +58,6 @@ class Job:
     out: Path = Path("out/default")
     resume: bool = False
 
-    @property
-    def partial(self) -> Path:
-        """The folder where the run works."""
-        return self.out.with_name(self.out.name + ".partial")
-
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
@@ -92,20 +80,23 @@ def run(job: Job, stages: Stages) -> Outcome:
     """Run the comparison and write its output folder.
 
     Raises:
-        UserError: If the job cannot be done; nothing is left half written in the output folder.
+        UserError: If the job cannot be done; the output folder is as it was.
     """
     started = datetime.now(UTC)
     _check(job)
     given = read_measurements(job.measurements) if job.measurements else None
-    with _partial_folder(job) as folder:
+    with replaced_folder(job.out, keep=_names(job) if job.resume else ()) as folder:
         with stages.stage("mesh"):
             mesh = finger_mesh(job.design, settings=job.mesh)
+            if given:
+                _check_inside(given, mesh)
         problem = Problem(mesh, job.material, job.load)
         with stages.stage("measurements") as progress:
             observations = given or virtual_experiment(problem, progress)
-            _check_inside(observations, problem)
             write_measurements(folder / "observations.csv", observations)
-        evaluations = [_evaluate(job, solver, problem, observations, folder, stages) for solver in job.solvers]
+        evaluations = [
+            _evaluate(job, solver, problem, observations, folder, stages) for solver in job.solvers
+        ]
         reference = pick_reference(evaluations, job.reference)
         with stages.stage("pictures") as progress:
             figures = draw_all(
@@ -122,7 +113,10 @@ def run(job: Job, stages: Stages) -> Outcome:
                 write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", mesh, evaluation)
             write_markers(folder / "markers.csv", evaluations=evaluations, observations=observations)
             write_summary(
-                folder / "summary.csv", evaluations=evaluations, observations=observations, reference=reference
+                folder / "summary.csv",
+                evaluations=evaluations,
+                observations=observations,
+                reference=reference,
             )
             numbers = metrics(
                 design=job.design,
@@ -172,19 +166,20 @@ def _check(job: Job) -> None:
     """Refuse what cannot be done before anything is computed."""
     if not job.solvers:
         raise UserError("no solver was asked for; name at least one")
-    names = [solver.name for solver in job.solvers]
+    names = _names(job)
     if len(set(names)) < len(names):
         raise UserError(f"a solver is named twice: {', '.join(names)}")
     if job.reference is not None and job.reference not in names:
         raise UserError(f"the reference {job.reference!r} is not among the solvers {', '.join(names)}")
     for solver in job.solvers:
         if job.load.kind not in solver.loads:
-            raise UserError(
-                f"{solver.name} takes the loads {', '.join(solver.loads)}, not {job.load.kind!r}"
-            )
+            raise UserError(f"{solver.name} takes the loads {', '.join(solver.loads)}, not {job.load.kind!r}")
         with_law(job.material, solver)
-    if job.out.exists() and not (job.out / RUN_FILE).is_file() and any(job.out.iterdir()):
-        raise UserError(f"{job.out} holds files that are not a comparison's; name another folder with --out")
+    check_output(job.out)
+
+
+def _names(job: Job) -> list[str]:
+    return [solver.name for solver in job.solvers]
 
 
 def _evaluate(
@@ -193,50 +188,42 @@ def _evaluate(
     """Solve and sample, or take over what an earlier run finished."""
     own = Problem(problem.mesh, with_law(job.material, solver), job.load)
     key = _key(solver, own, observations)
-    kept = folder / "solutions" / f"{solver.name}.npz"
+    kept = folder / SOLUTIONS / f"{solver.name}.npz"
     with stages.stage(solver.name) as progress:
         if job.resume:
-            for place in (kept, job.out / "solutions" / kept.name):
+            for place in (kept, job.out / SOLUTIONS / kept.name):
                 if (evaluation := Evaluation.load(place, key)) is not None:
                     progress(1.0, "taken over from an earlier run")
                     evaluation.save(kept, key)
                     return evaluation
-        solution = solver.solve(own, progress)
+        # A solver that hands its work to another one may return the other's name.
+        solution = replace(solver.solve(own, progress), solver=solver.name)
         evaluation = Evaluation.of(solution, problem.mesh, observations.points)
         evaluation.save(kept, key)
     return evaluation
 
 
 def _key(solver: Solver, problem: Problem, observations: Observations) -> str:
-    """SHA-256 over everything that a solution's samples depend on."""
-    settings = json.dumps([solver.name, solver.settings(), package_versions()], sort_keys=True, default=str)
-    return sha256((settings + problem.digest).encode() + observations.points.tobytes()).hexdigest()
+    """SHA-256 over everything that a solution's samples depend on, the solver's own sources included."""
+    package = type(solver).__module__.partition(".")[0]
+    parts = [
+        solver.name,
+        solver.settings(),
+        package_versions(),
+        sources_digest(["geometry", "solvers", package]),
+    ]
+    text = json.dumps(parts, sort_keys=True, default=str)
+    return sha256((text + problem.digest).encode() + observations.points.tobytes()).hexdigest()
 
 
-def _check_inside(observations: Observations, problem: Problem) -> None:
+def _check_inside(observations: Observations, mesh: TriangleMesh) -> None:
     try:
-        problem.mesh.locate(observations.points)
+        mesh.locate(observations.points)
     except OutsideBodyError as error:
         raise UserError(
-            f"the measurements are not of this finger: {error}; positions are those before loading, in the finger's frame"
+            f"the measurements are not of this finger: {error}; "
+            "positions are those before loading, in the finger's frame"
         ) from None
-
-
-@contextmanager
-def _partial_folder(job: Job) -> Iterator[Path]:
-    """The folder where the run works; it takes the place of the output folder when all went well."""
-    if job.partial.exists() and not job.resume:
-        shutil.rmtree(job.partial)
-    try:
-        job.partial.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"cannot write to {job.partial}: {error.strerror}") from None
-    yield job.partial
-    old = job.out.with_name(job.out.name + ".old")
-    if job.out.exists():
-        job.out.replace(old)
-    job.partial.replace(job.out)
-    shutil.rmtree(old, ignore_errors=True)
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:

@@ -4,6 +4,7 @@ import hashlib
 import os
 import platform
 import sys
+from collections.abc import Iterable
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -32,7 +33,7 @@ def package_versions() -> dict[str, str]:
             versions[package] = version(package)
         except PackageNotFoundError:
             module = sys.modules.get({"fenics-dolfinx": "dolfinx", "fenics-ufl": "ufl"}.get(package, package))
-            versions[package] = str(getattr(module, "__version__", "not loaded"))
+            versions[package] = str(getattr(module, "__version__", "unknown"))
     return versions
 
 
@@ -43,6 +44,23 @@ def machine() -> dict[str, str | int]:
         "processor": platform.machine(),
         "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1,
     }
+
+
+def sources_digest(modules: Iterable[str]) -> str:
+    """SHA-256 over the Python sources of loaded packages or single modules, in hexadecimal.
+
+    What was typed into a notebook has no source file, and no part in the digest.
+    """
+    sha = hashlib.sha256()
+    for name in sorted(set(modules)):
+        file = getattr(sys.modules.get(name), "__file__", None)
+        if file is None:
+            continue
+        path = Path(file)
+        sources = sorted(path.parent.rglob("*.py")) if path.name == "__init__.py" else [path]
+        for source in sources:
+            sha.update(os.fsencode(source.relative_to(path.parent)) + b"\0" + source.read_bytes())
+    return sha.hexdigest()
 
 
 def file_digest(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""`metrics.json`: the numbers of a comparison, in a form that scripts can rely on. Units: mm, MPa, N/mm, s."""
+"""`metrics.json`: the numbers of a comparison, for scripts to rely on. Units: mm, MPa, N/mm, s."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -26,8 +26,9 @@ def metrics(
 ) -> dict[str, Any]:
     """Everything that `metrics.json` holds.
 
-    `markers` compares with every marker that was seen. `held_out` compares with markers that the solver was not given: those
-    same markers for a solver that was given none, null for the solvers named in `assimilating`. Markers that were not seen are NaN.
+    `markers` compares with every marker that was seen. `held_out` compares with markers that the solver was
+    not given: those same markers for a solver that was given none, null for the solvers named in
+    `assimilating`. Markers that were not seen are NaN.
     """
     return {
         "schema": SCHEMA,

@@ -7,7 +7,14 @@ from types import TracebackType
 from typing import Self
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Column
 
 from solvers.solver import Progress as Report
@@ -16,12 +23,16 @@ from solvers.solver import Progress as Report
 class Stages:
     """Shows a line for every stage, with time left where the stage tells how far it is.
 
+    Where there is no terminal, each stage is a plain line when it is done.
+
     Attributes:
         seconds: Duration of every finished stage, s.
     """
 
     def __init__(self, console: Console, *, quiet: bool = False) -> None:
         self.seconds: dict[str, float] = {}
+        self._console = console
+        self._log = not (quiet or console.is_terminal)
         self._progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(bar_width=16),
@@ -29,10 +40,15 @@ class Stages:
             TimeElapsedColumn(),
             TextColumn("left"),
             TimeRemainingColumn(compact=True),
-            TextColumn("[dim]{task.fields[note]}", table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1)),
+            TextColumn(
+                "{task.fields[note]}",
+                style="dim",
+                markup=False,
+                table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1),
+            ),
             expand=True,
             console=console,
-            disable=quiet,
+            disable=quiet or not console.is_terminal,
         )
 
     def __enter__(self) -> Self:
@@ -49,10 +65,16 @@ class Stages:
         """Run a stage; what it yields takes the fraction done and a short note."""
         started = time.perf_counter()
         task = self._progress.add_task(name, total=1.0, note="")
+        last = ""
 
         def report(fraction: float, note: str) -> None:
+            nonlocal last
+            last = note
             self._progress.update(task, completed=fraction, note=note)
 
         yield report
         self._progress.update(task, completed=1.0)
         self.seconds[name] = time.perf_counter() - started
+        if self._log:
+            line = f"{name}: {self.seconds[name]:.1f} s{last and ', '}{last}"
+            self._console.print(line, markup=False, highlight=False, soft_wrap=True)

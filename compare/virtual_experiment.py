@@ -1,48 +1,61 @@
 """Marker displacements from a finite-strain simulation, where no camera has measured any.
 
-The indenter is a sliding patch on a neo-Hookean finger: a model that is richer than the linear ones that are judged by it, and
-whose distance from them is known to be of the size and pattern of the paper's gap between simulation and experiment.
+The indenter is a sliding patch on a neo-Hookean finger: a model that is richer than the linear ones that are
+judged by it, and whose distance from them is known to be of the size and pattern of the paper's gap between
+simulation and experiment.
 """
 
 import hashlib
 import json
-import os
-from pathlib import Path
+from contextlib import suppress
 
 import numpy as np
 
 from compare.atomic import atomic_path
+from compare.provenance import package_versions, sources_digest
 from geometry.cache import cache_folder
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.fem.nonlinear import FemNonlinearSolver
 from solvers.problem import Problem
-from solvers.solver import Progress, silent
+from solvers.registry import make_solver
+from solvers.solver import Progress, Solver, silent
 from vision.measurements import read_measurements, write_measurements
+
+SOURCE = (
+    "simulated by fem-nonlinear (neo-Hookean, finite strain, sliding contact patch); no camera was involved"
+)
+"""What is said of the numbers wherever they appear."""
+
+SOURCES = ("geometry", "solvers.elasticity", "solvers.fem", "solvers.problem", "solvers.solution")
+"""Modules whose change makes a new simulation."""
 
 
 def virtual_experiment(problem: Problem, progress: Progress = silent) -> Observations:
     """Simulate what a camera would have measured at the mesh's markers; kept in the cache folder.
 
     Raises:
-        UserError: If the simulation does not reach the full load.
+        UserError: If the simulation cannot be run or does not reach the full load.
     """
-    solver = FemNonlinearSolver()
-    richer = Problem(
-        mesh=problem.mesh,
-        material=problem.material.model_copy(update={"law": "neo-hookean", "plane": "strain"}),
-        load=problem.load.model_copy(
-            update={"kind": "patch", "displacement": (None, problem.load.displacement[1])}
-        ),
-    )
-    if richer.load.displacement[1] is None:
+    normal = problem.load.displacement[1]
+    if normal is None:
         raise UserError(
             "the virtual experiment presses on the finger: prescribe v, or give --measurements FILE.csv"
         )
+    try:
+        solver = make_solver("fem-nonlinear")
+    except ImportError as error:
+        raise UserError(f"the virtual experiment: {error}; or give --measurements FILE.csv") from None
+    richer = Problem(
+        mesh=problem.mesh,
+        material=problem.material.model_copy(update={"law": "neo-hookean", "plane": "strain"}),
+        load=problem.load.model_copy(update={"kind": "patch", "displacement": (None, normal)}),
+    )
     entry = cache_folder() / f"experiment-{_key(solver, richer)}.csv"
     if entry.exists():
-        progress(1.0, "from the cache")
-        return read_measurements(entry)
+        with suppress(UserError):  # a damaged file is made again
+            observations = read_measurements(entry)
+            progress(1.0, "from the cache")
+            return observations
     solution = solver.solve(richer, progress)
     if not solution.status.converged:
         raise UserError(f"the virtual experiment {solution.status.message}; or give --measurements FILE.csv")
@@ -52,7 +65,7 @@ def virtual_experiment(problem: Problem, progress: Progress = silent) -> Observa
         displacements=solution.displacement(markers),
         standard_deviations=np.zeros_like(markers),
         visible=np.ones(len(markers), dtype=bool),
-        source="simulated by fem-nonlinear (neo-Hookean, finite strain, sliding contact patch); no camera was involved",
+        source=SOURCE,
         simulated=True,
     )
     with atomic_path(entry) as partial:
@@ -60,15 +73,7 @@ def virtual_experiment(problem: Problem, progress: Progress = silent) -> Observa
     return observations
 
 
-def _key(solver: FemNonlinearSolver, problem: Problem) -> str:
-    sources = sorted(
-        source
-        for folder in ("solvers", "solvers/fem")
-        for source in (Path(__file__).parent.parent / folder).glob("*.py")
-    )
-    sha = hashlib.sha256(problem.digest.encode())
-    sha.update(json.dumps(solver.settings(), sort_keys=True).encode())
-    for source in sources:
-        sha.update(os.fsencode(source.name))
-        sha.update(source.read_bytes())
-    return sha.hexdigest()
+def _key(solver: Solver, problem: Problem) -> str:
+    """SHA-256 over all that the simulation depends on."""
+    parts = [problem.digest, solver.settings(), package_versions(), sources_digest(SOURCES)]
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()

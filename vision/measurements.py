@@ -1,6 +1,8 @@
 """Marker displacements as a CSV file: one row a marker, ordered from base to tip, units in the header."""
 
 import csv
+import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -8,79 +10,122 @@ import numpy as np
 from geometry.errors import UserError
 from geometry.observations import Observations
 
-REQUIRED = ("x_mm", "y_mm", "u_mm", "v_mm")
+POSITION = ("x_mm", "y_mm")
+DISPLACEMENT = ("u_mm", "v_mm")
+REQUIRED = (*POSITION, *DISPLACEMENT)
 OPTIONAL = {"std_u_mm": 0.0, "std_v_mm": 0.0, "visible": 1.0}
-SOURCE_MARK = "# source: "
 SIMULATED_MARK = "# simulated"
+SOURCE_MARK = "# source: "
 
 
 def write_measurements(path: Path, observations: Observations) -> None:
-    """Write observations; `read_measurements` gives the same back."""
+    """Write observations; `read_measurements` gives the same back.
+
+    Markers that were not seen have their position only, and are read back with zeros.
+    """
     with path.open("w", newline="", encoding="utf-8") as file:
         if observations.simulated:
             file.write(f"{SIMULATED_MARK}\n")
-        file.write(f"{SOURCE_MARK}{observations.source}\n")
-        writer = csv.writer(file)
+        file.write(f"{SOURCE_MARK}{' '.join(observations.source.split())}\n")
+        writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["marker", *REQUIRED, *OPTIONAL])
         columns = zip(
-            observations.points,
-            observations.displacements,
-            observations.standard_deviations,
-            observations.visible,
+            observations.points.tolist(),
+            observations.displacements.tolist(),
+            observations.standard_deviations.tolist(),
+            observations.visible.tolist(),
             strict=True,
         )
         for number, (point, displacement, deviation, visible) in enumerate(columns, start=1):
-            numbers = (repr(float(value)) for value in (*point, *displacement, *deviation))
-            writer.writerow([number, *numbers, int(visible)])
+            seen = (*displacement, *deviation) if visible else ("",) * 4
+            writer.writerow([number, *point, *seen, int(visible)])
 
 
 def read_measurements(path: Path) -> Observations:
     """Read observations.
 
-    The columns `x_mm, y_mm` (initial position in the finger's frame) and `u_mm, v_mm` (displacement, final minus initial) are
-    needed; `std_u_mm, std_v_mm` (standard deviations) and `visible` (1 or 0) may be left out. Comment lines start with `#`;
+    The columns `x_mm, y_mm` (initial position in the finger's frame) and `u_mm, v_mm` (displacement, final
+    minus initial) are needed; `std_u_mm, std_v_mm` (standard deviations) and `visible` (1 or 0) may be left
+    out. Of a marker that is not visible only the position is read. Comment lines start with `#`;
     `# source: TEXT` says where the numbers come from and `# simulated` that no camera was involved.
 
     Raises:
         UserError: If the file cannot be read, a column is missing or a value is no number; it names the line.
     """
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not a UTF-8 text"
-        raise UserError(f"cannot read the measurements {path}: {reason}") from None
-    table = [(number, line) for number, line in enumerate(lines, start=1) if line.strip() and line[0] != "#"]
-    header = [name.strip() for name in table[0][1].split(",")] if table else []
-    missing = [name for name in REQUIRED if name not in header]
-    if missing:
-        raise UserError(
-            f"{path} has no column {missing[0]}; the header must name {', '.join(REQUIRED)} "
-            f"and may name {', '.join(OPTIONAL)}"
-        )
+    comments, table = _lines(path)
+    header = table[0][1] if table else []
+    for name in REQUIRED:
+        if name not in header:
+            raise UserError(
+                f"{path} has no column {name}; the header must name {', '.join(REQUIRED)} "
+                f"and may name {', '.join(OPTIONAL)}, with commas between"
+            )
+    for name in (*REQUIRED, *OPTIONAL):
+        if header.count(name) > 1:
+            raise UserError(f"{path} has the column {name} twice; keep one")
     if len(table) == 1:
         raise UserError(f"{path} has a header but no marker")
-    rows = {name: np.empty(len(table) - 1) for name in (*REQUIRED, *OPTIONAL)}
-    for index, (number, line) in enumerate(table[1:]):
-        cells = dict(zip(header, next(csv.reader([line])), strict=False))
-        for name, column in rows.items():
-            column[index] = _number(cells.get(name, str(OPTIONAL.get(name, ""))), name, path, number)
-    comments = [line for line in lines if line.startswith("#")]
-    sources = [line.removeprefix(SOURCE_MARK) for line in comments if line.startswith(SOURCE_MARK)]
-    return Observations(
-        points=np.column_stack([rows["x_mm"], rows["y_mm"]]),
-        displacements=np.column_stack([rows["u_mm"], rows["v_mm"]]),
-        standard_deviations=np.column_stack([rows["std_u_mm"], rows["std_v_mm"]]),
-        visible=rows["visible"] != 0,
-        source=sources[0] if sources else f"measurements from {path.name}",
-        simulated=SIMULATED_MARK in (line.strip() for line in comments),
-    )
+    markers = []
+    for number, cells in table[1:]:
+        if len(cells) != len(header):
+            raise UserError(
+                f"{path}, line {number}: the header names {len(header)} columns, this line has {len(cells)}; "
+                "separate them with commas, and write decimals with a point"
+            )
+        markers.append(_marker(dict(zip(header, cells, strict=True)), f"{path}, line {number}"))
+    columns = {name: np.array([marker[name] for marker in markers]) for name in (*REQUIRED, *OPTIONAL)}
+    sources = [found[1] for comment in comments if (found := re.match(r"#\s*source:\s*(.*)", comment, re.I))]
+    try:
+        return Observations(
+            points=np.column_stack([columns["x_mm"], columns["y_mm"]]),
+            displacements=np.column_stack([columns["u_mm"], columns["v_mm"]]),
+            standard_deviations=np.column_stack([columns["std_u_mm"], columns["std_v_mm"]]),
+            visible=columns["visible"] == 1,
+            source=sources[0] if sources else f"measurements from {path.name}",
+            simulated=any(re.fullmatch(r"#\s*simulated", comment, re.I) for comment in comments),
+        )
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
 
 
-def _number(text: str, name: str, path: Path, line: int) -> float:
+def _lines(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """The comments, and the cells of the other lines with their line numbers.
+
+    A spreadsheet program that saves the file puts a mark before the first line, quotes comments that hold a
+    comma, and fills them up with commas: "simulated" must survive that.
+    """
+    comments: list[str] = []
+    table: list[tuple[int, list[str]]] = []
+    try:
+        for number, line in enumerate(path.read_text(encoding="utf-8-sig").splitlines(), start=1):
+            cells = [cell.strip() for cell in next(csv.reader([line]), [])]
+            if cells and cells[0].startswith("#"):
+                comments.append((cells[0] if line.lstrip().startswith('"') else line).strip(" \t,;"))
+            elif any(cells):
+                table.append((number, cells))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not a CSV file in UTF-8"
+        raise UserError(f"cannot read the measurements {path}: {reason}") from None
+    return comments, table
+
+
+def _marker(cells: Mapping[str, str], where: str) -> dict[str, float]:
+    """The numbers of one row; zeros for what means nothing because the marker was not seen."""
+    visible = _number(cells, "visible", where)
+    if visible not in (0, 1):
+        raise UserError(f"{where}: visible is {cells['visible']!r}; it must be 1 (seen) or 0 (not seen)")
+    values = {"visible": visible} | dict.fromkeys((*DISPLACEMENT, "std_u_mm", "std_v_mm"), 0.0)
+    for name in values if visible else ():
+        values[name] = _number(cells, name, where)
+    return values | {name: _number(cells, name, where) for name in POSITION}
+
+
+def _number(cells: Mapping[str, str], name: str, where: str) -> float:
+    text = cells.get(name, str(OPTIONAL.get(name, "")))
     try:
         value = float(text)
     except ValueError:
         value = float("nan")
     if not np.isfinite(value):
-        raise UserError(f"{path}, line {line}: {name} is {text.strip()!r}, which is not a number")
+        raise UserError(f"{where}: {name} is {text!r}, which is not a number")
     return value
