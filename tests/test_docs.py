@@ -289,10 +289,10 @@ def test_the_measurements_in_the_guide_can_be_read(tmp_path):
 
 
 def test_the_guide_has_every_exit_code():
-    from compare import cli
+    from compare import exits
 
     codes = {int(name) for name in names(table(GUIDE, "code"))}
-    assert codes == {0, 1, cli.BAD_INPUT, cli.NOT_CONVERGED, cli.INTERRUPTED}
+    assert codes == {0, 1, exits.BAD_INPUT, exits.NOT_CONVERGED, exits.INTERRUPTED}
 
 
 def test_the_guide_has_every_command():
