@@ -1,9 +1,5 @@
 """Meshes and references for the tests of the solvers."""
 
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -13,8 +9,6 @@ from geometry.mesh import TriangleMesh
 from geometry.settings import MeshSettings
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
-
-PLUGIN = Path(__file__).parent / "plugin"
 
 
 @pytest.fixture(scope="session")
@@ -33,21 +27,6 @@ def medium_mesh() -> TriangleMesh:
 def medium_fem(medium_mesh):
     """`fem` on the medium mesh with the default load."""
     return FemSolver().solve(Problem(medium_mesh))
-
-
-@pytest.fixture(scope="session")
-def plugin_folder(tmp_path_factory) -> Path:
-    """A folder where pip has installed the solver package that lives in the tests."""
-    folder = tmp_path_factory.mktemp("site")
-    subprocess.run(
-        [
-            *(sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation"),
-            *("--target", str(folder), str(PLUGIN)),
-        ],
-        check=True,
-        capture_output=True,
-    )
-    return folder
 
 
 def bar_mesh(
