@@ -34,11 +34,17 @@ class FingerOptions:
             help="Change a parameter, as in --set rib_count=6 or N=6; may be repeated.",
         ),
     ] = ()
-    mesh_size: Annotated[float, Parameter(help="Largest element in walls and ribs, mm.")] = 0.25
+    mesh_size: Annotated[
+        float, Parameter(help="Largest element, mm; thin walls get at least three across.")
+    ] = 0.25
 
     def read(self) -> tuple[Design, MeshSettings]:
         """The design and the mesh settings."""
-        design = load_design(self.design, parse_overrides(self.set))
+        changes = parse_overrides(self.set)
+        design = load_design(self.design, changes)
+        if changes:  # another finger than the preset, so another name and output folder
+            named = "-".join([design.name, *(f"{name}-{value}" for name, value in changes.items())])
+            design = design.replaced(name=changes.get("name", named))
         try:
             return design, MeshSettings(size=self.mesh_size)
         except UserError as error:
@@ -63,6 +69,10 @@ class PhysicsOptions:
         ),
     ] = "mean"
     stroke: Annotated[float, Parameter(help="How far the indenter presses, mm.")] = 10.0
+    slide: Annotated[
+        bool,
+        Parameter(negative="", show_default=False, help="Let the contact slide along the finger: u free."),
+    ] = False
 
     def read(self) -> tuple[Material, Load]:
         """The material and the load."""
@@ -73,7 +83,7 @@ class PhysicsOptions:
         try:
             return (
                 Material(young=self.young, poisson=self.poisson, plane=self.plane),
-                Load(kind=self.load, displacement=(0.0, -self.stroke)),
+                Load(kind=self.load, displacement=(None if self.slide else 0.0, -self.stroke)),
             )
         except ValidationError as error:
             first = error.errors()[0]

@@ -98,7 +98,7 @@ def _panel(
     _contact_path(axes, mesh, evaluation)
     seen = observations.visible
     observed = observations.points[seen] + observations.displacements[seen]
-    computed = mesh.markers + evaluation.marker_displacement
+    computed = observations.points + evaluation.marker_displacement
     axes.plot(*observed.T, "o", ms=5, mfc="none", mec="white", mew=2.0, zorder=4)
     axes.plot(*observed.T, "o", ms=5, mfc="none", mec=MEASURED, mew=1.1, zorder=5)
     axes.plot(*computed.T, "x", ms=4, color="white", mew=2.0, zorder=4)

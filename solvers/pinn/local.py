@@ -106,9 +106,7 @@ class PinnLocalSolver:
             field=field,
             energy=energy,
             reaction=reaction,
-            status=Status(
-                converged, message if converged else f"{message}; not converged: take a smaller spacing"
-            ),
+            status=Status(converged, message if converged else f"{message}; take a smaller spacing"),
             stats={
                 "seconds": time.perf_counter() - started,
                 "unknowns": 2 * field.units.count,

@@ -19,11 +19,16 @@ QUICK = {
 }
 """Settings that make a solver quick enough for the tests."""
 
+NAMES = list(dict.fromkeys([*solver_names(), "skfem-p1"]))
+"""Ours, those of the packages that are installed, and the package that lives in the tests."""
+
 ACCURACY = {"fem": 1e-8, "fem-nonlinear": 1e-6, "skfem-p1": 1e-8, "pinn-std": 0.1, "pinn-local": 0.02}
-"""Relative difference that two solutions of one problem may have: rounding, Newton's tolerance, training."""
+"""Relative difference that two solutions of one problem may have: rounding, Newton's tolerance, training.
+
+A solver that is not listed gets 0.01."""
 
 
-@pytest.fixture(scope="module", params=["fem", "fem-nonlinear", "pinn-std", "pinn-local", "skfem-p1"])
+@pytest.fixture(scope="module", params=NAMES)
 def solver(request, plugin_folder):
     sys.path.insert(0, str(plugin_folder))
     yield make_solver(request.param, **QUICK.get(request.param, {}))
@@ -45,7 +50,7 @@ def relative(difference, reference):
 
 def test_every_registered_solver_is_in_this_suite(plugin_folder, monkeypatch):
     monkeypatch.syspath_prepend(str(plugin_folder))
-    assert set(usable_solvers()) == set(ACCURACY) == set(solver_names())
+    assert set(usable_solvers()) == set(NAMES) == set(solver_names())
 
 
 def test_the_load_is_met_and_the_base_is_at_rest(solution, coarse_mesh):
@@ -93,7 +98,9 @@ def test_twice_the_travel_is_twice_the_displacement(solver, solution, coarse_mes
 def test_numbering_of_the_mesh_does_not_matter(solver, solution, coarse_mesh):
     permuted = solver.solve(problem_of(solver, coarse_mesh.permuted(7)))
     expected = solution.displacement(coarse_mesh.markers)
-    assert relative(permuted.displacement(coarse_mesh.markers) - expected, expected) < ACCURACY[solver.name]
+    assert relative(permuted.displacement(coarse_mesh.markers) - expected, expected) < ACCURACY.get(
+        solver.name, 0.01
+    )
 
 
 def test_mirrored_finger_moves_the_other_way(solver, solution, coarse_mesh):
@@ -103,7 +110,9 @@ def test_mirrored_finger_moves_the_other_way(solver, solution, coarse_mesh):
     )
     other = solver.solve(problem_of(solver, mirrored, (0.0, 2.0)))
     expected = solution.displacement(coarse_mesh.markers) * mirror
-    assert relative(other.displacement(mirrored.markers) - expected, expected) < ACCURACY[solver.name]
+    assert relative(other.displacement(mirrored.markers) - expected, expected) < ACCURACY.get(
+        solver.name, 0.01
+    )
 
 
 def test_gradient_is_the_derivative_of_the_displacement(solution, coarse_mesh):

@@ -122,7 +122,7 @@ def test_displacement_is_within_a_fifth_of_a_percent_of_finite_elements():
 def test_too_few_windows_are_reported_as_not_converged(coarse_mesh):
     solution = PinnLocalSolver(wall_spacing=1.2, corner_spacing=0.5, ridges=2).solve(Problem(coarse_mesh))
     assert not solution.status.converged
-    assert "not converged: take a smaller spacing" in solution.status.message
+    assert "take a smaller spacing" in solution.status.message
 
 
 @pytest.mark.parametrize(
