@@ -1,0 +1,158 @@
+"""Marker displacements as CSV, as written here and as they come from elsewhere; units mm."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from geometry.errors import UserError
+from geometry.observations import Observations
+from vision.measurements import read_measurements, write_measurements
+
+HEADER = "x_mm,y_mm,u_mm,v_mm"
+
+
+def observations(
+    *, hidden: tuple[int, ...] = (), source: str = "camera A", simulated: bool = False
+) -> Observations:
+    """Five markers with numbers that have no short decimal form."""
+    rng = np.random.default_rng(3)
+    visible = np.ones(5, dtype=bool)
+    visible[list(hidden)] = False
+    return Observations(
+        points=rng.normal(size=(5, 2)) * 1e3,
+        displacements=rng.normal(size=(5, 2)) / 3,
+        standard_deviations=rng.uniform(size=(5, 2)) * 1e-9,
+        visible=visible,
+        source=source,
+        simulated=simulated,
+    )
+
+
+def read(folder: Path, content: str | bytes) -> Observations:
+    path = folder / "markers.csv"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return read_measurements(path)
+
+
+@pytest.mark.parametrize("simulated", [True, False])
+@pytest.mark.parametrize(
+    "source",
+    [
+        "camera A",
+        "two cameras, mean of 30 frames; 25 °C",  # commas and letters beyond ASCII
+        '"quoted"',
+        "# simulated",  # a source that looks like the mark is none
+    ],
+)
+def test_what_was_written_is_read_back_to_the_last_digit(tmp_path, source, simulated):
+    path = tmp_path / "markers.csv"
+    written = observations(source=source, simulated=simulated)
+    write_measurements(path, written)
+    back = read_measurements(path)
+    for name in ("points", "displacements", "standard_deviations", "visible"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(written, name), err_msg=name)
+    assert (back.source, back.simulated) == (source, simulated)
+
+
+def test_a_source_of_several_lines_stays_a_comment(tmp_path):
+    path = tmp_path / "markers.csv"
+    write_measurements(path, observations(source="camera A\nsecond\u2028third"))
+    assert read_measurements(path).source == "camera A second third"
+
+
+def test_a_marker_that_was_not_seen_has_its_position_only(tmp_path):
+    path = tmp_path / "markers.csv"
+    written = observations(hidden=(1, 4))
+    write_measurements(path, written)
+    x, y = written.points[1].tolist()
+    assert f"2,{x!r},{y!r},,,,,0" in path.read_text().splitlines()
+    back = read_measurements(path)
+    assert back.visible.tolist() == [True, False, True, True, False]
+    np.testing.assert_array_equal(back.points, written.points)
+    np.testing.assert_array_equal(back.displacements[written.visible], written.displacements[written.visible])
+    assert not back.displacements[~written.visible].any()
+
+
+@pytest.mark.parametrize("cell", ["", "nan", "-", "3.5"])
+def test_what_stands_at_an_unseen_marker_is_not_read(tmp_path, cell):
+    found = read(tmp_path, f"{HEADER},std_u_mm,visible\n1,2,3,4,0.1,1\n5,6,{cell},{cell},{cell},0\n")
+    assert found.displacements.tolist() == [[3, 4], [0, 0]]
+    assert found.standard_deviations.tolist() == [[0.1, 0], [0, 0]]
+
+
+def test_optional_columns_may_be_left_out(tmp_path):
+    found = read(tmp_path, f"{HEADER}\n9,-1,0.5,-2\n")
+    assert (found.points.tolist(), found.displacements.tolist()) == ([[9, -1]], [[0.5, -2]])
+    assert (found.standard_deviations.tolist(), found.visible.tolist()) == ([[0, 0]], [True])
+    assert (found.source, found.label) == ("measurements from markers.csv", "measured")
+
+
+def test_columns_may_be_in_any_order_among_others(tmp_path):
+    found = read(tmp_path, "v_mm,note,visible,x_mm,u_mm,y_mm\n-2,left,1.0,9,0.5,-1\n")
+    assert (found.points.tolist(), found.displacements.tolist()) == ([[9, -1]], [[0.5, -2]])
+
+
+def test_comments_and_blank_lines_may_stand_anywhere(tmp_path):
+    content = f"\n# of May\n  # indented\n{HEADER}\n#1,2,3,4\n9,-1,0,0\n\n,,,\n# source: late\n"
+    found = read(tmp_path, content)
+    assert (len(found.points), found.source) == (1, "late")
+
+
+@pytest.mark.parametrize(
+    "mark", ["# simulated", "#simulated", "#  Simulated ", "# simulated,,,", '"# simulated",,,']
+)
+def test_the_mark_of_simulated_numbers_is_not_lost(tmp_path, mark):
+    assert read(tmp_path, f"{mark}\n{HEADER}\n9,-1,0,0\n").simulated
+
+
+def test_a_spreadsheet_may_save_the_file(tmp_path):
+    """With its byte-order mark, line ends, quoted comments and rows filled up with commas."""
+    path = tmp_path / "markers.csv"
+    written = observations(source="fem, finite strain", simulated=True)
+    write_measurements(path, written)
+    lines = path.read_text().splitlines()
+    saved = [lines[0] + "," * 7, f'"{lines[1]}"' + "," * 7, *lines[2:]]
+    back = read(tmp_path, b"\xef\xbb\xbf" + "\r\n".join(saved).encode())
+    np.testing.assert_array_equal(back.displacements, written.displacements)
+    assert (back.source, back.simulated) == ("fem, finite strain", True)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", "has no column x_mm; the header must name x_mm, y_mm, u_mm, v_mm"),
+        ("# only a comment\n", "has no column x_mm"),
+        ("x_mm,y_mm,u_mm\n1,2,3\n", "has no column v_mm"),
+        ("x_mm;y_mm;u_mm;v_mm\n1;2;3;4\n", "with commas between"),  # another separator
+        ("9,-1,0,0\n", "has no column x_mm"),  # no header
+        (f"{HEADER}\n", "has a header but no marker"),
+        (f"{HEADER},u_mm\n1,2,3,4,5\n", "has the column u_mm twice"),
+        (f"# c\n{HEADER}\n1,2,3,4\n1,2,three,4\n", "line 4: u_mm is 'three', which is not a number"),
+        (f"{HEADER}\n1,2,nan,4\n", "line 2: u_mm is 'nan', which is not a number"),
+        (f"{HEADER}\n1,2,3,inf\n", "line 2: v_mm is 'inf'"),
+        (f"{HEADER}\n1,2,3,\n", "line 2: v_mm is ''"),  # a seen marker must have all its numbers
+        (f"{HEADER},visible\n1,2,3,4,1\n,2,,,0\n", "line 3: x_mm is ''"),  # an unseen one its position
+        (f"{HEADER},std_u_mm\n1,2,3,4,\n", "line 2: std_u_mm is ''"),  # not zero without saying so
+        (f"{HEADER}\n1,2,3\n", "line 2: the header names 4 columns, this line has 3"),
+        (f"{HEADER}\n1,0,2,0,3,0,4,0\n", "this line has 8; .* decimals with a point"),  # decimal commas
+        (f"{HEADER},visible\n1,2,3,4,2\n", "line 2: visible is '2'; it must be 1 .* or 0"),
+        (f"{HEADER},visible\n1,2,3,4,yes\n", "line 2: visible is 'yes'"),
+        (f"{HEADER},visible\n1,2,3,4,\n", "line 2: visible is ''"),
+        (f"{HEADER},visible\n1,2,3,4,0\n", "markers.csv: none of the markers is visible"),
+        (f"{HEADER},std_v_mm\n1,2,3,4,-1\n", "markers.csv: standard deviations must be zero or more"),
+        (bytes(range(256)), "it is not a CSV file in UTF-8"),  # a binary file
+        (HEADER + "\n" + "1" * 200_000 + ",2,3,4\n", "it is not a CSV file"),  # more than a cell can hold
+    ],
+)
+def test_a_bad_file_is_named_with_what_is_wrong(tmp_path, content, message):
+    with pytest.raises(UserError, match=message) as error:
+        read(tmp_path, content)
+    assert "markers.csv" in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["absent.csv", "."])
+def test_a_file_that_cannot_be_opened_is_named(tmp_path, name):
+    with pytest.raises(UserError, match=r"cannot read the measurements .*: (No such file|Is a directory)"):
+        read_measurements(tmp_path / name)
