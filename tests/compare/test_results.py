@@ -1,0 +1,153 @@
+"""The content of `metrics.json`: keys, types and where the numbers come from."""
+
+import json
+import math
+from dataclasses import replace
+from numbers import Real
+
+import numpy as np
+import pytest
+
+from compare.metrics import marker_errors, reference_differences
+from compare.results import metrics
+from geometry.design import Design
+from solvers.problem import Load, Material
+
+ERRORS = {"mae_u": Real, "mae_v": Real, "mae_sum": Real, "mae_rss": Real}
+DIFFERENCE = {"rel_l2": Real, "mean": Real, "p95": Real}
+COMPONENTS = {"xx": DIFFERENCE, "yy": DIFFERENCE, "xy": DIFFERENCE}
+SOLVER = {
+    "status": str,
+    "message": str,
+    "seconds": Real,
+    "energy": Real,
+    "reaction": list,
+    "stats": dict,
+    "markers": {"ae_u": list, "ae_v": list, **ERRORS},
+    "held_out": ERRORS,
+    "to_reference": {
+        "rel_l2_displacement": Real,
+        "rel_l2_von_mises": Real,
+        "mae_markers": Real,
+        "rel_energy": Real,
+        "displacement": DIFFERENCE,
+        "von_mises": DIFFERENCE,
+        "stress": COMPONENTS,
+        "strain": COMPONENTS,
+    },
+}
+SCHEMA = {
+    "schema": int,
+    "design": dict,
+    "material": {"young": Real, "poisson": Real, "plane": str, "law": str},
+    "load": {"kind": str, "displacement": tuple},
+    "measurements": {"source": str, "description": str, "markers": int},
+    "reference": str,
+    "solvers": {"fem": SOLVER, "pinn-std": SOLVER},
+}
+"""Scripts rely on these: a key may be added, but not renamed or removed under the same `schema`."""
+
+
+def assert_schema(value, expected, where="metrics"):
+    if not isinstance(expected, dict):
+        assert isinstance(value, expected), f"{where} is {value!r}"
+        return
+    assert set(value) == set(expected), where
+    for key, inner in expected.items():
+        assert_schema(value[key], inner, f"{where}.{key}")
+
+
+@pytest.fixture
+def numbers(fem, pinn, observations):
+    """`numbers(...)`: the metrics of both solvers, with some arguments changed."""
+
+    def make(**changes):
+        arguments = {
+            "design": Design(),
+            "material": Material(),
+            "load": Load(),
+            "observations": observations,
+            "evaluations": [fem, pinn],
+            "reference": fem,
+        }
+        return metrics(**{**arguments, **changes})
+
+    return make
+
+
+def test_keys_and_types(numbers):
+    assert_schema(numbers(), SCHEMA)
+    assert numbers()["schema"] == 1
+
+
+def test_every_value_is_plain(numbers):
+    """Numbers that do not exist are NaN here and null in the file; `fem` has no strain yy at all."""
+    told = json.loads(json.dumps(numbers()))
+    assert math.isnan(told["solvers"]["pinn-std"]["to_reference"]["strain"]["yy"]["rel_l2"])
+
+
+def test_what_was_asked_for_is_told(numbers):
+    told = numbers(material=Material(poisson=0.3), load=Load(kind="point"), design=Design(rib_count=5))
+    assert (told["design"]["rib_count"], told["material"]["poisson"], told["load"]["kind"]) == (
+        5,
+        0.3,
+        "point",
+    )
+
+
+def test_the_numbers_are_those_of_the_metrics(numbers, fem, pinn, observations):
+    told = numbers()["solvers"]["pinn-std"]
+    errors, differences = marker_errors(pinn, observations), reference_differences(pinn, fem)
+    assert told["markers"]["ae_u"] == errors.ae_u.tolist()
+    assert told["markers"]["ae_v"] == errors.ae_v.tolist()
+    assert {name: told["markers"][name] for name in ERRORS} == {
+        name: getattr(errors, name) for name in ERRORS
+    }
+    to = told["to_reference"]
+    assert to["rel_l2_displacement"] == differences.displacement.rel_l2 == pytest.approx(0.1)
+    assert to["rel_l2_von_mises"] == differences.von_mises.rel_l2 == pytest.approx(0.1)
+    assert to["mae_markers"] == differences.mae_markers
+    assert to["rel_energy"] == pytest.approx(0.21)
+    assert (told["energy"], told["reaction"]) == (pinn.energy, pinn.reaction.tolist())
+    assert (told["seconds"], told["stats"]["unknowns"]) == (1.25, 450)
+
+
+def test_known_errors_of_the_reference(numbers):
+    told = numbers()["solvers"]["fem"]["markers"]
+    assert told["ae_u"] == pytest.approx([0.3] * 3)
+    assert told["ae_v"] == pytest.approx([0.4] * 3)
+    assert (told["mae_sum"], told["mae_rss"]) == (pytest.approx(0.7), pytest.approx(0.5))
+
+
+@pytest.mark.parametrize("simulated", [True, False])
+def test_the_source_of_the_measurements_is_told(numbers, observe, simulated):
+    told = numbers(observations=observe(np.zeros((3, 2)), simulated=simulated))["measurements"]
+    assert told["source"] == ("simulated" if simulated else "measured")
+    assert told["description"] in ("simulated by another solver", "measured by camera A")
+
+
+def test_a_marker_that_was_not_seen_is_nan_and_counts_nowhere(numbers, observe, fem):
+    moved = fem.marker_displacement + np.array([[0.3, -0.4], [9.0, 9.0], [0.3, -0.4]])
+    told = numbers(observations=observe(moved, hidden=(1,)))
+    markers = told["solvers"]["fem"]["markers"]
+    assert told["measurements"]["markers"] == 2
+    assert [math.isnan(value) for value in markers["ae_u"]] == [False, True, False]
+    assert [math.isnan(value) for value in markers["ae_v"]] == [False, True, False]
+    assert (markers["mae_u"], markers["mae_v"]) == (pytest.approx(0.3), pytest.approx(0.4))
+
+
+def test_held_out_errors_are_those_of_markers_that_the_solver_was_not_given(numbers):
+    told = numbers(assimilating=frozenset({"pinn-std"}))["solvers"]
+    assert told["pinn-std"]["held_out"] is None
+    assert told["fem"]["held_out"] == {name: told["fem"]["markers"][name] for name in ERRORS}
+
+
+def test_a_solver_that_did_not_converge_says_so(numbers, fem, failed):
+    told = numbers(evaluations=[fem, failed])["solvers"]
+    assert (told["fem"]["status"], told["fem-nonlinear"]["status"]) == ("converged", "not converged")
+    assert told["fem-nonlinear"]["message"] == "stopped after 20 steps; try more load_steps"
+
+
+def test_a_solver_that_does_not_tell_its_time(numbers, fem):
+    told = numbers(evaluations=[replace(fem, stats={})], reference=fem)["solvers"]["fem"]
+    assert math.isnan(told["seconds"])

@@ -1,0 +1,158 @@
+"""The simulated measurements: what is solved, when, and what is said of it; on the small rectangle."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compare.virtual_experiment import virtual_experiment
+from geometry.errors import UserError
+from geometry.mesh import TriangleMesh
+from solvers.fem.nonlinear import FemNonlinearSolver
+from solvers.problem import Load, Material, Problem
+from solvers.solution import Solution, Status
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache of this test's own."""
+    monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def solutions(cache: Path, monkeypatch: pytest.MonkeyPatch) -> list[Solution]:
+    """What the finite-strain solver has returned so far."""
+    returned: list[Solution] = []
+    solve = FemNonlinearSolver.solve
+
+    def watched(self: FemNonlinearSolver, *arguments: object) -> Solution:
+        returned.append(solve(self, *arguments))
+        return returned[-1]
+
+    monkeypatch.setattr(FemNonlinearSolver, "solve", watched)
+    return returned
+
+
+@pytest.fixture
+def problem(mesh: TriangleMesh) -> Problem:
+    return Problem(mesh, load=Load(displacement=(0.0, -0.5)))
+
+
+def test_a_sliding_patch_presses_on_a_neo_hookean_finger(problem, solutions):
+    virtual_experiment(problem)
+    (solution,) = solutions
+    solved = solution.problem
+    assert (solved.load.kind, solved.load.displacement) == ("patch", (None, -0.5))
+    assert (solved.material.law, solved.material.plane) == ("neo-hookean", "strain")
+    assert (solved.material.young, solved.material.poisson) == (11.4, 0.45)
+    contact = problem.mesh.points[np.unique(problem.mesh.boundary("contact"))]
+    u, v = solution.displacement(contact).T
+    np.testing.assert_allclose(v, -0.5, atol=1e-12)
+    assert abs(u).max() > 1e-3  # it slides
+    assert abs(solution.reaction[0]) < 1e-8 * abs(solution.reaction[1])  # without friction
+
+
+def test_the_markers_of_the_mesh_are_observed_and_said_to_be_simulated(problem, solutions):
+    observations = virtual_experiment(problem)
+    markers = problem.mesh.markers
+    np.testing.assert_array_equal(observations.points, markers)
+    np.testing.assert_array_equal(observations.displacements, solutions[0].displacement(markers))
+    assert observations.visible.all()
+    assert not observations.standard_deviations.any()
+    assert observations.simulated
+    assert observations.source.startswith("simulated by fem-nonlinear")
+    assert "no camera" in observations.source
+
+
+def test_the_second_time_it_is_read_from_the_cache(problem, solutions):
+    first = virtual_experiment(problem)
+    notes: list[str] = []
+    second = virtual_experiment(problem, lambda _, note: notes.append(note))
+    assert (len(solutions), notes) == (1, ["from the cache"])
+    np.testing.assert_array_equal(second.displacements, first.displacements)
+    assert (second.source, second.simulated) == (first.source, first.simulated)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"load": Load(displacement=(0.0, -0.4))},
+        {"material": Material(young=5.0)},
+        {"material": Material(poisson=0.3)},
+    ],
+    ids=["stroke", "young", "poisson"],
+)
+def test_another_problem_is_simulated_again(problem, solutions, changes):
+    virtual_experiment(problem)
+    virtual_experiment(replace(problem, **changes))
+    assert len(solutions) == 2
+
+
+def test_another_mesh_is_simulated_again(problem, solutions):
+    virtual_experiment(problem)
+    virtual_experiment(replace(problem, mesh=problem.mesh.permuted(1)))
+    assert len(solutions) == 2
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"load": Load(kind="point", displacement=(0.0, -0.5))},
+        {"load": Load(displacement=(None, -0.5))},
+        {"material": Material(plane="stress")},
+    ],
+    ids=["load", "free u", "plane"],
+)
+def test_what_has_no_part_in_the_experiment_does_not_repeat_it(problem, solutions, changes):
+    virtual_experiment(problem)
+    virtual_experiment(replace(problem, **changes))
+    assert len(solutions) == 1
+
+
+def test_another_version_of_a_package_or_of_our_sources_is_simulated_again(problem, solutions, monkeypatch):
+    virtual_experiment(problem)
+    monkeypatch.setattr("compare.virtual_experiment.package_versions", lambda: {"numpy": "9"})
+    virtual_experiment(problem)
+    monkeypatch.setattr("compare.virtual_experiment.sources_digest", lambda _: "other")
+    virtual_experiment(problem)
+    assert len(solutions) == 3
+
+
+@pytest.mark.parametrize("content", [b"", b"# simulated\nx_mm,y_mm,u_mm,v_mm\n", b"\xff\x00"])
+def test_a_damaged_file_in_the_cache_is_made_again(problem, solutions, cache, content):
+    virtual_experiment(problem)
+    (entry,) = cache.iterdir()
+    entry.write_bytes(content)
+    virtual_experiment(problem)
+    assert len(solutions) == 2
+    assert virtual_experiment(problem).simulated
+    assert len(solutions) == 2
+
+
+def test_an_experiment_that_stops_halfway_is_refused_and_not_kept(problem, cache, monkeypatch):
+    solve = FemNonlinearSolver.solve
+
+    def stops(self: FemNonlinearSolver, *arguments: object) -> Solution:
+        return replace(solve(self, *arguments), status=Status(False, "stopped at 50% of the load"))
+
+    monkeypatch.setattr(FemNonlinearSolver, "solve", stops)
+    with pytest.raises(UserError, match=r"experiment stopped at 50% of the load; or give --measurements"):
+        virtual_experiment(problem)
+    assert not cache.exists()
+
+
+def test_without_a_prescribed_v_there_is_no_experiment(problem, solutions):
+    with pytest.raises(UserError, match="prescribe v, or give --measurements"):
+        virtual_experiment(replace(problem, load=Load(displacement=(1.0, None))))
+    assert not solutions
+
+
+def test_without_the_finite_element_library_measurements_are_asked_for(problem, cache, monkeypatch):
+    def missing(name: str) -> None:
+        raise ModuleNotFoundError("No module named 'dolfinx'")
+
+    monkeypatch.setattr("compare.virtual_experiment.make_solver", missing)
+    with pytest.raises(UserError, match=r"No module named 'dolfinx'; or give --measurements"):
+        virtual_experiment(problem)
