@@ -1,0 +1,54 @@
+"""The picture of the deformed finger."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import BendingField
+from matplotlib.axes import Axes
+
+from compare.evaluation import Evaluation
+from compare.figures.overlay import draw_overlay
+from geometry.mesh import TriangleMesh
+from geometry.observations import Observations
+from solvers.problem import Problem
+from solvers.solution import Solution, Status
+
+
+def test_crosses_are_at_the_observed_points_even_if_they_are_not_the_meshs_markers(
+    mesh: TriangleMesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    points = np.array([[2.3, -1.1], [7.7, -3.2]])
+    solution = Solution(
+        solver="bent",
+        problem=Problem(mesh),
+        field=BendingField(1.0),
+        energy=1.0,
+        reaction=np.zeros(2),
+        status=Status(True, "a closed form"),
+        stats={},
+    )
+    observations = Observations(
+        points=points,
+        displacements=np.zeros((2, 2)),
+        standard_deviations=np.zeros((2, 2)),
+        visible=np.ones(2, dtype=bool),
+        source="a test",
+        simulated=True,
+    )
+    crosses = []
+    plot = Axes.plot
+
+    def watched(axes: Axes, *arguments: object, **options: object) -> object:
+        if "x" in arguments:
+            crosses.append(np.column_stack(arguments[:2]))
+        return plot(axes, *arguments, **options)
+
+    monkeypatch.setattr(Axes, "plot", watched)
+    evaluation = Evaluation.of(solution, mesh, points)
+    draw_overlay(tmp_path / "a.png", mesh=mesh, evaluations=[evaluation], observations=observations)
+    x, y = points.T
+    expected = points + np.stack([0.01 * y**2, -0.02 * x**2], axis=1)
+    assert len(crosses) > 0
+    for drawn in crosses:
+        np.testing.assert_allclose(drawn, expected, rtol=1e-12)
