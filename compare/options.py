@@ -1,5 +1,7 @@
 """Options that several commands share, and the objects that they stand for."""
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -42,13 +44,19 @@ class FingerOptions:
         """The design and the mesh settings."""
         changes = parse_overrides(self.set)
         design = load_design(self.design, changes)
-        if changes:  # another finger than the preset, so another name and output folder
-            named = "-".join([design.name, *(f"{name}-{value}" for name, value in changes.items())])
-            design = design.replaced(name=changes.get("name", named))
+        if changes and "name" not in changes:  # another finger, so another name and output folder
+            design = design.replaced(name=_changed_name(design, changes))
         try:
             return design, MeshSettings(size=self.mesh_size)
         except UserError as error:
             raise UserError(f"--mesh-{error}") from None
+
+
+def _changed_name(design: Design, changes: Mapping[str, object]) -> str:
+    """The preset's name with the changes, of the letters and the length that a name may have."""
+    parts = (f"-{name}-{value}" for name, value in changes.items())
+    name = design.name + re.sub(r"[^A-Za-z0-9._-]", "", "".join(parts))
+    return name if len(name) <= 64 else f"{name[:55]}-{design.digest[:8]}"
 
 
 @Parameter(name="*", group=PHYSICS)
