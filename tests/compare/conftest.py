@@ -140,3 +140,20 @@ def pages() -> Iterator[dict[Path, Page]]:
     """Every matplotlib figure that the module's tests have drawn so far, by its file."""
     with watching() as drawn:
         yield drawn
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The output of a whole comparison of the default finger on a coarse mesh: not to be changed."""
+    from compare.cli import main
+
+    out = tmp_path_factory.mktemp("finished") / "run"
+    options = ["--solvers", "fem,fem-nonlinear", "--mesh-size", "1.0", "--quiet"]
+    assert main(["compare", *options, "--out", str(out)]) == 0
+    return out
+
+
+@pytest.fixture
+def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures take most of the time of a small run, and have tests of their own."""
+    monkeypatch.setattr("compare.pipeline.draw_all", lambda folder, **_: [])

@@ -1,0 +1,431 @@
+"""The command line as a user meets it: what it refuses, prints and returns."""
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import pyvista
+
+from compare.cli import compare_main, main
+from compare.exits import BAD_INPUT, INTERRUPTED, NOT_CONVERGED
+from compare.options import FingerOptions
+from geometry.presets import preset_names
+from solvers.fem.linear import FemSolver
+from solvers.fem.nonlinear import FemNonlinearSolver
+from solvers.registry import solver_names
+from solvers.solution import Solution, Status
+
+ROOT = Path(__file__).parent.parent.parent
+HEADER = "x_mm,y_mm,u_mm,v_mm"
+SMALL = ["compare", "--solvers", "fem", "--mesh-size", "1.0"]
+
+INPUTS: dict[str, str | bytes] = {
+    "broken.toml": "height = = 90",
+    "other.toml": "hight = 90",
+    "column.csv": "x_mm,y_mm,u_mm\n20,-1,0\n",
+    "text.csv": f"{HEADER}\n20,-1,left,0\n",
+    "nan.csv": f"{HEADER}\n20,-1,nan,0\n",
+    "outside.csv": f"{HEADER}\n10,-10,0,0\n",
+    "unseen.csv": f"{HEADER},visible\n20,-1,,,0\n",
+    "flag.csv": f"{HEADER},visible\n20,-1,0,0,2\n",
+    "header.csv": f"{HEADER}\n",
+    "empty.csv": "",
+    "binary.csv": bytes(range(256)),
+    "good.csv": f"{HEADER}\n20,-1,0,-5\n",
+    "file": "",
+    "foreign/thesis.txt": "three years of work",
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with files that are wrong in one way each."""
+    for name, content in INPUTS.items():
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path): path.read_bytes() if path.is_file() else b"" for path in folder.rglob("*")}
+
+
+# Bad input: one line, exit code 2, nothing written
+
+BAD = [
+    # what does not exist
+    ("compare --frobnicate", "Unknown option: --frobnicate"),
+    ("frobnicate", "Unknown command .* Available commands: compare, design, mesh, solve, solvers"),
+    ("compare slender", "'slender' belongs to no option"),  # forgot --design
+    ("compare --seed", "--seed requires an argument"),
+    ("compare --solvers fen", r"no solver is called 'fen'; did you mean 'fem'\?"),  # near match
+    ("compare --solvers comsol", r"no solver is called 'comsol' \(there are: fem, "),  # nothing near
+    ("compare --solvers ,", "no solver was asked for"),
+    ("compare --design slendr", "there is no design 'slendr'; the presets are default, "),
+    ("compare --design absent.toml", "there is no design file absent.toml"),
+    # designs
+    ("compare --design broken.toml", r"cannot read design file broken.toml: .* line 1"),
+    ("compare --design other.toml", r"unknown parameter 'hight'; did you mean height \(H\)"),
+    ("compare --set rib_count", "cannot read 'rib_count'; write parameter=value"),
+    ("compare --set rib_cuont=3", r"unknown parameter 'rib_cuont'; did you mean rib_count \(N\)\?"),
+    ("compare --set rib_count=many", r"rib_count \(N\) = 'many' is not a whole number"),
+    ("compare --set N=4 --set rib_count=5", "set twice"),
+    ("compare --set rib_count=40", "ribs overlap: .* admissible with the rest unchanged: rib_count up to"),
+    ("compare --set height=9999", "outside its range, 10 to 500 mm"),
+    ("compare --set contact_position=200", "contact"),  # beyond the tip
+    ("compare --set name=../up", "must be a letter or digit"),  # would leave the output folder
+    ("compare --mesh-size 0", "--mesh-size = 0 mm is outside its range"),
+    ("compare --mesh-size nan", "--mesh-size = nan is not a finite number"),
+    ("compare --mesh-size fine", 'unable to convert "fine" into float'),
+    # material and load
+    ("compare --young -1", "--young -1.0: input should be greater than 0"),
+    ("compare --young inf", "--young inf"),
+    ("compare --poisson 0.5", "--poisson 0.5: input should be less than 0.5"),  # incompressible
+    ("compare --stroke 0", "--stroke 0: the indenter presses"),
+    ("compare --stroke -10", "--stroke -10: the indenter presses"),  # not the displacement v
+    ("compare --stroke nan", "--stroke nan"),
+    ("compare --load pull", 'Choose from: "mean", "point", "patch"'),
+    ("compare --load patch --solvers pinn-std", "pinn-std takes the loads mean, point, not 'patch'"),
+    ("compare --plane stress --solvers fem-nonlinear", "fem-nonlinear: .* plane strain only"),
+    # solvers and their settings
+    ("compare --solvers fem,fem", "named twice: fem, fem"),
+    ("compare --solvers fem --reference pinn-std", "reference 'pinn-std' is not among the solvers fem"),
+    ("compare --solvers fem --solver-set degree=1", "write solver.setting=value"),
+    ("compare --solvers fem --solver-set pinn-std.units=9", "'pinn-std', which is not among the solvers fem"),
+    ("compare --solvers fem --solver-set fem.order=1", "fem has no setting 'order'; it has degree"),
+    ("compare --solvers fem --solver-set fem.degree=two", "fem: degree = 'two'"),
+    ("compare --solvers fem --solver-set fem.degree=7", "degree 1 and 2, not 7"),
+    ("compare --solvers fem --solver-set fem.degree=1 --solver-set fem.degree=2", "fem.degree is set twice"),
+    ("compare --seed -1", "--seed -1: give a whole number from 0"),
+    # measurements
+    ("compare --measurements absent.csv", "there is no file absent.csv"),
+    ("compare --measurements foreign", "there is no file foreign"),  # a folder
+    ("compare --measurements column.csv", "column.csv has no column v_mm"),
+    ("compare --measurements text.csv", "text.csv, line 2: u_mm is 'left', which is not a number"),
+    ("compare --measurements nan.csv", "nan.csv, line 2: u_mm is 'nan', which is not a number"),
+    ("compare --measurements flag.csv", "flag.csv, line 2: visible is '2'"),
+    ("compare --measurements unseen.csv", "unseen.csv: none of the markers is visible"),
+    ("compare --measurements header.csv", "header.csv has a header but no marker"),
+    ("compare --measurements empty.csv", "empty.csv has no column x_mm"),
+    ("compare --measurements binary.csv", "binary.csv: it is not a CSV file in UTF-8"),
+    ("compare --mesh-size 1 --measurements outside.csv", "not of this finger: .* outside the body"),
+    # where to write
+    ("compare --out foreign", "foreign holds thesis.txt, which is not of a comparison"),
+    ("compare --out file", "file is a file; name a folder with --out"),
+    ("compare --out file/below", "cannot write to .*: Not a directory"),
+    ("compare --out /proc/absent/run", "cannot write to /proc/absent/run.partial"),  # whoever runs this
+    ("compare --out .", "cannot run inside it"),
+    # the other verbs
+    ("solve", "--solver requires an argument"),
+    ("solve fem,pinn-std", "name one solver, not 'fem,pinn-std'"),
+    ("solve ''", "name one solver"),
+    ("solve fem --out fields.csv", "give a name that ends in .vtu"),
+    ("design --formats step,dwg", "unknown CAD format 'dwg'; there are step, stl, dxf, svg"),
+    ("mesh --mesh-size 1 --out file", "file: File exists"),
+]
+
+
+@pytest.mark.parametrize(("line", "message"), BAD, ids=[line for line, _ in BAD])
+def test_bad_input_is_one_line_and_nothing_is_written(folder, capsys, line, message):
+    before = contents(folder)
+    assert main(shlex.split(line)) == BAD_INPUT
+    output = capsys.readouterr()
+    assert output.out == ""
+    (error,) = output.err.splitlines()
+    assert error.startswith("error: ")
+    assert re.search(message, error), error
+    assert contents(folder) == before
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_read_only_folder_is_one_line(folder, capsys):
+    (folder / "foreign").chmod(0o555)
+    assert main([*SMALL, "--out", "foreign/run"]) == BAD_INPUT
+    assert capsys.readouterr().err.endswith("run.partial: Permission denied\n")
+
+
+def test_bad_input_of_a_process_has_no_traceback(folder):
+    done = subprocess.run(
+        [sys.executable, "-m", "compare.cli", "compare", "--solvers", "fen"],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (BAD_INPUT, "")
+    assert done.stderr.startswith("error: no solver is called 'fen'")
+    assert done.stderr.count("\n") == 1
+
+
+# What is printed
+
+
+def test_the_table_and_the_report_are_named(folder, capsys, without_pictures):
+    assert compare_main([*SMALL[1:], "--measurements", "good.csv"]) == 0
+    output = capsys.readouterr()
+    assert "Mean absolute error at" in output.out
+    assert "measured" in output.out
+    mae = json.loads(Path("out/default/metrics.json").read_text())["solvers"]["fem"]["markers"]["mae_u"]
+    (row,) = [line for line in output.out.splitlines() if line.startswith("│ fem")]
+    assert f"{mae:.3f}" in row
+    assert output.out.splitlines()[-1] == "report: out/default/report.html"
+    assert Path("out/default/report.html").is_file()
+    stages = [line.split(":")[0] for line in output.err.splitlines()]
+    assert stages == ["mesh", "measurements", "fem", "pictures", "report"]
+
+
+def test_quiet_prints_nothing(folder, capsys, without_pictures):
+    assert main([*SMALL, "--measurements", "good.csv", "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_json_prints_the_metrics_and_nothing_else(folder, capsys, without_pictures):
+    assert main([*SMALL, "--measurements", "good.csv", "--json", "--out", "here"]) == 0
+    output = capsys.readouterr()
+    assert json.loads(output.out) == json.loads(Path("here/metrics.json").read_text())
+    assert output.err == ""
+
+
+@pytest.mark.parametrize("options", [["--quiet"], ["--json"]])
+def test_quiet_does_not_hide_an_error(folder, capsys, options):
+    assert main(["compare", "--solvers", "fen", *options]) == BAD_INPUT
+    assert capsys.readouterr().err.startswith("error: no solver is called 'fen'")
+
+
+def test_the_options_reach_the_job(folder, capsys, without_pictures):
+    options = "--set N=5 --young 3 --poisson 0.3 --plane stress --load point --stroke 4 --slide"
+    options += " --solver-set fem.degree=1"
+    assert main([*SMALL, *options.split(), "--measurements", "good.csv", "--json", "--out", "here"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["design"]["rib_count"] == 5
+    assert told["material"] == {"young": 3, "poisson": 0.3, "plane": "stress", "law": "linear"}
+    assert told["load"] == {"kind": "point", "displacement": [None, -4]}
+    assert told["solvers"]["fem"]["stats"]["degree"] == 1
+    assert json.loads(Path("here/run.json").read_text())["mesh"]["size"] == 1
+
+
+@pytest.mark.parametrize(
+    ("settings", "name"),
+    [
+        ([], "default"),
+        (["N=5"], "default-rib_count-5"),
+        (["rib_count=+5", "L_angle=-10.5"], "default-rib_count-5-rib_angle--10.5"),
+        (["N=5", "name=mine"], "mine"),
+    ],
+)
+def test_a_changed_design_has_a_folder_of_its_own(settings, name):
+    assert FingerOptions(set=tuple(settings)).read()[0].name == name
+
+
+def test_a_design_with_many_changes_still_has_a_name():
+    changes = ("rib_thickness=2.1", "front_thickness=2.1", "back_thickness=2.1", "base_thickness=2.1")
+    names = {FingerOptions(set=(*changes, f"height={height}")).read()[0].name for height in (95, 96)}
+    assert [len(name) for name in names] == [64, 64]  # and they differ
+
+
+# How a run ends
+
+
+def ends(monkeypatch: pytest.MonkeyPatch, end: BaseException | Callable[[Solution], Solution]) -> None:
+    """Let `fem` end as the test says."""
+    solve = FemSolver.solve
+
+    def scripted(self: FemSolver, *arguments: object) -> Solution:
+        if isinstance(end, BaseException):
+            raise end
+        return end(solve(self, *arguments))
+
+    monkeypatch.setattr(FemSolver, "solve", scripted)
+
+
+def test_an_interrupted_run_says_how_to_go_on(folder, capsys, monkeypatch, without_pictures):
+    """What the first solver had finished is not solved again."""
+    calls = []
+    solve = FemNonlinearSolver.solve
+
+    def counted(self: FemNonlinearSolver, *arguments: object) -> Solution:
+        calls.append(self)
+        return solve(self, *arguments)
+
+    monkeypatch.setattr(FemNonlinearSolver, "solve", counted)
+    options = ["--solvers", "fem-nonlinear,fem", "--mesh-size", "1.0", "--measurements", "good.csv"]
+    with monkeypatch.context() as patch:
+        ends(patch, KeyboardInterrupt())
+        assert main(["compare", *options, "--quiet"]) == INTERRUPTED
+    output = capsys.readouterr()
+    assert output == ("", "interrupted; what was finished is kept; --resume goes on from it\n")
+    assert not Path("out/default").exists()
+    assert main(["compare", *options, "--quiet", "--resume"]) == 0
+    assert len(calls) == 1
+    assert not Path("out/default.partial").exists()
+
+
+def test_an_interrupted_verb_says_so(folder, capsys, monkeypatch):
+    ends(monkeypatch, KeyboardInterrupt())
+    assert main(["solve", "fem", "--mesh-size", "1.0"]) == INTERRUPTED
+    assert capsys.readouterr().err.splitlines()[-1] == "interrupted"
+
+
+def test_a_solver_that_did_not_converge_has_its_own_exit_code(folder, capsys, monkeypatch, without_pictures):
+    """The result is written all the same."""
+    status = Status(False, "stopped at 40 % of the load;\n take smaller steps")
+    ends(monkeypatch, lambda solution: replace(solution, status=status))
+    assert main([*SMALL, "--measurements", "good.csv", "--quiet"]) == NOT_CONVERGED
+    said = "error: fem did not converge: stopped at 40 % of the load; take smaller steps\n"
+    assert capsys.readouterr() == ("", said)
+    assert "Stopped at 40 % of the load" in Path("out/default/report.html").read_text(encoding="utf-8")
+
+
+def test_a_training_that_is_too_short_does_not_converge(folder, capsys, without_pictures):
+    settings = ["pinn-std.units=10", "pinn-std.rounds=2"]
+    options = [word for setting in settings for word in ("--solver-set", setting)]
+    small = ["--solvers", "pinn-std", "--mesh-size", "1.0", "--measurements", "good.csv", "--quiet"]
+    assert main(["compare", *small, *options]) == NOT_CONVERGED
+    assert capsys.readouterr().err.startswith("error: pinn-std did not converge: ")
+
+
+def test_a_full_disk_is_one_line(folder, capsys, monkeypatch, without_pictures):
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("compare.pipeline.write_report", full)
+    assert main([*SMALL, "--measurements", "good.csv", "--quiet"]) == BAD_INPUT
+    assert capsys.readouterr().err == "error: input or output: No space left on device\n"
+
+
+def test_a_missing_library_is_one_line(folder, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "solvers.pinn.standard", None)
+    assert main(["compare", "--solvers", "pinn-std"]) == BAD_INPUT
+    assert capsys.readouterr().err.startswith("error: solver 'pinn-std' cannot be loaded: ")
+
+
+# The other verbs
+
+
+def test_solvers_are_listed(capsys):
+    assert main(["solvers"]) == 0
+    listed = capsys.readouterr().out
+    assert all(f"│ {name} " in listed for name in solver_names())
+
+
+def test_a_broken_plug_in_is_one_line_among_the_solvers(tmp_path, capsys, monkeypatch):
+    info = tmp_path / "broken-0.1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 0.1\n")
+    (info / "entry_points.txt").write_text("[pinnray.solvers]\nbroken = no_such_module:Solver\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert main(["solvers"]) == 0
+    output = capsys.readouterr()
+    assert "│ fem " in output.out
+    assert output.err.startswith("warning: solver 'broken' is left out: ")
+    assert output.err.count("\n") == 1
+
+
+def test_one_solver_alone(folder, capsys):
+    assert main(["solve", "fem", "--mesh-size", "1.0", "--out", "fields/fem.vtu"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("fem: solved directly")
+    assert lines[1].startswith("energy 1.101")
+    assert lines[-1] == "fields/fem.vtu"
+    assert pyvista.read("fields/fem.vtu").n_cells > 1000
+
+
+def test_the_mesh_alone(folder, capsys):
+    assert main(["mesh", "--mesh-size", "1.0", "--out", "here"]) == 0
+    assert "triangles, area" in capsys.readouterr().out
+    assert sorted(path.name for path in Path("here").iterdir()) == ["mesh.npz", "mesh.png", "mesh.vtu"]
+
+
+def test_the_design_alone(folder, capsys):
+    assert main(["design", "--formats", "svg", "--out", "here"]) == 0
+    listed = capsys.readouterr().out.splitlines()
+    assert listed == ["here/section.svg", "here/design.png"]
+    assert all(Path(name).is_file() for name in listed)
+
+
+# A solver of another package
+
+
+def test_a_plug_in_runs_in_the_main_job(folder, plugin_folder):
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "compare.cli",
+            "compare",
+            "--solvers",
+            "fem,skfem-p1",
+            "--mesh-size",
+            "1.0",
+            "--json",
+        ],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(plugin_folder)])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    told = json.loads(done.stdout)["solvers"]["skfem-p1"]
+    assert told["status"] == "converged"
+    assert 0 < told["to_reference"]["rel_l2_displacement"] < 0.05
+    assert Path("out/default/fields/skfem-p1.vtu").is_file()
+
+
+# Help
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--help"], ["compare", "design", "mesh", "solve", "solvers"]),
+        (["compare", "--help"], ["Parameters", "Finger", "Physics", "Output", "compare --design slender"]),
+    ],
+)
+def test_help_teaches_quickly(arguments, words):
+    """It names every group and the exit codes, takes two seconds at most and loads no heavy library."""
+    code = (
+        "import json, sys, time\n"
+        "from compare.cli import main\n"
+        "status = main(sys.argv[1:])\n"
+        "json.dump([time.process_time(), sorted(sys.modules)], sys.stderr)\n"
+        "sys.exit(status)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0
+    seconds, modules = json.loads(done.stderr)
+    heavy = {"torch", "dolfinx", "petsc4py", "cadquery", "gmsh", "pyvista", "vtk", "matplotlib", "cv2"}
+    assert not heavy & set(modules)
+    assert seconds < 2
+    for word in [*words, "Exit codes", "130 interrupted"]:
+        assert word in " ".join(done.stdout.split())
+
+
+def test_help_names_every_option_of_the_main_job(capsys):
+    assert main(["compare", "--help"]) == 0
+    text = capsys.readouterr().out
+    options = (
+        "design set mesh-size young poisson plane load stroke slide solvers solver-set seed measurements "
+        "reference out resume quiet json"
+    )
+    assert all(f"--{option} " in text for option in options.split())
+    assert "[default: ()]" not in text
+
+
+def test_every_preset_is_accepted():
+    for name in preset_names():
+        assert FingerOptions(design=name).read()[0].name == name

@@ -1,0 +1,157 @@
+"""The output folder: replaced as a whole or not at all, and only where nothing else would be lost."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from compare.output_folder import check_output, replaced_folder
+from geometry.errors import UserError
+
+
+def tree(folder: Path) -> dict[str, str]:
+    """Names and texts of all files under a folder."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_text() for path in folder.rglob("*") if path.is_file()
+    }
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    """A complete result."""
+    folder = tmp_path / "results" / "run"
+    (folder / "solutions").mkdir(parents=True)
+    (folder / "solutions" / "fem.npz").write_text("old solution")
+    (folder / "run.json").write_text(json.dumps({"files_sha256": {"solutions/fem.npz": "0"}}))
+    return folder
+
+
+def write(folder: Path, *, solutions: tuple[str, ...] = (), error: BaseException | None = None) -> None:
+    (folder / "report.html").write_text("new report")
+    for name in solutions:
+        (folder / "solutions").mkdir(exist_ok=True)
+        (folder / "solutions" / f"{name}.npz").write_text("new solution")
+    if error is not None:
+        raise error
+
+
+def attempt(out: Path, *, keep: tuple[str, ...] = (), **what: object) -> None:
+    with replaced_folder(out, keep=keep) as folder:
+        write(folder, **what)
+
+
+def test_the_new_folder_takes_the_place_of_the_old_one(out):
+    attempt(out)
+    assert tree(out.parent) == {"run/report.html": "new report"}
+
+
+def test_missing_parents_are_made(tmp_path):
+    attempt(tmp_path / "a" / "b" / "run")
+    assert tree(tmp_path) == {"a/b/run/report.html": "new report"}
+
+
+@pytest.mark.parametrize("error", [RuntimeError(), KeyboardInterrupt()], ids=["error", "Ctrl-C"])
+def test_an_error_leaves_the_old_folder_and_what_was_finished(out, error):
+    before = tree(out)
+    with pytest.raises(type(error)):
+        attempt(out, solutions=("fem",), error=error)
+    assert tree(out) == before
+    assert tree(out.with_name("run.partial")) == {
+        "report.html": "new report",
+        "solutions/fem.npz": "new solution",
+    }
+
+
+def test_an_error_before_anything_was_finished_leaves_nothing(tmp_path):
+    with pytest.raises(RuntimeError):
+        attempt(tmp_path / "a" / "b" / "run", error=RuntimeError())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_only_solutions_that_are_asked_for_outlive_an_earlier_attempt(out):
+    with pytest.raises(RuntimeError):
+        attempt(out, solutions=("fem", "pinn-std"), error=RuntimeError())
+    (out.with_name("run.partial") / "figures").mkdir()
+    with replaced_folder(out, keep=("fem",)) as folder:
+        assert tree(folder) == {"solutions/fem.npz": "new solution"}
+        assert not (folder / "figures").exists()
+
+
+def test_nothing_outlives_an_earlier_attempt_unless_asked(out):
+    with pytest.raises(RuntimeError):
+        attempt(out, solutions=("fem",), error=RuntimeError())
+    with replaced_folder(out) as folder:
+        assert tree(folder) == {}
+
+
+def test_two_runs_do_not_write_the_same_folder(out):
+    with replaced_folder(out) as folder:
+        write(folder)
+        with pytest.raises(UserError, match=r"another run is writing to .*run\.partial"):
+            attempt(out)
+        assert tree(folder) == {"report.html": "new report"}
+
+
+def test_a_folder_left_between_two_renames_does_no_harm(out):
+    out.with_name(".run.previous").mkdir()
+    (out.with_name(".run.previous") / "half.txt").write_text("removed")
+    attempt(out)
+    assert tree(out.parent) == {"run/report.html": "new report"}
+
+
+def test_a_result_that_cannot_take_its_place_is_complete_beside_it(out, monkeypatch):
+    def busy(self: Path, target: Path) -> None:
+        raise OSError(16, "Device or resource busy")  # `out` is a mounted volume
+
+    monkeypatch.setattr(Path, "replace", busy)
+    before = tree(out)
+    with pytest.raises(
+        UserError, match=r"cannot replace .* \(Device or resource busy\); the complete result is in"
+    ):
+        attempt(out)
+    assert tree(out) == before
+    assert tree(out.with_name("run.partial")) == {"report.html": "new report"}
+
+
+def test_a_link_stays_a_link(out):
+    link = out.parent.parent / "latest"
+    link.symlink_to(out)
+    attempt(link)
+    assert link.is_symlink()
+    assert tree(out) == {"report.html": "new report"}
+
+
+def test_our_own_result_an_empty_folder_and_none_may_be_replaced(out, tmp_path):
+    (tmp_path / "empty").mkdir()
+    for folder in (out, tmp_path / "empty", tmp_path / "absent"):
+        check_output(folder)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda out: (out / "notes.txt").write_text("mine"), "holds notes.txt, which is not of a comparison"),
+        (lambda out: (out / "solutions" / "mine.npz").write_text(""), "holds solutions/mine.npz"),
+        (lambda out: (out / "run.json").write_text("{}"), "holds "),  # another program's run.json
+        (lambda out: (out / "run.json").write_text("[1]"), "holds "),
+        (lambda out: (out / "run.json").write_bytes(b"\xff"), "holds "),
+    ],
+)
+def test_what_no_comparison_wrote_is_not_lost(out, spoil: Callable[[Path], object], message):
+    spoil(out)
+    with pytest.raises(UserError, match=message):
+        check_output(out)
+
+
+def test_a_file_is_not_replaced_by_a_folder(tmp_path):
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(UserError, match="is a file"):
+        check_output(tmp_path / "file")
+
+
+@pytest.mark.parametrize("inside", [".", "solutions"])
+def test_the_folder_that_one_stands_in_is_not_pulled_away(out, monkeypatch, inside):
+    monkeypatch.chdir(out / inside)
+    with pytest.raises(UserError, match="cannot run inside it"):
+        check_output(out)

@@ -1,0 +1,415 @@
+"""The main job: what it writes, what it leaves when it is stopped, and how it goes on from there."""
+
+import csv
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from datetime import datetime
+from io import StringIO
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+import pyvista
+from rich.console import Console
+
+from compare.pipeline import Job, Outcome, run
+from compare.provenance import package_versions
+from compare.stages import Stages
+from geometry.cache import finger_mesh
+from geometry.design import Design
+from geometry.errors import UserError
+from geometry.settings import MeshSettings
+from solvers.fem.linear import FemSolver
+from solvers.problem import Load, Material, Problem
+from solvers.solution import Solution, Status
+from solvers.solver import Progress, silent
+from vision.measurements import read_measurements
+
+COARSE = MeshSettings(size=1.0)
+
+
+@dataclass
+class Scripted:
+    """`fem` with linear elements under another name, which counts its calls and ends as the test says."""
+
+    name: str
+    end: BaseException | Callable[[Solution], Solution] | None = None
+    degree: int = 1
+    calls: int = 0
+    laws: ClassVar[tuple[str, ...]] = ("linear",)
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point")
+
+    def settings(self) -> dict[str, object]:
+        return {"degree": self.degree}
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        self.calls += 1
+        if isinstance(self.end, BaseException):
+            raise self.end
+        solution = FemSolver(degree=self.degree).solve(problem, progress)
+        return self.end(solution) if self.end else solution
+
+
+@pytest.fixture
+def measured(tmp_path: Path) -> Path:
+    """Two markers, measured, which are not those of the design."""
+    path = tmp_path / "measured.csv"
+    path.write_text("x_mm,y_mm,u_mm,v_mm\n20,-1,-0.5,-5\n85,-1,-2,-0.5\n")
+    return path
+
+
+@pytest.fixture
+def job(tmp_path: Path, measured: Path, without_pictures: None) -> Callable[..., Job]:
+    """`job(solver, ...)`: a small job with those solvers, changed by keyword."""
+
+    def make(*solvers: Scripted, **changes: Any) -> Job:
+        made = Job(Design(), solvers, mesh=COARSE, measurements=measured, out=tmp_path / "out" / "run")
+        return replace(made, **changes)
+
+    return make
+
+
+def compare(job: Job) -> Outcome:
+    with Stages(Console(file=StringIO()), quiet=True) as stages:
+        return run(job, stages)
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()
+    }
+
+
+def strictly(path: Path) -> dict[str, Any]:
+    """JSON without the NaN and Infinity that Python would let pass."""
+
+    def refuse(constant: str) -> None:
+        raise AssertionError(f"{path.name} holds {constant}")
+
+    return json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
+
+
+def without_times(metrics: dict[str, Any]) -> dict[str, Any]:
+    copy = json.loads(json.dumps(metrics))
+    for solver in copy["solvers"].values():
+        del solver["seconds"], solver["stats"]["seconds"]
+    return copy
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+# What a whole run writes
+
+
+def test_every_file_of_the_design_is_there(finished):
+    pictures = (
+        "design energy marker_errors mesh overlay strain_principal strain_xx strain_xy strain_yy von_mises"
+    )
+    assert sorted(files(finished)) == sorted(
+        ["report.html", "metrics.json", "run.json", "markers.csv", "summary.csv", "observations.csv"]
+        + [f"figures/{name}.png" for name in pictures.split()]
+        + ["fields/fem.vtu", "fields/fem-nonlinear.vtu", "solutions/fem.npz", "solutions/fem-nonlinear.npz"]
+    )
+    assert not finished.with_name("run.partial").exists()
+
+
+def test_run_json_has_the_digest_of_every_other_file(finished):
+    digests = {name: hashlib.sha256(content).hexdigest() for name, content in files(finished).items()}
+    del digests["run.json"]
+    assert strictly(finished / "run.json")["files_sha256"] == digests
+
+
+def test_run_json_tells_where_the_result_comes_from(finished):
+    told = strictly(finished / "run.json")
+    mesh = finger_mesh(Design(), settings=COARSE)
+    assert told["design_sha256"] == Design().digest
+    assert told["mesh_sha256"] == mesh.digest
+    assert told["problem_sha256"] == Problem(mesh).digest
+    assert told["measurements_sha256"] == told["files_sha256"]["observations.csv"]
+    assert told["mesh"] == COARSE.model_dump()
+    assert told["solvers"]["fem"] == {"degree": 2}
+    assert told["versions"] == package_versions()
+    assert told["machine"]["cores"] > 0
+    assert list(told["seconds"]) == ["mesh", "measurements", "fem", "fem-nonlinear", "pictures"]
+    assert datetime.fromisoformat(told["started"]).tzinfo is not None
+
+
+def test_metrics_of_the_default_finger(finished):
+    """At the markers `fem` is about 1.5 mm and 0.4 mm from a finite-strain run."""
+    told = strictly(finished / "metrics.json")
+    assert told["measurements"]["source"] == "simulated"
+    assert told["measurements"]["markers"] == 9
+    assert told["reference"] == "fem"
+    assert told["solvers"]["fem"]["markers"]["mae_u"] == pytest.approx(1.5, abs=0.1)
+    assert told["solvers"]["fem"]["markers"]["mae_v"] == pytest.approx(0.4, abs=0.05)
+    assert told["solvers"]["fem"]["to_reference"]["rel_l2_displacement"] == 0
+    assert 0.05 < told["solvers"]["fem-nonlinear"]["to_reference"]["rel_l2_displacement"] < 0.5
+
+
+def test_tables_agree_with_metrics(finished):
+    solvers = strictly(finished / "metrics.json")["solvers"]
+    for marker, row in enumerate(rows(finished / "markers.csv")):
+        for name, told in solvers.items():
+            assert float(row[f"{name}_ae_u_mm"]) == told["markers"]["ae_u"][marker]
+            assert float(row[f"{name}_ae_v_mm"]) == told["markers"]["ae_v"][marker]
+    summary = {row["solver"]: row for row in rows(finished / "summary.csv")}
+    assert list(summary) == list(solvers)
+    for name, told in solvers.items():
+        for key in ("mae_u", "mae_v", "mae_sum", "mae_rss"):
+            assert float(summary[name][f"{key}_mm"]) == told["markers"][key]
+        assert float(summary[name]["energy_N_mm_per_mm"]) == told["energy"]
+        assert (
+            float(summary[name]["to_reference_displacement_rel_l2"])
+            == (told["to_reference"]["rel_l2_displacement"])
+        )
+
+
+@pytest.mark.parametrize("solver", ["fem", "fem-nonlinear"])
+def test_fields_can_be_read_elsewhere(finished, solver):
+    """The largest displacement of the VTU file is that of the solution at the mesh's nodes."""
+    grid = pyvista.read(finished / "fields" / f"{solver}.vtu")
+    mesh = finger_mesh(Design(), settings=COARSE)
+    assert (grid.n_points, grid.n_cells) == (len(mesh.points), len(mesh.triangles))
+    with np.load(finished / "solutions" / f"{solver}.npz") as archive:
+        expected = np.abs(archive["node_displacement"]).max()
+    assert np.abs(grid.point_data["displacement_mm"]).max() == pytest.approx(expected)
+    assert grid.cell_data["von_mises_MPa"].min() > 0
+
+
+def test_the_report_holds_the_numbers(finished):
+    report = (finished / "report.html").read_text(encoding="utf-8")
+    for told in strictly(finished / "metrics.json")["solvers"].values():
+        for key in ("mae_u", "mae_v", "mae_sum", "mae_rss"):
+            assert f"{told['markers'][key]:.3f}" in report
+    assert report.count("data:image/png;base64,") == len(list((finished / "figures").iterdir()))
+    assert strictly(finished / "run.json")["mesh_sha256"] in report
+    assert "Simulated by fem-nonlinear" in report
+
+
+def test_the_observations_of_a_run_give_the_same_metrics_again(finished, job):
+    """They stay simulated."""
+    again = job(FemSolver(), measurements=finished / "observations.csv")
+    before, after = strictly(finished / "metrics.json"), compare(again).metrics
+    assert after["measurements"] == before["measurements"]
+    assert after["solvers"]["fem"]["markers"] == before["solvers"]["fem"]["markers"]
+
+
+def test_without_the_mark_they_count_as_measured(finished, tmp_path, job):
+    bare = tmp_path / "bare.csv"
+    bare.write_text((finished / "observations.csv").read_text().split("\n", 2)[2])
+    again = job(FemSolver(), measurements=bare)
+    outcome = compare(again)
+    assert outcome.metrics["measurements"]["source"] == "measured"
+    assert {row["observations"] for row in rows(again.out / "markers.csv")} == {"measured"}
+    assert "simulated" not in (again.out / "observations.csv").read_text()
+    assert "imulated" not in (again.out / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_marker_that_was_not_seen(tmp_path):
+    """Its errors are null and empty; every picture is drawn; the markers are not those of the design."""
+    path = tmp_path / "measured.csv"
+    path.write_text("x_mm,y_mm,u_mm,v_mm,visible\n20,-1,-0.5,-5,1\n50,-1,,,0\n85,-1,-2,-0.5,1\n")
+    out = tmp_path / "run"
+    compare(Job(Design(), [FemSolver()], mesh=COARSE, measurements=path, out=out))
+    told = strictly(out / "metrics.json")
+    assert told["measurements"]["markers"] == 2
+    errors = told["solvers"]["fem"]["markers"]
+    assert [value is None for value in errors["ae_u"]] == [False, True, False]
+    assert [value is None for value in errors["ae_v"]] == [False, True, False]
+    assert errors["mae_u"] == pytest.approx((errors["ae_u"][0] + errors["ae_u"][2]) / 2)
+    hidden = rows(out / "markers.csv")[1]
+    assert hidden["visible"] == "0"
+    assert [hidden[name] for name in ("observed_u_mm", "fem_ae_u_mm", "fem_ae_v_mm")] == [""] * 3
+    assert "2 of 3 markers seen" in (out / "report.html").read_text(encoding="utf-8")
+    assert read_measurements(out / "observations.csv").visible.tolist() == [True, False, True]
+
+
+# Stopped halfway
+
+STOPS = [
+    pytest.param(RuntimeError("a fault of the solver"), id="error"),
+    pytest.param(UserError("a problem that it cannot solve"), id="refusal"),
+    pytest.param(KeyboardInterrupt(), id="Ctrl-C"),
+]
+
+
+@pytest.mark.parametrize("stop", STOPS)
+def test_a_run_that_is_stopped_leaves_the_last_result_and_what_it_finished(job, stop):
+    complete = job(Scripted("old"))
+    compare(complete)
+    before = files(complete.out)
+    with pytest.raises(type(stop)):
+        compare(job(Scripted("first"), Scripted("second", stop)))
+    assert files(complete.out) == before
+    kept = complete.out.with_name("run.partial")
+    assert [path.name for path in (kept / "solutions").iterdir()] == ["first.npz"]
+
+
+@pytest.mark.parametrize("stop", STOPS)
+def test_a_run_that_is_stopped_before_it_finished_anything_leaves_nothing(job, tmp_path, stop):
+    with pytest.raises(type(stop)):
+        compare(job(Scripted("first", stop)))
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_resumed_run_does_not_solve_again_and_gives_the_same(job, tmp_path):
+    whole = compare(job(Scripted("first"), Scripted("second"), out=tmp_path / "whole"))
+    first, second = Scripted("first"), Scripted("second", KeyboardInterrupt())
+    with pytest.raises(KeyboardInterrupt):
+        compare(job(first, second))
+    second.end = None
+    resumed = compare(job(first, second, resume=True))
+    assert (first.calls, second.calls) == (1, 2)
+    assert without_times(resumed.metrics) == without_times(whole.metrics)
+    assert sorted(files(tmp_path / "out" / "run")) == sorted(files(tmp_path / "whole"))
+    for name in ("markers.csv", "observations.csv", "fields/first.vtu"):
+        assert (tmp_path / "out" / "run" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+def test_a_resumed_run_adds_a_solver_to_a_finished_one(job):
+    first, second = Scripted("first"), Scripted("second")
+    compare(job(first))
+    outcome = compare(job(first, second, resume=True))
+    assert (first.calls, second.calls) == (1, 1)
+    assert list(outcome.metrics["solvers"]) == ["first", "second"]
+
+
+def test_a_solver_that_is_not_asked_for_again_is_gone(job):
+    compare(job(Scripted("first"), Scripted("second")))
+    again = job(Scripted("first"), resume=True)
+    compare(again)
+    assert [path.name for path in (again.out / "solutions").iterdir()] == ["first.npz"]
+
+
+def test_without_resume_everything_is_solved_again(job):
+    first = Scripted("first")
+    compare(job(first))
+    compare(job(first))
+    assert first.calls == 2
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"design": Design(front_thickness=2.2)},
+        {"mesh": MeshSettings(size=1.5)},
+        {"material": Material(young=5.0)},
+        {"load": Load(displacement=(0.0, -9.0))},
+        {"load": Load(kind="point")},
+    ],
+    ids=["design", "mesh", "material", "stroke", "kind of load"],
+)
+def test_another_job_is_not_resumed_from(job, changes):
+    first = Scripted("first")
+    compare(job(first))
+    compare(job(first, resume=True, **changes))
+    assert first.calls == 2
+
+
+def test_other_settings_are_not_resumed_from(job):
+    compare(job(Scripted("first")))
+    other = Scripted("first", degree=2)
+    compare(job(other, resume=True))
+    assert other.calls == 1
+
+
+def test_other_markers_are_not_resumed_from(job, measured):
+    first = Scripted("first")
+    compare(job(first))
+    measured.write_text("x_mm,y_mm,u_mm,v_mm\n30,-1,0,-5\n")
+    assert compare(job(first, resume=True)).evaluations[0].marker_displacement.shape == (1, 2)
+    assert first.calls == 2
+
+
+@pytest.mark.parametrize("what", ["package_versions", "sources_digest"])
+def test_another_version_of_the_code_is_not_resumed_from(job, monkeypatch, what):
+    first = Scripted("first")
+    compare(job(first))
+    monkeypatch.setattr(f"compare.pipeline.{what}", lambda *_: {"other": "1"})
+    compare(job(first, resume=True))
+    assert first.calls == 2
+
+
+def test_other_measured_displacements_need_no_new_solution(job, measured):
+    first = Scripted("first")
+    before = compare(job(first)).metrics["solvers"]["first"]
+    measured.write_text(measured.read_text().replace("-0.5,-5", "-0.6,-5"))
+    after = compare(job(first, resume=True)).metrics["solvers"]["first"]
+    assert first.calls == 1
+    assert after["markers"]["mae_u"] != before["markers"]["mae_u"]
+
+
+# Solvers from elsewhere
+
+
+def test_a_solver_that_hands_its_work_on_keeps_its_own_name(job):
+    """Two solvers that both return `fem` would else be one row."""
+    outcome = compare(job(Scripted("first"), Scripted("second")))
+    assert list(outcome.metrics["solvers"]) == ["first", "second"]
+
+
+def test_numbers_of_numpy_are_no_obstacle(job):
+    def with_numpy(solution: Solution) -> Solution:
+        status = Status(np.bool_(True), "solved")
+        stats = {"seconds": np.float32(0.5), "unknowns": np.int64(7)}
+        return replace(solution, status=status, stats=stats, energy=np.float32(1.5))
+
+    asked = job(Scripted("first", with_numpy))
+    compare(asked)
+    told = strictly(asked.out / "metrics.json")["solvers"]["first"]
+    assert (told["status"], told["energy"], told["stats"]) == (
+        "converged",
+        1.5,
+        {"seconds": 0.5, "unknowns": 7},
+    )
+
+
+def test_what_is_not_a_number_is_null(job):
+    asked = job(Scripted("first", lambda solution: replace(solution, reaction=np.array([np.nan, np.inf]))))
+    compare(asked)
+    assert strictly(asked.out / "metrics.json")["solvers"]["first"]["reaction"] == [None, None]
+
+
+def test_a_solver_that_did_not_converge_is_marked(job):
+    message = "stopped after 20 steps; try more"
+    asked = job(Scripted("first", lambda solution: replace(solution, status=Status(False, message))))
+    compare(asked)
+    told = strictly(asked.out / "metrics.json")["solvers"]["first"]
+    assert (told["status"], told["message"]) == ("not converged", message)
+    assert rows(asked.out / "summary.csv")[0]["converged"] == "0"
+    assert "Stopped after 20 steps; try more" in (asked.out / "report.html").read_text(encoding="utf-8")
+
+
+# Refused before anything is computed
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"solvers": []}, "no solver was asked for"),
+        ({"solvers": [Scripted("a"), Scripted("a")]}, "named twice: a, a"),
+        ({"reference": "fem"}, "the reference 'fem' is not among the solvers first"),
+        ({"load": Load(kind="patch")}, "first takes the loads mean, point, not 'patch'"),
+    ],
+)
+def test_a_job_that_cannot_be_done(job, tmp_path, changes, message):
+    first = Scripted("first")
+    with pytest.raises(UserError, match=message):
+        compare(job(first, **changes))
+    assert not (tmp_path / "out").exists()
+    assert first.calls == 0
+
+
+def test_markers_outside_the_finger(job, tmp_path, measured):
+    measured.write_text("x_mm,y_mm,u_mm,v_mm\n20,-1,0,0\n10,-10,0,0\n")  # in the first cavity
+    with pytest.raises(
+        UserError, match=r"not of this finger: 1 of 2 points .* \(10, -10\) mm.* before loading"
+    ):
+        compare(job(Scripted("first")))
+    assert not (tmp_path / "out").exists()
