@@ -68,12 +68,15 @@ class Evaluation:
         """Sample a solution on the nodes and quadrature points of `mesh` and at the markers.
 
         Args:
-            solution: What to sample.
+            solution: What to sample; it may have been found on another mesh of the same body.
             mesh: The shared mesh.
             markers: Marker positions, shape (m, 2), mm; those of the mesh if None.
         """
         quadrature = body_quadrature(mesh, QUADRATURE_DEGREE)
-        state = solution.state(quadrature.location)
+        inside, nodes = quadrature.location, mesh.at_nodes()
+        if solution.problem.mesh is not mesh:  # a location belongs to its mesh
+            inside, nodes = (solution.problem.mesh.locate(place.points) for place in (inside, nodes))
+        state = solution.state(inside)
         return cls(
             solver=solution.solver,
             converged=bool(solution.status.converged),
@@ -83,9 +86,9 @@ class Evaluation:
             stats={name: _plain(value) for name, value in solution.stats.items()},
             history={name: np.asarray(column) for name, column in solution.history.items()},
             marker_displacement=solution.displacement(mesh.markers if markers is None else markers),
-            node_displacement=solution.displacement(mesh.at_nodes()),
+            node_displacement=solution.displacement(nodes),
             weights=quadrature.weights,
-            displacement=solution.displacement(quadrature.location),
+            displacement=solution.displacement(inside),
             strain=state.strain,
             stress=state.stress,
             stress_zz=state.stress_zz,

@@ -6,6 +6,9 @@ import pytest
 
 from compare.evaluation import Evaluation
 from geometry.mesh import TriangleMesh
+from solvers.fem.lagrange import LagrangeField, LagrangeSpace
+from solvers.problem import Problem
+from solvers.solution import Solution, Status
 
 
 def test_it_samples_the_nodes_the_markers_and_three_points_a_triangle(
@@ -53,3 +56,22 @@ def test_another_key_is_another_result(pinn: Evaluation, tmp_path: Path) -> None
 
 def test_a_missing_file_is_no_result(tmp_path: Path) -> None:
     assert Evaluation.load(tmp_path / "none.npz", "digest") is None
+
+
+def test_a_solution_found_on_another_mesh_is_sampled_at_the_same_places(mesh: TriangleMesh) -> None:
+    """Where an element has another number there, the values must still be those of the place."""
+    own, other = (
+        Solution(
+            solver="linear",
+            problem=Problem(shared),
+            field=LagrangeField(LagrangeSpace(shared, 1), shared.points * [0.1, -0.2] + [0.0, 0.3]),
+            energy=1.0,
+            reaction=np.zeros(2),
+            status=Status(True, "a closed form"),
+            stats={},
+        )
+        for shared in (mesh, mesh.permuted(3))
+    )
+    expected, sampled = (Evaluation.of(solution, mesh) for solution in (own, other))
+    for name in ("marker_displacement", "node_displacement", "displacement", "stress"):
+        np.testing.assert_allclose(getattr(sampled, name), getattr(expected, name), atol=1e-12, err_msg=name)
