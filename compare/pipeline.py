@@ -210,7 +210,7 @@ def _key(solver: Solver, problem: Problem, observations: Observations) -> str:
         solver.name,
         solver.settings(),
         package_versions(),
-        sources_digest(["geometry", "solvers", package]),
+        sources_digest(["compare.evaluation", "geometry", "solvers", package]),
     ]
     text = json.dumps(parts, sort_keys=True, default=str)
     return sha256((text + problem.digest).encode() + observations.points.tobytes()).hexdigest()

@@ -43,8 +43,8 @@ class PinnStdSolver:
     """
 
     units: int = 500
-    rounds: int = 4
-    tolerance: float = 0.01
+    rounds: int = 6
+    tolerance: float = 0.005
     gate_width: float = 3.0
     width_ratio: float = 1.0
     encoder_slope: float = 0.3
