@@ -1,0 +1,74 @@
+"""Progress on a terminal and in a log."""
+
+from io import StringIO
+
+import pytest
+from rich.console import Console
+
+from compare.stages import Stages
+
+
+def console(*, terminal: bool) -> Console:
+    return Console(file=StringIO(), force_terminal=terminal, width=100, color_system=None)
+
+
+def shown(where: Console) -> str:
+    assert isinstance(where.file, StringIO)
+    return where.file.getvalue()
+
+
+def two_stages(stages: Stages) -> None:
+    with stages:
+        with stages.stage("mesh"):
+            pass
+        with stages.stage("fem") as progress:
+            progress(0.5, "half [of] the load")
+            progress(1.0, "all [of] the load")
+
+
+def test_a_log_has_a_line_a_stage_with_its_last_note():
+    log = console(terminal=False)
+    two_stages(Stages(log))
+    assert shown(log) == "mesh: 0.0 s\nfem: 0.0 s, all [of] the load\n"
+
+
+def test_a_long_note_stays_one_line_in_a_log():
+    log = console(terminal=False)
+    with Stages(log) as stages, stages.stage("fem") as progress:
+        progress(1.0, "word " * 50)
+    assert shown(log).count("\n") == 1
+
+
+def test_a_terminal_has_a_bar_a_stage():
+    terminal = console(terminal=True)
+    two_stages(Stages(terminal))
+    lines = shown(terminal).splitlines()
+    assert any(line.startswith("mesh") and "100%" in line for line in lines)
+    assert any(line.startswith("fem ") and "100%" in line and "all [of] the load" in line for line in lines)
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_quiet_shows_nothing(terminal):
+    quiet = console(terminal=terminal)
+    two_stages(Stages(quiet, quiet=True))
+    assert shown(quiet) == ""
+
+
+def fail_halfway(stages: Stages) -> None:
+    with stages, stages.stage("fem"):
+        raise RuntimeError
+
+
+def test_a_stage_that_fails_is_not_said_to_be_done():
+    log = console(terminal=False)
+    stages = Stages(log)
+    with pytest.raises(RuntimeError):
+        fail_halfway(stages)
+    assert (shown(log), stages.seconds) == ("", {})
+
+
+def test_the_time_of_every_stage_is_kept():
+    stages = Stages(console(terminal=False))
+    two_stages(stages)
+    assert list(stages.seconds) == ["mesh", "fem"]
+    assert all(0 <= seconds < 1 for seconds in stages.seconds.values())
