@@ -136,6 +136,14 @@ def run(job: Job, stages: Stages) -> Outcome:
                 "mesh": job.mesh.model_dump(),
                 "measurements_sha256": file_digest(folder / "observations.csv"),
                 "solvers": {solver.name: solver.settings() for solver in job.solvers},
+                "seed": {
+                    solver.name: solver.settings()["seed"]
+                    for solver in job.solvers
+                    if "seed" in solver.settings()
+                },
+                "device": {
+                    evaluation.solver: evaluation.stats.get("device", "cpu") for evaluation in evaluations
+                },
                 "versions": package_versions(),
                 "machine": machine(),
             }

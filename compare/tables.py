@@ -56,7 +56,7 @@ def write_csv(path: Path, rows: Sequence[dict[str, Cell]]) -> None:
 def mae_table(evaluations: Sequence[Evaluation], observations: Observations, reference: Evaluation) -> Table:
     """Mean absolute errors at the markers and the distance from the reference, for the terminal."""
     seen, count = int(observations.visible.sum()), len(observations.visible)
-    markers = f"{count} markers" if seen == count else f"{seen} of {count} markers"
+    markers = f"{count} marker{'s' * (count > 1)}" if seen == count else f"{seen} of {count} markers"
     table = Table(
         title=f"Mean absolute error at {markers}, mm ({observations.label} displacements)",
         caption=(

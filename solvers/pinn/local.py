@@ -68,6 +68,8 @@ class PinnLocalSolver:
     loads: ClassVar[tuple[str, ...]] = ("mean", "point")
 
     def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise UserError(f"pinn-local: seed must be zero or more, got {self.seed}")
         for setting in ("wall_spacing", "corner_spacing", "slope", "tolerance", "base_length"):
             if not getattr(self, setting) > 0:
                 raise UserError(f"pinn-local: {setting} must be positive, got {getattr(self, setting)}")

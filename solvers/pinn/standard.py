@@ -56,6 +56,8 @@ class PinnStdSolver:
     loads: ClassVar[tuple[str, ...]] = ("mean", "point")
 
     def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise UserError(f"pinn-std: seed must be zero or more, got {self.seed}")
         if self.units < 1 or self.rounds < 2:
             raise UserError(
                 "pinn-std needs at least 1 unit a round and 2 rounds, to see whether it has converged"

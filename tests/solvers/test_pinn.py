@@ -131,6 +131,7 @@ def test_point_load_of_the_paper_is_met(coarse_mesh):
     [
         ({"rounds": 1}, "2 rounds"),  # one round cannot be compared with the one before
         ({"units": 0}, "at least 1 unit"),
+        ({"seed": -1}, "seed must be zero or more"),  # NumPy's generators refuse it with a traceback
         ({"gate_width": -1.0}, "gate_width must be positive, got -1"),
     ],
 )

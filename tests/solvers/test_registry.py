@@ -16,11 +16,13 @@ def test_settings_are_converted_from_text():
         ("fen", {}, r"no solver is called 'fen'; did you mean 'fem'\? \(there are: fem, "),
         ("comsol", {}, "no solver is called 'comsol' "),  # nothing near: no guess
         ("fem", {"order": 2}, "fem has no setting 'order'; it has degree"),
+        ("skfem-p1", {"mesh": 2}, "solver 'skfem-p1' cannot be made with "),  # no dataclass
         ("fem", {"degree": "two"}, "fem: degree = 'two': input should be a valid integer"),
         ("pinn-std", {"units": 1.5}, "pinn-std: units = 1.5: "),
     ],
 )
-def test_mistakes_are_one_line(name, settings, message):
+def test_mistakes_are_one_line(name, settings, message, plugin_folder, monkeypatch):
+    monkeypatch.syspath_prepend(str(plugin_folder))
     with pytest.raises(UserError, match=message):
         make_solver(name, **settings)
 
