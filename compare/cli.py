@@ -90,7 +90,9 @@ def compare(
         with Stages(Console(stderr=True), quiet=quiet or json_) as stages:
             outcome = run(job, stages)
     except KeyboardInterrupt:
-        raise KeyboardInterrupt("what was finished is kept; --resume goes on from it") from None
+        kept = job.out.with_name(f"{job.out.name}.partial").exists()
+        note = "what was finished is kept; --resume goes on from it" if kept else "nothing was finished yet"
+        raise KeyboardInterrupt(note) from None
     if json_:
         print((job.out / "metrics.json").read_text(encoding="utf-8"), end="")
     elif not quiet:

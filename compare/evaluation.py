@@ -29,6 +29,7 @@ class Evaluation:
 
     Attributes:
         solver: Name of the solver.
+        law: Material law that it had: "linear" (strain is infinitesimal) or "neo-hookean" (Green-Lagrange).
         converged: Whether the solver's own criterion was met.
         message: The solver's sentence on how it ended.
         energy: Elastic energy per unit depth, N mm / mm.
@@ -47,6 +48,7 @@ class Evaluation:
     """
 
     solver: str
+    law: str
     converged: bool
     message: str
     energy: float
@@ -79,6 +81,7 @@ class Evaluation:
         state = solution.state(inside)
         return cls(
             solver=solution.solver,
+            law=solution.problem.material.law,
             converged=bool(solution.status.converged),
             message=solution.status.message,
             energy=float(solution.energy),

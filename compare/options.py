@@ -37,7 +37,7 @@ class FingerOptions:
         ),
     ] = ()
     mesh_size: Annotated[
-        float, Parameter(help="Largest element, mm; thin walls get at least three across.")
+        float, Parameter(help="Elements in walls and ribs, mm; up to 4 times larger in the tip.")
     ] = 0.25
 
     def read(self) -> tuple[Design, MeshSettings]:

@@ -134,6 +134,8 @@ def run(job: Job, stages: Stages) -> Outcome:
                 "mesh_sha256": mesh.digest,
                 "problem_sha256": problem.digest,
                 "mesh": job.mesh.model_dump(),
+                "material": job.material.model_dump(),
+                "load": job.load.model_dump(),
                 "measurements_sha256": file_digest(folder / "observations.csv"),
                 "solvers": {solver.name: solver.settings() for solver in job.solvers},
                 "seed": {

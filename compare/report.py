@@ -94,7 +94,9 @@ def render(content: ReportContent) -> str:
         entries=[_entry(evaluation, content) for evaluation in content.evaluations],
         design_rows=text.design_rows(content.design),
         paper_rows=[(symbol, value) for _, symbol, value in text.design_rows(content.design) if symbol],
-        material_rows=text.material_rows(content.material),
+        material_rows=text.material_rows(
+            content.material, {evaluation.solver: evaluation.law for evaluation in content.evaluations}
+        ),
         load_sentence=text.load_sentence(content.load, content.design),
         source=text.source_sentence(content.observations),
         provenance=text.grouped(content.provenance),

@@ -30,11 +30,18 @@ def _value(value: object, unit: str) -> str:
     return number + {"": "", "deg": "°"}.get(unit, f" {unit}")
 
 
-def material_rows(material: Material) -> list[tuple[str, str]]:
-    """The material in words."""
-    law = {"linear": "linear elastic (Hooke)", "neo-hookean": "neo-Hookean, finite strain"}[material.law]
-    constants = f"E = {material.young:g} MPa, Poisson’s ratio {material.poisson:g}"
-    return [("Material", f"{law}, plane {material.plane}; {constants}")]
+LAWS = {
+    "linear": "linear elastic (Hooke), infinitesimal strain",
+    "neo-hookean": "neo-Hookean, finite strain: the strain is Green-Lagrange, the stress Cauchy",
+}
+
+
+def material_rows(material: Material, laws: Mapping[str, str]) -> list[tuple[str, str]]:
+    """The material in words, and the law of each solver where they differ."""
+    constants = f"plane {material.plane}; E = {material.young:g} MPa, Poisson’s ratio {material.poisson:g}"
+    if len(set(laws.values())) == 1:
+        return [("Material", f"{LAWS[next(iter(laws.values()))]}; {constants}")]
+    return [("Material", constants), *((f"Law of {solver}", LAWS[law]) for solver, law in laws.items())]
 
 
 def load_sentence(load: Load, design: Parameters) -> str:

@@ -57,6 +57,7 @@ def _solver(
     differences = reference_differences(evaluation, reference)
     means = {name: getattr(errors, name) for name in ("mae_u", "mae_v", "mae_sum", "mae_rss")}
     return {
+        "law": evaluation.law,
         "status": "converged" if evaluation.converged else "not converged",
         "message": evaluation.message,
         "seconds": float(evaluation.stats.get("seconds", math.nan)),

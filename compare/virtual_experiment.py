@@ -22,7 +22,8 @@ from solvers.solver import Progress, Solver, silent
 from vision.measurements import read_measurements, write_measurements
 
 SOURCE = (
-    "simulated by fem-nonlinear (neo-Hookean, finite strain, sliding contact patch); no camera was involved"
+    "simulated by fem-nonlinear (neo-Hookean, finite strain, plane strain, sliding contact patch); "
+    "no camera was involved"
 )
 """What is said of the numbers wherever they appear."""
 

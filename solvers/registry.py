@@ -47,10 +47,13 @@ def make_solver(name: str, **settings: Any) -> Solver:
             factory = found[0].load()
         except Exception as error:
             raise UserError(f"solver {name!r} ({found[0].value}) cannot be loaded: {error}") from error
+    typed = _typed(name, factory, settings)
     try:
-        solver = factory(**_typed(name, factory, settings))
-    except TypeError as error:  # a factory that is no dataclass says itself which settings it has
-        raise UserError(f"solver {name!r} cannot be made with {dict(settings)}: {error}") from error
+        solver = factory(**typed)
+    except UserError:
+        raise
+    except Exception as error:  # whatever the constructor of another package raises
+        raise UserError(f"solver {name!r} cannot be made with {typed}: {error}") from error
     if not isinstance(solver, Solver):
         raise UserError(
             f"solver {name!r} does not have the interface: "

@@ -127,7 +127,7 @@ def draw_field(
             values = quantity.values(evaluation)
             axes = panel(row, 0, scale, values, evaluation)
             axes.set_title(solver_label(evaluation), size=8.5, pad=2, weight="bold")
-            _remark(axes, f"max {size} = {np.abs(values).max():.3g} {quantity.unit}")
+            _remark(axes, f"largest mean of a triangle: {size} = {np.abs(values).max():.3g} {quantity.unit}")
             if evaluation is not reference:
                 axes = panel(row, 1, differences, values - base, evaluation)
                 norm = field_difference(values, base, reference.weights).rel_l2

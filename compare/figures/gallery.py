@@ -89,6 +89,11 @@ class Gallery:
                 evaluations=self.evaluations,
                 reference=self.reference,
             )
+        mixed = (
+            " The solvers have different laws: strain is Green-Lagrange where it is finite, stress is Cauchy."
+            if len({evaluation.law for evaluation in self.evaluations}) > 1
+            else ""
+        )
         beside = (
             f" Right: the field minus that of {solver_label(self.reference)}, point by point; the scale ends "
             f"at the same share of the area of the solver that is farthest from it."
@@ -100,7 +105,8 @@ class Gallery:
             quantity.title,
             f"{quantity.title} of every solver on the undeformed body, each triangle in the colour of its "
             f"mean. One scale for all: {PERCENT:g} % of the area of {solver_label(self.reference)} lie "
-            f"within it, the peaks at the corners take the end colours.{beside}",
+            f"within it, the peaks at the corners take the end colours. At a sharp corner the field has no "
+            f"bound: the largest mean of a triangle, printed beside, grows with refinement.{beside}{mixed}",
         )
 
     def energy(self) -> Figure | None:

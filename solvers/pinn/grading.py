@@ -85,7 +85,7 @@ def graded_quadrature(triangles: FloatArray, degree: int) -> tuple[FloatArray, F
 def spread_points(triangles: FloatArray, mesh: TriangleMesh, spacing: Spacing, share: float) -> FloatArray:
     """Corners of triangles (t, 3, 2), thinned to at least `share` of the spacing apart, shape (c, 2), mm.
 
-    Points on the boundary are taken before those inside, and near singular points before those far away.
+    The mesh's boundary nodes are taken before all others, and near singular points before those far away.
     """
     points = np.unique(np.round(triangles.reshape(-1, 2), 9), axis=0)
     distance, _ = cKDTree(spacing.singular).query(points)

@@ -49,6 +49,8 @@ class PinnLocalSolver:
         slope: Slope of the ridges per radius.
         coarser: How many times larger the spacings of the first level are.
         tolerance: Relative L2 change of the displacement between the levels below which it has converged.
+        thinning: Smallest distance of two windows in spacings.
+        cell: Longest edge of a quadrature cell in spacings.
         base_length: Distance from the base, mm, at which the hard condition's factor is one half.
         seed: Of the random numbers.
     """
@@ -61,6 +63,8 @@ class PinnLocalSolver:
     slope: float = 0.7
     coarser: float = 1.5
     tolerance: float = 0.005
+    thinning: float = 0.75
+    cell: float = 0.6
     base_length: float = 5.0
     seed: int = 0
     name: ClassVar[str] = "pinn-local"
@@ -70,7 +74,8 @@ class PinnLocalSolver:
     def __post_init__(self) -> None:
         if self.seed < 0:
             raise UserError(f"pinn-local: seed must be zero or more, got {self.seed}")
-        for setting in ("wall_spacing", "corner_spacing", "slope", "tolerance", "base_length"):
+        positive = ("wall_spacing", "corner_spacing", "slope", "tolerance", "thinning", "cell", "base_length")
+        for setting in positive:
             if not getattr(self, setting) > 0:
                 raise UserError(f"pinn-local: {setting} must be positive, got {getattr(self, setting)}")
         if self.ridges < 2 or self.radius < 1.2 or self.coarser <= 1 or self.growth < 0:
@@ -142,8 +147,8 @@ class _Level:
             corner=settings.corner_spacing * unit,
             growth=settings.growth * scale,
         )
-        triangles = graded_triangles(mesh, spacing, 0.6)
-        centres = spread_points(triangles, mesh, spacing, 0.75)
+        triangles = graded_triangles(mesh, spacing, settings.cell)
+        centres = spread_points(triangles, mesh, spacing, settings.thinning)
         units = LocalUnits.around(
             centres,
             settings.radius * spacing.at(centres),

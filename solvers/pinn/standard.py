@@ -1,4 +1,4 @@
-"""`pinn-std`: the paper's kind of network, without measurements, brought to least potential energy."""
+"""`pinn-std`: the paper's gated architecture with random hidden weights, at least potential energy."""
 
 import time
 from dataclasses import asdict, dataclass
@@ -33,7 +33,8 @@ class PinnStdSolver:
     Attributes:
         units: Hidden units added in a round.
         rounds: The most rounds.
-        tolerance: Relative L2 change of the displacement in a round below which training has converged.
+        tolerance: Relative L2 change of the displacement in a round below which it has settled; the error
+            is a few times larger, and that of the stress larger still.
         gate_width: Half width of the region where a unit's gate is open in the first round, mm.
         width_ratio: By how much that is multiplied from round to round.
         encoder_slope: Slope of the encoders, 1/mm.
@@ -78,7 +79,7 @@ class PinnStdSolver:
         return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
-        """Train the network on the linear problem; see `Solver`."""
+        """Solve the linear problem; see `Solver`."""
         check_problem(self, problem)
         started = time.perf_counter()
         rng = np.random.default_rng(self.seed)
@@ -137,7 +138,8 @@ class PinnStdSolver:
         converged = change <= self.tolerance
         message = (
             f"the last {self.units} units changed the displacement by {change:.2%} "
-            f"(criterion {self.tolerance:.2%}) and the stress, in the energy norm, by {history[-1, 3]:.0%}"
+            f"(criterion {self.tolerance:.2%}) and the stress, in the energy norm, by {history[-1, 3]:.0%}; "
+            "the errors themselves are a few times larger than these changes"
         )
         if not converged:
             message += "; take more rounds or more units"
@@ -152,7 +154,7 @@ class PinnStdSolver:
                 "seconds": seconds,
                 "unknowns": 2 * field.trial.units.count,
                 "units": field.trial.units.count,
-                "quadrature_points": 3 * len(problem.mesh.triangles),
+                "quadrature_points": len(body_quadrature(problem.mesh).weights),
                 "regularisation": best.regularisation,
                 "seed": self.seed,
                 "device": "cpu",

@@ -17,6 +17,7 @@ ERRORS = {"mae_u": Real, "mae_v": Real, "mae_sum": Real, "mae_rss": Real}
 DIFFERENCE = {"rel_l2": Real, "mean": Real, "p95": Real}
 COMPONENTS = {"xx": DIFFERENCE, "yy": DIFFERENCE, "xy": DIFFERENCE}
 SOLVER = {
+    "law": str,
     "status": str,
     "message": str,
     "seconds": Real,

@@ -10,6 +10,7 @@ from geometry.errors import OutsideBodyError, UserError
 from geometry.mesh import TriangleMesh
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver, solver_names, usable_solvers
+from solvers.solution import State
 from solvers.solver import Solver, with_law
 from tests.solvers.conftest import bar_mesh
 
@@ -151,6 +152,37 @@ def test_a_load_that_the_solver_does_not_have_is_refused(solver, coarse_mesh):
     for kind in missing:
         with pytest.raises(UserError, match=f"{solver.name} takes the loads"):
             solver.solve(replace(problem_of(solver, coarse_mesh), load=Load(kind=kind)))
+
+
+def test_patch_test(solver):
+    """A bar without lateral contraction that is pulled along: its mean strain is that of the force.
+
+    The load pulls at the end's top only, so the strain is averaged over sections away from both ends, where
+    bending cancels.
+    """
+    mesh = bar_mesh(24.0, 2.0, 48, 4, contact=(23.0, 24.0))
+    material = with_law(Material(poisson=0.0), solver)
+    solution = solver.solve(Problem(mesh, material, Load(displacement=(0.024, None))))
+    location = mesh.at_centroids()
+    middle = (location.points[:, 0] > 4) & (location.points[:, 0] < 16)
+    strain = np.average(solution.state(location).strain[middle], axis=0, weights=mesh.areas[middle])
+    expected = solution.reaction[0] / (material.young * 2.0)
+    np.testing.assert_allclose(strain, [[expected, 0], [0, 0]], atol=0.03 * expected)
+
+
+@pytest.mark.parametrize("angle", [0.1, 1.0, 3.0])
+def test_rigid_motion_has_no_stress(solver, solution, angle):
+    """The stress of every solution is derived from the gradient in one place: a rotation there is free of it.
+
+    The base is clamped, so that no solver can rotate the body itself; infinitesimal for a linear law.
+    """
+    sine, cosine = np.sin(angle), np.cos(angle)
+    linear = solution.problem.material.law == "linear"
+    rotation = [[0, -angle], [angle, 0]] if linear else [[cosine - 1, -sine], [sine, cosine - 1]]
+    state = State.from_gradient(np.array([rotation]), solution.problem)
+    assert np.abs(state.stress).max() < 1e-12
+    assert np.abs(state.stress_zz).max() < 1e-12
+    assert np.abs(state.energy_density).max() < 1e-12
 
 
 def test_cantilever_against_beam_theory(solver):

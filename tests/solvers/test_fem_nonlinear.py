@@ -68,7 +68,7 @@ def test_history_starts_at_rest_and_ends_at_the_full_load(pressed):
 
 
 def test_load_that_tears_the_mesh_stops_with_advice(coarse_mesh):
-    """A single node driven through the finger: no equilibrium without an element turned inside out."""
+    """A patch driven through the finger: no equilibrium without an element turned inside out."""
     solver = FemNonlinearSolver(min_step=0.02, max_iterations=6)
     solution = solver.solve(
         Problem(coarse_mesh, NEO_HOOKEAN, Load(kind="patch", displacement=(-60.0, -60.0)))
