@@ -206,8 +206,15 @@ def _evaluate(
                     progress(1.0, "taken over from an earlier run")
                     evaluation.save(kept, key)
                     return evaluation
+        try:
+            solution = solver.solve(own, progress)
+        except Exception as error:  # its own fault goes on, with a word on what is left
+            error.add_note(
+                f"solver {solver.name} failed; run again with --resume and without it for the rest"
+            )
+            raise
         # A solver that hands its work to another one may return the other's name.
-        solution = replace(solver.solve(own, progress), solver=solver.name)
+        solution = replace(solution, solver=solver.name)
         evaluation = Evaluation.of(solution, problem.mesh, observations.points)
         evaluation.save(kept, key)
     return evaluation

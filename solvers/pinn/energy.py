@@ -1,11 +1,14 @@
 """The elastic energy as a quadratic form of the output layer, and its exact minimiser."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 
 from geometry.errors import UserError
 from solvers.elasticity import Lame
+
+Matrix = Any
+"""A tensor or a sparse matrix."""
 
 
 class Minimum(NamedTuple):
@@ -24,14 +27,31 @@ class Minimum(NamedTuple):
     regularisation: float
 
 
+def stiffness_blocks(xx: Matrix, yy: Matrix, xy: Matrix, lame: Lame) -> tuple[Matrix, Matrix, Matrix]:
+    """Hessian of the elastic energy over output weights that both displacement components have for each unit.
+
+    With weighted derivatives X = sqrt(w) d/dx and Y = sqrt(w) d/dy of U units at the quadrature points,
+
+        K_uu = (λ + 2 μ) X^T X + μ Y^T Y    K_uv = λ X^T Y + μ Y^T X    K_vv = (λ + 2 μ) Y^T Y + μ X^T X
+
+    Args:
+        xx: X^T X, shape (U, U), a tensor or a sparse matrix.
+        yy: Y^T Y.
+        xy: X^T Y.
+        lame: Lamé constants of the plane law, MPa.
+
+    Returns:
+        The blocks K_uu, K_uv and K_vv, each (U, U).
+    """
+    stiff, λ, μ = lame.λ + 2 * lame.μ, lame.λ, lame.μ
+    return stiff * xx + μ * yy, λ * xy + μ * xy.T, stiff * yy + μ * xx
+
+
 class QuadraticEnergy:
     """U(c) = 1/2 c^T K c over the output weights c of units that both displacement components share.
 
-    With weighted derivatives X = sqrt(w) d/dx and Y = sqrt(w) d/dy of the units at the quadrature points,
-
-        K_uu = (λ + 2 μ) X^T X + μ Y^T Y    K_vv = (λ + 2 μ) Y^T Y + μ X^T X    K_uv = λ X^T Y + μ Y^T X
-
-    Units can be added; the products of those that are there already are kept.
+    K is made of products of the units' weighted derivatives (`stiffness_blocks`). Units can be added; the
+    products of those that are there already are kept.
     """
 
     def __init__(self, weights: torch.Tensor, lame: Lame) -> None:
@@ -72,14 +92,8 @@ class QuadraticEnergy:
             prescribed: Their values, shape (k,), mm.
         """
         count = len(functionals)
-        stiff, λ, μ = self._lame.λ + 2 * self._lame.μ, self._lame.λ, self._lame.μ
-        coupling = λ * self._xy + μ * self._xy.T
-        matrix = torch.cat(
-            [
-                torch.cat([stiff * self._xx + μ * self._yy, coupling], dim=1),
-                torch.cat([coupling.T, stiff * self._yy + μ * self._xx], dim=1),
-            ]
-        )
+        uu, uv, vv = stiffness_blocks(self._xx, self._yy, self._xy, self._lame)
+        matrix = torch.cat([torch.cat([uu, uv], dim=1), torch.cat([uv.T, vv], dim=1)])
         scale = matrix.diagonal().rsqrt()
         matrix = matrix * scale * scale[:, None]
         factor, regularisation = _regularised_cholesky(matrix)

@@ -10,7 +10,7 @@ from scipy.sparse import bmat, csr_matrix, diags
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.quadrature import body_quadrature
-from solvers.elasticity import Lame
+from solvers.pinn.energy import stiffness_blocks
 from solvers.pinn.grading import (
     Spacing,
     graded_quadrature,
@@ -163,7 +163,9 @@ class _Level:
         """The field of least energy under the load's conditions, its energy, and the load's forces."""
         matrices = self.units.matrices(self.points)
         root = diags(np.sqrt(self.weights))
-        stiffness = _stiffness(root @ matrices.along_x, root @ matrices.along_y, problem.material.lame)
+        x, y = root @ matrices.along_x, root @ matrices.along_y
+        uu, uv, vv = stiffness_blocks(x.T @ x, y.T @ y, x.T @ y, problem.material.lame)
+        stiffness = csr_matrix(bmat([[uu, uv], [uv.T, vv]]))
         scale = 1 / np.sqrt(stiffness.diagonal())
         scaled = csr_matrix(
             diags(scale) @ stiffness @ diags(scale) + REGULARISATION * diags(np.ones_like(scale))
@@ -179,14 +181,6 @@ class _Level:
         output = scale * (responses @ forces)
         energy = 0.5 * float(output @ (stiffness @ output))
         return LocalField(self.units, output.reshape(2, -1).T.copy()), energy, forces
-
-
-def _stiffness(x: csr_matrix, y: csr_matrix, lame: Lame) -> csr_matrix:
-    """Hessian of the energy over the output weights, from weighted derivatives (q, U) of the units."""
-    xx, yy, xy = x.T @ x, y.T @ y, x.T @ y
-    stiff, λ, μ = lame.λ + 2 * lame.μ, lame.λ, lame.μ
-    coupling = λ * xy + μ * xy.T
-    return csr_matrix(bmat([[stiff * xx + μ * yy, coupling], [coupling.T, stiff * yy + μ * xx]]))
 
 
 def _relative(difference: FloatArray, field: FloatArray, weights: FloatArray) -> float:

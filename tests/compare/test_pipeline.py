@@ -251,6 +251,12 @@ def test_a_run_that_is_stopped_leaves_the_last_result_and_what_it_finished(job, 
     assert [path.name for path in (kept / "solutions").iterdir()] == ["first.npz"]
 
 
+def test_a_solver_with_a_fault_is_named_and_the_rest_can_go_on(job):
+    with pytest.raises(RuntimeError) as caught:
+        compare(job(Scripted("first"), Scripted("second", RuntimeError("a fault"))))
+    assert "solver second failed; run again with --resume" in caught.value.__notes__[0]
+
+
 @pytest.mark.parametrize("stop", STOPS)
 def test_a_run_that_is_stopped_before_it_finished_anything_leaves_nothing(job, tmp_path, stop):
     with pytest.raises(type(stop)):
