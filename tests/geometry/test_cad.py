@@ -3,13 +3,12 @@
 import re
 from pathlib import Path
 
+import ezdxf
 import numpy as np
 import pytest
 
-from geometry import Design, UserError, cad_files, finger_section, marker_positions
+from geometry import Design, UserError, cad, cad_files, finger_section, marker_positions
 from geometry.svg import section_svg
-
-cad = pytest.importorskip("geometry.cad")
 
 
 def test_face_has_the_area_and_the_holes_of_the_closed_form(design: Design) -> None:
@@ -97,7 +96,6 @@ def test_stl_files_enclose_the_volumes(written: dict[str, Path]) -> None:
 
 
 def test_dxf_has_a_layer_for_the_outline_and_one_for_the_markers(written: dict[str, Path]) -> None:
-    ezdxf = pytest.importorskip("ezdxf")
     entities = list(ezdxf.readfile(written["section.dxf"]).modelspace())
     lines = [entity for entity in entities if entity.dxf.layer == "outline"]
     circles = [entity for entity in entities if entity.dxf.layer == "markers"]
