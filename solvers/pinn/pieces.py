@@ -5,23 +5,35 @@ each of them; with pieces there is one barrier in all. On two busy cores this wa
 eight times as fast.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
 
 import torch
 
 PIECE = 2**14
 """Numbers in one array of a piece: an eighth of a megabyte."""
 
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
 
 def in_pieces(task: Callable[[slice], None], points: int, units: int) -> None:
     """Call `task` with slices that cut `points` rows of `units` numbers into pieces, on every thread."""
-    size = max(PIECE // units, 8)
-    slices = [slice(start, min(start + size, points)) for start in range(0, points, size)]
+    in_threads(task, cut(points, max(PIECE // units, 8)))
+
+
+def cut(points: int, size: int) -> list[slice]:
+    """Slices that cut `points` rows into pieces of at most `size`."""
+    return [slice(start, min(start + size, points)) for start in range(0, points, size)]
+
+
+def in_threads(task: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+    """`task` of every item, in the items' order, on every thread; torch's own threads rest meanwhile."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
         with ThreadPoolExecutor(threads, initializer=torch.set_num_threads, initargs=(1,)) as pool:
-            list(pool.map(task, slices))
+            return list(pool.map(task, items))
     finally:
         torch.set_num_threads(threads)
