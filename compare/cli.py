@@ -8,10 +8,10 @@ from cyclopts import App, Group, Parameter
 from rich.console import Console
 
 from compare.exits import EXIT_CODES, NOT_CONVERGED, guarded, say
-from compare.options import FingerOptions, PhysicsOptions, existing, read_solvers
+from compare.options import FingerOptions, PhysicsOptions, SolverOptions, existing
 from geometry.errors import UserError
 
-OUTPUT = Group("Output", sort_key=3, default_parameter=Parameter(negative="", show_default=False))
+OUTPUT = Group("Output", sort_key=4, default_parameter=Parameter(negative="", show_default=False))
 
 pinnray = App(
     name="pinnray",
@@ -26,19 +26,11 @@ pinnray = App(
 def compare(
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
+    options: SolverOptions = SolverOptions(),
     *,
     solvers: Annotated[
         str, Parameter(help="Names with commas between; `pinnray solvers` lists them.")
     ] = "fem,pinn-std",
-    solver_set: Annotated[
-        tuple[str, ...],
-        Parameter(
-            negative="",
-            show_default=False,
-            help="Change a solver's setting, as in --solver-set pinn-std.units=300; may be repeated.",
-        ),
-    ] = (),
-    seed: Annotated[int, Parameter(help="Of every solver that draws random numbers.")] = 0,
     measurements: Annotated[
         Path | None,
         Parameter(
@@ -68,16 +60,17 @@ def compare(
     - compare --design default
     - compare --design slender --solvers fem
     - compare --set rib_count=6 --set height=110 --measurements markers.csv
+    - compare --preset paper --device cuda
     """
     from compare.pipeline import Job, run
     from compare.stages import Stages
     from compare.tables import mae_table
 
-    design, mesh = finger.read()
-    material, load = physics.read()
+    design, mesh = finger.read(options.preset)
+    material, load = physics.read(options.preset)
     job = Job(
         design=design,
-        solvers=read_solvers(solvers, solver_set, seed),
+        solvers=options.read(solvers),
         mesh=mesh,
         material=material,
         load=load,
@@ -154,16 +147,8 @@ def solve(
     solver: Annotated[str, Parameter(help="Name of the solver; `pinnray solvers` lists them.")],
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
+    options: SolverOptions = SolverOptions(),
     *,
-    solver_set: Annotated[
-        tuple[str, ...],
-        Parameter(
-            negative="",
-            show_default=False,
-            help="Change a setting, as in --solver-set fem.degree=1; may be repeated.",
-        ),
-    ] = (),
-    seed: Annotated[int, Parameter(help="Of a solver that draws random numbers.")] = 0,
     out: Annotated[Path, Parameter(help="The VTU file for the fields.")] = Path("out/solution.vtu"),
 ) -> int:
     """Solve one finger with one solver and write its fields, without comparing anything."""
@@ -174,11 +159,11 @@ def solve(
     from solvers.problem import Problem
     from solvers.solver import with_law
 
-    chosen, settings = finger.read()
-    material, load = physics.read()
+    chosen, settings = finger.read(options.preset)
+    material, load = physics.read(options.preset)
     if out.suffix != ".vtu":
         raise UserError(f"--out {out}: the fields are a VTU file; give a name that ends in .vtu")
-    chosen_solvers = read_solvers(solver, solver_set, seed)
+    chosen_solvers = options.read(solver)
     if len(chosen_solvers) != 1:
         raise UserError(f"name one solver, not {solver!r}; `compare` takes several")
     (made,) = chosen_solvers
@@ -197,15 +182,17 @@ def solve(
 
 @pinnray.command
 def solvers() -> int:
-    """List the solvers, with the material laws and loads that each has and its settings."""
+    """List the solvers, with the material laws and loads that each has, its presets and their settings."""
     from rich.table import Table
 
-    from solvers.registry import usable_solvers
+    from solvers.registry import PRESETS, make_solver, usable_solvers
 
     table = Table("solver", "laws", "loads", "settings")
-    for name, solver in usable_solvers().items():
-        settings = ", ".join(f"{key}={value}" for key, value in solver.settings().items())
-        table.add_row(name, ", ".join(solver.laws), ", ".join(solver.loads), settings)
+    for name, usual in usable_solvers().items():
+        _, *others = PRESETS.get(name, [""])
+        for solver in [usual, *(make_solver(name, preset=preset) for preset in others)]:
+            settings = ", ".join(f"{key}={value}" for key, value in solver.settings().items())
+            table.add_row(name, ", ".join(solver.laws), ", ".join(solver.loads), settings)
     Console().print(table)
     return 0
 

@@ -10,16 +10,18 @@ from typing import Annotated, Literal
 from cyclopts import Group, Parameter
 from pydantic import ValidationError
 
+from compare.preset_jobs import job_defaults
 from geometry.design import Design
 from geometry.errors import UserError
 from geometry.presets import load_design, parse_overrides
 from geometry.settings import MeshSettings
 from solvers.problem import Load, Material
-from solvers.registry import make_solver
+from solvers.registry import PRESETS, make_solver
 from solvers.solver import Solver
 
 FINGER = Group("Finger", sort_key=1)
 PHYSICS = Group("Physics", sort_key=2)
+TRAINING = Group("Solvers' settings", sort_key=3)
 
 
 @Parameter(name="*", group=FINGER)
@@ -37,17 +39,21 @@ class FingerOptions:
         ),
     ] = ()
     mesh_size: Annotated[
-        float, Parameter(help="Elements in walls and ribs, mm; up to 4 times larger in the tip.")
-    ] = 0.25
+        float | None,
+        Parameter(help="Elements in walls and ribs, mm; up to 4 times larger in the tip; 0.25 if not given."),
+    ] = None
 
-    def read(self) -> tuple[Design, MeshSettings]:
-        """The design and the mesh settings."""
+    def read(self, preset: str | None = None) -> tuple[Design, MeshSettings]:
+        """The design and the mesh settings, which a preset of the solvers may have of its own."""
         changes = parse_overrides(self.set)
         design = load_design(self.design, changes)
         if changes and "name" not in changes:  # another finger, so another name and output folder
             design = design.replaced(name=_changed_name(design, changes))
+        settings = job_defaults(preset).mesh.model_dump()
+        if self.mesh_size is not None:
+            settings["size"] = self.mesh_size
         try:
-            return design, MeshSettings(size=self.mesh_size)
+            return design, MeshSettings(**settings)
         except UserError as error:
             raise UserError(f"--mesh-{error}") from None
 
@@ -70,66 +76,113 @@ class PhysicsOptions:
         Literal["strain", "stress"], Parameter(help="Plane strain, or plane stress as the paper's equations.")
     ] = "strain"
     load: Annotated[
-        Literal["mean", "point", "patch"],
+        Literal["mean", "point", "patch"] | None,
         Parameter(
-            help="mean: weighted mean displacement of the contact; point: the paper's, whose limit under "
-            "refinement does not exist; patch: rigid."
+            help="mean: weighted mean displacement of the contact, the default; point: the paper's, whose "
+            "limit under refinement does not exist; patch: rigid."
         ),
-    ] = "mean"
+    ] = None
     stroke: Annotated[float, Parameter(help="How far the indenter presses, mm.")] = 10.0
     slide: Annotated[
         bool,
         Parameter(negative="", show_default=False, help="Let the contact slide along the finger: u free."),
     ] = False
 
-    def read(self) -> tuple[Material, Load]:
-        """The material and the load."""
+    def read(self, preset: str | None = None) -> tuple[Material, Load]:
+        """The material and the load, whose kind a preset of the solvers may choose."""
         if not 0 < self.stroke < inf:
             raise UserError(f"--stroke {self.stroke:g}: the indenter presses; give its travel, above 0 mm")
         if self.young == inf:
             raise UserError("--young inf: a rigid finger does not bend; give a finite Young's modulus, MPa")
+        kind = self.load or job_defaults(preset).load
         try:
             return (
                 Material(young=self.young, poisson=self.poisson, plane=self.plane),
-                Load(kind=self.load, displacement=(None if self.slide else 0.0, -self.stroke)),
+                Load(kind=kind, displacement=(None if self.slide else 0.0, -self.stroke)),
             )
         except ValidationError as error:
             first = error.errors()[0]
             raise UserError(f"--{first['loc'][0]} {first['input']}: {first['msg'].lower()}") from None
 
 
-def read_solvers(names: str, settings: tuple[str, ...], seed: int) -> list[Solver]:
-    """Solvers from a list of names with commas and settings such as `pinn-std.units=300`.
+@Parameter(name="*", group=TRAINING)
+@dataclass(frozen=True, kw_only=True)
+class SolverOptions:
+    """Settings of the solvers that are named elsewhere."""
 
-    Raises:
-        UserError: If a solver or setting does not exist or a text cannot be read.
-    """
-    if seed < 0:
-        raise UserError(f"--seed {seed}: give a whole number from 0")
-    chosen = [name.strip() for name in names.split(",") if name.strip()]
-    given: dict[str, dict[str, object]] = {name: {} for name in chosen}
-    for setting in settings:
-        target, dot, rest = setting.partition(".")
+    preset: Annotated[
+        str | None,
+        Parameter(
+            show_default=False,
+            help="Of the solvers that have it. paper: pinn-std exactly as in the paper, and the paper's job: "
+            "a uniform mesh of 91,006 nodes and --load point, unless --mesh-size or --load is given. On a "
+            "CPU its 60,000 epochs take many hours.",
+        ),
+    ] = None
+    solver_set: Annotated[
+        tuple[str, ...],
+        Parameter(
+            negative="",
+            show_default=False,
+            help="Change a solver's setting, as in --solver-set pinn-std.units=300; may be repeated.",
+        ),
+    ] = ()
+    device: Annotated[
+        str | None,
+        Parameter(show_default=False, help="cpu or cuda, for the solvers that can choose."),
+    ] = None
+    seed: Annotated[int, Parameter(help="Of every solver that draws random numbers.")] = 0
+
+    def read(self, names: str) -> list[Solver]:
+        """The solvers with these names, commas between them.
+
+        Raises:
+            UserError: If a solver, preset or setting does not exist or a text cannot be read.
+        """
+        if self.seed < 0:
+            raise UserError(f"--seed {self.seed}: give a whole number from 0")
+        chosen = [name.strip() for name in names.split(",") if name.strip()]
+        given = _settings(chosen, self.solver_set)
+        if self.preset is not None:
+            having = [name for name in given if self.preset in PRESETS.get(name, ())]
+            if not having:
+                known = "; ".join(f"{name} has {', '.join(presets)}" for name, presets in PRESETS.items())
+                raise UserError(f"--preset {self.preset}: none of the solvers {names} has it ({known})")
+            for name in having:
+                given[name].setdefault("preset", self.preset)
+        shared: dict[str, object] = {"seed": self.seed}
+        if self.device is not None:
+            shared["device"] = self.device
+        solvers = [_made(name, given[name], shared) for name in chosen]
+        if "device" in shared and not any("device" in solver.settings() for solver in solvers):
+            raise UserError(f"--device {self.device}: none of the solvers {names} can choose a device")
+        return solvers
+
+
+def _settings(names: list[str], texts: tuple[str, ...]) -> dict[str, dict[str, object]]:
+    """The settings of each solver from texts such as `pinn-std.units=300`."""
+    given: dict[str, dict[str, object]] = {name: {} for name in names}
+    for text in texts:
+        target, dot, rest = text.partition(".")
         key, equals, value = rest.partition("=")
         if not (dot and equals and key and value):
-            raise UserError(
-                f"cannot read {setting!r}; write solver.setting=value, such as pinn-std.units=300"
-            )
+            raise UserError(f"cannot read {text!r}; write solver.setting=value, such as pinn-std.units=300")
         if target not in given:
-            raise UserError(f"{setting!r} is for {target!r}, which is not among the solvers {names}")
+            raise UserError(f"{text!r} is for {target!r}, which is not among the solvers {', '.join(names)}")
         if key in given[target]:
             raise UserError(f"{target}.{key} is set twice; set it once")
         given[target][key] = value
-    solvers = []
-    for name in chosen:
-        try:
-            solver = make_solver(name, **given[name])
-            if "seed" in solver.settings() and "seed" not in given[name]:
-                solver = make_solver(name, **given[name], seed=seed)
-        except ImportError as error:
-            raise UserError(f"solver {name!r} cannot be loaded: {error}") from None
-        solvers.append(solver)
-    return solvers
+    return given
+
+
+def _made(name: str, given: Mapping[str, object], shared: Mapping[str, object]) -> Solver:
+    """The solver with its own settings and, of the shared ones, those that it has."""
+    try:
+        solver = make_solver(name, **given)
+        had = {key: value for key, value in shared.items() if key in solver.settings() and key not in given}
+        return make_solver(name, **given, **had)
+    except ImportError as error:
+        raise UserError(f"solver {name!r} cannot be loaded: {error}") from None
 
 
 def existing(path: Path | None) -> Path | None:

@@ -1,7 +1,8 @@
 """The output folder: the last complete result or the new one, never half of one.
 
 A run works in `NAME.partial` beside the output folder `NAME` and takes its place at the end. A killed run
-leaves there the solutions that it had finished, from which a resumed run goes on.
+leaves there the solutions that it had finished and the checkpoints of the one in training, from which a
+resumed run goes on.
 """
 
 import fcntl
@@ -16,6 +17,7 @@ from geometry.errors import UserError
 
 RUN_FILE = "run.json"
 SOLUTIONS = "solutions"
+TRAINING = "training"
 
 
 def check_output(out: Path) -> None:
@@ -42,7 +44,8 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
 
     Args:
         out: The output folder.
-        keep: Names of the solvers whose solutions are left in place if an earlier, killed run finished them.
+        keep: Names of the solvers whose solutions and checkpoints are left in place if there are any of an
+            earlier, killed run.
 
     Raises:
         UserError: If the folder cannot be written, or another run is writing it.
@@ -54,18 +57,27 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
         partial.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UserError(f"cannot write to {partial}: {error.strerror}") from None
-    with _locked(partial):
+    with locked(partial):
         _clear(partial, keep)
         try:
             yield partial
         except BaseException:
-            if not any(partial.glob(f"{SOLUTIONS}/*.npz")):
+            if not any([*partial.glob(f"{SOLUTIONS}/*.npz"), *partial.glob(f"{TRAINING}/*/*")]):
                 shutil.rmtree(partial, ignore_errors=True)
                 for folder in missing:
                     with suppress(OSError):  # somebody else uses it by now
                         folder.rmdir()
             raise
         _take_place(partial, out)
+
+
+def take_training(name: str, source: Path, target: Path) -> None:
+    """Copy what a solver's training left from one output folder to another, in place of what is there."""
+    left, place = source / TRAINING / name, target / TRAINING / name
+    if left != place:
+        shutil.rmtree(place, ignore_errors=True)
+        if left.is_dir():
+            shutil.copytree(left, place)
 
 
 def _take_place(partial: Path, out: Path) -> None:
@@ -91,20 +103,27 @@ def _written(out: Path) -> set[str]:
 
 
 def _clear(partial: Path, keep: Collection[str]) -> None:
-    """Remove what an earlier run left, except solutions that can be taken over."""
+    """Remove what an earlier run left, except solutions and checkpoints that can be taken over."""
     for path in partial.iterdir():
-        if path.name != SOLUTIONS:
-            if path.is_dir():
-                shutil.rmtree(path)
-            else:
-                path.unlink()
+        if path.name not in (SOLUTIONS, TRAINING):
+            _remove(path)
     for path in partial.glob(f"{SOLUTIONS}/*"):
         if path.suffix != ".npz" or path.stem not in keep:
             path.unlink()
+    for path in partial.glob(f"{TRAINING}/*"):
+        if path.name not in keep:
+            _remove(path)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink()
 
 
 @contextmanager
-def _locked(folder: Path) -> Iterator[None]:
+def locked(folder: Path) -> Iterator[None]:
     """Keep a second run out of the folder; the lock ends with the process, however that ends."""
     handle = os.open(folder, os.O_RDONLY)
     try:

@@ -5,16 +5,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from hashlib import sha256
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from compare.atomic import atomic_path
+from compare.atomic import write_json
 from compare.evaluation import Evaluation
 from compare.fields import write_vtu
 from compare.figures import draw_all
 from compare.metrics import pick_reference
-from compare.output_folder import RUN_FILE, SOLUTIONS, check_output, replaced_folder
+from compare.output_folder import RUN_FILE, SOLUTIONS, TRAINING, check_output, replaced_folder, take_training
 from compare.provenance import file_digest, machine, package_versions, sources_digest
 from compare.report import ReportContent, write_report
 from compare.results import metrics
@@ -29,6 +28,7 @@ from geometry.observations import Observations
 from geometry.settings import MeshSettings
 from solvers.problem import Load, Material, Problem
 from solvers.solver import Solver, with_law
+from solvers.training import TrainedSolver, TrainingContext
 from vision.measurements import read_measurements, write_measurements
 
 
@@ -94,9 +94,10 @@ def run(job: Job, stages: Stages) -> Outcome:
         with stages.stage("measurements") as progress:
             observations = given or virtual_experiment(problem, progress)
             write_measurements(folder / "observations.csv", observations)
-        evaluations = [
-            _evaluate(job, solver, problem, observations, folder, stages) for solver in job.solvers
-        ]
+        evaluations: list[Evaluation] = []
+        for solver in job.solvers:
+            known = _in_context(solver, job, folder, evaluations)
+            evaluations.append(_evaluate(job, known, problem, observations, folder, stages))
         reference = pick_reference(evaluations, job.reference)
         with stages.stage("pictures") as progress:
             figures = draw_all(
@@ -126,7 +127,7 @@ def run(job: Job, stages: Stages) -> Outcome:
                 evaluations=evaluations,
                 reference=reference,
             )
-            _write_json(folder / "metrics.json", numbers)
+            write_json(folder / "metrics.json", numbers)
             provenance = {
                 "started": started.isoformat(timespec="seconds"),
                 "seconds": {name: round(seconds, 2) for name, seconds in stages.seconds.items()},
@@ -168,7 +169,7 @@ def run(job: Job, stages: Stages) -> Outcome:
                 for path in sorted(folder.rglob("*"))
                 if path.is_file() and path.name != RUN_FILE
             }
-            _write_json(folder / RUN_FILE, {"schema": 1, **provenance, "files_sha256": files})
+            write_json(folder / RUN_FILE, {"schema": 1, **provenance, "files_sha256": files})
     return Outcome(numbers, evaluations, observations, reference)
 
 
@@ -192,6 +193,20 @@ def _names(job: Job) -> list[str]:
     return [solver.name for solver in job.solvers]
 
 
+def _in_context(solver: Solver, job: Job, folder: Path, finished: Sequence[Evaluation]) -> Solver:
+    """The solver, told where to save its training and what is known, if it is one that asks."""
+    if not isinstance(solver, TrainedSolver):
+        return solver
+    law = with_law(job.material, solver).law
+    energies = [entry.energy for entry in finished if (entry.solver, entry.law) == ("fem", law)]
+    context = TrainingContext(
+        folder=folder / TRAINING / solver.name,
+        resume=job.resume,
+        reference_energy=energies[0] if energies else None,
+    )
+    return solver.in_context(context)
+
+
 def _evaluate(
     job: Job, solver: Solver, problem: Problem, observations: Observations, folder: Path, stages: Stages
 ) -> Evaluation:
@@ -201,10 +216,11 @@ def _evaluate(
     kept = folder / SOLUTIONS / f"{solver.name}.npz"
     with stages.stage(solver.name) as progress:
         if job.resume:
-            for place in (kept, job.out / SOLUTIONS / kept.name):
-                if (evaluation := Evaluation.load(place, key)) is not None:
+            for place in (folder, job.out):
+                if (evaluation := Evaluation.load(place / SOLUTIONS / kept.name, key)) is not None:
                     progress(1.0, "taken over from an earlier run")
                     evaluation.save(kept, key)
+                    take_training(solver.name, place, folder)
                     return evaluation
         try:
             solution = solver.solve(own, progress)
@@ -241,18 +257,3 @@ def _check_inside(observations: Observations, mesh: TriangleMesh) -> None:
             f"the measurements are not of this finger: {error}; "
             "positions are those before loading, in the finger's frame"
         ) from None
-
-
-def _write_json(path: Path, content: dict[str, Any]) -> None:
-    text = json.dumps(_without_nan(content), indent=2, allow_nan=False)
-    with atomic_path(path) as partial:
-        partial.write_text(text + "\n", encoding="utf-8")
-
-
-def _without_nan(value: Any) -> Any:
-    """The same content with null where a number is not finite, which JSON cannot hold."""
-    if isinstance(value, dict):
-        return {key: _without_nan(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_without_nan(entry) for entry in value]
-    return None if isinstance(value, float) and not isfinite(value) else value

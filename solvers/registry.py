@@ -15,10 +15,18 @@ from solvers.solver import Solver
 
 GROUP = "pinnray.solvers"
 
+PRESETS = {
+    "pinn-std": {
+        "fast": "solvers.pinn.standard:PinnStdSolver",
+        "paper": "solvers.pinn.paper:PaperPinnSolver",
+    },
+}
+"""Presets of our solvers, the usual one first. Each is a class with settings of its own."""
+
 BUILT_IN = {
     "fem": "solvers.fem.linear:FemSolver",
     "fem-nonlinear": "solvers.fem.nonlinear:FemNonlinearSolver",
-    "pinn-std": "solvers.pinn.standard:PinnStdSolver",
+    "pinn-std": PRESETS["pinn-std"]["fast"],
     "pinn-local": "solvers.pinn.local:PinnLocalSolver",
 }
 
@@ -31,11 +39,16 @@ def solver_names() -> list[str]:
 def make_solver(name: str, **settings: Any) -> Solver:
     """The solver called `name`, with the settings given and its defaults for the rest.
 
+    Where a solver has `PRESETS`, the setting `preset` chooses one.
+
     Raises:
-        UserError: If there is no such solver, or a package that offers it cannot be loaded.
+        UserError: If there is no such solver or preset, or a package that offers it cannot be loaded.
     """
     if name in BUILT_IN:
-        module, _, attribute = BUILT_IN[name].partition(":")
+        place = BUILT_IN[name]
+        if name in PRESETS and "preset" in settings:
+            place = _preset(name, settings.pop("preset"))
+        module, _, attribute = place.partition(":")
         factory = getattr(import_module(module), attribute)
     else:
         found = [entry for entry in entry_points(group=GROUP) if entry.name == name]
@@ -71,6 +84,13 @@ def usable_solvers() -> dict[str, Solver]:
         except (UserError, ImportError) as error:
             warnings.warn(f"solver {name!r} is left out: {error}", stacklevel=2)
     return solvers
+
+
+def _preset(name: str, preset: str) -> str:
+    """Where the class of a solver's preset is."""
+    if preset not in PRESETS[name]:
+        raise UserError(f"{name} has no preset {preset!r}; it has {', '.join(PRESETS[name])}")
+    return PRESETS[name][preset]
 
 
 def _typed(name: str, factory: Any, settings: Mapping[str, Any]) -> dict[str, Any]:

@@ -75,8 +75,8 @@ class PinnStdSolver:
                 raise UserError(f"pinn-std: {setting} must be positive, got {getattr(self, setting)}")
 
     def settings(self) -> dict[str, object]:
-        """Size, initialisation, criterion and seed."""
-        return asdict(self)
+        """The preset that this is, size, initialisation, criterion and seed."""
+        return {"preset": "fast", **asdict(self)}
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve the linear problem; see `Solver`."""
