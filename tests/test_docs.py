@@ -6,6 +6,7 @@ import re
 import runpy
 import shlex
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,6 +17,7 @@ from geometry.markers import marker_positions
 from geometry.parameters import Parameters, fact
 from geometry.presets import FOLDER, load_design, preset_names
 from geometry.settings import MeshSettings
+from solvers.solver import Solver
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
@@ -247,14 +249,29 @@ def test_the_guide_has_every_preset_as_it_is():
         assert said == changed, name
 
 
+def settings_of(solvers: Iterable[Solver]) -> dict[str, str]:
+    return {
+        f"{solver.name}.{key}": str(value) for solver in solvers for key, value in solver.settings().items()
+    }
+
+
 def test_the_guide_has_every_solver_setting_as_it_is():
     from solvers.registry import BUILT_IN, make_solver
 
-    actual = {
-        f"{name}.{key}": value for name in BUILT_IN for key, value in make_solver(name).settings().items()
-    }
     rows = table(GUIDE, "setting", after="## Solvers")
-    assert {name: float(row[1]) for name, row in zip(names(rows), rows, strict=True)} == actual
+    assert {name: row[1] for name, row in zip(names(rows), rows, strict=True)} == settings_of(
+        make_solver(name) for name in BUILT_IN
+    )
+
+
+def test_the_guide_has_every_setting_of_the_other_presets_as_it_is():
+    from solvers.registry import PRESETS, make_solver
+
+    for name, (_, *others) in PRESETS.items():
+        for preset in others:
+            rows = table(GUIDE, f"setting of `{preset}`")
+            documented = {name: row[1] for name, row in zip(names(rows), rows, strict=True)}
+            assert documented == settings_of([make_solver(name, preset=preset)])
 
 
 def test_the_guide_has_every_solver_with_its_loads():

@@ -15,11 +15,12 @@ import pyvista
 
 from compare.cli import compare_main, main
 from compare.exits import BAD_INPUT, INTERRUPTED, NOT_CONVERGED
-from compare.options import FingerOptions
+from compare.options import FingerOptions, PhysicsOptions, SolverOptions
+from geometry.cache import finger_mesh
 from geometry.presets import preset_names
 from solvers.fem.linear import FemSolver
 from solvers.fem.nonlinear import FemNonlinearSolver
-from solvers.registry import solver_names
+from solvers.registry import PRESETS, solver_names
 from solvers.solution import Solution, Status
 
 ROOT = Path(__file__).parent.parent.parent
@@ -106,6 +107,17 @@ BAD = [
     ("compare --solvers fem --solver-set fem.degree=7", "degree 1 and 2, not 7"),
     ("compare --solvers fem --solver-set fem.degree=1 --solver-set fem.degree=2", "fem.degree is set twice"),
     ("compare --seed -1", "--seed -1: give a whole number from 0"),
+    ("compare --preset papre", r"none of the solvers fem,pinn-std has it \(pinn-std has fast, paper\)"),
+    ("compare --preset paper --solvers fem", "--preset paper: none of the solvers fem has it"),
+    ("compare --solver-set pinn-std.preset=slow", "pinn-std has no preset 'slow'; it has fast, paper"),
+    (
+        "compare --preset paper --solver-set pinn-std.units=9",
+        "pinn-std has no setting 'units'; it has epochs",
+    ),
+    ("compare --preset paper --load patch", "pinn-std takes the loads mean, point, not 'patch'"),
+    ("compare --device cuda", "--device cuda: none of the solvers fem,pinn-std can choose a device"),
+    ("compare --preset paper --device tpu", "pinn-std: device = 'tpu': input should be 'cpu' or 'cuda'"),
+    ("solve fem --preset paper", "--preset paper: none of the solvers fem has it"),
     # measurements
     ("compare --measurements absent.csv", "there is no file absent.csv"),
     ("compare --measurements foreign", "there is no file foreign"),  # a folder
@@ -226,6 +238,54 @@ def test_a_changed_design_has_a_folder_of_its_own(settings, name):
     assert FingerOptions(set=tuple(settings)).read()[0].name == name
 
 
+@pytest.mark.parametrize(
+    ("preset", "finger", "physics", "mesh", "load"),
+    [
+        (None, {}, {}, (0.25, 4), "mean"),
+        ("fast", {}, {}, (0.25, 4), "mean"),
+        ("paper", {}, {}, (0.0823, 1), "point"),
+        ("paper", {"mesh_size": 0.5}, {"load": "mean"}, (0.5, 1), "mean"),  # what is given wins
+        ("paper", {"mesh_size": 0.25}, {"load": "point"}, (0.25, 1), "point"),  # even if it is the usual
+    ],
+)
+def test_a_preset_brings_its_job_unless_told_otherwise(preset, finger, physics, mesh, load):
+    settings = FingerOptions(**finger).read(preset)[1]
+    assert (settings.size, settings.coarsening) == mesh
+    assert PhysicsOptions(**physics).read(preset)[1].kind == load
+
+
+def test_a_preset_as_a_setting_changes_the_solver_and_not_the_job(folder, capsys, without_pictures):
+    """Both ways lead to the same solver."""
+    tiny = ["--solver-set", "pinn-std.epochs=2", "--solver-set", "pinn-std.width=4", "--quiet"]
+    small = ["--solvers", "pinn-std", "--mesh-size", "1.0", "--measurements", "good.csv"]
+    for name, options in (("a", ["--preset", "paper"]), ("b", ["--solver-set", "pinn-std.preset=paper"])):
+        assert main(["compare", *small, *tiny, *options, "--device", "cpu", "--out", name]) == NOT_CONVERGED
+    (first, second) = (json.loads(Path(name, "run.json").read_text()) for name in "ab")
+    assert first["solvers"] == second["solvers"]
+    assert first["solvers"]["pinn-std"]["epochs"] == 2
+    assert (first["load"]["kind"], second["load"]["kind"]) == ("point", "mean")
+    assert (first["mesh"]["coarsening"], second["mesh"]["coarsening"]) == (1, 4)
+
+
+def test_the_seed_reaches_every_preset():
+    for preset in ("fast", "paper"):
+        (solver,) = SolverOptions(preset=preset, seed=7).read("pinn-std")
+        assert (solver.settings()["preset"], solver.settings()["seed"]) == (preset, 7)
+
+
+def test_a_setting_of_one_solver_wins_over_an_option_for_all():
+    texts = ("pinn-std.preset=fast", "pinn-std.seed=3")
+    (solver,) = SolverOptions(preset="paper", seed=7, solver_set=texts).read("pinn-std")
+    assert (solver.settings()["preset"], solver.settings()["seed"]) == ("fast", 3)
+
+
+@pytest.mark.slow
+def test_the_paper_mesh_has_about_as_many_nodes_as_the_paper():
+    """90,959; another release of Gmsh may place them a little differently."""
+    design, settings = FingerOptions().read("paper")
+    assert len(finger_mesh(design, settings=settings).points) == pytest.approx(90_959, rel=0.005)
+
+
 def test_a_design_with_many_changes_still_has_a_name():
     changes = ("rib_thickness=2.1", "front_thickness=2.1", "back_thickness=2.1", "base_thickness=2.1")
     names = {FingerOptions(set=(*changes, f"height={height}")).read()[0].name for height in (95, 96)}
@@ -315,6 +375,7 @@ def test_solvers_are_listed(capsys):
     assert main(["solvers"]) == 0
     listed = capsys.readouterr().out
     assert all(f"│ {name} " in listed for name in solver_names())
+    assert all(f"preset={preset}" in listed for presets in PRESETS.values() for preset in presets)
 
 
 def test_a_broken_plug_in_is_one_line_among_the_solvers(tmp_path, capsys, monkeypatch):
@@ -387,7 +448,10 @@ def test_a_plug_in_runs_in_the_main_job(folder, plugin_folder):
     ("arguments", "words"),
     [
         (["--help"], ["compare", "design", "mesh", "solve", "solvers"]),
-        (["compare", "--help"], ["Parameters", "Finger", "Physics", "Output", "compare --design slender"]),
+        (
+            ["compare", "--help"],
+            ["Parameters", "Finger", "Physics", "Solvers' settings", "Output", "compare --design slender"],
+        ),
     ],
 )
 def test_help_teaches_quickly(arguments, words):
@@ -419,8 +483,8 @@ def test_help_names_every_option_of_the_main_job(capsys):
     assert main(["compare", "--help"]) == 0
     text = capsys.readouterr().out
     options = (
-        "design set mesh-size young poisson plane load stroke slide solvers solver-set seed measurements "
-        "reference out resume quiet json"
+        "design set mesh-size young poisson plane load stroke slide solvers solver-set seed preset device "
+        "measurements reference out resume quiet json"
     )
     assert all(f"--{option} " in text for option in options.split())
     assert "[default: ()]" not in text

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.output_folder import check_output, replaced_folder
+from compare.output_folder import check_output, replaced_folder, take_training
 from geometry.errors import UserError
 
 
@@ -27,8 +27,17 @@ def out(tmp_path: Path) -> Path:
     return folder
 
 
-def write(folder: Path, *, solutions: tuple[str, ...] = (), error: BaseException | None = None) -> None:
+def write(
+    folder: Path,
+    *,
+    solutions: tuple[str, ...] = (),
+    training: str = "",
+    error: BaseException | None = None,
+) -> None:
     (folder / "report.html").write_text("new report")
+    if training:
+        (folder / "training" / training).mkdir(parents=True)
+        (folder / "training" / training / "checkpoint").write_text("epoch 7")
     for name in solutions:
         (folder / "solutions").mkdir(exist_ok=True)
         (folder / "solutions" / f"{name}.npz").write_text("new solution")
@@ -76,6 +85,25 @@ def test_only_solutions_that_are_asked_for_outlive_an_earlier_attempt(out):
     with replaced_folder(out, keep=("fem",)) as folder:
         assert tree(folder) == {"solutions/fem.npz": "new solution"}
         assert not (folder / "figures").exists()
+
+
+def test_a_checkpoint_outlives_an_earlier_attempt_if_its_solver_is_asked_for(out):
+    for kept, left in ((("pinn-std",), {"training/pinn-std/checkpoint": "epoch 7"}), (("fem",), {})):
+        with pytest.raises(KeyboardInterrupt):
+            attempt(out, training="pinn-std", error=KeyboardInterrupt())
+        with replaced_folder(out, keep=kept) as folder:
+            assert tree(folder) == left
+
+
+def test_what_a_training_left_is_copied_in_place_of_another(out, tmp_path):
+    for folder, text in ((out, "finished"), (tmp_path, "of other settings")):
+        (folder / "training" / "pinn-std").mkdir(parents=True)
+        (folder / "training" / "pinn-std" / "checkpoint").write_text(text)
+    take_training("pinn-std", out, tmp_path)
+    assert (tmp_path / "training" / "pinn-std" / "checkpoint").read_text() == "finished"
+    take_training("pinn-std", tmp_path, tmp_path)
+    take_training("fem", out, tmp_path)
+    assert [path.name for path in (tmp_path / "training").iterdir()] == ["pinn-std"]
 
 
 def test_nothing_outlives_an_earlier_attempt_unless_asked(out):

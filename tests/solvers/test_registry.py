@@ -3,7 +3,7 @@
 import pytest
 
 from geometry.errors import UserError
-from solvers.registry import make_solver, solver_names, usable_solvers
+from solvers.registry import PRESETS, make_solver, solver_names, usable_solvers
 
 
 def test_settings_are_converted_from_text():
@@ -19,12 +19,28 @@ def test_settings_are_converted_from_text():
         ("skfem-p1", {"mesh": 2}, "solver 'skfem-p1' cannot be made with "),  # no dataclass
         ("fem", {"degree": "two"}, "fem: degree = 'two': input should be a valid integer"),
         ("pinn-std", {"units": 1.5}, "pinn-std: units = 1.5: "),
+        ("pinn-std", {"preset": "quick"}, "pinn-std has no preset 'quick'; it has fast, paper"),
+        ("pinn-std", {"preset": "paper", "units": 9}, "pinn-std has no setting 'units'; it has epochs, "),
+        ("fem", {"preset": "paper"}, "fem has no setting 'preset'; it has degree"),
     ],
 )
 def test_mistakes_are_one_line(name, settings, message, plugin_folder, monkeypatch):
     monkeypatch.syspath_prepend(str(plugin_folder))
     with pytest.raises(UserError, match=message):
         make_solver(name, **settings)
+
+
+@pytest.mark.parametrize(("name", "preset"), [(name, preset) for name in PRESETS for preset in PRESETS[name]])
+def test_a_preset_keeps_the_name_and_can_be_made_from_its_own_settings(name, preset):
+    solver = make_solver(name, preset=preset)
+    assert solver.name == name
+    assert solver.settings()["preset"] == preset
+    assert make_solver(name, **solver.settings()) == solver
+
+
+def test_the_first_preset_is_the_usual_one():
+    for name, presets in PRESETS.items():
+        assert make_solver(name) == make_solver(name, preset=next(iter(presets)))
 
 
 def test_a_package_adds_a_solver_by_its_entry_point(plugin_folder, monkeypatch):

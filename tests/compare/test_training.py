@@ -1,0 +1,129 @@
+"""Solvers that train for long: what the main job tells them, keeps of them, and goes on from."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from io import StringIO
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pytest
+from rich.console import Console
+
+from compare.evaluation import Evaluation
+from compare.pipeline import Job, run
+from compare.stages import Stages
+from geometry.design import Design
+from geometry.settings import MeshSettings
+from solvers.fem.linear import FemSolver
+from solvers.fem.nonlinear import FemNonlinearSolver
+from solvers.problem import Problem
+from solvers.solution import Solution
+from solvers.solver import Progress, silent
+from solvers.training import TrainingContext
+
+EPOCHS = 4
+
+
+@dataclass(frozen=True)
+class Counting:
+    """`fem`, after it has counted epochs in a file; it is interrupted after one of them as the test says."""
+
+    diary: list[tuple[int, TrainingContext]]
+    stop_after: int | None = None
+    context: TrainingContext = field(default=TrainingContext())
+    name: ClassVar[str] = "counting"
+    laws: ClassVar[tuple[str, ...]] = ("linear",)
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point")
+
+    def settings(self) -> dict[str, object]:
+        return {"epochs": EPOCHS}
+
+    def in_context(self, context: TrainingContext) -> "Counting":
+        return replace(self, context=context)
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        assert self.context.folder is not None
+        self.context.folder.mkdir(parents=True, exist_ok=True)
+        checkpoint = self.context.folder / "checkpoint"
+        first = int(checkpoint.read_text()) if self.context.resume and checkpoint.exists() else 0
+        for epoch in range(first + 1, EPOCHS + 1):
+            self.diary.append((epoch, self.context))
+            checkpoint.write_text(str(epoch))
+            if epoch == self.stop_after:
+                raise KeyboardInterrupt
+        return FemSolver(degree=1).solve(problem, progress)
+
+    @property
+    def epochs(self) -> list[int]:
+        return [epoch for epoch, _ in self.diary]
+
+
+@pytest.fixture
+def job(tmp_path: Path, without_pictures: None) -> Callable[..., Job]:
+    measured = tmp_path / "measured.csv"
+    measured.write_text("x_mm,y_mm,u_mm,v_mm\n20,-1,-0.5,-5\n")
+
+    def make(*solvers: Any, **changes: Any) -> Job:
+        mesh = MeshSettings(size=1.0)
+        return replace(
+            Job(Design(), solvers, mesh=mesh, measurements=measured, out=tmp_path / "run"), **changes
+        )
+
+    return make
+
+
+def compare(job: Job) -> list[Evaluation]:
+    with Stages(Console(file=StringIO()), quiet=True) as stages:
+        return list(run(job, stages).evaluations)
+
+
+def test_an_interrupted_training_goes_on_and_its_files_end_in_the_output(job, tmp_path):
+    first, second = Counting([], stop_after=3), Counting([])
+    with pytest.raises(KeyboardInterrupt):
+        compare(job(first))
+    assert first.epochs == [1, 2, 3]
+    assert (tmp_path / "run.partial" / "training" / "counting" / "checkpoint").read_text() == "3"
+    compare(job(second, resume=True))
+    assert second.epochs == [4]
+    assert (tmp_path / "run" / "training" / "counting" / "checkpoint").read_text() == str(EPOCHS)
+    assert "training/counting/checkpoint" in (tmp_path / "run" / "run.json").read_text()
+    assert not (tmp_path / "run.partial").exists()
+
+
+def test_without_resume_a_training_starts_afresh(job):
+    with pytest.raises(KeyboardInterrupt):
+        compare(job(Counting([], stop_after=3)))
+    again = Counting([])
+    compare(job(again))
+    assert again.epochs == [1, 2, 3, 4]
+
+
+def test_a_solution_that_is_taken_over_brings_its_training_along(job, tmp_path):
+    compare(job(Counting([])))
+    again = Counting([])
+    compare(job(again, FemSolver(), resume=True))
+    assert again.epochs == []
+    assert (tmp_path / "run" / "training" / "counting" / "checkpoint").read_text() == str(EPOCHS)
+
+
+@pytest.mark.parametrize(
+    ("solvers", "known"),
+    [
+        ((FemSolver(degree=1),), True),
+        ((FemNonlinearSolver(degree=1),), False),  # another solver, another law
+        ((), False),
+    ],
+    ids=["fem", "another solver", "alone"],
+)
+def test_the_energy_of_fem_is_told_if_it_was_solved_before(job, solvers, known):
+    counting = Counting([])
+    evaluations = compare(job(*solvers, counting))
+    _, context = counting.diary[0]
+    assert context.reference_energy == (evaluations[0].energy if known else None)
+    assert not context.resume
+
+
+def test_fem_that_comes_later_is_not_known(job):
+    counting = Counting([])
+    compare(job(counting, FemSolver(degree=1)))
+    assert counting.diary[0][1].reference_energy is None
