@@ -4,7 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
+from geometry.errors import UserError
 from solvers.solver import Solver
+
+
+class TrainingDiverged(UserError):
+    """The training went astray: the message says when and by what, and what to try."""
 
 
 @dataclass(frozen=True)
