@@ -155,6 +155,7 @@ def solve(
     from compare.evaluation import Evaluation
     from compare.fields import write_vtu
     from compare.stages import Stages
+    from compare.verdict import certified
     from geometry.cache import finger_mesh
     from solvers.problem import Problem
     from solvers.solver import with_law
@@ -171,13 +172,16 @@ def solve(
         with stages.stage("mesh"):
             triangles = finger_mesh(chosen, settings=settings)
         with stages.stage(made.name) as progress:
-            solution = made.solve(Problem(triangles, with_law(material, made), load), progress)
-        write_vtu(out, triangles, Evaluation.of(solution, triangles))
-    print(f"{solution.solver}: {solution.status.message}")
+            problem = Problem(triangles, with_law(material, made), load)
+            solution = made.solve(problem, progress)
+        with stages.stage("certificate"):
+            (evaluation,) = certified([Evaluation.of(solution, triangles)], problem)
+        write_vtu(out, triangles, evaluation)
+    print(f"{evaluation.solver}: {evaluation.message}")
     u, v = solution.reaction
     print(f"energy {solution.energy:.6g} N mm/mm, reaction ({u:.6g}, {v:.6g}) N/mm")
     print(out)
-    return 0 if solution.status.converged else NOT_CONVERGED
+    return 0 if evaluation.converged else NOT_CONVERGED
 
 
 @pinnray.command

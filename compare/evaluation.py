@@ -14,9 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compare.atomic import atomic_path
+from compare.certificate import Certificate
 from geometry.arrays import FloatArray
 from geometry.mesh import TriangleMesh
 from geometry.quadrature import body_quadrature
+from solvers.fem.lagrange import LagrangeSpace
 from solvers.solution import Solution
 
 QUADRATURE_DEGREE = 2
@@ -25,19 +27,20 @@ HISTORY_PREFIX = "history_"
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """One solver's result on the shared mesh: t triangles, n nodes, m markers, q = 3 t quadrature points.
+    """One solver's result on the shared mesh: t triangles, n nodes, e edges, m markers, q = 3 t points.
 
     Attributes:
         solver: Name of the solver.
         law: Material law that it had: "linear" (strain is infinitesimal) or "neo-hookean" (Green-Lagrange).
-        converged: Whether the solver's own criterion was met.
-        message: The solver's sentence on how it ended.
+        converged: Whether the solver's own criterion was met and, where there is a certificate, its limit.
+        message: The solver's sentence on how it ended, and what the certificate adds.
         energy: Elastic energy per unit depth, N mm / mm.
         reaction: Force of the indenter per unit depth, shape (2,), N/mm.
         stats: What the solver says of its run: `seconds`, `unknowns`, ...
         history: Columns of the training or load-stepping record, all of one length.
         marker_displacement: Shape (m, 2), mm.
         node_displacement: Shape (n, 2), mm.
+        edge_displacement: At the middles of the mesh's edges, shape (e, 2), mm.
         weights: Quadrature weights, shape (q,), mm^2.
         displacement: At the quadrature points, shape (q, 2), mm.
         strain: At the quadrature points, shape (q, 2, 2).
@@ -45,6 +48,7 @@ class Evaluation:
         stress_zz: Shape (q,), MPa.
         von_mises: Shape (q,), MPa.
         energy_density: Shape (q,), MPa.
+        certificate: What the result is worth by the energy of finite elements; not part of the archive.
     """
 
     solver: str
@@ -57,6 +61,7 @@ class Evaluation:
     history: Mapping[str, FloatArray]
     marker_displacement: FloatArray
     node_displacement: FloatArray
+    edge_displacement: FloatArray
     weights: FloatArray
     displacement: FloatArray
     strain: FloatArray
@@ -64,10 +69,11 @@ class Evaluation:
     stress_zz: FloatArray
     von_mises: FloatArray
     energy_density: FloatArray
+    certificate: Certificate | None = None
 
     @classmethod
     def of(cls, solution: Solution, mesh: TriangleMesh, markers: ArrayLike | None = None) -> "Evaluation":
-        """Sample a solution on the nodes and quadrature points of `mesh` and at the markers.
+        """Sample a solution on the nodes, edges and quadrature points of `mesh` and at the markers.
 
         Args:
             solution: What to sample; it may have been found on another mesh of the same body.
@@ -75,10 +81,10 @@ class Evaluation:
             markers: Marker positions, shape (m, 2), mm; those of the mesh if None.
         """
         quadrature = body_quadrature(mesh, QUADRATURE_DEGREE)
-        inside, nodes = quadrature.location, mesh.at_nodes()
+        inside, nodes = quadrature.location, LagrangeSpace(mesh, 2).at_nodes()
         if solution.problem.mesh is not mesh:  # a location belongs to its mesh
             inside, nodes = (solution.problem.mesh.locate(place.points) for place in (inside, nodes))
-        state = solution.state(inside)
+        state, displacement = solution.state(inside), solution.displacement(nodes)
         return cls(
             solver=solution.solver,
             law=solution.problem.material.law,
@@ -89,7 +95,8 @@ class Evaluation:
             stats={name: _plain(value) for name, value in solution.stats.items()},
             history={name: np.asarray(column) for name, column in solution.history.items()},
             marker_displacement=solution.displacement(mesh.markers if markers is None else markers),
-            node_displacement=solution.displacement(nodes),
+            node_displacement=displacement[: len(mesh.points)],
+            edge_displacement=displacement[len(mesh.points) :],
             weights=quadrature.weights,
             displacement=solution.displacement(inside),
             strain=state.strain,
@@ -114,7 +121,7 @@ class Evaluation:
             value = getattr(self, entry.name)
             if isinstance(value, np.ndarray):
                 arrays[entry.name] = value
-            elif entry.name != "history":
+            elif entry.name not in ("history", "certificate"):
                 header[entry.name] = dict(value) if isinstance(value, Mapping) else value
         arrays |= {HISTORY_PREFIX + name: column for name, column in self.history.items()}
         with atomic_path(path) as partial:

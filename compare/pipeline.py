@@ -19,6 +19,7 @@ from compare.report import ReportContent, write_report
 from compare.results import metrics
 from compare.stages import Stages
 from compare.tables import write_markers, write_summary
+from compare.verdict import certified
 from compare.virtual_experiment import virtual_experiment
 from geometry.cache import finger_mesh
 from geometry.design import Design
@@ -98,6 +99,8 @@ def run(job: Job, stages: Stages) -> Outcome:
         for solver in job.solvers:
             known = _in_context(solver, job, folder, evaluations)
             evaluations.append(_evaluate(job, known, problem, observations, folder, stages))
+        with stages.stage("certificate"):
+            evaluations = certified(evaluations, problem)
         reference = pick_reference(evaluations, job.reference)
         with stages.stage("pictures") as progress:
             figures = draw_all(

@@ -64,6 +64,7 @@ def _solver(
         "energy": evaluation.energy,
         "reaction": evaluation.reaction.tolist(),
         "stats": dict(evaluation.stats),
+        "certificate": evaluation.certificate and evaluation.certificate.numbers(),
         "markers": {
             "ae_u": errors.ae_u.tolist(),
             "ae_v": errors.ae_v.tolist(),

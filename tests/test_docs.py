@@ -25,7 +25,7 @@ GUIDE, OWN_SOLVER = DOCS / "guide.md", DOCS / "own-solver.md"
 PAGES = sorted([*DOCS.glob("*.md"), *ROOT.glob("*.md")])
 PLUGIN = ROOT / "tests" / "solvers" / "plugin"
 
-PLACEHOLDERS = ("COMPONENT", "DIFFERENCE", "FIELD", "NAME", "PARAMETER", "STAT", "UNIT")
+PLACEHOLDERS = ("COMPONENT", "DIFFERENCE", "FIELD", "NAME", "PARAMETER", "REGION", "STAT", "UNIT")
 """Words of the tables that stand for any name."""
 
 

@@ -53,6 +53,16 @@ class LagrangeSpace:
             return nodes
         return np.concatenate([nodes, self._edge_numbers(np.sort(edges, axis=1))])
 
+    def at_nodes(self) -> Location:
+        """The location of every node, in the order of the nodes."""
+        corners = np.eye(3)
+        barycentric = np.concatenate([corners, corners[EDGES].mean(axis=1)])[: self.cell_nodes.shape[1]]
+        cells, local = (np.zeros(len(self.nodes), dtype=np.int64) for _ in range(2))
+        for number, nodes in enumerate(self.cell_nodes.T):
+            cells[nodes] = np.arange(len(nodes))
+            local[nodes] = number
+        return Location(points=self.nodes, cells=cells, barycentric=barycentric[local])
+
     def shape_functions(self, location: Location) -> csr_matrix:
         """Values of the shape functions, as a matrix (n, N) that maps nodal values to values at points."""
         λ = location.barycentric

@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,8 +12,14 @@ from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
 from solvers.elasticity import Lame, linear_energy_density
 from solvers.fem.bridge import DistributedSpace, Factorisation
+from solvers.fem.conditions import (
+    held_components,
+    load_functionals,
+    patch_displacement,
+    reaction_by_residual_work,
+)
 from solvers.fem.lagrange import LagrangeField, LagrangeSpace
-from solvers.problem import Problem, contact_functional
+from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, check_problem, silent
 
@@ -49,7 +56,9 @@ class FemSolver:
         space = LagrangeSpace(problem.mesh, self.degree)
         system = LinearSystem.of(problem, space)
         progress(0.3, "assembled")
-        nodal = system.solve()
+        least = LeastEnergy.of(system)
+        nodal = least.solution()
+        least.factors.destroy()
         residual = system.residual(nodal)
         return Solution(
             solver=self.name,
@@ -98,63 +107,80 @@ class LinearSystem:
         matrix = self.distributed.assemble_matrix(self.forms["stiffness"], conditions)
         return Factorisation(self.distributed, matrix, clamped, positive_definite=True)
 
-    def solve(self) -> FloatArray:
-        """Nodal displacements, shape (N, 2), mm."""
-        space, load = self.distributed.space, self.problem.load
-        clamped = held_components(self.problem, space)
-        if load.kind == "patch":
-            prescribed = patch_displacement(self.problem, space)
-            factors = self.factorise(clamped)
-            nodal = prescribed + factors.solve(-self.residual(prescribed))
-        else:
-            functionals = load_functionals(self.problem, space)
-            factors = self.factorise(clamped)
-            responses = [factors.solve(functional) for functional in functionals]
-            compliance = np.array([[(b * x).sum() for x in responses] for b in functionals])
-            forces = np.linalg.solve(compliance, load.values)
-            nodal = np.asarray(np.einsum("k,knx->nx", forces, responses))
-        factors.destroy()
-        return nodal
-
     def residual(self, nodal: FloatArray) -> FloatArray:
         """Internal force K u of nodal displacements, shape (N, 2), N/mm."""
         self.distributed.set_function(nodal)
         return self.distributed.assemble_nodal(self.forms["residual"])
 
 
-def held_components(problem: Problem, space: LagrangeSpace) -> BoolArray:
-    """Nodal components that a Dirichlet condition prescribes, (N, 2): base and, for a `patch`, contact."""
-    held = np.zeros((len(space.nodes), 2), dtype=bool)
-    held[space.boundary_nodes("base")] = True
-    if problem.load.kind == "patch":
-        held[np.ix_(space.boundary_nodes("contact"), np.array(problem.load.prescribed))] = True
-    return held
+@dataclass(frozen=True, eq=False)
+class LeastEnergy:
+    """Displacements of least energy for any values at base and contact, from one factorisation.
 
-
-def patch_displacement(problem: Problem, space: LagrangeSpace) -> FloatArray:
-    """Nodal displacements that are the load on the contact and zero elsewhere, shape (N, 2), mm."""
-    values = np.zeros((len(space.nodes), 2))
-    nodes = space.boundary_nodes("contact")
-    values[np.ix_(nodes, np.array(problem.load.prescribed))] = problem.load.values
-    return values
-
-
-def load_functionals(problem: Problem, space: LagrangeSpace) -> FloatArray:
-    """The load's functional on every shape function, one for each prescribed component, shape (k, N, 2)."""
-    points, weights = contact_functional(problem)
-    coefficients = space.shape_functions(problem.mesh.locate(points)).T @ weights
-    functionals = np.zeros((len(problem.load.prescribed), len(space.nodes), 2))
-    for row, axis in enumerate(problem.load.prescribed):
-        functionals[row, :, axis] = coefficients
-    return functionals
-
-
-def reaction_by_residual_work(space: LagrangeSpace, residual: FloatArray) -> FloatArray:
-    """Force of the indenter on the finger, shape (2,), N/mm: the work of the residual on a unit translation.
-
-    The translation is one everywhere but at the base, where the clamp's own force works. Exact for the
-    discrete solution, unlike an integral of stresses along the boundary.
+    Attributes:
+        system: The stiffness.
+        held: Nodal components whose values are given, mask of shape (N, 2).
+        functionals: The load's functionals whose values are given, shape (k, N, 2); none for a `patch`.
+        factors: Of the stiffness with the components of `held` clamped.
+        responses: Displacement under the unit force of each functional, shape (k, N, 2), mm per N/mm.
     """
-    moved = np.ones(len(space.nodes), dtype=bool)
-    moved[space.boundary_nodes("base")] = False
-    return np.asarray(residual[moved].sum(axis=0))
+
+    system: LinearSystem
+    held: BoolArray
+    functionals: FloatArray
+    factors: Factorisation
+    responses: FloatArray
+
+    @classmethod
+    def of(cls, system: LinearSystem) -> "LeastEnergy":
+        """Factorise, and solve once for each functional."""
+        problem, space = system.problem, system.distributed.space
+        held = held_components(problem, space)
+        functionals = (
+            np.zeros((0, *held.shape)) if problem.load.kind == "patch" else load_functionals(problem, space)
+        )
+        factors = system.factorise(held)
+        responses = np.array([factors.solve(functional) for functional in functionals])
+        return cls(system, held, functionals, factors, responses.reshape(functionals.shape))
+
+    @cached_property
+    def compliance(self) -> FloatArray:
+        """Values of the functionals under their unit forces, shape (k, k), mm per N/mm."""
+        return np.asarray(np.einsum("inx,jnx->ij", self.functionals, self.responses))
+
+    def values(self, nodal: FloatArray) -> FloatArray:
+        """The load's functionals of nodal displacements, shape (k,), mm."""
+        return np.asarray(np.einsum("knx,nx->k", self.functionals, nodal))
+
+    def solution(self) -> FloatArray:
+        """The nodal displacements that solve the problem, shape (N, 2), mm."""
+        problem, space = self.system.problem, self.system.distributed.space
+        if problem.load.kind == "patch":
+            return self.minimiser(patch_displacement(problem, space), np.zeros(0))
+        return self.minimiser(np.zeros(self.held.shape), problem.load.values)
+
+    def minimiser(self, given: FloatArray, values: FloatArray) -> FloatArray:
+        """The nodal displacements of least energy, shape (N, 2), mm.
+
+        Args:
+            given: Nodal displacements whose components of `held` are taken, shape (N, 2), mm.
+            values: What the functionals have to be, shape (k,), mm.
+        """
+        nodal = np.where(self.held, given, 0.0)
+        if nodal.any():
+            nodal = nodal + self.factors.solve(-self.system.residual(nodal))
+        forces = np.linalg.solve(self.compliance, values - self.values(nodal))
+        return np.asarray(nodal + np.einsum("k,knx->nx", forces, self.responses))
+
+    def unbalanced(self, internal: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What internal forces, shape (N, 2), N/mm, leave unbalanced under any forces of the functionals.
+
+        Returns:
+            Nodal forces r, shape (N, 2), N/mm, zero where displacements are given, and the displacement
+            K^-1 r, mm, by which every functional is zero: the square root of their product is the dual norm
+            of r.
+        """
+        response = self.factors.solve(internal)
+        forces = np.linalg.solve(self.compliance, self.values(response))
+        balance = np.where(self.held, 0.0, internal - np.einsum("k,knx->nx", forces, self.functionals))
+        return balance, response - np.einsum("k,knx->nx", forces, self.responses)

@@ -13,13 +13,13 @@ from geometry.errors import UserError
 from geometry.quadrature import body_quadrature
 from solvers.elasticity import Lame, deformation_jacobian, neo_hookean_energy_density
 from solvers.fem.bridge import DistributedSpace, Factorisation
-from solvers.fem.lagrange import LagrangeField, LagrangeSpace
-from solvers.fem.linear import (
+from solvers.fem.conditions import (
     held_components,
     load_functionals,
     patch_displacement,
     reaction_by_residual_work,
 )
+from solvers.fem.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, check_problem, silent

@@ -10,12 +10,21 @@ import pytest
 
 from compare.metrics import marker_errors, reference_differences
 from compare.results import metrics
+from compare.verdict import certified
 from geometry.design import Design
-from solvers.problem import Load, Material
+from solvers.problem import Load, Material, Problem
 
 ERRORS = {"mae_u": Real, "mae_v": Real, "mae_sum": Real, "mae_rss": Real}
 DIFFERENCE = {"rel_l2": Real, "mean": Real, "p95": Real}
 COMPONENTS = {"xx": DIFFERENCE, "yy": DIFFERENCE, "xy": DIFFERENCE}
+REGION = {"area": Real, "excess": Real, "rel_l2_displacement": Real, "rel_l2_von_mises": Real}
+CERTIFICATE = {
+    **dict.fromkeys(("energy", "fem_energy", "excess", "rel_excess", "violation", "rel_violation"), Real),
+    **dict.fromkeys(("energy_norm_error", "weak_residual", "imbalance", "missed", "base"), Real),
+    "misses_energy": bool,
+    "load": list,
+    "regions": {"corners": REGION, "contact": REGION, "walls": REGION},
+}
 SOLVER = {
     "law": str,
     "status": str,
@@ -24,6 +33,7 @@ SOLVER = {
     "energy": Real,
     "reaction": list,
     "stats": dict,
+    "certificate": CERTIFICATE,
     "markers": {"ae_u": list, "ae_v": list, **ERRORS},
     "held_out": ERRORS,
     "to_reference": {
@@ -59,7 +69,7 @@ def assert_schema(value, expected, where="metrics"):
 
 
 @pytest.fixture
-def numbers(fem, pinn, observations):
+def numbers(fem, pinn, observations, mesh):
     """`numbers(...)`: the metrics of both solvers, with some arguments changed."""
 
     def make(**changes):
@@ -68,7 +78,7 @@ def numbers(fem, pinn, observations):
             "material": Material(),
             "load": Load(),
             "observations": observations,
-            "evaluations": [fem, pinn],
+            "evaluations": certified([fem, pinn], Problem(mesh)),
             "reference": fem,
         }
         return metrics(**{**arguments, **changes})

@@ -17,8 +17,9 @@ from geometry.design import Design
 from geometry.errors import UserError
 from geometry.settings import MeshSettings
 from solvers.elasticity import Plane, linear_stress
+from solvers.fem.conditions import load_functionals
 from solvers.fem.lagrange import LagrangeSpace
-from solvers.fem.linear import FemSolver, load_functionals
+from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 from tests.solvers.conftest import bar_mesh
 

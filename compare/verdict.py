@@ -1,0 +1,48 @@
+"""Whether a result counts as converged: by its solver's own criterion and by its certificate."""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+
+from compare.certificate import Certificate
+from compare.evaluation import Evaluation
+from solvers.problem import Problem
+
+CERTIFIED_LAW = "linear"
+"""Only there does the least energy settle the question: it is quadratic."""
+
+
+def certified(evaluations: Sequence[Evaluation], problem: Problem) -> list[Evaluation]:
+    """The evaluations, those of the linear law with a certificate and the verdict that follows from it.
+
+    Without DOLFINx there are no certificates, and a warning says so.
+
+    Args:
+        evaluations: Sampled on the problem's mesh.
+        problem: What was solved; each evaluation knows its own law.
+    """
+    if all(evaluation.law != CERTIFIED_LAW for evaluation in evaluations):
+        return list(evaluations)
+    try:
+        from compare.certifier import Certifier
+    except ImportError as error:
+        warnings.warn(f"no result is certified: {error}", stacklevel=2)
+        return list(evaluations)
+    material = problem.material.model_copy(update={"law": CERTIFIED_LAW})
+    certifier = Certifier(replace(problem, material=material))
+    return [
+        judged(evaluation, certifier.certificate(evaluation))
+        if evaluation.law == CERTIFIED_LAW
+        else evaluation
+        for evaluation in evaluations
+    ]
+
+
+def judged(evaluation: Evaluation, certificate: Certificate) -> Evaluation:
+    """The evaluation with its certificate; not converged if that finds a fault, whatever the solver says."""
+    return replace(
+        evaluation,
+        converged=evaluation.converged and not certificate.faults,
+        message="; ".join([evaluation.message.rstrip(". "), *certificate.faults]),
+        certificate=certificate,
+    )

@@ -1,0 +1,236 @@
+"""The certificate against identities of linear algebra that hold for any displacement, and its verdict."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import skfem
+from skfem.models.elasticity import linear_elasticity
+
+from compare.certificate import CONDITION_LIMIT, ENERGY_LIMIT, INTERPOLANT_LIMIT, Certificate
+from compare.certifier import Certifier
+from compare.evaluation import Evaluation
+from compare.metrics import reference_differences
+from compare.regions import REGIONS, body_regions
+from compare.verdict import certified, judged
+from geometry.arrays import FloatArray
+from geometry.cache import finger_mesh
+from geometry.design import Design
+from geometry.mesh import TriangleMesh
+from geometry.settings import MeshSettings
+from solvers.fem.lagrange import LagrangeField, LagrangeSpace
+from solvers.fem.linear import FemSolver
+from solvers.problem import Load, Material, Problem
+from solvers.solution import Solution, Status
+
+LOADS = {
+    "mean": Load(),
+    "point": Load(kind="point"),
+    "patch": Load(kind="patch"),
+    "sliding patch": Load(kind="patch", displacement=(None, -10.0)),
+    "v only": Load(displacement=(None, -10.0)),
+}
+
+
+@pytest.fixture(scope="module")
+def finger() -> TriangleMesh:
+    return finger_mesh(Design(), settings=MeshSettings(size=1.0))
+
+
+def sampled(problem: Problem, nodal: FloatArray, energy: float = 1.0) -> Evaluation:
+    """The evaluation of a quadratic finite-element displacement, which reports the energy given, N mm/mm."""
+    solution = Solution(
+        solver="given",
+        problem=problem,
+        field=LagrangeField(LagrangeSpace(problem.mesh, 2), nodal),
+        energy=energy,
+        reaction=np.zeros(2),
+        status=Status(True, "a given displacement"),
+        stats={},
+    )
+    return Evaluation.of(solution, problem.mesh)
+
+
+def disturbed(problem: Problem, size: float, *, at_base: bool = False) -> FloatArray:
+    """The solution of `fem` plus a random displacement of so many mm, at the base and the contact too."""
+    field = FemSolver().solve(problem).field
+    random = size * np.random.default_rng(3).uniform(-1, 1, field.values.shape)
+    if not at_base:
+        random[field.space.boundary_nodes("base")] = 0.0
+    return field.values + random
+
+
+@pytest.mark.parametrize("load", LOADS.values(), ids=LOADS)
+def test_fem_itself_has_no_excess_and_nothing_out_of_balance(finger: TriangleMesh, load: Load) -> None:
+    problem = Problem(finger, load=load)
+    (own,) = certified([Evaluation.of(FemSolver().solve(problem), finger)], problem)
+    certificate = own.certificate
+    assert own.converged
+    assert own.message == FemSolver().solve(problem).status.message
+    assert not certificate.has_excess
+    assert certificate.energy == pytest.approx(own.energy, rel=1e-12)
+    for value in (certificate.rel_excess, certificate.rel_violation, certificate.weak_residual):
+        assert 0 <= value < 1e-8
+    assert certificate.imbalance < 1e-8
+    assert np.nanmax([certificate.base, *certificate.load]) < 1e-10
+
+
+@pytest.mark.parametrize("load", LOADS.values(), ids=LOADS)
+def test_energies_of_any_displacement_against_another_program(finger: TriangleMesh, load: Load) -> None:
+    """Pythagoras: excess and violation are the energy of the difference from `fem`, which scikit-fem has too.
+
+    The excess is the energy above the least with the same values; the dual norm of the imbalance, where the
+    displacement is in the space, is the norm of what is above it.
+    """
+    problem = Problem(finger, load=load)
+    nodal = disturbed(problem, 1e-3, at_base=True)
+    certificate = Certifier(problem).certificate(sampled(problem, nodal))
+    stiffness, order = stiffness_of_scikit_fem(problem)
+
+    def energy(values: FloatArray) -> float:
+        vector = values[order[:, 0], order[:, 1]]
+        return 0.5 * float(vector @ (stiffness @ vector))
+
+    assert certificate.energy == pytest.approx(energy(nodal), rel=1e-9)
+    difference = energy(nodal - FemSolver().solve(problem).field.values)
+    assert certificate.excess + certificate.violation == pytest.approx(difference, rel=1e-6)
+    assert min(certificate.excess, certificate.violation) > 1e-3 * difference
+    assert certificate.weak_residual == pytest.approx(np.sqrt(certificate.rel_excess), rel=1e-6)
+    shares = [region.excess for region in certificate.regions.values()]
+    assert sum(shares) == pytest.approx(1)
+    assert (certificate.density * finger.areas).sum() == pytest.approx(certificate.excess, rel=1e-9)
+
+
+def stiffness_of_scikit_fem(problem: Problem) -> tuple[object, FloatArray]:
+    """Its stiffness matrix, and for each of its degrees of freedom our node and component."""
+    mesh, lame = problem.mesh, problem.material.lame
+    basis = skfem.Basis(
+        skfem.MeshTri(mesh.points.T.copy(), mesh.triangles.T.copy()),
+        skfem.ElementVector(skfem.ElementTriP2()),
+    )
+    number = {tuple(place): node for node, place in enumerate(np.round(LagrangeSpace(mesh, 2).nodes, 9))}
+    order = np.zeros((basis.N, 2), dtype=int)
+    for axis in range(2):
+        dofs = np.concatenate([basis.nodal_dofs[axis], basis.facet_dofs[axis]])
+        order[dofs, 0] = [number[tuple(np.round(basis.doflocs[:, dof], 9))] for dof in dofs]
+        order[dofs, 1] = axis
+    return skfem.asm(linear_elasticity(lame.λ, lame.μ), basis), order
+
+
+@pytest.mark.parametrize("load", LOADS.values(), ids=LOADS)
+def test_missed_conditions_are_told_in_mm(finger: TriangleMesh, load: Load) -> None:
+    """Everything moved by (0.02, -0.03) mm, base and contact included, which takes no energy."""
+    problem = Problem(finger, load=load)
+    moved = FemSolver().solve(problem).field.values + np.array([0.02, -0.03])
+    certificate = Certifier(problem).certificate(sampled(problem, moved))
+    assert certificate.base == pytest.approx(np.hypot(0.02, 0.03))
+    free = [value is None for value in load.displacement]
+    np.testing.assert_allclose(certificate.load, np.where(free, np.nan, [0.02, 0.03]), rtol=1e-8)
+    assert max(certificate.rel_excess, certificate.rel_violation) < 1e-12
+    assert certificate.faults == []  # 0.04 mm of 10 mm
+
+
+def test_half_the_stroke_is_no_excess_and_a_quarter_of_the_energy_in_violation(finger: TriangleMesh) -> None:
+    problem = Problem(finger)
+    half = 0.5 * FemSolver().solve(problem).field.values
+    certificate = Certifier(problem).certificate(sampled(problem, half))
+    assert certificate.rel_excess < 1e-12
+    assert certificate.rel_violation == pytest.approx(0.25)
+    assert "it misses the conditions by up to 5 mm (limit 0.2 mm)" in certificate.faults
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.44])
+def test_a_wrong_law_shows(finger: TriangleMesh, poisson: float) -> None:
+    """The field of another Poisson's ratio is not in balance under the right law."""
+    wrong = FemSolver().solve(Problem(finger, Material(poisson=poisson)))
+    certificate = Certifier(Problem(finger)).certificate(Evaluation.of(wrong, finger))
+    assert certificate.rel_excess > 1e-4
+    assert bool(certificate.faults) is (poisson == 0.3)
+
+
+def test_linear_elements_do_not_pass_on_a_coarse_mesh(finger: TriangleMesh) -> None:
+    problem = Problem(finger)
+    (linear,) = certified([Evaluation.of(FemSolver(degree=1).solve(problem), finger)], problem)
+    assert not linear.converged
+    assert "its energy is" in linear.message
+
+
+def test_a_solver_that_reports_too_little_energy_is_found_out(finger: TriangleMesh) -> None:
+    problem = Problem(finger)
+    solution = FemSolver().solve(problem)
+    honest = Certifier(problem).certificate(sampled(problem, solution.field.values, solution.energy))
+    short = Certifier(problem).certificate(sampled(problem, solution.field.values, 0.95 * solution.energy))
+    assert (honest.misses_energy, short.misses_energy) == (False, True)
+    assert short.missed == pytest.approx(0.05 * solution.energy)
+
+
+def test_only_the_linear_law_is_certified(finger: TriangleMesh) -> None:
+    problem = Problem(finger)
+    evaluation = Evaluation.of(FemSolver().solve(problem), finger)
+    other = replace(evaluation, law="neo-hookean")
+    first, second = certified([evaluation, other], problem)
+    assert first.certificate is not None
+    assert second is other
+
+
+def test_a_verdict_can_only_take_convergence_away(fem: Evaluation, failed: Evaluation) -> None:
+    good = perfect()
+    assert judged(fem, good).converged
+    assert not judged(failed, good).converged
+    for fault in (
+        {"weak_residual": 1.01 * np.sqrt(ENERGY_LIMIT)},
+        {"base": 1.01 * CONDITION_LIMIT},
+        {"load": np.array([np.nan, 1.01 * CONDITION_LIMIT])},
+        {"excess": 1.01 * INTERPOLANT_LIMIT},
+        {"excess": np.nan},
+    ):
+        bad = judged(fem, replace(good, **fault))
+        assert not bad.converged
+        assert bad.message.startswith("solved directly; it")
+
+
+def perfect() -> Certificate:
+    return Certificate(
+        energy=1.0,
+        fem_energy=1.0,
+        excess=0.0,
+        violation=0.0,
+        missed=0.0,
+        weak_residual=0.0,
+        imbalance=0.0,
+        base=0.0,
+        load=np.zeros(2),
+        stroke=1.0,
+        regions={},
+        density=np.zeros(1),
+    )
+
+
+def test_the_regions_are_the_whole_body_once(finger: TriangleMesh, mesh: TriangleMesh) -> None:
+    for body, names in ((finger, list(REGIONS)), (mesh, ["corners", "contact", "walls"])):
+        regions = body_regions(body)
+        assert list(regions) == names  # a bar has no cavity, so nothing lies beyond the last one
+        np.testing.assert_array_equal(sum(here.astype(int) for here in regions.values()), 1)
+
+
+def test_the_regions_are_where_they_are_called(finger: TriangleMesh) -> None:
+    regions = body_regions(finger)
+    x, y = finger.at_centroids().points.T
+    assert x[regions["tip"]].min() >= 90 - 20
+    assert np.abs(x[regions["contact"]] - 35).max() < 1 + 1.5
+    assert y[regions["contact"]].min() > -1.5
+    # 5 cells with four corners each and two ends of the base; every corner has a triangle of its own.
+    corners = finger.points[finger.triangles[regions["corners"]]].reshape(-1, 2)
+    for place in ([0, 0], [0, -30], [2, -2], [70, -2]):
+        assert np.linalg.norm(corners - place, axis=1).min() < 1e-9
+
+
+def test_the_errors_of_the_regions_add_up_to_that_of_the_body(finger: TriangleMesh) -> None:
+    problem = Problem(finger)
+    evaluation = sampled(problem, disturbed(problem, 1e-3))
+    differences = reference_differences(evaluation, Evaluation.of(FemSolver().solve(problem), finger))
+    regions = Certifier(problem).certificate(evaluation).regions.values()
+    for name, whole in (("displacement", differences.displacement), ("von_mises", differences.von_mises)):
+        parts = [getattr(region, f"rel_l2_{name}") for region in regions]
+        assert np.linalg.norm(parts) == pytest.approx(whole.rel_l2)
+    assert sum(region.area for region in regions) == pytest.approx(1)
