@@ -1,0 +1,212 @@
+"""The paper's grid search for a learning rate and a weight of the boundary conditions."""
+
+import json
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from compare.atomic import write_json
+from compare.gridsearch_run import FAILED, RESULT_FILE, Point, Reference, Run, Task, train
+from compare.gridsearch_tables import best_of, ranked, run_note, write_runs
+from compare.output_folder import locked
+from compare.processes import ProcessFailed, in_processes
+from compare.provenance import machine, package_versions, sources_digest
+from compare.stages import Stages
+from geometry.cache import finger_mesh
+from geometry.design import Design
+from geometry.errors import UserError
+from geometry.settings import MeshSettings
+from solvers.problem import Load, Material, Problem
+from solvers.registry import make_solver
+from solvers.solver import Progress, Solver, check_problem
+
+SEARCH_FILE = "search.json"
+
+
+@dataclass(frozen=True)
+class Search:
+    """What to search, and where to write.
+
+    Attributes:
+        design: The finger.
+        mesh: Element sizes.
+        material: The elastic law.
+        load: What moves the finger.
+        learning_rates: Of the optimiser.
+        bc_weights: Weights of the boundary conditions in the loss, MPa/mm².
+        settings: The other settings of `pinn-std`, its preset `paper` among them.
+        out: Output folder; what an earlier search with the same settings finished there is taken over.
+        processes: How many runs are trained at a time.
+        threads: Threads of each.
+    """
+
+    design: Design
+    mesh: MeshSettings
+    material: Material
+    load: Load
+    learning_rates: Sequence[float]
+    bc_weights: Sequence[float]
+    settings: Mapping[str, object]
+    out: Path
+    processes: int
+    threads: int
+
+    @property
+    def points(self) -> list[Point]:
+        """The points of the grid."""
+        return [Point(*pair) for pair in product(self.learning_rates, self.bc_weights)]
+
+    def folder(self, point: Point) -> Path:
+        """Where the run of a point keeps its checkpoints and its result."""
+        return self.out / "runs" / point.name
+
+    def solver(self, point: Point) -> Solver:
+        """The solver of a point."""
+        return make_solver("pinn-std", **self.settings, **asdict(point))
+
+
+def search(wanted: Search, stages: Stages) -> list[Run]:
+    """Train at every point of the grid that has no result yet, and write tables and picture.
+
+    Returns:
+        The runs, the one nearest to `fem` first.
+
+    Raises:
+        UserError: If it cannot be done, or the folder holds something else.
+    """
+    started = datetime.now(UTC)
+    solvers = [wanted.solver(point) for point in wanted.points]
+    with stages.stage("mesh"):
+        problem = Problem(finger_mesh(wanted.design, settings=wanted.mesh), wanted.material, wanted.load)
+    check_problem(solvers[0], problem)
+    definition = _definition(wanted, solvers[0], problem)
+    _check_folder(wanted.out, definition)
+    wanted.out.mkdir(parents=True, exist_ok=True)
+    with locked(wanted.out):
+        write_json(wanted.out / SEARCH_FILE, definition)
+        finished = {point: wanted.folder(point) / RESULT_FILE for point in wanted.points}
+        results = {point: Run.load(path) for point, path in finished.items() if path.exists()}
+        if missing := [point for point in wanted.points if point not in results]:
+            results |= _trained(wanted, missing, problem, stages)
+        runs = ranked(list(results.values()))
+        write_runs(wanted.out / "gridsearch.csv", runs)
+        with stages.stage("picture"):
+            from compare.figures.grid_chart import draw_grid
+
+            draw_grid(wanted.out / "gridsearch.png", runs=runs)
+        best = best_of(runs)
+        write_json(
+            wanted.out / "gridsearch.json",
+            {
+                **definition,
+                "learning_rates": list(wanted.learning_rates),
+                "bc_weights": list(wanted.bc_weights),
+                "ranked_by": "rel_l2_displacement: relative L2 difference from fem on the same mesh",
+                "best": best and asdict(best),
+                "runs": [asdict(run) for run in runs],
+                "started": started.isoformat(timespec="seconds"),
+                "seconds": {name: round(seconds, 2) for name, seconds in stages.seconds.items()},
+                "versions": package_versions(),
+                "machine": machine(),
+            },
+        )
+    return runs
+
+
+def _definition(wanted: Search, solver: Solver, problem: Problem) -> dict[str, Any]:
+    """Everything that the result of a run depends on, but for its point of the grid."""
+    searched = {"learning_rate", "bc_weight"}
+    return {
+        "schema": 1,
+        "design": wanted.design.model_dump(),
+        "mesh": wanted.mesh.model_dump(),
+        "material": wanted.material.model_dump(),
+        "load": wanted.load.model_dump(mode="json"),
+        "solver": {key: value for key, value in solver.settings().items() if key not in searched},
+        "problem_sha256": problem.digest,
+        "program_sha256": sources_digest(["compare.gridsearch_run", "geometry", "solvers"]),
+    }
+
+
+def _check_folder(out: Path, definition: Mapping[str, Any]) -> None:
+    """Refuse a folder that holds another search, or something else."""
+    if out.exists() and not out.is_dir():
+        raise UserError(f"{out} is a file; name a folder with --out")
+    if not out.exists() or not any(out.iterdir()):
+        return
+    try:
+        before = json.loads((out / SEARCH_FILE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        raise UserError(
+            f"{out} holds files that are not of a grid search; name another folder with --out"
+        ) from None
+    if differing := _differing(before, definition):
+        raise UserError(
+            f"{out} holds a search with other settings ({', '.join(differing)}); "
+            "name another folder with --out, or remove that one"
+        )
+
+
+def _differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+    """Names of the entries that differ; digests only where nothing else says why."""
+    flat_before, flat_now = _flat(before), _flat(now)
+    names = [name for name in {**flat_before, **flat_now} if flat_before.get(name) != flat_now.get(name)]
+    return [name for name in names if not name.endswith("_sha256")] or names
+
+
+def _flat(content: Mapping[str, Any]) -> dict[str, Any]:
+    entries: dict[str, Any] = {}
+    for key, value in content.items():
+        entries |= (
+            {f"{key}.{name}": inner for name, inner in value.items()}
+            if isinstance(value, dict)
+            else {key: value}
+        )
+    return entries
+
+
+def _trained(wanted: Search, points: Sequence[Point], problem: Problem, stages: Stages) -> dict[Point, Run]:
+    """Train at points of the grid, each in a process of its own."""
+    with stages.stage("fem") as progress:
+        reference = Reference.of(make_solver("fem").solve(problem, progress))
+    mesh = wanted.out / "mesh.npz"
+    problem.mesh.save(mesh)
+    tasks = {
+        point.name: Task(
+            point=point,
+            settings=wanted.settings,
+            mesh=mesh,
+            material=wanted.material,
+            load=wanted.load,
+            reference=reference,
+            folder=wanted.folder(point),
+            threads=wanted.threads,
+        )
+        for point in points
+    }
+    results: dict[Point, Run] = {}
+    lines: dict[str, tuple[ExitStack, Progress]] = {}
+
+    def report(name: str, fraction: float, note: str) -> None:
+        if name not in lines:
+            stack = ExitStack()
+            lines[name] = stack, stack.enter_context(stages.stage(name))
+        lines[name][1](fraction, note)
+
+    with (
+        stages.stage("runs") as overall,
+        closing(in_processes(train, tasks, processes=wanted.processes, report=report)) as answers,
+    ):
+        for name, answer in answers:
+            point = tasks[name].point
+            if isinstance(answer, ProcessFailed):
+                answer = Run(point, FAILED, f"its process ended with exit code {answer.exit_code}")
+            results[point] = answer
+            report(name, 1.0, run_note(answer))
+            lines[name][0].close()
+            overall(len(results) / len(tasks), f"{len(results)} of {len(tasks)} runs")
+    return results

@@ -1,0 +1,106 @@
+"""Tasks in processes of their own: their answers, their end, and what is left of them."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from compare.processes import ProcessFailed, in_processes
+from solvers.solver import Progress
+
+ROOT = Path(__file__).parent.parent.parent
+
+
+def half(number: int, progress: Progress) -> float:
+    progress(0.5, f"halving {number}")
+    return number / 2
+
+
+def ended(number: int, progress: Progress) -> float:
+    """Task 1 is killed, as by a system without memory; task 2 has a fault."""
+    if number == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return 1 / (number - 2)
+
+
+def endless(folder: Path, progress: Progress) -> None:
+    """Counts until it is interrupted, and then leaves a word."""
+    try:
+        while True:
+            progress(0.0, str(os.getpid()))
+            time.sleep(0.02)
+    except KeyboardInterrupt:
+        (folder / str(os.getpid())).write_text("saved")
+        raise
+
+
+def until(condition: Callable[[], bool]) -> None:
+    limit = time.monotonic() + 20
+    while not condition() and time.monotonic() < limit:
+        time.sleep(0.05)
+
+
+def silent(name: str, fraction: float, note: str) -> None:
+    pass
+
+
+def test_every_task_is_answered_and_reports_under_its_name():
+    said = []
+    tasks = {f"task {number}": number for number in range(3)}
+    answers = dict(in_processes(half, tasks, processes=2, report=lambda *what: said.append(what)))
+    assert answers == {"task 0": 0.0, "task 1": 0.5, "task 2": 1.0}
+    assert sorted(said) == [(f"task {number}", 0.5, f"halving {number}") for number in range(3)]
+
+
+def test_a_process_that_ends_without_an_answer_does_not_stop_the_others(capfd):
+    answers = dict(in_processes(ended, {"a": 1, "b": 2, "c": 3}, processes=3, report=silent))
+    assert answers == {"a": ProcessFailed(-signal.SIGKILL), "b": ProcessFailed(1), "c": 1.0}
+    assert "ZeroDivisionError" in capfd.readouterr().err  # whose fault it is can be read
+
+
+def test_an_interruption_lets_every_process_save_its_state(tmp_path):
+    heard = set()
+
+    def report(name: str, fraction: float, note: str) -> None:
+        heard.add(note)
+        if len(heard) == 2:
+            raise KeyboardInterrupt
+
+    tasks = {"a": tmp_path, "b": tmp_path, "c": tmp_path}
+    with (
+        pytest.raises(KeyboardInterrupt),
+        closing(in_processes(endless, tasks, processes=2, report=report)) as answers,
+    ):
+        next(answers)
+    assert {path.name for path in tmp_path.iterdir()} == heard  # and the third never started
+
+
+def test_processes_end_with_the_program_that_started_them(tmp_path):
+    code = (
+        "import sys; sys.path[:0] = sys.argv[1:3]\n"
+        "from pathlib import Path\n"
+        "from test_processes import endless, silent\n"
+        "from compare.processes import in_processes\n"
+        "def report(name, fraction, note): print(note, flush=True)\n"
+        "if __name__ == '__main__':\n"
+        "    list(in_processes(endless, {'a': Path(sys.argv[3])}, processes=1, report=report))\n"
+    )
+    script = tmp_path / "script.py"
+    script.write_text(code)
+    program = subprocess.Popen(
+        [sys.executable, str(script), str(ROOT), str(Path(__file__).parent), str(tmp_path)],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert program.stdout is not None
+    child = program.stdout.readline().strip()
+    program.kill()
+    program.communicate()
+    until((tmp_path / child).exists)
+    assert (tmp_path / child).read_text() == "saved"
