@@ -22,7 +22,7 @@ from geometry.errors import UserError
 from geometry.settings import MeshSettings
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
-from solvers.solver import Progress, Solver, check_problem
+from solvers.solver import Progress, Solver, check_load
 
 SEARCH_FILE = "search.json"
 
@@ -79,12 +79,12 @@ def search(wanted: Search, stages: Stages) -> list[Run]:
         UserError: If it cannot be done, or the folder holds something else.
     """
     started = datetime.now(UTC)
-    solvers = [wanted.solver(point) for point in wanted.points]
+    solver, *_ = (wanted.solver(point) for point in wanted.points)
+    check_load(solver, wanted.load)
+    definition = _definition(wanted, solver)
+    _check_folder(wanted.out, definition)
     with stages.stage("mesh"):
         problem = Problem(finger_mesh(wanted.design, settings=wanted.mesh), wanted.material, wanted.load)
-    check_problem(solvers[0], problem)
-    definition = _definition(wanted, solvers[0], problem)
-    _check_folder(wanted.out, definition)
     wanted.out.mkdir(parents=True, exist_ok=True)
     with locked(wanted.out):
         write_json(wanted.out / SEARCH_FILE, definition)
@@ -110,14 +110,14 @@ def search(wanted: Search, stages: Stages) -> list[Run]:
                 "runs": [asdict(run) for run in runs],
                 "started": started.isoformat(timespec="seconds"),
                 "seconds": {name: round(seconds, 2) for name, seconds in stages.seconds.items()},
-                "versions": package_versions(),
+                "problem_sha256": problem.digest,
                 "machine": machine(),
             },
         )
     return runs
 
 
-def _definition(wanted: Search, solver: Solver, problem: Problem) -> dict[str, Any]:
+def _definition(wanted: Search, solver: Solver) -> dict[str, Any]:
     """Everything that the result of a run depends on, but for its point of the grid."""
     searched = {"learning_rate", "bc_weight"}
     return {
@@ -127,7 +127,7 @@ def _definition(wanted: Search, solver: Solver, problem: Problem) -> dict[str, A
         "material": wanted.material.model_dump(),
         "load": wanted.load.model_dump(mode="json"),
         "solver": {key: value for key, value in solver.settings().items() if key not in searched},
-        "problem_sha256": problem.digest,
+        "versions": package_versions(),
         "program_sha256": sources_digest(["compare.gridsearch_run", "geometry", "solvers"]),
     }
 
@@ -152,10 +152,9 @@ def _check_folder(out: Path, definition: Mapping[str, Any]) -> None:
 
 
 def _differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
-    """Names of the entries that differ; digests only where nothing else says why."""
+    """Names of the entries that differ."""
     flat_before, flat_now = _flat(before), _flat(now)
-    names = [name for name in {**flat_before, **flat_now} if flat_before.get(name) != flat_now.get(name)]
-    return [name for name in names if not name.endswith("_sha256")] or names
+    return [name for name in {**flat_before, **flat_now} if flat_before.get(name) != flat_now.get(name)]
 
 
 def _flat(content: Mapping[str, Any]) -> dict[str, Any]:

@@ -65,14 +65,21 @@ def runs_table(runs: Sequence[Run]) -> Table:
     table = Table(
         title="Runs by their distance from fem",
         caption=(
-            "L²: relative difference of the displacement field from fem on the same mesh. Violation: of base\n"
-            "or load, over the stroke. Losses do not compare between weights; a short training favours large\n"
-            "steps."
+            "L²: relative difference of the displacement field from fem on the same mesh. Violation:\n"
+            "of base or load, over the stroke. Losses do not compare between weights; a short training\n"
+            "favours large steps."
         ),
         title_justify="left",
         caption_justify="left",
     )
-    headings = ("learning\nrate", "BC weight\nMPa/mm²", "L²\n%", "energy\nof fem's", "violation\n%", "loss\nMPa")
+    headings = (
+        "learning\nrate",
+        "BC weight\nMPa/mm²",
+        "L²\n%",
+        "energy\nof fem's",
+        "violation\n%",
+        "loss\nMPa",
+    )
     for heading in (*headings, "time\ns"):
         table.add_column(heading, justify="right", no_wrap=True)
     for run in ranked(runs):

@@ -28,7 +28,7 @@ from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
 from geometry.settings import MeshSettings
 from solvers.problem import Load, Material, Problem
-from solvers.solver import Solver, with_law
+from solvers.solver import Solver, check_load, with_law
 from solvers.training import TrainedSolver, TrainingContext
 from vision.measurements import read_measurements, write_measurements
 
@@ -186,8 +186,7 @@ def _check(job: Job) -> None:
     if job.reference is not None and job.reference not in names:
         raise UserError(f"the reference {job.reference!r} is not among the solvers {', '.join(names)}")
     for solver in job.solvers:
-        if job.load.kind not in solver.loads:
-            raise UserError(f"{solver.name} takes the loads {', '.join(solver.loads)}, not {job.load.kind!r}")
+        check_load(solver, job.load)
         with_law(job.material, solver)
     check_output(job.out)
 

@@ -6,7 +6,7 @@ from typing import Protocol, runtime_checkable
 from pydantic import ValidationError
 
 from geometry.errors import UserError
-from solvers.problem import Material, Problem
+from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution
 
 Progress = Callable[[float, str], None]
@@ -56,8 +56,13 @@ def check_problem(solver: Solver, problem: Problem) -> None:
     """Raise a `UserError` if the problem's law or kind of load is not one that the solver has."""
     if problem.material.law not in solver.laws:
         raise UserError(f"{solver.name} has the law {' or '.join(solver.laws)}, not {problem.material.law}")
-    if problem.load.kind not in solver.loads:
-        raise UserError(f"{solver.name} takes the loads {', '.join(solver.loads)}, not {problem.load.kind!r}")
+    check_load(solver, problem.load)
+
+
+def check_load(solver: Solver, load: Load) -> None:
+    """Raise a `UserError` if the kind of load is not one that the solver takes."""
+    if load.kind not in solver.loads:
+        raise UserError(f"{solver.name} takes the loads {', '.join(solver.loads)}, not {load.kind!r}")
 
 
 def with_law(material: Material, solver: Solver) -> Material:

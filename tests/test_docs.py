@@ -327,6 +327,20 @@ def test_the_guide_has_every_cad_file(tmp_path):
     assert_same(names(table(GUIDE, "file", after="### CAD")), [path.name for path in tmp_path.iterdir()])
 
 
+def test_the_guide_has_every_file_of_a_grid_search(tmp_path):
+    from compare.cli import main
+
+    grid = "--learning-rates 1e-3 --bc-weights 10 --epochs 2 --mesh-size 1 --solver-set pinn-std.width=4"
+    assert main(["gridsearch", *grid.split(), "--out", str(tmp_path / "search")]) == 0
+    actual = [
+        path.relative_to(tmp_path / "search").as_posix() for path in tmp_path.rglob("*") if path.is_file()
+    ]
+    documented = [
+        name.replace("NAME", "lr-0.001_bc-10.0") for name in names(table(GUIDE, "file of a search"))
+    ]
+    assert sorted(documented) == sorted(actual)
+
+
 def test_the_guide_has_every_output_file(run_folder):
     actual = [path.relative_to(run_folder).as_posix() for path in run_folder.rglob("*") if path.is_file()]
     assert_same(names(table(GUIDE, "file", after="## Output")), actual)

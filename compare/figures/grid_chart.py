@@ -63,7 +63,11 @@ def _map(axes: Axes, runs: Sequence[Run], value: Callable[[Measured], float]) ->
         axes.imshow(table, norm=norm, cmap=colormaps["viridis_r"], aspect="auto")
     if best := best_of(runs):
         corner = (rates.index(best.point.learning_rate) - 0.5, weights.index(best.point.bc_weight) - 0.5)
-        axes.add_patch(Rectangle(corner, 1, 1, fill=False, edgecolor=INK, linewidth=1.8, path_effects=HALO, clip_on=False))
+        axes.add_patch(
+            Rectangle(
+                corner, 1, 1, fill=False, edgecolor=INK, linewidth=1.8, path_effects=HALO, clip_on=False
+            )
+        )
     axes.set_xlim(-0.5, len(rates) - 0.5)
     axes.set_ylim(-0.5, len(weights) - 0.5)
     axes.set_xticks(range(len(rates)), [f"{rate:g}" for rate in rates])

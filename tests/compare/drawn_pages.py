@@ -13,7 +13,15 @@ from matplotlib.figure import Figure as MplFigure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-MODULES = ("overlay", "marker_chart", "fields", "energy_chart", "design_drawing", "mesh_drawing", "grid_chart")
+MODULES = (
+    "overlay",
+    "marker_chart",
+    "fields",
+    "energy_chart",
+    "design_drawing",
+    "mesh_drawing",
+    "grid_chart",
+)
 
 
 class Page(NamedTuple):

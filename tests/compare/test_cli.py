@@ -65,7 +65,10 @@ def contents(folder: Path) -> dict[str, bytes]:
 BAD = [
     # what does not exist
     ("compare --frobnicate", "Unknown option: --frobnicate"),
-    ("frobnicate", "Unknown command .* Available commands: compare, design, mesh, solve, solvers"),
+    (
+        "frobnicate",
+        "Unknown command .* commands: compare, design, mesh, solve, gridsearch, solvers",
+    ),
     ("compare slender", "'slender' belongs to no option"),  # forgot --design
     ("compare --seed", "--seed requires an argument"),
     ("compare --solvers fen", r"no solver is called 'fen'; did you mean 'fem'\?"),  # near match
@@ -141,6 +144,19 @@ BAD = [
     ("solve fem,pinn-std", "name one solver, not 'fem,pinn-std'"),
     ("solve ''", "name one solver"),
     ("solve fem --out fields.csv", "give a name that ends in .vtu"),
+    ("gridsearch --learning-rates 1e-3;1e-2", "--learning-rates 1e-3;1e-2: give numbers with commas"),
+    ("gridsearch --bc-weights 1,1.0", "--bc-weights 1,1.0: give different numbers above 0"),
+    ("gridsearch --bc-weights 0", "--bc-weights 0: give different numbers above 0"),
+    ("gridsearch --learning-rates inf", "--learning-rates inf: give different numbers above 0"),
+    ("gridsearch --processes 0", "--processes 0: give a whole number from 1"),
+    ("gridsearch --epochs 0", "pinn-std: epochs must be positive, got 0"),
+    ("gridsearch --epochs 9 --solver-set pinn-std.epochs=8", "pinn-std.epochs is set twice"),
+    ("gridsearch --preset fast", "--preset fast: the search is for the settings of the preset paper"),
+    ("gridsearch --solver-set pinn-std.bc_weight=1", "is what is searched for; give its values with --bc-we"),
+    ("gridsearch --solver-set pinn-local.ridges=3", "'pinn-local', which is not among the solvers pinn-std"),
+    ("gridsearch --load patch", "pinn-std takes the loads mean, point, not 'patch'"),
+    ("gridsearch --out foreign", "foreign holds files that are not of a grid search"),
+    ("gridsearch --out file", "file is a file; name a folder with --out"),
     ("design --formats step,dwg", "unknown CAD format 'dwg'; there are step, stl, dxf, svg"),
     ("mesh --mesh-size 1 --out file", "file: File exists"),
 ]
@@ -451,7 +467,7 @@ def test_a_plug_in_runs_in_the_main_job(folder, plugin_folder):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--help"], ["compare", "design", "mesh", "solve", "solvers"]),
+        (["--help"], ["compare", "design", "gridsearch", "mesh", "solve", "solvers"]),
         (
             ["compare", "--help"],
             ["Parameters", "Finger", "Physics", "Solvers' settings", "Output", "compare --design slender"],
