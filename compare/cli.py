@@ -154,6 +154,7 @@ def solve(
     """Solve one finger with one solver and write its fields, without comparing anything."""
     from compare.evaluation import Evaluation
     from compare.fields import write_vtu
+    from compare.figures.labels import solver_label
     from compare.stages import Stages
     from compare.verdict import certified
     from geometry.cache import finger_mesh
@@ -177,7 +178,7 @@ def solve(
         with stages.stage("certificate"):
             (evaluation,) = certified([Evaluation.of(solution, triangles)], problem)
         write_vtu(out, triangles, evaluation)
-    print(f"{evaluation.solver}: {evaluation.message}")
+    print(f"{solver_label(evaluation)}: {evaluation.message}")
     u, v = solution.reaction
     print(f"energy {solution.energy:.6g} N mm/mm, reaction ({u:.6g}, {v:.6g}) N/mm")
     print(out)

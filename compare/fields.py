@@ -23,7 +23,7 @@ def write_vtu(path: Path, mesh: TriangleMesh, evaluation: Evaluation) -> None:
     (the tensor's component, half the engineering shear), `stress_MPa` (Cauchy; six components named XX to XZ,
     of which YZ and XZ are zero), `stress_zz_MPa`, `von_mises_MPa`, `energy_density_MPa`.
 
-    For the whole: `solver`, `status`, `energy_N_mm_per_mm`, `reaction_N_per_mm`.
+    For the whole: `solver`, `converged` (1 or 0), `status`, `energy_N_mm_per_mm`, `reaction_N_per_mm`.
 
     Args:
         path: Where to write; the suffix is .vtu.
@@ -46,6 +46,7 @@ def write_vtu(path: Path, mesh: TriangleMesh, evaluation: Evaluation) -> None:
     grid.cell_data["von_mises_MPa"] = evaluation.per_triangle(evaluation.von_mises)
     grid.cell_data["energy_density_MPa"] = evaluation.per_triangle(evaluation.energy_density)
     grid.field_data["solver"] = [evaluation.solver]
+    grid.field_data["converged"] = [int(evaluation.converged)]
     grid.field_data["status"] = [evaluation.message]
     grid.field_data["energy_N_mm_per_mm"] = [evaluation.energy]
     grid.field_data["reaction_N_per_mm"] = evaluation.reaction[None]

@@ -12,12 +12,12 @@ NEAR = 0.5
 """How far from a corner or the contact still counts as there, in mean wall thicknesses."""
 
 REGIONS = {
-    "corners": "re-entrant corners and base ends",
-    "contact": "contact",
-    "tip": "tip",
-    "walls": "walls and ribs",
+    "corners": "at re-entrant corners and base ends",
+    "contact": "at the contact",
+    "tip": "in the tip",
+    "walls": "in walls and ribs",
 }
-"""Every region and what it is called in words."""
+"""Every region and how to say in words what is there."""
 
 
 def body_regions(mesh: TriangleMesh) -> dict[str, BoolArray]:

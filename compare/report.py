@@ -8,10 +8,13 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from compare import report_text as text
 from compare.atomic import atomic_path
+from compare.certificate import Certificate
+from compare.certificate_text import certificate_sentences
 from compare.evaluation import Evaluation
 from compare.figures import Figure
 from compare.figures.labels import solver_label
 from compare.metrics import MarkerErrors, ReferenceDifferences, marker_errors, reference_differences
+from compare.regions import NEAR
 from compare.tables import seconds
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
@@ -60,6 +63,8 @@ class SolverEntry:
     differences: ReferenceDifferences
     reaction: tuple[float, float]
     seconds: str
+    certificate: Certificate | None
+    certificate_sentences: str
 
 
 def write_report(path: Path, content: ReportContent) -> None:
@@ -80,6 +85,7 @@ def render(content: ReportContent) -> str:
     )
     environment.filters |= {
         "number": text.number,
+        "distance": text.distance,
         "percent": text.percent,
         "png": text.embedded,
         "sentence": text.sentence,
@@ -95,8 +101,9 @@ def render(content: ReportContent) -> str:
         design_rows=text.design_rows(content.design),
         paper_rows=[(symbol, value) for _, symbol, value in text.design_rows(content.design) if symbol],
         material_rows=text.material_rows(
-            content.material, {evaluation.solver: evaluation.law for evaluation in content.evaluations}
+            content.material, {solver_label(evaluation): evaluation.law for evaluation in content.evaluations}
         ),
+        near=NEAR,
         load_sentence=text.load_sentence(content.load, content.design),
         source=text.source_sentence(content.observations),
         provenance=text.grouped(content.provenance),
@@ -113,4 +120,6 @@ def _entry(evaluation: Evaluation, content: ReportContent) -> SolverEntry:
         differences=reference_differences(evaluation, content.reference),
         reaction=text.without_rounding(evaluation.reaction),
         seconds=seconds(evaluation),
+        certificate=evaluation.certificate,
+        certificate_sentences=certificate_sentences(evaluation),
     )

@@ -130,3 +130,8 @@ def without_rounding(force: FloatArray) -> tuple[float, float]:
 def percent(value: float) -> str:
     """A share as a percentage with three significant digits."""
     return f"{number(100 * value, 3)} %"
+
+
+def distance(value: float) -> str:
+    """A small length, mm, with two significant digits; a dash where it is NaN, zero where it is rounding."""
+    return "–" if np.isnan(value) else f"{value if value > 1e-9 else 0:.2g}".replace("-", "−")

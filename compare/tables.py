@@ -33,6 +33,7 @@ def write_markers(path: Path, *, evaluations: Sequence[Evaluation], observations
         for evaluation, error in zip(evaluations, errors, strict=True):
             name = evaluation.solver
             own_u, own_v = (float(value) for value in evaluation.marker_displacement[marker])
+            row |= {f"{name}_converged": int(evaluation.converged)}
             row |= {f"{name}_u_mm": own_u, f"{name}_v_mm": own_v}
             row[f"{name}_ae_u_mm"] = float(error.ae_u[marker]) if seen else ""
             row[f"{name}_ae_v_mm"] = float(error.ae_v[marker]) if seen else ""

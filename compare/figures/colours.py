@@ -7,7 +7,7 @@ from typing import NamedTuple
 import matplotlib as mpl
 import numpy as np
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Colormap, ListedColormap, Normalize
+from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize
 from numpy.typing import NDArray
 
 from compare.metrics import weighted_percentile
@@ -26,16 +26,19 @@ class Scale(NamedTuple):
         low: Value of the first colour.
         high: Value of the last one.
         colours: The colour map.
+        log: Whether the colours follow the logarithm of the value, which must be positive.
     """
 
     low: float
     high: float
     colours: Colormap
+    log: bool = False
 
     @property
     def mappable(self) -> ScalarMappable:
         """For a colour bar."""
-        return ScalarMappable(Normalize(self.low, self.high), self.colours)
+        norm = LogNorm if self.log else Normalize
+        return ScalarMappable(norm(self.low, self.high), self.colours)
 
     def paint(self, values: FloatArray) -> NDArray[np.uint8]:
         """Colours of values of shape (t,): red, green and blue, shape (t, 3)."""

@@ -107,7 +107,7 @@ def _distances(
     for evaluation, distance in zip(members, distances, strict=True):
         _line(axes, evaluation.history[group[0]], distance, colours[evaluation.solver], None)
     _scale(axes, group, distances, members)
-    axes.set_ylabel(f"|E / E({reference.solver}) − 1|")
+    axes.set_ylabel("|E / E(reference) − 1|")
 
 
 def _line(axes: Axes, x: FloatArray, y: FloatArray, colour: str, label: str | None) -> None:

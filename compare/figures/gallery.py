@@ -11,6 +11,7 @@ from compare.figures.canvas import Canvas
 from compare.figures.colours import PERCENT
 from compare.figures.design_drawing import draw_design
 from compare.figures.energy_chart import draw_energy
+from compare.figures.excess import DECADES, draw_excess
 from compare.figures.fields import QUANTITIES, Quantity, draw_field, field_extent
 from compare.figures.labels import solver_label
 from compare.figures.marker_chart import draw_marker_errors
@@ -43,6 +44,7 @@ class Gallery:
             ("picture of the deformed finger", self.overlay),
             ("chart of the errors at the markers", self.marker_errors),
             *fields,
+            ("picture of the excess energy", self.excess),
             ("chart of the energy", self.energy),
             ("drawing of the design", self.drawing),
             ("picture of the mesh", self.mesh_picture),
@@ -107,6 +109,22 @@ class Gallery:
             f"mean. One scale for all: {PERCENT:g} % of the area of {solver_label(self.reference)} lie "
             f"within it, the peaks at the corners take the end colours. At a sharp corner the field has no "
             f"bound: the largest mean of a triangle, printed beside, grows with refinement.{beside}{mixed}",
+        )
+
+    def excess(self) -> Figure | None:
+        """Where the energy sits by which every certified solver is above finite elements."""
+        path = self.folder / "excess.png"
+        with Canvas(self.mesh, field_extent(self.mesh), width=body.PIXELS // 2) as canvas:
+            if not draw_excess(path, canvas=canvas, mesh=self.mesh, evaluations=self.evaluations):
+                return None
+        return Figure(
+            path,
+            "Excess energy",
+            f"Energy of the difference between each solver’s displacement, taken over to the elements of "
+            f"fem, and the displacement of least energy with the same values at base and contact: its mean "
+            f"over each triangle, on one logarithmic scale of {DECADES} powers of ten. {PERCENT:g} % of the "
+            f"area of every solver lie below its end. A solver without a certificate, or without any excess, "
+            f"is left out.",
         )
 
     def energy(self) -> Figure | None:

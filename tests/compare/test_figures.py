@@ -16,9 +16,17 @@ from compare.figures.canvas import Canvas
 from compare.figures.fields import QUANTITIES, draw_field, field_extent
 from compare.figures.overlay import overlay_extent
 from compare.figures.style import DPI, WIDTH
+from compare.verdict import certified
 from geometry.design import Design
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
+from solvers.problem import Problem
+
+
+def with_certificate(evaluation: Evaluation, mesh: TriangleMesh) -> Evaluation:
+    """The evaluation with its certificate, but not with the verdict."""
+    (judged,) = certified([evaluation], Problem(mesh))
+    return replace(evaluation, certificate=judged.certificate)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +50,7 @@ def figures(
         tmp_path_factory.mktemp("figures"),
         design=Design(),
         mesh=mesh,
-        evaluations=[fem, pinn, failed],
+        evaluations=[fem, with_certificate(pinn, mesh), with_certificate(failed, mesh)],
         observations=observe(fem.marker_displacement, hidden=(1,)),
         reference=fem,
         progress=lambda done, what: said.append((done, what)),
@@ -50,7 +58,8 @@ def figures(
     return {figure.path.stem: figure for figure in drawn}
 
 
-ALL = ("overlay", "marker_errors", *(quantity.name for quantity in QUANTITIES), "energy", "design", "mesh")
+FIELDS = tuple(quantity.name for quantity in QUANTITIES)
+ALL = ("overlay", "marker_errors", *FIELDS, "excess", "energy", "design", "mesh")
 
 
 def test_the_pictures_come_in_the_order_of_the_report(figures: dict[str, Figure]) -> None:
@@ -85,6 +94,7 @@ def test_six_solvers_find_room_too(
     failed: Evaluation,
     observations: Observations,
 ) -> None:
+    pinn, failed = (with_certificate(evaluation, mesh) for evaluation in (pinn, failed))
     more = [replace(pinn, solver=f"pinn-{name}", converged=name != "asm") for name in ("local", "asm", "x")]
     draw_all(
         tmp_path,
@@ -94,12 +104,12 @@ def test_six_solvers_find_room_too(
         observations=observations,
         reference=fem,
     )
-    for name in ("overlay", "marker_errors", "von_mises", "energy"):
+    for name in ("overlay", "marker_errors", "von_mises", "excess", "energy"):
         page = pages[tmp_path / f"{name}.png"]
         assert (name, page.cut_off(), page.overlaps()) == (name, [], [])
 
 
-@pytest.mark.parametrize("name", ["overlay", "marker_errors", *(quantity.name for quantity in QUANTITIES)])
+@pytest.mark.parametrize("name", ["overlay", "marker_errors", *FIELDS, "excess"])
 def test_a_solver_that_failed_is_marked(
     name: str, figures: dict[str, Figure], pages: dict[Path, Page]
 ) -> None:

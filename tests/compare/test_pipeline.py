@@ -15,6 +15,7 @@ import pytest
 import pyvista
 from rich.console import Console
 
+from compare.figures.labels import solver_label
 from compare.pipeline import Job, Outcome, run
 from compare.provenance import package_versions
 from compare.stages import Stages
@@ -392,6 +393,36 @@ def test_a_solver_that_did_not_converge_is_marked(job):
     assert (told["status"], told["message"]) == ("not converged", message)
     assert rows(asked.out / "summary.csv")[0]["converged"] == "0"
     assert "Stopped after 20 steps; try more" in (asked.out / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_result_that_its_solver_believes_in_but_finite_elements_do_not_is_marked(job, monkeypatch):
+    """Linear elements on a coarse mesh: in JSON, both CSV files, report, fields and what pictures get."""
+    drawn = []
+    monkeypatch.setattr(
+        "compare.pipeline.draw_all", lambda folder, *, evaluations, **_: drawn.extend(evaluations) or []
+    )
+    asked = job(FemSolver(), Scripted("linear", degree=1))
+    compare(asked)
+    assert [solver_label(evaluation) for evaluation in drawn] == ["fem", "linear (not converged)"]
+    told = strictly(asked.out / "metrics.json")["solvers"]
+    assert [told[name]["status"] for name in ("fem", "linear")] == ["converged", "not converged"]
+    assert told["linear"]["message"].startswith("solved directly; the discretisation is the only error; its")
+    assert told["linear"]["certificate"]["rel_excess"] > 0.05 > told["fem"]["certificate"]["rel_excess"]
+    assert [row["converged"] for row in rows(asked.out / "summary.csv")] == ["1", "0"]
+    assert {row["linear_converged"] for row in rows(asked.out / "markers.csv")} == {"0"}
+    assert "linear (not converged)" in (asked.out / "report.html").read_text(encoding="utf-8")
+    assert pyvista.read(asked.out / "fields" / "linear.vtu").field_data["converged"][0] == 0
+
+
+def test_the_archive_keeps_the_solvers_own_word(job):
+    """The verdict is found again when a run is resumed, maybe with other limits."""
+    asked = job(Scripted("linear", degree=1))
+    first = compare(asked)
+    with np.load(asked.out / "solutions" / "linear.npz") as archive:
+        assert json.loads(str(archive["header"]))["converged"] is True
+    again = compare(replace(asked, resume=True))
+    assert asked.solvers[0].calls == 1
+    assert without_times(again.metrics) == without_times(first.metrics)
 
 
 # Refused before anything is computed

@@ -1,3 +1,4 @@
+import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,11 +11,12 @@ from PIL import Image
 from compare.evaluation import Evaluation
 from compare.figures import Figure
 from compare.report import ReportContent, render, write_report
-from compare.report_text import number, percent, sentence
+from compare.report_text import distance, number, percent, sentence
+from compare.verdict import certified
 from geometry.design import Design
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
-from solvers.problem import Load, Material
+from solvers.problem import Load, Material, Problem
 
 VOID = {"meta", "img", "br", "link", "hr", "input"}
 
@@ -154,6 +156,27 @@ def test_a_solver_that_failed_is_marked_everywhere(content: ReportContent, faile
     assert bare == []
 
 
+def test_the_certificate_has_a_sentence_and_its_numbers(content: ReportContent, mesh: TriangleMesh) -> None:
+    """A network with the energy of fem times 1.21 at the same places: a given field, and far from balance."""
+    evaluations = certified(content.evaluations, Problem(mesh))
+    page = Page(render(replace(content, evaluations=evaluations, reference=evaluations[0])))
+    text = page.text.replace("\N{NO-BREAK SPACE}", " ")
+    assert "pinn-std (not converged) is not to be relied on: its displacement, taken over" in text
+    assert {"certificate", "regions"} <= set(page.values("id"))
+    certificate = evaluations[1].certificate
+    assert certificate is not None
+    shown = [certificate.rel_excess, certificate.energy_norm_error, certificate.weak_residual]
+    shown += [region.excess for region in certificate.regions.values()]
+    assert [value for value in shown if percent(value) not in text] == []
+    assert page.unbalanced == []
+
+
+def test_without_certificates_there_is_no_table_of_them(content: ReportContent) -> None:
+    page = Page(render(content))
+    assert "pinn-std has no certificate: DOLFINx, which makes it, is not installed." in page.text
+    assert {"certificate", "regions"}.isdisjoint(page.values("id"))
+
+
 def test_a_single_solver_is_compared_with_nothing(content: ReportContent, fem: Evaluation) -> None:
     text = Page(render(replace(content, evaluations=[fem]))).text
     assert "nothing to compare it with" in text
@@ -186,4 +209,5 @@ def test_numbers_are_set_with_four_digits(value: float, expected: str) -> None:
 
 def test_small_words() -> None:
     assert percent(-0.0123) == "−1.23 %"
+    assert [distance(value) for value in (math.nan, 3e-15, 9.44e-7, 0.21)] == ["–", "0", "9.4e−07", "0.21"]
     assert sentence("solved directly; no more.") == "Solved directly; no more."

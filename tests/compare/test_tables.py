@@ -17,7 +17,7 @@ from geometry.observations import Observations
 Rows = list[dict[str, str]]
 UNITS = ("_mm", "_MPa", "_1", "_N_mm_per_mm", "_N_per_mm", "_s", "_rel_l2", "_rel")
 WITHOUT_UNIT = {"marker", "observations", "visible", "solver", "converged", "reference", "status"}
-WITHOUT_UNIT |= {"misses_energy"}
+WITHOUT_UNIT |= {"misses_energy", "fem_converged", "pinn-std_converged"}
 
 
 def read(path: Path) -> Rows:

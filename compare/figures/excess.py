@@ -1,0 +1,75 @@
+"""Where in the body the energy sits by which each solver is above finite elements."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+
+from compare.certificate import Certificate
+from compare.evaluation import Evaluation
+from compare.figures import body
+from compare.figures.canvas import Canvas
+from compare.figures.colours import PERCENT, Scale
+from compare.figures.labels import solver_label
+from compare.figures.style import MUTED, WIDTH, axes_at, figure, heading
+from compare.metrics import weighted_percentile
+from geometry.arrays import FloatArray
+from geometry.mesh import TriangleMesh
+
+MARGIN = 0.1
+HEAD, PANEL_TITLE, FOOT = 0.3, 0.2, 0.55
+"""Heights in inches: heading; the name above a panel; the colour bar."""
+
+DECADES = 4
+"""Powers of ten on the colour scale."""
+
+
+def excesses(evaluations: Sequence[Evaluation]) -> list[tuple[str, Certificate]]:
+    """Label and certificate of every solver that has an excess."""
+    return [
+        (solver_label(evaluation), evaluation.certificate)
+        for evaluation in evaluations
+        if evaluation.certificate is not None and evaluation.certificate.has_excess
+    ]
+
+
+def excess_scale(mesh: TriangleMesh, densities: Sequence[FloatArray]) -> Scale:
+    """The logarithmic scale that every solver shares; it ends at the highest percentile of any of them."""
+    high = max(weighted_percentile(density, mesh.areas, PERCENT) for density in densities)
+    return Scale(high / 10**DECADES, high, mpl.colormaps["viridis"], log=True)
+
+
+def draw_excess(path: Path, *, canvas: Canvas, mesh: TriangleMesh, evaluations: Sequence[Evaluation]) -> bool:
+    """Draw the density of the excess energy of every solver that has one.
+
+    Returns:
+        Whether there was one to draw.
+    """
+    entries = excesses(evaluations)
+    if not entries:
+        return False
+    columns = min(len(entries), 2)
+    rows = -(-len(entries) // columns)
+    width = (WIDTH - MARGIN * (columns + 1)) / columns
+    height = width * canvas.extent.height / canvas.extent.width
+    scale = excess_scale(mesh, [certificate.density for _, certificate in entries])
+    edges = body.boundary_edges(mesh)
+    total = HEAD + rows * (PANEL_TITLE + height) + FOOT
+    with figure(path, total) as drawn:
+        heading(drawn, "Excess energy over finite elements, undeformed body")
+        for number, (label, certificate) in enumerate(entries):
+            row, column = divmod(number, columns)
+            top = HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
+            axes = axes_at(drawn, (MARGIN + column * (width + MARGIN), top, width, height))
+            body.prepare(axes, canvas.extent)
+            colours = scale.paint(np.maximum(certificate.density, scale.low))
+            body.show(axes, canvas.picture(colours), canvas.extent)
+            body.outline(axes, edges, mesh.points, width=0.35)
+            axes.set_title(label, size=8.5, pad=2, weight="bold")
+            note = f"in all {100 * certificate.rel_excess:.2g} % of the energy"
+            axes.text(0.99, 0.27, note, ha="right", size=7, color=MUTED, transform=axes.transAxes)
+        body.scale_bar(axes, canvas.extent)
+        bar = axes_at(drawn, (0.2 * WIDTH, total - FOOT + 0.1, 0.6 * WIDTH, 0.09))
+        body.colour_bar(bar, scale, "density of the excess energy, MPa", extend="both")
+    return True

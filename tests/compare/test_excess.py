@@ -1,0 +1,93 @@
+"""The picture of the excess energy and the certificate in words."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compare.certificate import Certificate, Region
+from compare.certificate_text import certificate_sentences
+from compare.evaluation import Evaluation
+from compare.figures.canvas import Canvas
+from compare.figures.excess import DECADES, draw_excess, excess_scale
+from compare.figures.fields import field_extent
+from compare.verdict import judged
+from geometry.mesh import TriangleMesh
+
+
+@pytest.fixture
+def certificate(mesh: TriangleMesh) -> Certificate:
+    """An excess of 1 % of the energy, most of it at the corners."""
+    return Certificate(
+        energy=2.02,
+        fem_energy=2.0,
+        excess=0.02,
+        violation=0.0,
+        missed=0.0,
+        weak_residual=0.05,
+        imbalance=0.3,
+        base=0.0,
+        load=np.array([np.nan, 2e-6]),
+        stroke=10.0,
+        regions={"corners": Region(0.1, 0.9, 0.001, 0.02), "walls": Region(0.9, 0.1, 0.002, 0.01)},
+        density=np.linspace(0.0, 1.0, len(mesh.triangles)),
+    )
+
+
+def words(evaluation: Evaluation, certificate: Certificate) -> str:
+    return certificate_sentences(judged(evaluation, certificate)).replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_a_good_result_in_words(pinn: Evaluation, certificate: Certificate) -> None:
+    assert words(pinn, certificate) == (
+        "pinn-std is converged to 1.00 % of the energy: its displacement, taken over to the elements of fem, "
+        "has 1.00 % more energy than the least with the same values at base and contact, and its own stress "
+        "is out of balance by 5.00 % in the energy norm. 90.0 % of the excess sits at re-entrant corners and "
+        "base ends, 10.0 % of the area. At the base it is off by at most 0 mm, at the contact by 2e−06 mm."
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"excess": 0.2}, "pinn-std (not converged) is not to be relied on"),
+        ({"excess": 0.0, "weak_residual": 0.0}, "is the finite-element solution itself"),
+        ({"missed": 0.05}, "It reports 2.50 % less energy than that least: its quadrature misses energy."),
+        (
+            {"missed": 0.005},
+            "0.250 % less energy than that least: it is nearer to the exact solution than",
+        ),
+    ],
+    ids=["too much energy", "fem", "much less energy", "a little less energy"],
+)
+def test_words_for_other_results(
+    pinn: Evaluation, certificate: Certificate, changes: dict[str, float], expected: str
+) -> None:
+    assert expected in words(pinn, replace(certificate, **changes))
+
+
+def test_a_finite_strain_result_has_no_certificate(pinn: Evaluation) -> None:
+    said = certificate_sentences(replace(pinn, law="neo-hookean"))
+    assert said == "pinn-std has no certificate: there is one for the linear law only."
+
+
+def test_one_scale_for_all_that_ends_at_the_larger_excess(mesh: TriangleMesh) -> None:
+    flat = np.ones(len(mesh.triangles))
+    scale = excess_scale(mesh, [flat, 5 * flat])
+    assert (scale.low, scale.high) == (pytest.approx(5 / 10**DECADES), 5.0)
+    low, middle, high = scale.paint(scale.low * np.array([1.0, 10 ** (DECADES / 2), 10.0**DECADES]))
+    np.testing.assert_allclose(middle, scale.colours(0.5, bytes=True)[:3], atol=1)
+    assert (low.tolist(), high.tolist()) == ([68, 1, 84], [253, 231, 36])  # the ends of viridis
+
+
+def test_without_an_excess_there_is_no_picture(
+    mesh: TriangleMesh, fem: Evaluation, certificate: Certificate, tmp_path: Path
+) -> None:
+    exact = judged(fem, replace(certificate, excess=0.0))
+    path = tmp_path / "excess.png"
+    with Canvas(mesh, field_extent(mesh), width=100) as canvas:
+        assert not draw_excess(path, canvas=canvas, mesh=mesh, evaluations=[fem, exact])
+        assert not path.exists()
+        assert draw_excess(path, canvas=canvas, mesh=mesh, evaluations=[fem, judged(fem, certificate)])
+    assert path.exists()
