@@ -1,0 +1,34 @@
+"""What the optimisers for sums of squares are given and what they return."""
+
+from typing import NamedTuple, Protocol
+
+import torch
+
+
+class Residuals(Protocol):
+    """Functions r of n parameters; minimised is |r|² / 2."""
+
+    def values(self, parameters: torch.Tensor) -> torch.Tensor:
+        """Residuals at parameters of shape (n,): shape (m,)."""
+        ...
+
+    def linearised(self, parameters: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Residuals, shape (m,), and their Jacobian, shape (m, n)."""
+        ...
+
+
+class Iterate(NamedTuple):
+    """Where an optimiser is.
+
+    Attributes:
+        parameters: Shape (n,).
+        value: What is minimised, there.
+    """
+
+    parameters: torch.Tensor
+    value: float
+
+
+def half_square(residuals: torch.Tensor) -> float:
+    """|r|² / 2."""
+    return 0.5 * float(residuals @ residuals)
