@@ -1,4 +1,4 @@
-"""The loss and its gradient over the parameters, term by term, in pieces of points and in several threads."""
+"""The loss and its derivatives over the parameters, in pieces of points, on several threads and processes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,14 +8,18 @@ from typing import NamedTuple
 import torch
 
 from solvers.pinn.losses import LossTerm
+from solvers.pinn.mlp_passes import MlpPass
 from solvers.pinn.modified_mlp import ModifiedMlp
 from solvers.pinn.pieces import cut, in_threads
+from solvers.pinn.processes import ONE_PROCESS, Processes
 
 LANES = 16
 """Pieces are summed in so many fixed groups, so that rounding does not depend on the threads."""
 
 PIECE = 256
 """Points in a piece."""
+
+Piece = tuple[LossTerm, slice]
 
 
 class Evaluation(NamedTuple):
@@ -40,37 +44,44 @@ class Loss:
         network: The networks.
         terms: What is summed.
         factors: Weight of the terms by their names.
+        processes: Who share the pieces.
     """
 
     network: ModifiedMlp
     terms: Sequence[LossTerm]
     factors: Mapping[str, float]
-
-    @cached_property
-    def _lanes(self) -> list[list[tuple[LossTerm, slice]]]:
-        pieces = []
-        for term in self.terms:
-            whole = not term.divisible or term.points.is_cuda
-            count = len(term.points)
-            pieces += [(term, rows) for rows in cut(count, count if whole else PIECE)]
-        return [pieces[start::LANES] for start in range(min(LANES, len(pieces)))]
+    processes: Processes = ONE_PROCESS
 
     def __call__(self, parameters: torch.Tensor) -> Evaluation:
         """The loss and its gradient at parameters of shape (networks, parameters)."""
+        weights = self.network.weights(self.network.in_logistic_form(parameters))
 
-        def lane(pieces: list[tuple[LossTerm, slice]]) -> tuple[dict[str, float], torch.Tensor]:
-            sums = dict.fromkeys(self.factors, 0.0)
+        def lane(pieces: list[Piece]) -> tuple[dict[str, float], torch.Tensor]:
+            values = dict.fromkeys(self.factors, 0.0)
             gradient = torch.zeros_like(parameters)
+            sums = self.network.weights(gradient)
             for term, rows in pieces:
-                layers = self.network.forward(parameters, term.points[rows], derivatives=term.derivatives)
-                share = term.share(layers.output, rows)
-                sums[term.name] += float(share.value)
-                self.network.reverse(parameters, layers, self.factors[term.name] * share.adjoint, gradient)
-            return sums, gradient
+                networks = MlpPass(self.network, weights, term.points[rows])
+                values[term.name] += term.add(networks, rows, self.factors[term.name], sums)
+            return values, gradient
 
-        results = in_threads(lane, self._lanes)
-        terms = {name: sum(sums[name] for sums, _ in results) for name in self.factors}
-        gradient = results[0][1]
-        for _, other in results[1:]:
-            gradient += other
-        return Evaluation(terms, sum(self.factors[name] * value for name, value in terms.items()), gradient)
+        values = torch.zeros(len(self.factors), dtype=torch.float64)
+        gradient = torch.zeros_like(parameters)
+        for of_lane, gradient_of_lane in in_threads(lane, self._lanes):
+            values += torch.tensor(list(of_lane.values()), dtype=torch.float64)
+            gradient += gradient_of_lane
+        self.processes.sum(values, gradient)
+        terms = dict(zip(self.factors, values.tolist(), strict=True))
+        total = sum(self.factors[name] * value for name, value in terms.items())
+        return Evaluation(terms, total, self.network.in_logistic_form(gradient))
+
+    @cached_property
+    def _lanes(self) -> list[list[Piece]]:
+        """The pieces of this process, in groups; one piece a term on a GPU."""
+        pieces: list[Piece] = []
+        for term in self.terms:
+            count = len(term.points)
+            size = PIECE if term.divisible and not term.points.is_cuda else count
+            pieces += [(term, rows) for rows in cut(count, size)]
+        lanes = [pieces[start::LANES] for start in range(min(LANES, len(pieces)))]
+        return lanes[self.processes.rank :: self.processes.count]

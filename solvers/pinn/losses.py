@@ -1,33 +1,23 @@
-"""The terms of the loss and the derivatives of each along the network's output."""
+"""The terms of the loss: what they add to it, and to its derivatives over the parameters."""
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 import torch
 
 from geometry.arrays import FloatArray
 from solvers.elasticity import Lame, linear_stress
-
-
-class Share(NamedTuple):
-    """What some points contribute to a term.
-
-    Attributes:
-        value: Scalar.
-        adjoint: Its derivatives along the network's output, shape (2, streams, n).
-    """
-
-    value: torch.Tensor
-    adjoint: torch.Tensor
+from solvers.pinn.mlp_passes import MlpPass
+from solvers.pinn.modified_mlp import Weights
 
 
 class LossTerm(Protocol):
-    """A sum over points of something that the network's output determines there."""
+    """A sum over points of something that two networks, for u and v, determine there."""
 
     @property
     def name(self) -> str:
-        """Terms of one name are added and weighted together."""
+        """Terms of one name are added and have one factor in the loss."""
         ...
 
     @property
@@ -36,17 +26,19 @@ class LossTerm(Protocol):
         ...
 
     @property
-    def derivatives(self) -> bool:
-        """Whether it needs the displacement gradient."""
-        ...
-
-    @property
     def divisible(self) -> bool:
         """Whether its points can be evaluated in pieces."""
         ...
 
-    def share(self, output: torch.Tensor, rows: slice) -> Share:
-        """What the points `rows` contribute, given the network's output there, shape (2, streams, n)."""
+    def add(self, networks: MlpPass, rows: slice, factor: float, sums: Weights) -> float:
+        """What the points `rows` contribute; factor times its derivatives are added to `sums`.
+
+        Args:
+            networks: Both networks at these points.
+            rows: Which of the points they are.
+            factor: Of the term in the loss.
+            sums: Derivatives over the parameters in logistic form.
+        """
         ...
 
 
@@ -58,22 +50,22 @@ class EnergyTerm:
         points: Shape (n, 2), mm.
         shares: Share of each point in the mean, shape (n,).
         stiffness: What multiplies (du/dx, du/dy, dv/dx, dv/dy) to give the stress, shape (4, 4), MPa.
+        name: Of the term.
+        divisible: Points can be evaluated in pieces.
     """
 
     points: torch.Tensor
     shares: torch.Tensor
     stiffness: torch.Tensor
     name: str = "PDE"
-    derivatives: bool = True
     divisible: bool = True
 
-    def share(self, output: torch.Tensor, rows: slice) -> Share:
-        """Half of stress times gradient; the stress is its derivative."""
-        gradient = output[:, 1:].flatten(0, 1)
-        stress = (self.stiffness @ gradient).mul_(self.shares[rows])
-        adjoint = torch.zeros_like(output)
-        adjoint[:, 1:] = stress.view(2, 2, -1)
-        return Share(0.5 * (stress * gradient).sum(), adjoint)
+    def add(self, networks: MlpPass, rows: slice, factor: float, sums: Weights) -> float:
+        """Half of stress times displacement gradient, whose derivative along that gradient is the stress."""
+        gradient = networks.slopes().transpose(0, 1).flatten(1)
+        stress = (gradient @ self.stiffness).mul_(self.shares[rows, None])
+        networks.add_slope_gradient((factor * stress).unflatten(1, (2, 2)).transpose(0, 1), sums)
+        return 0.5 * float((stress * gradient).sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,28 +85,28 @@ class DisplacementTerm:
     targets: torch.Tensor
     weights: torch.Tensor
     functional: torch.Tensor | None = None
-    derivatives: bool = False
 
     @property
     def divisible(self) -> bool:
         """Whether every point counts for itself."""
         return self.functional is None
 
-    def share(self, output: torch.Tensor, rows: slice) -> Share:
+    def add(self, networks: MlpPass, rows: slice, factor: float, sums: Weights) -> float:
         """Weighted squares of the differences."""
-        values = output[:, 0]
+        values = networks.values()
         if self.functional is None:
             difference = values - self.targets[:, rows]
             weighted = self.weights[:, rows] * difference
-            adjoint = 2 * weighted
+            factors = weighted
         else:
             difference = values @ self.functional.T - self.targets
             weighted = self.weights * difference
-            adjoint = 2 * weighted @ self.functional
-        return Share((weighted * difference).sum(), adjoint[:, None])
+            factors = weighted @ self.functional
+        networks.add_value_gradient(2 * factor * factors, sums)
+        return float((weighted * difference).sum())
 
 
 def stiffness_matrix(lame: Lame) -> FloatArray:
-    """`linear_stress` as a matrix on (du/dx, du/dy, dv/dx, dv/dy), shape (4, 4), MPa."""
+    """`linear_stress` as a matrix on (du/dx, du/dy, dv/dx, dv/dy), shape (4, 4), MPa; it is symmetric."""
     stress = linear_stress(np.eye(4).reshape(4, 2, 2), lame)
-    return np.stack([stress.xx, stress.xy, stress.xy, stress.yy])
+    return np.stack([stress.xx, stress.xy, stress.xy, stress.yy], axis=1)

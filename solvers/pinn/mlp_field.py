@@ -7,6 +7,7 @@ import torch
 
 from geometry.arrays import FloatArray
 from geometry.locate import Location
+from solvers.pinn.mlp_passes import MlpPass
 from solvers.pinn.modified_mlp import ModifiedMlp
 from solvers.pinn.pieces import in_pieces
 
@@ -17,7 +18,7 @@ class MlpField:
 
     Attributes:
         network: Their shape.
-        parameters: Shape (2, parameters), double precision.
+        parameters: Shape (2, parameters); in double precision.
     """
 
     network: ModifiedMlp
@@ -25,19 +26,22 @@ class MlpField:
 
     def displacement(self, location: Location) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
-        return self._output(location, derivatives=False)[:, :, 0]
+        result = torch.empty(len(location), 2, dtype=torch.float64)
+        self._evaluate(location, result, slopes=False)
+        return np.asarray(result.numpy())
 
     def gradient(self, location: Location) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
-        return self._output(location, derivatives=True)[:, :, 1:]
+        result = torch.empty(len(location), 2, 2, dtype=torch.float64)
+        self._evaluate(location, result, slopes=True)
+        return np.asarray(result.numpy())
 
-    def _output(self, location: Location, *, derivatives: bool) -> FloatArray:
+    def _evaluate(self, location: Location, result: torch.Tensor, *, slopes: bool) -> None:
         points = torch.from_numpy(np.array(location.points))
-        result = points.new_empty(len(points), 2, 3 if derivatives else 1)
+        weights = self.network.weights(self.network.in_logistic_form(self.parameters))
 
         def task(rows: slice) -> None:
-            layers = self.network.forward(self.parameters, points[rows], derivatives=derivatives)
-            result[rows] = layers.output.permute(2, 0, 1)
+            networks = MlpPass(self.network, weights, points[rows])
+            result[rows] = (networks.slopes() if slopes else networks.values()).transpose(0, 1)
 
         in_pieces(task, len(points), self.network.width)
-        return np.asarray(result.numpy())

@@ -15,7 +15,7 @@ TINY = {"width": 8, "layers": 2, "base_points": 20, "precision": "double"}
 def test_first_500_epochs_are_those_of_the_plain_implementation():
     """To rounding, which Adam lets grow once its steps are too long for the boundary's stiff penalty.
 
-    Two plain runs whose initial weights differ by rounding were seen to part by 1e-13 in 300 epochs and by 2e-7
+    Two plain runs whose initial weights differ by rounding were seen to part by 1e-13 in 300 epochs and 2e-7
     in 500; ours and the plain one by no more. A wrong law, gate or weight shows in the first epoch.
     """
     problem = Problem(bar_mesh(24.0, 4.0, 12, 4, contact=(14.0, 18.0)))
