@@ -1,20 +1,20 @@
 """Values of modified MLPs, their derivatives along x and y, and the derivatives of both over the parameters.
 
-With σ the logistic function, s the doubled argument of an activation, and a, b, σ_k in the place of A, B, Z_k,
-the formulas of `modified_mlp` read
+With σ the logistic function, whose argument s is twice tanh's, and a, b, σ_k in the place of A, B, Z_k, the
+formulas of `modified_mlp` read
 
     step = 4 (b - a)        base = 4 a - 2 b - 1        H_k+1 = base + σ_k * step
 
-The derivatives along x and y take one pass down through the layers, as in reverse differentiation. What a loss
-needs of them over the parameters is the sum over points of f_x du/dx + f_y du/dy, the derivative of u along a
-direction f at each point. Over a matrix between a layer h and an argument s the derivative of u is h^T δ with
-δ = du/ds; that of the sum is, by the product rule,
+The derivatives along x and y take one pass down through the layers, as in reverse differentiation. What a
+loss needs of them over the parameters is the sum over points of f_x du/dx + f_y du/dy, the derivative of u
+along a direction f at each point. Over a matrix between a layer h and an argument s the derivative of u is
+h^T δ with δ = du/ds; that of the sum is, by the product rule,
 
     h'^T δ + h^T δ'
 
-with h' and δ' the derivatives of h and δ along f: one more pass up and one down. That are two thirds of the
-matrix products that it takes to carry both derivatives forward. Arrays have the shape (networks, n, width), those
-of the layers that see X (networks, 3, n, width), where the three are a, b and σ_1 (or that of H_1).
+with h' and δ' the derivatives of h and δ along f: one more pass up and one down. These are two thirds of the
+matrix products that it takes to carry both derivatives forward. Arrays have the shape (networks, n, width),
+those of the layers that see X (networks, 3, n, width); the three are a, b and σ_1 (or that of H_1).
 """
 
 from typing import NamedTuple
@@ -197,7 +197,11 @@ def _to_encoders(to_base: torch.Tensor, to_step: torch.Tensor, outer: torch.Tens
 
 
 def _product_along(
-    base: torch.Tensor, gate: torch.Tensor, gate_along: torch.Tensor, step: torch.Tensor, step_along: torch.Tensor
+    base: torch.Tensor,
+    gate: torch.Tensor,
+    gate_along: torch.Tensor,
+    step: torch.Tensor,
+    step_along: torch.Tensor,
 ) -> torch.Tensor:
     """Derivative of base + gate * step."""
     return torch.addcmul(base, gate_along, step).addcmul_(gate, step_along)

@@ -1,7 +1,7 @@
 """The modified MLP that the paper uses: its shape, its initial weights, and views of its parameters.
 
-With X = (x, y) and `*` by element (S. Wang, Y. Teng, P. Perdikaris: Understanding and mitigating gradient flow
-pathologies in physics-informed neural networks, SIAM J. Sci. Comput. 43 (2021) A3055-A3081):
+With X = (x, y) and `*` by element (S. Wang, Y. Teng, P. Perdikaris: Understanding and mitigating gradient
+flow pathologies in physics-informed neural networks, SIAM J. Sci. Comput. 43 (2021) A3055-A3081):
 
     A = tanh(X W_A + b_A)         B = tanh(X W_B + b_B)
     Z_1 = tanh(X W_1 + b_1)       Z_k = tanh(H_k W_k + b_k), k = 2..L
@@ -24,8 +24,8 @@ class Weights(NamedTuple):
     Attributes:
         first: The layers that see X, those of A, B and Z_1 (or H_1): slopes along x and y and the bias, shape
             (networks, 3, 3, width).
-        gates: The gates that see a hidden layer: weights and, in the last row, the bias, shape (networks, gates,
-            width + 1, width).
+        gates: The gates that see a hidden layer: weights and, in the last row, the bias, shape
+            (networks, gates, width + 1, width).
         output: Weights and, last, the bias, shape (networks, width + 1).
     """
 
@@ -69,8 +69,8 @@ class ModifiedMlp:
     def initial(self, seed: int, dtype: torch.dtype) -> torch.Tensor:
         """Glorot-normal weights and zero biases, shape (networks, parameters).
 
-        Source: X. Glorot, Y. Bengio: Understanding the difficulty of training deep feedforward neural networks,
-        AISTATS 2010: variance 2 / (inputs + outputs).
+        Source: X. Glorot, Y. Bengio: Understanding the difficulty of training deep feedforward neural
+        networks, AISTATS 2010: variance 2 / (inputs + outputs).
         """
         generator = torch.Generator().manual_seed(seed)
         parameters = torch.zeros(self.networks, self.parameters, dtype=torch.float64)
@@ -86,8 +86,8 @@ class ModifiedMlp:
     def in_logistic_form(self, parameters: torch.Tensor) -> torch.Tensor:
         """Twice all parameters but the output's: what the passes of `mlp_passes` work with.
 
-        tanh(s) = 2 σ(2 s) - 1 with the logistic function σ, which torch evaluates several times as fast. Applied
-        to derivatives along the doubled parameters it gives those along the parameters.
+        tanh(s) = 2 σ(2 s) - 1 with the logistic function σ, which torch evaluates several times as fast.
+        Applied to derivatives over the doubled parameters it gives those over the parameters.
         """
         doubled = 2 * parameters
         doubled[:, -self.width - 1 :] = parameters[:, -self.width - 1 :]

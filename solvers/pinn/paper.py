@@ -1,5 +1,7 @@
 """`pinn-std --preset paper`: the paper's two networks, its loss, its optimiser, its 60,000 epochs."""
 
+import hashlib
+import json
 import time
 from dataclasses import dataclass, field, fields, replace
 from typing import ClassVar, Literal
@@ -9,20 +11,25 @@ import torch
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from geometry.quadrature import body_quadrature
-from solvers.elasticity import linear_energy_density
 from solvers.pinn.collocation import Collocation, base_points, body_sample
-from solvers.pinn.loss_gradient import Evaluation, Loss
+from solvers.pinn.loss_gradient import Loss
 from solvers.pinn.losses import DisplacementTerm, EnergyTerm, LossTerm, stiffness_matrix
 from solvers.pinn.mlp_field import MlpField
 from solvers.pinn.modified_mlp import ModifiedMlp
-from solvers.pinn.training import OPTIMISERS, train
+from solvers.pinn.pieces import torch_threads
+from solvers.pinn.processes import ONE_PROCESS, Processes
+from solvers.pinn.training import OPTIMISERS, Recipe, Store, Training
+from solvers.pinn.training_progress import TrainingProgress
+from solvers.pinn.verdict import judge
 from solvers.problem import Problem, contact_functional
-from solvers.solution import Solution, Status
+from solvers.solution import Solution
 from solvers.solver import Progress, check_problem, silent
 from solvers.training import TrainingContext
 
 PRECISIONS = {"single": torch.float32, "double": torch.float64}
+
+FREE = ("epochs", "patience", "min_change", "checkpoint_every", "threads", "device")
+"""Settings that may change when a training is resumed."""
 
 
 @dataclass(frozen=True)
@@ -103,53 +110,63 @@ class PaperPinnSolver:
         return ModifiedMlp(width=self.width, layers=self.layers, literal_gate=self.literal_gate)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
-        """Train on the problem; see `Solver`."""
+        """Train on the problem; see `Solver`.
+
+        Raises:
+            TrainingDiverged: If the loss is not a number or has grown beyond all bounds.
+        """
         check_problem(self, problem)
         started = time.perf_counter()
-        loss = self.loss(problem)
+        processes = Processes.of_environment()
         area = float(problem.mesh.areas.sum())
-
-        def report(epoch: int, evaluation: Evaluation) -> None:
-            terms = ", ".join(f"{name} {value:.3g}" for name, value in evaluation.terms.items())
-            progress(
-                epoch / self.epochs, f"epoch {epoch}: {terms}, energy {area * evaluation.terms['PDE']:.4g}"
+        with torch_threads(self.threads) as threads:
+            loss = self.loss(problem, processes)
+            initial = self.network.initial(self.seed, PRECISIONS[self.precision]).to(self.device)
+            training = Training(loss, initial, self._recipe(), area, self._store(problem, processes))
+            told = TrainingProgress(
+                progress if processes.rank == 0 else silent,
+                self.epochs,
+                training.epoch,
+                area,
+                self._context.reference_energy,
             )
-
-        initial = self.network.initial(self.seed, PRECISIONS[self.precision]).to(self.device)
-        trained = train(
-            loss,
-            initial,
-            optimiser=self.optimiser,
-            learning_rate=self.learning_rate,
-            epochs=self.epochs,
-            report=report,
-        )
-        mlp_field = MlpField(self.network, trained.parameters.double().cpu())
-        rule = body_quadrature(problem.mesh)
-        density = linear_energy_density(mlp_field.gradient(rule.location), problem.material.lame)
+            training.run(told)
+            field = MlpField(self.network, training.parameters.double().cpu())
+            result = judge(problem, field, training)
         seconds = time.perf_counter() - started
-        columns = ("epoch", *loss.factors, "total", "seconds")
         return Solution(
             solver=self.name,
             problem=problem,
-            field=mlp_field,
-            energy=float((rule.weights * density).sum()),
-            reaction=np.zeros(2),
-            status=Status(False, f"{self.epochs} epochs; the paper's recipe has no criterion"),
+            field=field,
+            energy=result.energy,
+            reaction=result.reaction,
+            status=result.status,
             stats={
                 "seconds": seconds,
-                "epochs": len(trained.history),
-                "parameters": trained.parameters.numel(),
+                "epochs": training.epoch,
+                "parameters": initial.numel(),
+                "collocation_points": len(loss.terms[0].points),
+                "seconds_per_epoch": float(training.history[-1, -1] / training.epoch),
                 "seed": self.seed,
                 "device": self.device,
-                "seconds_per_epoch": seconds / len(trained.history),
-                "collocation_points": len(loss.terms[0].points),
-                "threads": torch.get_num_threads(),
+                "threads": threads,
+                "processes": processes.count,
             },
-            history=dict(zip(columns, trained.history.T, strict=True)),
+            history=dict(zip(training.columns, training.history.T, strict=True)),
         )
 
-    def loss(self, problem: Problem) -> Loss:
+    def _recipe(self) -> Recipe:
+        return Recipe(**{entry.name: getattr(self, entry.name) for entry in fields(Recipe)})
+
+    def _store(self, problem: Problem, processes: Processes) -> Store | None:
+        """Where to save; a checkpoint belongs to the problem and to all settings but those of `FREE`."""
+        if self._context.folder is None:
+            return None
+        binding = {name: value for name, value in self.settings().items() if name not in FREE}
+        digest = hashlib.sha256((problem.digest + json.dumps(binding, sort_keys=True)).encode()).hexdigest()
+        return Store(self._context.folder, digest, self._context.resume, writes=processes.rank == 0)
+
+    def loss(self, problem: Problem, processes: Processes = ONE_PROCESS) -> Loss:
         """The paper's loss: L_PDE + bc_weight L_BC."""
 
         def tensor(array: FloatArray) -> torch.Tensor:
@@ -174,4 +191,4 @@ class PaperPinnSolver:
                 "BC", tensor(contact), tensor(targets), tensor(wanted), functional=tensor(functional[None])
             ),
         ]
-        return Loss(self.network, terms, {"PDE": 1.0, "BC": self.bc_weight})
+        return Loss(self.network, terms, {"PDE": 1.0, "BC": self.bc_weight}, processes)

@@ -5,8 +5,9 @@ each of them; with pieces there is one barrier in all. On two busy cores this wa
 eight times as fast.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import TypeVar
 
 import torch
@@ -31,9 +32,19 @@ def cut(points: int, size: int) -> list[slice]:
 def in_threads(task: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
     """`task` of every item, in the items' order, on every thread; torch's own threads rest meanwhile."""
     threads = torch.get_num_threads()
-    torch.set_num_threads(1)
+    with (
+        torch_threads(1),
+        ThreadPoolExecutor(threads, initializer=torch.set_num_threads, initargs=(1,)) as pool,
+    ):
+        return list(pool.map(task, items))
+
+
+@contextmanager
+def torch_threads(count: int) -> Iterator[int]:
+    """Let torch use `count` threads, or as many as it is set to if that is 0; yields how many those are."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(count or before)
     try:
-        with ThreadPoolExecutor(threads, initializer=torch.set_num_threads, initargs=(1,)) as pool:
-            return list(pool.map(task, items))
+        yield count or before
     finally:
-        torch.set_num_threads(threads)
+        torch.set_num_threads(before)

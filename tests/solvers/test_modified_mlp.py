@@ -1,8 +1,9 @@
-"""The paper's network: its size, its derivatives and its reverse pass against automatic differentiation."""
+"""The paper's network: its size, its derivatives and its gradient against automatic differentiation."""
 
 import pytest
 import torch
 
+from solvers.pinn.mlp_passes import MlpPass
 from solvers.pinn.modified_mlp import ModifiedMlp
 
 
@@ -21,6 +22,17 @@ def plain(network: ModifiedMlp, parameters: torch.Tensor, points: torch.Tensor) 
     return torch.stack(results)
 
 
+def plain_slopes(network, parameters, points) -> torch.Tensor:
+    """Derivatives along x and y by automatic differentiation, shape (networks, n, 2)."""
+    points = points.clone().requires_grad_()
+    values = plain(network, parameters, points)
+    return torch.stack([torch.autograd.grad(value.sum(), points, create_graph=True)[0] for value in values])
+
+
+def noise(*shape: int, seed: int) -> torch.Tensor:
+    return torch.randn(*shape, generator=torch.Generator().manual_seed(seed), dtype=torch.float64)
+
+
 @pytest.fixture(params=[False, True], ids=["published", "literal"])
 def network(request) -> ModifiedMlp:
     return ModifiedMlp(width=7, layers=4, literal_gate=request.param)
@@ -29,23 +41,17 @@ def network(request) -> ModifiedMlp:
 @pytest.fixture
 def parameters(network) -> torch.Tensor:
     """With biases that are not zero."""
-    noise = torch.randn(
-        2, network.parameters, generator=torch.Generator().manual_seed(1), dtype=torch.float64
-    )
-    return network.initial(0, torch.float64) + 0.2 * noise
+    return network.initial(0, torch.float64) + 0.2 * noise(2, network.parameters, seed=1)
 
 
 @pytest.fixture
 def points() -> torch.Tensor:
-    return torch.randn(11, 2, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
+    return noise(11, 2, seed=2)
 
 
-def streams(network, parameters, points) -> torch.Tensor:
-    """Value and derivatives by automatic differentiation, shape (networks, 3, n)."""
-    points = points.clone().requires_grad_()
-    values = plain(network, parameters, points)
-    slopes = [torch.autograd.grad(value.sum(), points, create_graph=True)[0].T for value in values]
-    return torch.cat([values[:, None], torch.stack(slopes)], dim=1)
+@pytest.fixture
+def at_points(network, parameters, points) -> MlpPass:
+    return MlpPass(network, network.weights(network.in_logistic_form(parameters)), points)
 
 
 @pytest.mark.parametrize(
@@ -60,31 +66,36 @@ def test_number_of_parameters(literal, count):
 
 def test_initial_weights_are_glorot_normal():
     """Within three standard errors of the mean and the deviation; biases are exactly zero."""
-    first, gates, output = ModifiedMlp(networks=3).weights(ModifiedMlp(networks=3).initial(0, torch.float64))
+    network = ModifiedMlp(networks=3)
+    first, gates, output = network.weights(network.initial(0, torch.float64))
     for matrix, fans in ((first[:, :, :-1], 66), (gates[:, :, :-1], 128), (output[:, :-1], 65)):
         assert matrix.std() == pytest.approx((2 / fans) ** 0.5, rel=3 / (2 * matrix.numel()) ** 0.5)
         assert abs(matrix.mean()) < 3 * matrix.std() / matrix.numel() ** 0.5
     assert max(bias.abs().max() for bias in (first[:, :, -1], gates[:, :, -1], output[:, -1])) == 0
 
 
-def test_values_and_derivatives(network, parameters, points):
-    expected = streams(network, parameters, points).detach()
-    output = network.forward(parameters, points, derivatives=True).output
-    torch.testing.assert_close(output, expected, rtol=1e-12, atol=1e-13)
-    values = network.forward(parameters, points, derivatives=False).output
-    torch.testing.assert_close(values, expected[:, :1], rtol=1e-12, atol=1e-13)
+def test_values_and_slopes(network, parameters, points, at_points):
+    torch.testing.assert_close(at_points.values(), plain(network, parameters, points), rtol=1e-12, atol=1e-13)
+    expected = plain_slopes(network, parameters, points).detach()
+    torch.testing.assert_close(at_points.slopes(), expected, rtol=1e-12, atol=1e-13)
 
 
-@pytest.mark.parametrize("derivatives", [True, False])
-def test_gradient_over_every_parameter(network, parameters, points, derivatives):
-    layers = network.forward(parameters, points, derivatives=derivatives)
-    adjoint = torch.randn(
-        layers.output.shape, generator=torch.Generator().manual_seed(3), dtype=torch.float64
-    )
-    gradient = torch.ones_like(parameters)  # what is there is added to
-    network.reverse(parameters, layers, adjoint, gradient)
+@pytest.mark.parametrize("of", ["values", "slopes"])
+def test_gradient_over_every_parameter(network, parameters, points, at_points, of):
+    """Rounding of sums of some hundred terms; what is there already is added to."""
+    gradient = torch.ones_like(parameters)
     variable = parameters.clone().requires_grad_()
-    expected = streams(network, variable, points)[:, : adjoint.shape[1]]
-    (wanted,) = torch.autograd.grad((expected * adjoint).sum(), variable)
-    torch.testing.assert_close(gradient - 1, wanted, rtol=1e-11, atol=1e-12)
-    assert (wanted != 0).all(), "a parameter that does nothing would not be checked"
+    if of == "values":
+        factors = noise(2, 11, seed=3)
+        at_points.add_value_gradient(factors, network.weights(gradient))
+        loss = (factors * plain(network, variable, points)).sum()
+    else:
+        factors = noise(2, 11, 2, seed=3)
+        at_points.slopes()
+        at_points.add_slope_gradient(factors, network.weights(gradient))
+        loss = (factors * plain_slopes(network, variable, points)).sum()
+    expected = torch.autograd.grad(loss, variable)[0]
+    ours = network.in_logistic_form(gradient - 1)
+    torch.testing.assert_close(ours, expected, rtol=1e-11, atol=1e-12)
+    unused = (expected == 0).sum().item()
+    assert unused == (2 if of == "slopes" else 0), "only the output's biases do not move the slopes"

@@ -1,0 +1,88 @@
+"""What a gradient-trained network amounts to: energy, reaction, and whether the training has settled."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.quadrature import body_quadrature
+from solvers.elasticity import linear_energy_density, linear_stress
+from solvers.pinn.mlp_field import MlpField
+from solvers.pinn.training import Training
+from solvers.problem import Problem, contact_extent, contact_functional
+from solvers.solution import Status
+
+ENERGY_CHANGE = 0.01
+"""Relative change of the energy over the last tenth of the epochs below which it has settled."""
+
+VIOLATION = 0.01
+"""Share of the stroke by which base and contact may miss their prescribed displacement."""
+
+
+class Verdict(NamedTuple):
+    """Energy per depth, N mm/mm; the indenter's force per depth, shape (2,), N/mm; how the training ended."""
+
+    energy: float
+    reaction: FloatArray
+    status: Status
+
+
+def judge(problem: Problem, field: MlpField, training: Training) -> Verdict:
+    """Energy and reaction by the element rule, and the status by two criteria."""
+    rule = body_quadrature(problem.mesh)
+    gradient = field.gradient(rule.location)
+    energy = float((rule.weights * linear_energy_density(gradient, problem.material.lame)).sum())
+    reaction = _section_force(problem, rule.location.points, rule.weights, gradient)
+    change = _late_change(training.history[:, training.columns.index("energy")])
+    base, contact = _violations(problem, field)
+    converged = change <= ENERGY_CHANGE and max(base, contact) <= VIOLATION
+    message = (
+        f"{training.epoch} epochs; over their last tenth the energy changed by {change:.2%} (criterion "
+        f"{ENERGY_CHANGE:.0%}), the base moves by {base:.2%} and the contact misses its displacement by "
+        f"{contact:.2%} of the stroke (criterion {VIOLATION:.0%}); "
+    )
+    message += (
+        "so the training has settled, which does not say how far it is from the least energy"
+        if converged
+        else "so the training has not settled: take more epochs"
+    )
+    return Verdict(energy, reaction, Status(converged, message))
+
+
+def _section_force(
+    problem: Problem, points: FloatArray, weights: FloatArray, gradient: FloatArray
+) -> FloatArray:
+    """Force on the sections between base and contact, on average, for the prescribed components.
+
+    In equilibrium each of these sections transmits the indenter's force. This is the work of the stress on a
+    displacement that grows linearly from the base to the contact, where it is a unit translation.
+    """
+    start = float(problem.mesh.points[problem.mesh.boundary("base").ravel(), 0].max())
+    middle, width = contact_extent(problem.mesh)
+    end = middle - width / 2
+    between = (points[:, 0] > start) & (points[:, 0] < end)
+    stress = linear_stress(gradient[between], problem.material.lame)
+    force = np.zeros(2)
+    for axis in problem.load.prescribed:
+        force[axis] = (weights[between] * (stress.xx, stress.xy)[axis]).sum() / (end - start)
+    return force
+
+
+def _late_change(energy: FloatArray) -> float:
+    """Relative change from the last but one to the last twentieth, of their means: training is noisy."""
+    count = max(len(energy) // 20, 1)
+    if len(energy) < 2 * count:
+        return float("inf")
+    before, after = energy[-2 * count :].reshape(2, count).mean(axis=1)
+    return float(abs(after - before) / abs(after))
+
+
+def _violations(problem: Problem, field: MlpField) -> tuple[float, float]:
+    """Root mean square displacement of the base and error of the contact's, as shares of the stroke."""
+    mesh, load = problem.mesh, problem.load
+    nodes = np.unique(mesh.boundary("base"))
+    base = field.displacement(mesh.locate(mesh.points[nodes]))
+    points, weights = contact_functional(problem)
+    contact = (weights @ field.displacement(mesh.locate(points)))[load.prescribed] - load.values
+    stroke = np.abs(load.values).max() or 1.0
+    return float(np.sqrt((base**2).sum(axis=1).mean()) / stroke), float(np.abs(contact).max() / stroke)
