@@ -1,7 +1,8 @@
 """The networks: error against finite elements and time, by their size and for three seeds.
 
-The reference has quadratic elements graded to 0.02 mm at the corners; `fem` on the shared mesh is listed
-beside the networks as what they are to equal.
+The reference has quadratic elements graded to 0.002 mm at the corners. Halving its other elements changes its
+von Mises stress by 0.3 % and its displacement by 0.0005 %. `fem` on the shared mesh is listed beside the
+networks as what they are to equal.
 """
 
 import numpy as np
@@ -40,7 +41,7 @@ def main() -> Table:
     for column in ("solver", "time, s", "L2, %", "von Mises, %", "markers, mm"):
         table.add_column(column, justify="left" if column == "solver" else "right")
     mesh = finger_mesh(Design())
-    graded = finger_mesh(Design(), settings=MeshSettings(corner_size=0.02))
+    graded = finger_mesh(Design(), settings=MeshSettings(corner_size=0.002))
     reference = Evaluation.of(FemSolver().solve(Problem(graded)), mesh)
     for name, solvers in CASES.items():
         rows = []

@@ -1,14 +1,11 @@
 """The elastic energy as a quadratic form of the output layer, and its exact minimiser."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import torch
 
 from geometry.errors import UserError
 from solvers.elasticity import Lame
-
-Matrix = Any
-"""A tensor or a sparse matrix."""
 
 
 class Minimum(NamedTuple):
@@ -27,7 +24,9 @@ class Minimum(NamedTuple):
     regularisation: float
 
 
-def stiffness_blocks(xx: Matrix, yy: Matrix, xy: Matrix, lame: Lame) -> tuple[Matrix, Matrix, Matrix]:
+def stiffness_blocks(
+    xx: torch.Tensor, yy: torch.Tensor, xy: torch.Tensor, lame: Lame
+) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """Hessian of the elastic energy over output weights that both displacement components have for each unit.
 
     With weighted derivatives X = sqrt(w) d/dx and Y = sqrt(w) d/dy of U units at the quadrature points,
@@ -35,7 +34,7 @@ def stiffness_blocks(xx: Matrix, yy: Matrix, xy: Matrix, lame: Lame) -> tuple[Ma
         K_uu = (λ + 2 μ) X^T X + μ Y^T Y    K_uv = λ X^T Y + μ Y^T X    K_vv = (λ + 2 μ) Y^T Y + μ X^T X
 
     Args:
-        xx: X^T X, shape (U, U), a tensor or a sparse matrix.
+        xx: X^T X, shape (U, U).
         yy: Y^T Y.
         xy: X^T Y.
         lame: Lamé constants of the plane law, MPa.

@@ -5,12 +5,11 @@ from dataclasses import asdict, dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.sparse import bmat, csr_matrix, diags
+import torch
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.quadrature import body_quadrature
-from solvers.pinn.energy import stiffness_blocks
 from solvers.pinn.grading import (
     Spacing,
     graded_quadrature,
@@ -19,8 +18,8 @@ from solvers.pinn.grading import (
     singular_points,
     spread_points,
 )
+from solvers.pinn.local_energy import LocalEnergy
 from solvers.pinn.local_units import LocalField, LocalUnits
-from solvers.pinn.sparse_cholesky import solve_positive_definite
 from solvers.pinn.trial_space import BaseFactor
 from solvers.problem import Problem, contact_functional
 from solvers.solution import Solution, Status
@@ -56,15 +55,15 @@ class PinnLocalSolver:
     """
 
     wall_spacing: float = 0.5
-    corner_spacing: float = 0.02
-    growth: float = 0.4
+    corner_spacing: float = 0.006
+    growth: float = 0.5
     radius: float = 1.8
     ridges: int = 5
     slope: float = 0.7
-    coarser: float = 1.5
+    coarser: float = 2.0
     tolerance: float = 0.005
     thinning: float = 0.75
-    cell: float = 0.6
+    cell: float = 0.45
     base_length: float = 5.0
     seed: int = 0
     name: ClassVar[str] = "pinn-local"
@@ -98,8 +97,8 @@ class PinnLocalSolver:
             displacement = field.displacement(rule.location)
             change = _relative(displacement - before, displacement, rule.weights)
             before = displacement
-            history.append((field.units.count, energy, change, time.perf_counter() - started))
-            progress((number + 1) / 2, f"{field.units.count} units, energy {energy:.4f} N mm/mm")
+            history.append((field.output[:, 0].numel(), energy, change, time.perf_counter() - started))
+            progress((number + 1) / 2, f"{field.output[:, 0].numel()} units, energy {energy:.4f} N mm/mm")
         converged = change <= self.tolerance
         message = (
             f"{self.coarser:g} times finer windows changed the displacement by {change:.2%} "
@@ -116,9 +115,9 @@ class PinnLocalSolver:
             status=Status(converged, message if converged else f"{message}; take a smaller spacing"),
             stats={
                 "seconds": time.perf_counter() - started,
-                "unknowns": 2 * field.units.count,
-                "units": field.units.count,
-                "windows": len(field.units.centres),
+                "unknowns": field.output.numel(),
+                "units": field.output[:, 0].numel(),
+                "windows": field.units.windows,
                 "quadrature_points": len(level.points),
                 "seed": self.seed,
                 "device": "cpu",
@@ -161,26 +160,18 @@ class _Level:
 
     def solve(self, problem: Problem) -> tuple[LocalField, float, FloatArray]:
         """The field of least energy under the load's conditions, its energy, and the load's forces."""
-        matrices = self.units.matrices(self.points)
-        root = diags(np.sqrt(self.weights))
-        x, y = root @ matrices.along_x, root @ matrices.along_y
-        uu, uv, vv = stiffness_blocks(x.T @ x, y.T @ y, x.T @ y, problem.material.lame)
-        stiffness = csr_matrix(bmat([[uu, uv], [uv.T, vv]]))
-        scale = 1 / np.sqrt(stiffness.diagonal())
-        scaled = csr_matrix(
-            diags(scale) @ stiffness @ diags(scale) + REGULARISATION * diags(np.ones_like(scale))
-        )
-        points, weights = contact_functional(problem)
-        functional = self.units.matrices(points).values.T @ weights
-        right = np.zeros((2 * self.units.count, len(problem.load.prescribed)))
-        for column, axis in enumerate(problem.load.prescribed):
-            right[axis * self.units.count : (axis + 1) * self.units.count, column] = functional
-        right *= scale[:, None]
-        responses = solve_positive_definite(scaled, right)
-        forces = np.linalg.solve(right.T @ responses, problem.load.values)
-        output = scale * (responses @ forces)
-        energy = 0.5 * float(output @ (stiffness @ output))
-        return LocalField(self.units, output.reshape(2, -1).T.copy()), energy, forces
+        energy = LocalEnergy.of(self.units, problem.material, self.points, self.weights)
+        shape = (self.units.windows, 2, self.units.per_window)
+        _, hessian = energy.derivatives(torch.zeros(shape, dtype=torch.float64))
+        functional = self.units.functional(*contact_functional(problem))
+        right = np.zeros((len(problem.load.prescribed), *shape))
+        for row, axis in enumerate(problem.load.prescribed):
+            right[row, :, axis] = functional
+        right = right.reshape(len(right), -1)
+        responses = hessian.solve(right, REGULARISATION)
+        forces = np.linalg.solve(right @ responses.T, problem.load.values)
+        field = LocalField(self.units, torch.from_numpy(forces @ responses).view(shape))
+        return field, 0.5 * float(forces @ problem.load.values), forces
 
 
 def _relative(difference: FloatArray, field: FloatArray, weights: FloatArray) -> float:

@@ -8,25 +8,17 @@ Moseley, Markham and Nissen-Meyer, Finite basis physics-informed neural networks
 National Conference (1968).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_matrix
-from scipy.spatial import cKDTree
+import torch
 
-from geometry.arrays import FloatArray, IntArray
+from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.locate import Location
+from solvers.pinn.patches import cut_into_patches, over_patches
 from solvers.pinn.trial_space import BaseFactor
-
-
-class UnitMatrices(NamedTuple):
-    """Values and derivatives of U units at n points, each a sparse matrix (n, U)."""
-
-    values: csr_matrix
-    along_x: csr_matrix
-    along_y: csr_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,16 +33,21 @@ class LocalUnits:
         factor: The hard condition on the base.
     """
 
-    centres: FloatArray
-    radii: FloatArray
-    slopes: FloatArray
-    biases: FloatArray
+    centres: torch.Tensor
+    radii: torch.Tensor
+    slopes: torch.Tensor
+    biases: torch.Tensor
     factor: BaseFactor
 
     @property
-    def count(self) -> int:
-        """Number of units."""
-        return len(self.centres) * (self.slopes.shape[1] + 1)
+    def windows(self) -> int:
+        """Number of windows, c."""
+        return len(self.centres)
+
+    @property
+    def per_window(self) -> int:
+        """Number of units in a window, m + 1."""
+        return self.slopes.shape[1] + 1
 
     @classmethod
     def around(
@@ -68,74 +65,81 @@ class LocalUnits:
         turn = rng.uniform(0, np.pi, (count, 1)) + np.pi * np.arange(ridges) / ridges
         angle = turn + rng.uniform(-0.2, 0.2, (count, ridges))
         slopes = slope * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        return cls(centres, radii, slopes, rng.uniform(-1, 1, (count, ridges)), factor)
+        biases = rng.uniform(-1, 1, (count, ridges))
+        tensors = (torch.from_numpy(array) for array in (centres, radii, slopes, biases))
+        return cls(*tensors, factor=factor)
 
-    def matrices(self, points: FloatArray) -> UnitMatrices:
-        """The units times the hard condition's factor at points (n, 2), mm.
+    def near(self, points: torch.Tensor) -> torch.Tensor:
+        """Numbers of the windows that reach the box around points (n, 2), mm, in ascending order."""
+        nearest = self.centres.clamp(points.amin(dim=0), points.amax(dim=0))
+        return ((nearest - self.centres).square().sum(dim=1) < self.radii.square()).nonzero()[:, 0]
+
+    def values(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
+        """The units of the windows `near` (w,), times the hard condition's factor, at points (n, 2), mm.
+
+        Returns:
+            Shape (n, w, m + 1).
 
         Raises:
             UserError: If a point lies in no window.
         """
-        point, window = self._pairs(points)
-        radius = self.radii[window, None]
-        local = (points[point] - self.centres[window]) / radius
-        rise = 1 - (local**2).sum(axis=1)
-        share, share_x, share_y = _partition_of_unity(
-            point, len(points), rise**3, -6 * rise[:, None] ** 2 * local / radius
-        )
-        slopes = self.slopes[window]
-        ridge = np.tanh(np.einsum("pmx,px->pm", slopes, local) + self.biases[window])
-        rate = (1 - ridge**2) / radius
-        one, zero = np.ones((len(point), 1)), np.zeros((len(point), 1))
-        unit = np.concatenate([one, ridge], axis=1)
-        unit_x = np.concatenate([zero, rate * slopes[:, :, 0]], axis=1)
-        unit_y = np.concatenate([zero, rate * slopes[:, :, 1]], axis=1)
-        factor, factor_slope = (array[point] for array in self.factor.at(points))
-        value = share * unit
-        return UnitMatrices(
-            self._matrix(len(points), point, window, factor * value),
-            self._matrix(
-                len(points),
-                point,
-                window,
-                factor * (share_x * unit + share * unit_x) + factor_slope * value,
-            ),
-            self._matrix(len(points), point, window, factor * (share_y * unit + share * unit_y)),
-        )
+        local = self._local(points, near)
+        share = _share((1 - local.square().sum(dim=-1)).clamp_(min=0) ** 3)
+        return (self.factor.at(points)[0] * share)[:, :, None] * self._units(local, near)
 
-    def _pairs(self, points: FloatArray) -> tuple[IntArray, IntArray]:
-        """Every point with every window that holds it, sorted by point; two arrays of numbers."""
-        found = cKDTree(points).query_ball_point(self.centres, self.radii * (1 - 1e-9))
-        window = np.repeat(np.arange(len(found)), [len(inside) for inside in found])
-        point = np.fromiter(
-            (index for inside in found for index in inside), dtype=np.int64, count=len(window)
-        )
-        order = np.argsort(point, kind="stable")
-        return point[order], window[order]
+    def derivatives(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
+        """Derivatives of `values` along x and y, 1/mm: (2, n, w, m + 1)."""
+        local, radii = self._local(points, near), self.radii[near]
+        rise = (1 - local.square().sum(dim=-1)).clamp_(min=0)
+        window = rise**3
+        share, total = _share(window), window.sum(dim=1, keepdim=True)
+        unit = self._units(local, near)
+        rate = (1 - unit[:, :, 1:].square()) / radii[:, None]
+        factor, factor_slope = self.factor.at(points)
+        found = local.new_zeros(2, *unit.shape)
+        for axis, along in enumerate(found):
+            slope = -6 * rise.square() * local[:, :, axis] / radii
+            change = factor * (slope - share * slope.sum(dim=1, keepdim=True)) / total
+            if axis == 0:
+                change += factor_slope * share
+            torch.mul(rate, self.slopes[near, :, axis], out=along[:, :, 1:])
+            along.mul_((factor * share)[:, :, None]).addcmul_(change[:, :, None], unit)
+        return found
 
-    def _matrix(self, rows: int, point: IntArray, window: IntArray, values: FloatArray) -> csr_matrix:
-        units = values.shape[1]
-        columns = window[:, None] * units + np.arange(units)
-        starts = np.concatenate([[0], np.cumsum(np.bincount(point, minlength=rows))]) * units
-        return csr_matrix((values.ravel(), columns.ravel(), starts), shape=(rows, self.count))
+    def functional(self, points: FloatArray, weights: FloatArray) -> FloatArray:
+        """The sum of weights (n,) times the units at points (n, 2), mm: (c, m + 1)."""
+        found = self.centres.new_zeros(self.windows, self.per_window)
+        for patch in cut_into_patches(points):
+            places = torch.from_numpy(points[patch])
+            near = self.near(places)
+            found.index_add_(
+                0,
+                near,
+                torch.einsum("n,nwu->wu", torch.from_numpy(weights[patch]), self.values(places, near)),
+            )
+        return np.asarray(found)
+
+    def _local(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
+        """Positions in the windows, in radii, (n, w, 2)."""
+        return (points[:, None] - self.centres[near]) / self.radii[near, None]
+
+    def _units(self, local: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
+        """One and the ridges, (n, w, m + 1)."""
+        slopes = self.slopes[near]
+        unit = local.new_ones(*local.shape[:2], self.per_window)
+        ridge = unit[:, :, 1:]
+        torch.addcmul(self.biases[near], local[:, :, :1], slopes[:, :, 0], out=ridge)
+        ridge.addcmul_(local[:, :, 1:], slopes[:, :, 1]).tanh_()
+        return unit
 
 
-def _partition_of_unity(
-    point: IntArray, count: int, window: FloatArray, gradient: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Windows over their sum at each point, and the derivatives of that, each (pairs, 1)."""
-    total = np.bincount(point, window, count)
-    if (total <= 0).any():
-        raise UserError(
-            f"{int((total <= 0).sum())} points lie in no window of the network; take a smaller spacing"
-        )
-    share = window / total[point]
-    along = (
-        (gradient[:, axis] - share * np.bincount(point, gradient[:, axis], count)[point]) / total[point]
-        for axis in range(2)
-    )
-    share_x, share_y = (derivative[:, None] for derivative in along)
-    return share[:, None], share_x, share_y
+def _share(windows: torch.Tensor) -> torch.Tensor:
+    """Windows (n, w) over their sum at each point."""
+    total = windows.sum(dim=1, keepdim=True)
+    missing = int((total <= 0).sum())
+    if missing:
+        raise UserError(f"{missing} points lie in no window of the network; take a smaller spacing")
+    return windows / total
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,17 +148,32 @@ class LocalField:
 
     Attributes:
         units: The hidden units.
-        output: Output layer, shape (U, 2), mm.
+        output: Output layer, shape (c, 2, m + 1): for every window, component and unit, mm.
     """
 
     units: LocalUnits
-    output: FloatArray
+    output: torch.Tensor
 
     def displacement(self, location: Location) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
-        return np.asarray(self.units.matrices(location.points).values @ self.output)
+        return self._sample(location.points, self.displacement_of_patch)
 
     def gradient(self, location: Location) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
-        matrices = self.units.matrices(location.points)
-        return np.stack([matrices.along_x @ self.output, matrices.along_y @ self.output], axis=-1)
+        return self._sample(location.points, self.gradient_of_patch)
+
+    def displacement_of_patch(self, points: torch.Tensor) -> torch.Tensor:
+        """`displacement` for a few points, in the calling thread."""
+        near = self.units.near(points)
+        return torch.einsum("nwu,wiu->ni", self.units.values(points, near), self.output[near])
+
+    def gradient_of_patch(self, points: torch.Tensor) -> torch.Tensor:
+        """`gradient` for a few points, in the calling thread."""
+        near = self.units.near(points)
+        return torch.einsum("xnwu,wiu->nix", self.units.derivatives(points, near), self.output[near])
+
+    def _sample(self, points: FloatArray, field: Callable[[torch.Tensor], torch.Tensor]) -> FloatArray:
+        patches = cut_into_patches(points)
+        parts = over_patches(lambda patch: field(torch.from_numpy(points[patch])).numpy(), patches)
+        order = np.argsort(np.concatenate(patches))
+        return np.asarray(np.concatenate(list(parts))[order])

@@ -1,45 +1,74 @@
-"""Sparse symmetric positive definite systems by MUMPS."""
+"""Sparse symmetric systems of dense blocks, by MUMPS."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
-from scipy.sparse import csr_matrix
 
-from geometry.arrays import FloatArray
+from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
 
 
-def solve_positive_definite(matrix: csr_matrix, right: FloatArray) -> FloatArray:
-    """Solve for several right-hand sides (n, k) with one factorisation.
+@dataclass(frozen=True, eq=False)
+class BlockMatrix:
+    """The upper half of a symmetric matrix of n x n blocks of b x b numbers.
 
-    Raises:
-        UserError: If the factorisation fails.
+    Attributes:
+        size: Blocks in a row, n.
+        rows: Row of every block, ascending, shape (k,).
+        columns: Its column, at least the row and ascending within it, shape (k,).
+        blocks: Shape (k, b, b).
     """
-    index: Any = PETSc.IntType
-    stored = PETSc.Mat().createAIJ(
-        matrix.shape,
-        csr=(matrix.indptr.astype(index), matrix.indices.astype(index), matrix.data),
-        comm=PETSc.COMM_SELF,
-    )
-    stored.setOption(PETSc.Mat.Option.SPD, True)
-    ksp = PETSc.KSP().create(PETSc.COMM_SELF)
-    ksp.setOperators(stored)
-    ksp.setType(PETSc.KSP.Type.PREONLY)
-    preconditioner = ksp.getPC()
-    preconditioner.setType(PETSc.PC.Type.CHOLESKY)
-    preconditioner.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-    ksp.setErrorIfNotConverged(True)
-    solution = np.empty_like(right)
-    vector, result = stored.createVecs()
-    try:
-        for column in range(right.shape[1]):
-            vector.array[:] = right[:, column]
-            ksp.solve(vector, result)
-            solution[:, column] = result.array
-    except PETSc.Error as error:
-        raise UserError("MUMPS cannot factorise the network's output layer; take fewer units") from error
-    finally:
-        for item in (vector, result, ksp, stored):
-            item.destroy()
-    return solution
+
+    size: int
+    rows: IntArray
+    columns: IntArray
+    blocks: FloatArray
+
+    def diagonal(self) -> FloatArray:
+        """The diagonal, shape (n, b)."""
+        return np.diagonal(self.blocks[self.rows == self.columns], axis1=1, axis2=2)
+
+    def solve(self, right: FloatArray, regularisation: float) -> FloatArray:
+        """Solve for several right-hand sides with one factorisation, the diagonal scaled to one.
+
+        Args:
+            right: Right-hand sides, shape (r, n b).
+            regularisation: What to add to the unit diagonal.
+
+        Raises:
+            UserError: If the factorisation fails.
+        """
+        scale = 1 / np.sqrt(self.diagonal())
+        scaled = self.blocks * scale[self.rows, :, None] * scale[self.columns, None, :]
+        scaled[self.rows == self.columns] += regularisation * np.eye(scaled.shape[-1])
+        starts = np.searchsorted(self.rows, np.arange(self.size + 1))
+        index: Any = PETSc.IntType
+        stored = PETSc.Mat().createSBAIJ(
+            (scale.size, scale.size),
+            scaled.shape[-1],
+            csr=(starts.astype(index), self.columns.astype(index), scaled.ravel()),
+            comm=PETSc.COMM_SELF,
+        )
+        stored.setOption(PETSc.Mat.Option.SPD, True)
+        ksp = PETSc.KSP().create(PETSc.COMM_SELF)
+        ksp.setOperators(stored)
+        ksp.setType(PETSc.KSP.Type.PREONLY)
+        preconditioner = ksp.getPC()
+        preconditioner.setType(PETSc.PC.Type.CHOLESKY)
+        preconditioner.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+        ksp.setErrorIfNotConverged(True)
+        solution = np.empty_like(right)
+        vector, result = stored.createVecs()
+        try:
+            for row, found in zip(right * scale.ravel(), solution, strict=True):
+                vector.array[:] = row
+                ksp.solve(vector, result)
+                found[:] = result.array
+        except PETSc.Error as error:
+            raise UserError("MUMPS cannot factorise the network's output layer; take fewer units") from error
+        finally:
+            for item in (vector, result, ksp, stored):
+                item.destroy()
+        return solution * scale.ravel()

@@ -1,0 +1,45 @@
+"""Points in patches: neighbours, so few that what is evaluated at them stays in a core's cache.
+
+The units of a finite-basis network that reach one patch are a small dense block, which the fast kernels for
+dense matrices like better than a sparse matrix of all points and units.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
+
+import torch
+from scipy.spatial import cKDTree
+
+from geometry.arrays import FloatArray, IntArray
+
+PATCH = 96
+"""Most points in a patch. With fewer, windows are evaluated in more patches; with more, where they are zero."""
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def cut_into_patches(points: FloatArray) -> list[IntArray]:
+    """Numbers of the points (n, 2) of each patch; every point is in one of them."""
+    if not len(points):
+        return []
+    found, todo = [], [cKDTree(points, leafsize=PATCH).tree]
+    while todo:
+        node: Any = todo.pop()
+        if node.lesser is None:
+            found.append(node.indices.copy())
+        else:
+            todo += [node.greater, node.lesser]
+    return found
+
+
+def over_patches(task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+    """Results of `task` for each patch, in order, computed on every thread."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        with ThreadPoolExecutor(threads, initializer=torch.set_num_threads, initargs=(1,)) as pool:
+            yield from pool.map(task, items)
+    finally:
+        torch.set_num_threads(threads)
