@@ -60,7 +60,7 @@ class PinnLocalSolver:
     radius: float = 1.8
     ridges: int = 5
     slope: float = 0.7
-    coarser: float = 2.0
+    coarser: float = 1.7
     tolerance: float = 0.005
     thinning: float = 0.75
     cell: float = 0.45

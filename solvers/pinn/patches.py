@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from geometry.arrays import FloatArray, IntArray
 
 PATCH = 96
-"""Most points in a patch. With fewer, windows are evaluated in more patches; with more, where they are zero."""
+"""Most points in a patch: with fewer, windows are in more patches; with more, in patches they hardly reach."""
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
