@@ -80,15 +80,14 @@ class MlpPass:
         third = first[:, 2]
         gates: list[torch.Tensor] = []
         hidden = [2 * third - 1 if self._literal else torch.addcmul(base, third, step)]
-        for matrix in weights.gates.unbind(1):
-            gates.append(torch.baddbmm(matrix[:, -1:], hidden[-1], matrix[:, :-1]).sigmoid_())
+        for matrix, bias in zip(weights.gates, weights.biases, strict=True):
+            gates.append(torch.baddbmm(bias, hidden[-1], matrix).sigmoid_())
             hidden.append(torch.addcmul(base, gates[-1], step))
         self._up = Ascent(ones, first, step, gates, hidden)
 
     def values(self) -> torch.Tensor:
         """Outputs of the networks, shape (networks, n)."""
-        output = self._weights.output
-        return torch.matmul(self._up.hidden[-1], output[:, :-1, None])[..., 0] + output[:, -1:]
+        return (self._up.hidden[-1] @ self._weights.output)[..., 0] + self._weights.output_bias
 
     def slopes(self) -> torch.Tensor:
         """Derivatives of the outputs along x and y, shape (networks, n, 2)."""
@@ -105,8 +104,8 @@ class MlpPass:
         down = self._descend(factors[..., None])
         _add_products(self._up, down.first, down.arguments, sums)
         _add_biases(down.arguments, sums)
-        sums.output[:, :-1] += torch.matmul(factors[:, None], self._up.hidden[-1])[:, 0]
-        sums.output[:, -1] += factors.sum(1)
+        sums.output.add_(self._up.hidden[-1].mT @ factors[..., None])
+        sums.output_bias.add_(factors.sum(1, keepdim=True))
 
     def add_slope_gradient(self, factors: torch.Tensor, sums: Weights) -> None:
         """Add those of Σ factors * slopes, with factors of shape (networks, n, 2); after `slopes`."""
@@ -116,21 +115,21 @@ class MlpPass:
         _add_products(up, first, arguments, sums)
         _add_biases(arguments, sums)
         _add_products(up_along, down.first, down.arguments, sums)
-        sums.output[:, :-1] += up_along.hidden[-1].sum(1)
+        sums.output.add_(up_along.hidden[-1].sum(1)[..., None])
 
     def _descend(self, factors: torch.Tensor) -> Descent:
         """Derivatives of the sum of factors times values."""
         up, weights = self._up, self._weights
-        above = [(factors * weights.output[:, None, :-1]).expand_as(up.step)]
+        above = [(factors * weights.output.mT).expand_as(up.step)]
         rates: list[torch.Tensor] = []
         arguments: list[torch.Tensor] = []
         to_base, to_step = torch.zeros_like(up.step), torch.zeros_like(up.step)
-        for gate, matrix in zip(reversed(up.gates), reversed(weights.gates.unbind(1)), strict=True):
+        for gate, matrix in zip(reversed(up.gates), reversed(weights.gates), strict=True):
             rates.insert(0, torch.addcmul(gate, gate, gate, value=-1))
             to_base += above[0]
             to_step.addcmul_(above[0], gate)
             arguments.insert(0, (above[0] * up.step).mul_(rates[0]))
-            above.insert(0, torch.matmul(arguments[0], matrix[:, :-1].mT))
+            above.insert(0, arguments[0] @ matrix.mT)
         outer = torch.empty_like(up.first)
         if self._literal:
             torch.mul(above[0], 2, out=outer[:, 2])
@@ -151,8 +150,8 @@ class MlpPass:
         third = first[:, 2]
         gates: list[torch.Tensor] = []
         hidden = [2 * third if self._literal else _product_along(base, up.first[:, 2], third, up.step, step)]
-        for gate, rate, matrix in zip(up.gates, down.rates, weights.gates.unbind(1), strict=True):
-            gates.append(torch.matmul(hidden[-1], matrix[:, :-1]).mul_(rate))
+        for gate, rate, matrix in zip(up.gates, down.rates, weights.gates, strict=True):
+            gates.append((hidden[-1] @ matrix).mul_(rate))
             hidden.append(_product_along(base, gate, gates[-1], up.step, step))
         return Ascent(points, first, step, gates, hidden)
 
@@ -170,7 +169,7 @@ class MlpPass:
             level = (along.step * down.rates[k]).addcmul_(up.step, rate)
             argument = (higher * level).addcmul_(above * up.step, down.rates[k])
             arguments.insert(0, argument)
-            above = torch.matmul(argument, weights.gates[:, k, :-1].mT)
+            above = argument @ weights.gates[k].mT
         outer = torch.empty_like(up.first)
         third, third_along = up.first[:, 2], along.first[:, 2]
         if self._literal:
@@ -210,10 +209,10 @@ def _product_along(
 def _add_products(up: Ascent, first: torch.Tensor, arguments: list[torch.Tensor], sums: Weights) -> None:
     """Add inputs times derivatives along arguments, h^T δ, of every layer but the last."""
     sums.first.add_(torch.matmul(up.points.mT, first))
-    for k, argument in enumerate(arguments):
-        sums.gates[:, k, :-1].baddbmm_(up.hidden[k].mT, argument)
+    for matrix, hidden, argument in zip(sums.gates, up.hidden[:-1], arguments, strict=True):
+        matrix.baddbmm_(hidden.mT, argument)
 
 
 def _add_biases(arguments: list[torch.Tensor], sums: Weights) -> None:
-    for k, argument in enumerate(arguments):
-        sums.gates[:, k, -1] += argument.sum(1)
+    for bias, argument in zip(sums.biases, arguments, strict=True):
+        bias.add_(argument.sum(1, keepdim=True))

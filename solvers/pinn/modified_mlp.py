@@ -24,14 +24,17 @@ class Weights(NamedTuple):
     Attributes:
         first: The layers that see X, those of A, B and Z_1 (or H_1): slopes along x and y and the bias, shape
             (networks, 3, 3, width).
-        gates: The gates that see a hidden layer: weights and, in the last row, the bias, shape
-            (networks, gates, width + 1, width).
-        output: Weights and, last, the bias, shape (networks, width + 1).
+        gates: Matrices of the gates that see a hidden layer, each (networks, width, width).
+        biases: Their biases, each (networks, 1, width).
+        output: Shape (networks, width, 1).
+        output_bias: Shape (networks, 1).
     """
 
     first: torch.Tensor
-    gates: torch.Tensor
+    gates: list[torch.Tensor]
+    biases: list[torch.Tensor]
     output: torch.Tensor
+    output_bias: torch.Tensor
 
 
 @dataclass(frozen=True)
@@ -62,9 +65,16 @@ class ModifiedMlp:
 
     def weights(self, parameters: torch.Tensor) -> Weights:
         """Views of a parameter tensor of shape (networks, parameters)."""
-        shapes = ((3, 3, self.width), (self.gates, self.width + 1, self.width), (self.width + 1,))
-        parts = parameters.split([torch.Size(shape).numel() for shape in shapes], dim=1)
-        return Weights(*(part.unflatten(1, shape) for part, shape in zip(parts, shapes, strict=True)))
+        width, gate = self.width, (self.width + 1) * self.width
+        first, *gates, output, bias = parameters.split([9 * width, *[gate] * self.gates, width, 1], dim=1)
+        layers = [part.unflatten(1, (width + 1, width)) for part in gates]
+        return Weights(
+            first.unflatten(1, (3, 3, width)),
+            [layer[:, :-1] for layer in layers],
+            [layer[:, -1:] for layer in layers],
+            output[:, :, None],
+            bias,
+        )
 
     def initial(self, seed: int, dtype: torch.dtype) -> torch.Tensor:
         """Glorot-normal weights and zero biases, shape (networks, parameters).
@@ -74,13 +84,10 @@ class ModifiedMlp:
         """
         generator = torch.Generator().manual_seed(seed)
         parameters = torch.zeros(self.networks, self.parameters, dtype=torch.float64)
-        first, gates, output = self.weights(parameters)
-        for matrix, inputs, outputs in (
-            (first[:, :, :-1], 2, self.width),
-            (gates[:, :, :-1], self.width, self.width),
-            (output[:, :-1], self.width, 1),
-        ):
-            matrix.normal_(0, (2 / (inputs + outputs)) ** 0.5, generator=generator)
+        weights = self.weights(parameters)
+        for matrix in (weights.first[:, :, :-1], *weights.gates, weights.output):
+            variance = 2 / sum(matrix.shape[-2:])
+            matrix.normal_(0, variance**0.5, generator=generator)
         return parameters.to(dtype)
 
     def in_logistic_form(self, parameters: torch.Tensor) -> torch.Tensor:

@@ -47,16 +47,18 @@ class PlainPinn:
         """
         self.problem, self.bc_weight = problem, solver.bc_weight
         parameters = solver.network.initial(solver.seed, dtype)
-        first, gates, output = solver.network.weights(parameters)
+        first, gates, biases, output, output_bias = solver.network.weights(parameters)
         self.networks = []
         for k in range(2):
             network = PlainMlp(solver.width, solver.layers, solver.literal_gate).to(dtype)
             layers = [network.encoder_a, network.encoder_b, network.first, *network.gates, network.last]
-            matrices = [*first[k], *gates[k], output[k][:, None]]
+            initial = [(layer[:2], layer[2]) for layer in first[k]]
+            initial += [(gate[k], bias[k, 0]) for gate, bias in zip(gates, biases, strict=True)]
+            initial.append((output[k], output_bias[k]))
             with torch.no_grad():
-                for layer, matrix in zip(layers, matrices, strict=True):
-                    layer.weight.copy_(matrix[:-1].T)
-                    layer.bias.copy_(matrix[-1])
+                for layer, (matrix, bias) in zip(layers, initial, strict=True):
+                    layer.weight.copy_(matrix.T)
+                    layer.bias.copy_(bias)
             self.networks.append(network)
         trained = [parameter for network in self.networks for parameter in network.parameters()]
         self.adam = torch.optim.Adam(trained, lr=solver.learning_rate)

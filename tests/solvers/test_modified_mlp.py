@@ -9,16 +9,16 @@ from solvers.pinn.modified_mlp import ModifiedMlp
 
 def plain(network: ModifiedMlp, parameters: torch.Tensor, points: torch.Tensor) -> torch.Tensor:
     """The published formulas, one network after the other: shape (networks, n)."""
-    first, gates, output = network.weights(parameters)
+    first, gates, biases, output, output_bias = network.weights(parameters)
     results = []
     for k in range(network.networks):
         a, b, hidden = (torch.tanh(points @ layer[:2] + layer[2]) for layer in first[k])
         if not network.literal_gate:
             hidden = (1 - hidden) * a + hidden * b
-        for gate in gates[k]:
-            z = torch.tanh(hidden @ gate[:-1] + gate[-1])
+        for gate, bias in zip(gates, biases, strict=True):
+            z = torch.tanh(hidden @ gate[k] + bias[k])
             hidden = (1 - z) * a + z * b
-        results.append(hidden @ output[k, :-1] + output[k, -1])
+        results.append((hidden @ output[k])[:, 0] + output_bias[k])
     return torch.stack(results)
 
 
@@ -67,11 +67,11 @@ def test_number_of_parameters(literal, count):
 def test_initial_weights_are_glorot_normal():
     """Within three standard errors of the mean and the deviation; biases are exactly zero."""
     network = ModifiedMlp(networks=3)
-    first, gates, output = network.weights(network.initial(0, torch.float64))
-    for matrix, fans in ((first[:, :, :-1], 66), (gates[:, :, :-1], 128), (output[:, :-1], 65)):
+    first, gates, biases, output, output_bias = network.weights(network.initial(0, torch.float64))
+    for matrix, fans in ((first[:, :, :-1], 66), *((gate, 128) for gate in gates), (output, 65)):
         assert matrix.std() == pytest.approx((2 / fans) ** 0.5, rel=3 / (2 * matrix.numel()) ** 0.5)
         assert abs(matrix.mean()) < 3 * matrix.std() / matrix.numel() ** 0.5
-    assert max(bias.abs().max() for bias in (first[:, :, -1], gates[:, :, -1], output[:, -1])) == 0
+    assert max(bias.abs().max() for bias in (first[:, :, -1], *biases, output_bias)) == 0
 
 
 def test_values_and_slopes(network, parameters, points, at_points):

@@ -188,3 +188,32 @@ def test_two_processes_train_as_one(problem, tmp_path):
     np.testing.assert_allclose(two[0], one.field.parameters.numpy(), rtol=1e-9, atol=1e-12)
     assert [(tmp_path / f"told{rank}").read_text() for rank in range(2)] == ["15", "0"]
     assert len(rows(tmp_path)) == 15
+
+
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA device")
+def test_a_gpu_trains_as_the_processor_does(problem):
+    settings = {"precision": "double", "epochs": 15}
+    cpu, gpu = (replace(SMALL, device=device, **settings).solve(problem) for device in ("cpu", "cuda"))
+    torch.testing.assert_close(gpu.field.parameters, cpu.field.parameters, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"epochs": 0}, "epochs must be positive, got 0"),
+        ({"learning_rate": -1.0}, "learning_rate must be positive, got -1"),
+        ({"base_points": 1}, "base_points must be at least 2, got 1"),
+        ({"patience": -1}, "patience must be zero or more, got -1"),
+        ({"optimiser": "sgd"}, "optimiser must be adam, got 'sgd'"),
+    ],
+)
+def test_bad_settings_are_refused(settings, message):
+    with pytest.raises(UserError, match=message):
+        PaperPinnSolver(**settings)
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="a CUDA device is there")
+def test_a_gpu_that_is_not_there_is_refused_with_advice():
+    with pytest.raises(UserError, match="device cuda needs a GPU and torch's CUDA build; take device=cpu"):
+        PaperPinnSolver(device="cuda")
