@@ -14,7 +14,8 @@ def certificate_sentences(evaluation: Evaluation) -> str:
     if evaluation.law != CERTIFIED_LAW:
         return f"{label} has no certificate: there is one for the {CERTIFIED_LAW} law only."
     if certificate is None:
-        return f"{label} has no certificate: DOLFINx, which makes it, is not installed."
+        reason = "DOLFINx, which makes it, is not installed" if evaluation.finite else "it is not finite"
+        return f"{label} has no certificate: {reason}."
     if not certificate.has_excess and not certificate.faults:
         return f"{label} is the finite-element solution itself: nothing is left out of balance."
     sentences = [_verdict(label, evaluation.converged, certificate), _where(certificate)]

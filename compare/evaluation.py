@@ -106,6 +106,12 @@ class Evaluation:
             energy_density=state.energy_density,
         )
 
+    @property
+    def finite(self) -> bool:
+        """Whether displacement and stress are numbers everywhere."""
+        fields = (self.node_displacement, self.edge_displacement, self.stress)
+        return all(np.isfinite(values).all() for values in fields)
+
     def per_triangle(self, values: FloatArray) -> FloatArray:
         """Area-weighted mean over each triangle: values at the quadrature points (q, ...) to (t, ...)."""
         points = 3

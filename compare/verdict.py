@@ -31,18 +31,22 @@ def certified(evaluations: Sequence[Evaluation], problem: Problem) -> list[Evalu
     material = problem.material.model_copy(update={"law": CERTIFIED_LAW})
     certifier = Certifier(replace(problem, material=material))
     return [
-        judged(evaluation, certifier.certificate(evaluation))
+        judged(evaluation, certifier.certificate(evaluation) if evaluation.finite else None)
         if evaluation.law == CERTIFIED_LAW
         else evaluation
         for evaluation in evaluations
     ]
 
 
-def judged(evaluation: Evaluation, certificate: Certificate) -> Evaluation:
-    """The evaluation with its certificate; not converged if that finds a fault, whatever the solver says."""
+def judged(evaluation: Evaluation, certificate: Certificate | None) -> Evaluation:
+    """The evaluation with its certificate; not converged if that finds a fault, whatever the solver says.
+
+    A result that is not finite has no certificate, which is a fault of its own.
+    """
+    faults = ["its displacement is not finite everywhere"] if certificate is None else certificate.faults
     return replace(
         evaluation,
-        converged=evaluation.converged and not certificate.faults,
-        message="; ".join([evaluation.message.rstrip(". "), *certificate.faults]),
+        converged=evaluation.converged and not faults,
+        message="; ".join([evaluation.message.rstrip(". "), *faults]),
         certificate=certificate,
     )

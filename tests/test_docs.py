@@ -274,6 +274,13 @@ def test_the_guide_has_every_setting_of_the_other_presets_as_it_is():
             assert documented == settings_of([make_solver(name, preset=preset)])
 
 
+def test_the_guide_has_the_limits_of_the_certificate():
+    from compare.certificate import CONDITION_LIMIT, ENERGY_LIMIT, INTERPOLANT_LIMIT
+
+    said = [float(row[1].split(" %")[0]) / 100 for row in table(GUIDE, "fault")]
+    assert said == [ENERGY_LIMIT, CONDITION_LIMIT, INTERPOLANT_LIMIT]
+
+
 def test_the_guide_has_every_solver_with_its_loads():
     from solvers.registry import BUILT_IN, make_solver
 

@@ -5,21 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import skfem
+from scipy.sparse import csr_matrix
 from skfem.models.elasticity import linear_elasticity
 
 from compare.certificate import CONDITION_LIMIT, ENERGY_LIMIT, INTERPOLANT_LIMIT, Certificate
+from compare.certificate_text import certificate_sentences
 from compare.certifier import Certifier
 from compare.evaluation import Evaluation
 from compare.metrics import reference_differences
 from compare.regions import REGIONS, body_regions
 from compare.verdict import certified, judged
-from geometry.arrays import FloatArray
+from geometry.arrays import FloatArray, IntArray
 from geometry.cache import finger_mesh
 from geometry.design import Design
 from geometry.mesh import TriangleMesh
 from geometry.settings import MeshSettings
+from solvers.fem.conditions import load_functionals
 from solvers.fem.lagrange import LagrangeField, LagrangeSpace
-from solvers.fem.linear import FemSolver
+from solvers.fem.linear import FemSolver, LeastEnergy
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, Status
 
@@ -101,12 +104,14 @@ def test_energies_of_any_displacement_against_another_program(finger: TriangleMe
     assert (certificate.density * finger.areas).sum() == pytest.approx(certificate.excess, rel=1e-9)
 
 
-def stiffness_of_scikit_fem(problem: Problem) -> tuple[object, FloatArray]:
-    """Its stiffness matrix, and for each of its degrees of freedom our node and component."""
+def stiffness_of_scikit_fem(problem: Problem, *, centroids_only: bool = False) -> tuple[csr_matrix, IntArray]:
+    """Its stiffness matrix, exact or seen at one point a triangle, and our node and axis of each row."""
     mesh, lame = problem.mesh, problem.material.lame
     basis = skfem.Basis(
         skfem.MeshTri(mesh.points.T.copy(), mesh.triangles.T.copy()),
         skfem.ElementVector(skfem.ElementTriP2()),
+        intorder=2,
+        quadrature=(np.full((2, 1), 1 / 3), np.array([0.5])) if centroids_only else None,
     )
     number = {tuple(place): node for node, place in enumerate(np.round(LagrangeSpace(mesh, 2).nodes, 9))}
     order = np.zeros((basis.N, 2), dtype=int)
@@ -162,6 +167,27 @@ def test_a_solver_that_reports_too_little_energy_is_found_out(finger: TriangleMe
     short = Certifier(problem).certificate(sampled(problem, solution.field.values, 0.95 * solution.energy))
     assert (honest.misses_energy, short.misses_energy) == (False, True)
     assert short.missed == pytest.approx(0.05 * solution.energy)
+
+
+def test_a_minimiser_whose_quadrature_is_too_coarse_is_found_out(finger: TriangleMesh) -> None:
+    """Quadratic elements whose energy is seen at one point a triangle: blind to some of their modes."""
+    problem = Problem(finger)
+    space = LagrangeSpace(finger, 2)
+    seen, order = stiffness_of_scikit_fem(problem, centroids_only=True)
+    whole, _ = stiffness_of_scikit_fem(problem)
+    functionals = load_functionals(problem, space)[:, order[:, 0], order[:, 1]].T
+    clamped = np.flatnonzero(np.isin(order[:, 0], space.boundary_nodes("base")))
+    blind = seen + 1e-3 * whole  # for it to have a minimum
+    influence = np.column_stack(
+        [skfem.solve(*skfem.condense(blind, functional, D=clamped)) for functional in functionals.T]
+    )
+    dofs = influence @ np.linalg.solve(functionals.T @ influence, problem.load.values)
+    nodal = np.zeros((len(space.nodes), 2))
+    nodal[order[:, 0], order[:, 1]] = dofs
+    certificate = Certifier(problem).certificate(sampled(problem, nodal, 0.5 * float(dofs @ (seen @ dofs))))
+    assert certificate.misses_energy
+    assert certificate.energy > 2 * certificate.fem_energy
+    assert len(certificate.faults) == 2
 
 
 def test_only_the_linear_law_is_certified(finger: TriangleMesh) -> None:
@@ -234,3 +260,24 @@ def test_the_errors_of_the_regions_add_up_to_that_of_the_body(finger: TriangleMe
         parts = [getattr(region, f"rel_l2_{name}") for region in regions]
         assert np.linalg.norm(parts) == pytest.approx(whole.rel_l2)
     assert sum(region.area for region in regions) == pytest.approx(1)
+
+
+def test_energy_below_the_least_is_a_fault_of_the_program(
+    finger: TriangleMesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = Problem(finger)
+    evaluation = Evaluation.of(FemSolver().solve(problem), finger)
+    certifier = Certifier(problem)
+    least = LeastEnergy.minimiser
+    monkeypatch.setattr(LeastEnergy, "minimiser", lambda *arguments: 1.001 * least(*arguments))
+    with pytest.raises(RuntimeError, match="below the least"):
+        certifier.certificate(evaluation)
+
+
+def test_a_result_that_is_not_finite_is_not_converged(finger: TriangleMesh) -> None:
+    problem = Problem(finger)
+    nodal = np.full((len(LagrangeSpace(finger, 2).nodes), 2), np.nan)
+    (lost,) = certified([sampled(problem, nodal)], problem)
+    assert not lost.converged
+    assert lost.message == "a given displacement; its displacement is not finite everywhere"
+    assert certificate_sentences(lost) == "given (not converged) has no certificate: it is not finite."
