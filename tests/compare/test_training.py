@@ -15,8 +15,7 @@ from compare.stages import Stages
 from geometry.design import Design
 from geometry.settings import MeshSettings
 from solvers.fem.linear import FemSolver
-from solvers.fem.nonlinear import FemNonlinearSolver
-from solvers.problem import Problem
+from solvers.problem import Material, Problem
 from solvers.solution import Solution
 from solvers.solver import Progress, silent
 from solvers.training import TrainingContext
@@ -51,7 +50,7 @@ class Counting:
             checkpoint.write_text(str(epoch))
             if epoch == self.stop_after:
                 raise KeyboardInterrupt
-        return FemSolver(degree=1).solve(problem, progress)
+        return FemSolver(degree=1).solve(replace(problem, material=Material()), progress)
 
     @property
     def epochs(self) -> list[int]:
@@ -106,20 +105,32 @@ def test_a_solution_that_is_taken_over_brings_its_training_along(job, tmp_path):
     assert (tmp_path / "run" / "training" / "counting" / "checkpoint").read_text() == str(EPOCHS)
 
 
+class Other(FemSolver):
+    """`fem` by another name."""
+
+    name = "other"
+
+
+class FiniteStrain(Counting):
+    """Says that it has another law than `fem`."""
+
+    laws = ("neo-hookean",)
+
+
 @pytest.mark.parametrize(
-    ("solvers", "known"),
+    ("before", "kind", "known"),
     [
-        ((FemSolver(degree=1),), True),
-        ((FemNonlinearSolver(degree=1),), False),  # another solver, another law
-        ((), False),
+        (FemSolver(degree=1), Counting, True),
+        (Other(degree=1), Counting, False),
+        (FemSolver(degree=1), FiniteStrain, False),
     ],
-    ids=["fem", "another solver", "alone"],
+    ids=["fem", "another solver", "another law"],
 )
-def test_the_energy_of_fem_is_told_if_it_was_solved_before(job, solvers, known):
-    counting = Counting([])
-    evaluations = compare(job(*solvers, counting))
+def test_the_energy_of_fem_is_told_if_it_was_solved_before_with_the_same_law(job, before, kind, known):
+    counting = kind([])
+    reference, _ = compare(job(before, counting))
     _, context = counting.diary[0]
-    assert context.reference_energy == (evaluations[0].energy if known else None)
+    assert context.reference_energy == (reference.energy if known else None)
     assert not context.resume
 
 
