@@ -65,9 +65,9 @@ def runs_table(runs: Sequence[Run]) -> Table:
     table = Table(
         title="Runs by their distance from fem",
         caption=(
-            "L²: relative difference of the displacement field from fem on the same mesh. Violation:\n"
-            "of base or load, over the stroke. Losses do not compare between weights; a short training\n"
-            "favours large steps."
+            "L²: relative difference of the displacement field from fem on the same mesh. Violation: of base "
+            "or load, over the stroke. Losses do not compare between weights; a short training favours large "
+            "steps."
         ),
         title_justify="left",
         caption_justify="left",
