@@ -199,10 +199,13 @@ def _in_context(solver: Solver, job: Job, folder: Path, finished: Sequence[Evalu
     """The solver, told where to save its training and what is known, if it is one that asks."""
     if not isinstance(solver, TrainedSolver):
         return solver
+    left = folder / TRAINING / solver.name
+    if job.resume and not left.exists():
+        take_training(solver.name, job.out, folder)
     law = with_law(job.material, solver).law
     energies = [entry.energy for entry in finished if (entry.solver, entry.law) == ("fem", law)]
     context = TrainingContext(
-        folder=folder / TRAINING / solver.name,
+        folder=left,
         resume=job.resume,
         reference_energy=energies[0] if energies else None,
     )

@@ -20,8 +20,6 @@ from solvers.solution import Solution
 from solvers.solver import Progress, silent
 from solvers.training import TrainingContext
 
-EPOCHS = 4
-
 
 @dataclass(frozen=True)
 class Counting:
@@ -29,13 +27,14 @@ class Counting:
 
     diary: list[tuple[int, TrainingContext]]
     stop_after: int | None = None
+    total: int = 4
     context: TrainingContext = field(default=TrainingContext())
     name: ClassVar[str] = "counting"
     laws: ClassVar[tuple[str, ...]] = ("linear",)
     loads: ClassVar[tuple[str, ...]] = ("mean", "point")
 
     def settings(self) -> dict[str, object]:
-        return {"epochs": EPOCHS}
+        return {"epochs": self.total}
 
     def in_context(self, context: TrainingContext) -> "Counting":
         return replace(self, context=context)
@@ -45,7 +44,7 @@ class Counting:
         self.context.folder.mkdir(parents=True, exist_ok=True)
         checkpoint = self.context.folder / "checkpoint"
         first = int(checkpoint.read_text()) if self.context.resume and checkpoint.exists() else 0
-        for epoch in range(first + 1, EPOCHS + 1):
+        for epoch in range(first + 1, self.total + 1):
             self.diary.append((epoch, self.context))
             checkpoint.write_text(str(epoch))
             if epoch == self.stop_after:
@@ -84,7 +83,7 @@ def test_an_interrupted_training_goes_on_and_its_files_end_in_the_output(job, tm
     assert (tmp_path / "run.partial" / "training" / "counting" / "checkpoint").read_text() == "3"
     compare(job(second, resume=True))
     assert second.epochs == [4]
-    assert (tmp_path / "run" / "training" / "counting" / "checkpoint").read_text() == str(EPOCHS)
+    assert (tmp_path / "run" / "training" / "counting" / "checkpoint").read_text() == "4"
     assert "training/counting/checkpoint" in (tmp_path / "run" / "run.json").read_text()
     assert not (tmp_path / "run.partial").exists()
 
@@ -102,7 +101,15 @@ def test_a_solution_that_is_taken_over_brings_its_training_along(job, tmp_path):
     again = Counting([])
     compare(job(again, FemSolver(), resume=True))
     assert again.epochs == []
-    assert (tmp_path / "run" / "training" / "counting" / "checkpoint").read_text() == str(EPOCHS)
+    assert (tmp_path / "run" / "training" / "counting" / "checkpoint").read_text() == "4"
+
+
+def test_a_finished_training_goes_on_where_more_is_asked_of_it(job, tmp_path):
+    compare(job(Counting([])))
+    longer = Counting([], total=6)
+    compare(job(longer, resume=True))
+    assert longer.epochs == [5, 6]
+    assert (tmp_path / "run" / "training" / "counting" / "checkpoint").read_text() == "6"
 
 
 class Other(FemSolver):
