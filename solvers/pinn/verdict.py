@@ -7,10 +7,9 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.quadrature import body_quadrature
 from solvers.elasticity import linear_energy_density, linear_stress
-from solvers.pinn.mlp_field import MlpField
 from solvers.pinn.training import Training
 from solvers.problem import Problem, contact_extent, contact_functional
-from solvers.solution import Status
+from solvers.solution import DisplacementField, Status
 
 ENERGY_CHANGE = 0.01
 """Relative change of the energy over the last tenth of the epochs below which it has settled."""
@@ -27,7 +26,7 @@ class Verdict(NamedTuple):
     status: Status
 
 
-def judge(problem: Problem, field: MlpField, training: Training) -> Verdict:
+def judge(problem: Problem, field: DisplacementField, training: Training) -> Verdict:
     """Energy and reaction by the element rule, and the status by two criteria."""
     rule = body_quadrature(problem.mesh)
     gradient = field.gradient(rule.location)
@@ -77,7 +76,7 @@ def _late_change(energy: FloatArray) -> float:
     return float(abs(after - before) / abs(after))
 
 
-def _violations(problem: Problem, field: MlpField) -> tuple[float, float]:
+def _violations(problem: Problem, field: DisplacementField) -> tuple[float, float]:
     """Root mean square displacement of the base and error of the contact's, as shares of the stroke."""
     mesh, load = problem.mesh, problem.load
     nodes = np.unique(mesh.boundary("base"))
