@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from geometry.arrays import FloatArray, IntArray
 
 PATCH = 96
-"""Most points in a patch: with fewer, windows are in more patches; with more, in patches they hardly reach."""
+"""Most points in a patch: with fewer, windows are in more patches; with more, far from some of the points."""
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
