@@ -1,4 +1,4 @@
-"""First Piola-Kirchhoff stress and its tangent, for Newton's method on torch tensors.
+"""Energy density, first Piola-Kirchhoff stress and tangent, for Newton's method on torch tensors.
 
 Source: J. Bonet, R. D. Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed., section
 6.4.3; with d(F^-T) = -F^-T dF^T F^-T.
@@ -6,7 +6,14 @@ Source: J. Bonet, R. D. Wood, Nonlinear Continuum Mechanics for Finite Element A
 
 import torch
 
-from solvers.elasticity import Lame
+from solvers.elasticity import Lame, linear_energy_density, neo_hookean_energy_density
+
+
+def energy_density(gradient: torch.Tensor, lame: Lame, law: str) -> torch.Tensor:
+    """ψ of the law "linear" or "neo-hookean" at displacement gradients (n, 2, 2): (n,), MPa."""
+    if law == "linear":
+        return torch.as_tensor(linear_energy_density(gradient, lame))
+    return torch.as_tensor(neo_hookean_energy_density(gradient, lame, torch.log))
 
 
 def piola_stress_and_tangent(

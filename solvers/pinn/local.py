@@ -5,11 +5,11 @@ from dataclasses import asdict, dataclass
 from typing import ClassVar
 
 import numpy as np
-import torch
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.quadrature import body_quadrature
+from solvers.pinn.conditions import contact_ends
 from solvers.pinn.grading import (
     Spacing,
     graded_quadrature,
@@ -18,26 +18,25 @@ from solvers.pinn.grading import (
     singular_points,
     spread_points,
 )
-from solvers.pinn.local_energy import LocalEnergy
+from solvers.pinn.local_level import Level
+from solvers.pinn.local_newton import Path, equilibrium, follow_load
 from solvers.pinn.local_units import LocalField, LocalUnits
 from solvers.pinn.trial_space import BaseFactor
-from solvers.problem import Problem, contact_functional
+from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, check_problem, silent
 
 QUADRATURE_DEGREE = 2
-REGULARISATION = 1e-12
-"""Added to the unit diagonal of the scaled system, so that nearly dependent units do no harm."""
 
 
 @dataclass(frozen=True)
 class PinnLocalSolver:
     """Windows spread over the body, denser at its re-entrant corners, each with a few random tanh ridges.
 
-    The energy is quadratic in the output layer, which is found by one sparse factorisation; the hidden
-    weights stay as they were drawn. It is solved on two levels of spacing, and the change between them tells
-    whether the network is fine enough. Spacings are in units of the body's mean thickness, so that one
-    setting serves every design.
+    The energy of the linear law is quadratic in the output layer, which is found by one sparse factorisation;
+    the neo-Hookean one is minimised by Newton's method. The hidden weights stay as they were drawn. It is
+    solved on two levels of spacing, and the change between them tells whether the network is fine enough.
+    Spacings are in units of the body's mean thickness, so that one setting serves every design.
 
     Attributes:
         wall_spacing: Spacing of the windows along walls.
@@ -67,8 +66,8 @@ class PinnLocalSolver:
     base_length: float = 5.0
     seed: int = 0
     name: ClassVar[str] = "pinn-local"
-    laws: ClassVar[tuple[str, ...]] = ("linear",)
-    loads: ClassVar[tuple[str, ...]] = ("mean", "point")
+    laws: ClassVar[tuple[str, ...]] = ("linear", "neo-hookean")
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -85,40 +84,42 @@ class PinnLocalSolver:
         return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
-        """Train the network on the linear problem; see `Solver`."""
+        """Train the network; see `Solver`."""
         check_problem(self, problem)
         started = time.perf_counter()
         rule = body_quadrature(problem.mesh, 1)
         before, change = np.zeros_like(rule.location.points), float("inf")
         history = []
+        coarse: LocalField | None = None
         for number, scale in enumerate((self.coarser, 1.0)):
-            level = _Level.of(self, problem, scale)
-            field, energy, forces = level.solve(problem)
+            level = self._level(problem, scale)
+            path = _train(level, coarse, _part(progress, number))
+            field = coarse = level.field(path.output)
             displacement = field.displacement(rule.location)
             change = _relative(displacement - before, displacement, rule.weights)
             before = displacement
-            history.append((field.output[:, 0].numel(), energy, change, time.perf_counter() - started))
-            progress((number + 1) / 2, f"{field.output[:, 0].numel()} units, energy {energy:.4f} N mm/mm")
-        converged = change <= self.tolerance
-        message = (
-            f"{self.coarser:g} times finer windows changed the displacement by {change:.2%} "
-            f"(criterion {self.tolerance:.2%})"
-        )
+            energy = level.energy.total(path.output)
+            units = field.units.windows * field.units.per_window
+            history.append((units, energy, change, time.perf_counter() - started))
+            progress((number + 1) / 2, f"{units} units, energy {energy:.4f} N mm/mm")
+            if path.fraction < 1:
+                break
         reaction = np.zeros(2)
-        reaction[problem.load.prescribed] = forces
+        reaction[problem.load.prescribed] = path.forces[:, 0]
         return Solution(
             solver=self.name,
             problem=problem,
             field=field,
             energy=energy,
             reaction=reaction,
-            status=Status(converged, message if converged else f"{message}; take a smaller spacing"),
+            status=self._status(path, change),
             stats={
                 "seconds": time.perf_counter() - started,
                 "unknowns": field.output.numel(),
-                "units": field.output[:, 0].numel(),
+                "units": units,
                 "windows": field.units.windows,
-                "quadrature_points": len(level.points),
+                "quadrature_points": level.energy.points,
+                "newton_iterations": path.iterations,
                 "seed": self.seed,
                 "device": "cpu",
             },
@@ -127,51 +128,59 @@ class PinnLocalSolver:
             ),
         )
 
-
-@dataclass(frozen=True, eq=False)
-class _Level:
-    """The units and the quadrature of one level of spacing."""
-
-    units: LocalUnits
-    points: FloatArray
-    weights: FloatArray
-
-    @classmethod
-    def of(cls, settings: PinnLocalSolver, problem: Problem, scale: float) -> "_Level":
+    def _level(self, problem: Problem, scale: float) -> Level:
         mesh = problem.mesh
         unit = scale * mean_thickness(mesh)
+        singular = singular_points(mesh)
+        if problem.load.kind == "patch":
+            singular = np.concatenate([singular, contact_ends(mesh)])
         spacing = Spacing(
-            singular_points(mesh),
-            wall=settings.wall_spacing * unit,
-            corner=settings.corner_spacing * unit,
-            growth=settings.growth * scale,
+            singular,
+            wall=self.wall_spacing * unit,
+            corner=self.corner_spacing * unit,
+            growth=self.growth * scale,
         )
-        triangles = graded_triangles(mesh, spacing, settings.cell)
-        centres = spread_points(triangles, mesh, spacing, settings.thinning)
+        triangles = graded_triangles(mesh, spacing, self.cell)
+        centres = spread_points(triangles, mesh, spacing, self.thinning)
         units = LocalUnits.around(
             centres,
-            settings.radius * spacing.at(centres),
-            ridges=settings.ridges,
-            slope=settings.slope,
-            factor=BaseFactor.of(mesh, settings.base_length),
-            rng=np.random.default_rng(settings.seed),
+            self.radius * spacing.at(centres),
+            ridges=self.ridges,
+            slope=self.slope,
+            factor=BaseFactor.of(mesh, self.base_length),
+            rng=np.random.default_rng(self.seed),
         )
-        return cls(units, *graded_quadrature(triangles, QUADRATURE_DEGREE))
+        return Level.of(units, problem, *graded_quadrature(triangles, QUADRATURE_DEGREE))
 
-    def solve(self, problem: Problem) -> tuple[LocalField, float, FloatArray]:
-        """The field of least energy under the load's conditions, its energy, and the load's forces."""
-        energy = LocalEnergy.of(self.units, problem.material, self.points, self.weights)
-        shape = (self.units.windows, 2, self.units.per_window)
-        _, hessian = energy.derivatives(torch.zeros(shape, dtype=torch.float64))
-        functional = self.units.functional(*contact_functional(problem))
-        right = np.zeros((len(problem.load.prescribed), *shape))
-        for row, axis in enumerate(problem.load.prescribed):
-            right[row, :, axis] = functional
-        right = right.reshape(len(right), -1)
-        responses = hessian.solve(right, REGULARISATION)
-        forces = np.linalg.solve(right @ responses.T, problem.load.values)
-        field = LocalField(self.units, torch.from_numpy(forces @ responses).view(shape))
-        return field, 0.5 * float(forces @ problem.load.values), forces
+    def _status(self, path: Path, change: float) -> Status:
+        if path.fraction < 1:
+            return Status(
+                False,
+                f"stopped at {path.fraction:.1%} of the load: Newton's method fails beyond; "
+                "take a smaller spacing, the load patch or a smaller stroke",
+            )
+        message = (
+            f"{self.coarser:g} times finer windows changed the displacement by {change:.2%} "
+            f"(criterion {self.tolerance:.2%})"
+        )
+        converged = change <= self.tolerance
+        return Status(converged, message if converged else f"{message}; take a smaller spacing")
+
+
+def _train(level: Level, coarse: LocalField | None, progress: Progress) -> Path:
+    """Equilibrium on a level: at once for a linear law, else from a coarser level's or along the load."""
+    if level.energy.material.law == "linear":
+        return Path.start(level).to(1.0, level.step(level.rest), 1)
+    if coarse is not None:
+        state, iterations = equilibrium(level, level.nearest(coarse), 1.0)
+        if state is not None:
+            return Path.start(level).to(1.0, state, iterations)
+    return follow_load(level, progress)
+
+
+def _part(progress: Progress, number: int) -> Progress:
+    """The progress of one of the two levels."""
+    return lambda fraction, text: progress((number + fraction) / 2, text)
 
 
 def _relative(difference: FloatArray, field: FloatArray, weights: FloatArray) -> float:

@@ -7,11 +7,11 @@ import numpy as np
 import torch
 
 from geometry.arrays import FloatArray, IntArray
-from solvers.pinn.local_units import LocalUnits
+from solvers.pinn.local_units import LocalField, LocalUnits
 from solvers.pinn.patches import cut_into_patches, over_patches
 from solvers.pinn.sparse_cholesky import BlockMatrix
 from solvers.problem import Material
-from solvers.tangent import piola_stress_and_tangent
+from solvers.tangent import energy_density, piola_stress_and_tangent
 
 
 class Patch(NamedTuple):
@@ -37,6 +37,14 @@ class LocalEnergy:
     Every patch gives a small dense Hessian of the output weights that reach it. With the units' derivatives
     Z_x and Z_y and the tangent A, the block of the components i and k is the sum over j and l of
     Z_j^T w A_ijkl Z_l; one product of matrices has them all.
+
+    Attributes:
+        units: The hidden units.
+        material: The elastic law.
+        patches: The quadrature.
+        rows: First window of every pair that a patch has, shape (b,).
+        columns: Second window, not before the first, shape (b,).
+        origin: A displacement that has no energy; None for zero.
     """
 
     units: LocalUnits
@@ -44,6 +52,7 @@ class LocalEnergy:
     patches: list[Patch]
     rows: IntArray
     columns: IntArray
+    origin: LocalField | None = None
 
     @classmethod
     def of(
@@ -63,6 +72,23 @@ class LocalEnergy:
         patches = [Patch(*parts) for parts in zip(places, shares, near, pairs, strict=True)]
         rows, columns = np.divmod(known.numpy(), units.windows)
         return cls(units, material, patches, rows, columns)
+
+    @property
+    def points(self) -> int:
+        """Number of quadrature points."""
+        return sum(len(patch.points) for patch in self.patches)
+
+    def total(self, output: torch.Tensor) -> float:
+        """The energy per depth of an output layer (c, 2, m + 1), N mm / mm."""
+        field = LocalField(self.units, output)
+
+        def task(patch: Patch) -> float:
+            density = energy_density(
+                field.gradient_of_patch(patch.points), self.material.lame, self.material.law
+            )
+            return float(patch.weights @ density)
+
+        return sum(over_patches(task, self.patches))
 
     def derivatives(self, output: torch.Tensor) -> tuple[torch.Tensor, BlockMatrix]:
         """First and second derivative of the energy at an output layer (c, 2, m + 1).
@@ -90,6 +116,8 @@ class LocalEnergy:
         along = self.units.derivatives(patch.points, patch.near)
         windows, units = along.shape[2:]
         gradient = torch.einsum("xnwu,wiu->nix", along, output)
+        if self.origin is not None:
+            gradient -= self.origin.gradient_of_patch(patch.points)
         stress, tangent = piola_stress_and_tangent(gradient, self.material.lame, self.material.law)
         first = torch.einsum("xnwu,nix->wiu", along, patch.weights[:, None, None] * stress)
         weighted = patch.weights[:, None, None, None, None] * tangent

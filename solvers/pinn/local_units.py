@@ -65,9 +65,13 @@ class LocalUnits:
         turn = rng.uniform(0, np.pi, (count, 1)) + np.pi * np.arange(ridges) / ridges
         angle = turn + rng.uniform(-0.2, 0.2, (count, ridges))
         slopes = slope * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        biases = rng.uniform(-1, 1, (count, ridges))
-        tensors = (torch.from_numpy(array) for array in (centres, radii, slopes, biases))
-        return cls(*tensors, factor=factor)
+        return cls(
+            centres=torch.from_numpy(centres),
+            radii=torch.from_numpy(radii),
+            slopes=torch.from_numpy(slopes),
+            biases=torch.from_numpy(rng.uniform(-1, 1, (count, ridges))),
+            factor=factor,
+        )
 
     def near(self, points: torch.Tensor) -> torch.Tensor:
         """Numbers of the windows that reach the box around points (n, 2), mm, in ascending order."""
@@ -106,17 +110,13 @@ class LocalUnits:
             along.mul_((factor * share)[:, :, None]).addcmul_(change[:, :, None], unit)
         return found
 
-    def functional(self, points: FloatArray, weights: FloatArray) -> FloatArray:
-        """The sum of weights (n,) times the units at points (n, 2), mm: (c, m + 1)."""
-        found = self.centres.new_zeros(self.windows, self.per_window)
+    def functionals(self, points: FloatArray, weights: FloatArray) -> FloatArray:
+        """Sums of weights (k, n) times the units at points (n, 2), mm: (k, c, m + 1)."""
+        found = self.centres.new_zeros(len(weights), self.windows, self.per_window)
         for patch in cut_into_patches(points):
-            places = torch.from_numpy(points[patch])
+            places, shares = torch.from_numpy(points[patch]), torch.from_numpy(weights[:, patch])
             near = self.near(places)
-            found.index_add_(
-                0,
-                near,
-                torch.einsum("n,nwu->wu", torch.from_numpy(weights[patch]), self.values(places, near)),
-            )
+            found.index_add_(1, near, torch.einsum("kn,nwu->kwu", shares, self.values(places, near)))
         return np.asarray(found)
 
     def _local(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:

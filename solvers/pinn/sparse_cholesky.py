@@ -30,17 +30,18 @@ class BlockMatrix:
         """The diagonal, shape (n, b)."""
         return np.diagonal(self.blocks[self.rows == self.columns], axis1=1, axis2=2)
 
-    def solve(self, right: FloatArray, regularisation: float) -> FloatArray:
+    def solve(self, right: FloatArray, regularisation: float, *, definite: bool = True) -> FloatArray:
         """Solve for several right-hand sides with one factorisation, the diagonal scaled to one.
 
         Args:
             right: Right-hand sides, shape (r, n b).
             regularisation: What to add to the unit diagonal.
+            definite: Whether the matrix is known to be positive definite.
 
         Raises:
             UserError: If the factorisation fails.
         """
-        scale = 1 / np.sqrt(self.diagonal())
+        scale = 1 / np.sqrt(np.abs(self.diagonal()))
         scaled = self.blocks * scale[self.rows, :, None] * scale[self.columns, None, :]
         scaled[self.rows == self.columns] += regularisation * np.eye(scaled.shape[-1])
         starts = np.searchsorted(self.rows, np.arange(self.size + 1))
@@ -51,7 +52,8 @@ class BlockMatrix:
             csr=(starts.astype(index), self.columns.astype(index), scaled.ravel()),
             comm=PETSc.COMM_SELF,
         )
-        stored.setOption(PETSc.Mat.Option.SPD, True)
+        stored.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        stored.setOption(PETSc.Mat.Option.SPD, definite)
         ksp = PETSc.KSP().create(PETSc.COMM_SELF)
         ksp.setOperators(stored)
         ksp.setType(PETSc.KSP.Type.PREONLY)
@@ -71,4 +73,4 @@ class BlockMatrix:
         finally:
             for item in (vector, result, ksp, stored):
                 item.destroy()
-        return solution * scale.ravel()
+        return np.asarray(solution * scale.ravel(), dtype=np.float64)

@@ -63,6 +63,23 @@ def test_the_load_is_met_and_the_base_is_at_rest(solution, coarse_mesh):
     assert np.abs(solution.displacement(base)).max() < 1e-12
 
 
+@pytest.mark.parametrize("kind", ["mean", "point", "patch"])
+def test_every_load_that_the_solver_has_is_met(solver, coarse_mesh, kind):
+    from solvers.problem import contact_functional
+
+    if kind not in solver.loads:
+        return  # refused, as another test sees
+    problem = replace(problem_of(solver, coarse_mesh), load=Load(kind=kind, displacement=(0.0, -2.0)))
+    solution = solver.solve(problem)
+    if kind == "patch":
+        contact = coarse_mesh.points[np.unique(coarse_mesh.boundary("contact"))]
+        # A network prescribes moments of the displacement.
+        assert np.abs(solution.displacement(contact) - [0.0, -2.0]).max() < 0.01
+    else:
+        points, weights = contact_functional(problem)
+        np.testing.assert_allclose(weights @ solution.displacement(points), [0.0, -2.0], atol=1e-6)
+
+
 def test_energy_is_the_integral_of_its_density(solution, coarse_mesh):
     from geometry.quadrature import body_quadrature
 

@@ -1,0 +1,51 @@
+"""The load's conditions on a network, as linear functionals of its displacement."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.mesh import TriangleMesh
+from solvers.problem import Problem, contact_functional
+
+MOMENTS = 12
+"""Moments of the displacement that a rigid patch prescribes for each component."""
+
+
+class Conditions(NamedTuple):
+    """For every prescribed component: the sum of weights times displacement at points is a value.
+
+    Attributes:
+        points: Shape (q, 2), mm.
+        weights: Shape (k, q); those of the first functional sum to one, so that its multiplier is the force.
+        values: Shape (a, k), mm, for each prescribed component.
+    """
+
+    points: FloatArray
+    weights: FloatArray
+    values: FloatArray
+
+
+def load_conditions(problem: Problem) -> Conditions:
+    """The functionals of a load.
+
+    For `patch` they are moments against the tractions T_k(s) / sqrt(1 - s^2) with Chebyshev polynomials T_k,
+    which have the singularity of a rigid punch at both ends: the first is that of the punch on a half-plane
+    (K. L. Johnson, Contact Mechanics, Cambridge University Press, 1985, section 2.8). Gauss-Chebyshev
+    quadrature makes them sums over its points s = cos(angle), where T_k is cos(k angle).
+    """
+    values = problem.load.values[:, None]
+    if problem.load.kind != "patch":
+        points, weights = contact_functional(problem)
+        return Conditions(points, weights[None], values)
+    angles = np.pi * (np.arange(2 * MOMENTS) + 0.5) / (2 * MOMENTS)
+    left, right = contact_ends(problem.mesh)
+    points = left + 0.5 * (1 + np.cos(angles))[:, None] * (right - left)
+    weights = np.cos(np.outer(np.arange(MOMENTS), angles)) / len(angles)
+    return Conditions(points, weights, np.pad(values, ((0, 0), (0, MOMENTS - 1))))
+
+
+def contact_ends(mesh: TriangleMesh) -> FloatArray:
+    """The two ends of the contact, shape (2, 2), mm."""
+    nodes = mesh.points[np.unique(mesh.boundary("contact"))]
+    return nodes[[nodes[:, 0].argmin(), nodes[:, 0].argmax()]]
