@@ -184,6 +184,6 @@ def _part(progress: Progress, number: int) -> Progress:
 
 
 def _relative(difference: FloatArray, field: FloatArray, weights: FloatArray) -> float:
-    """Relative L2 norm of a difference of fields (q, 2)."""
+    """Relative L2 norm of a difference of fields (q, 2); infinite if there is no displacement."""
     norms = [np.sqrt((weights[:, None] * values**2).sum()) for values in (difference, field)]
-    return float(norms[0] / norms[1])
+    return float(norms[0] / norms[1]) if norms[1] > 0 else float("inf")
