@@ -16,7 +16,7 @@ from solvers.pinn.processes import ONE_PROCESS, Processes
 LANES = 16
 """Pieces are summed in so many fixed groups, so that rounding does not depend on the threads."""
 
-PIECE = 256
+PIECE = 384
 """Points in a piece."""
 
 Piece = tuple[LossTerm, slice]

@@ -9,7 +9,7 @@ flow pathologies in physics-informed neural networks, SIAM J. Sci. Comput. 43 (2
     output = H_L+1 w + b
 
 The paper prints a layer more: Z_1 is made of H_1 = tanh(X W_0 + b_0), as the other gates are. `literal_gate`
-takes that reading. X is in mm, as it is: neither the paper nor the network of Wang et al. has a scaling.
+takes that reading. X is in mm, as it is: the paper mentions no scaling.
 """
 
 from dataclasses import dataclass

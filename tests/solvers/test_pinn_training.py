@@ -5,6 +5,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -135,6 +136,27 @@ def test_the_history_is_a_table_with_units(problem, straight, tmp_path):
 def rows(folder: Path) -> list[dict[str, str]]:
     with (folder / "history.csv").open(encoding="utf-8") as file:
         return list(csv.DictReader(file))
+
+
+def test_tensorboard_gets_every_epoch_once_if_it_is_installed(problem, tmp_path, monkeypatch):
+    written: list[tuple[str, int]] = []
+
+    class SummaryWriter:
+        def __init__(self, folder: Path, purge_step: int) -> None:
+            written.append(("purge", purge_step))
+
+        def add_scalar(self, name: str, value: float, epoch: int) -> None:
+            written.append((name, epoch))
+
+        def flush(self) -> None:
+            pass
+
+    monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", SimpleNamespace(SummaryWriter=SummaryWriter))
+    context = TrainingContext(tmp_path, resume=True)
+    for epochs in (10, 20):
+        replace(SMALL, epochs=epochs).in_context(context).solve(problem)
+    assert [epoch for name, epoch in written if name == "BC"] == list(range(1, 21))
+    assert [epoch for name, epoch in written if name == "purge"] == [1, 11]
 
 
 def test_progress_tells_terms_energy_and_time(problem):
