@@ -66,8 +66,8 @@ def runs_table(runs: Sequence[Run]) -> Table:
         title="Runs by their distance from fem",
         caption=(
             "L²: relative difference of the displacement field from fem on the same mesh. Violation: of base "
-            "or load, over the stroke. Losses do not compare between weights; a short training favours large "
-            "steps."
+            "or load, over the stroke. Losses do not compare between weights; the order of short trainings "
+            "need not be that of long ones."
         ),
         title_justify="left",
         caption_justify="left",
