@@ -1,23 +1,42 @@
-"""Run every benchmark, or those named on the command line, and print their tables."""
+"""Run the benchmarks that the command line names, or the short ones, and print their tables."""
 
+import argparse
+import importlib
 import sys
 
 from rich.console import Console
 
-from benchmarks import fem_against_scikit_fem, pinn_against_fem
+BENCHMARKS = {
+    "fem": "fem_against_scikit_fem",
+    "pinn": "pinn_against_fem",
+    "deepxde": "deepxde_against_ours",
+    "recipes": "pinn_recipes",
+}
+"""Names and modules; the modules' docstrings say what they do and how long they take."""
 
-BENCHMARKS = {"fem": fem_against_scikit_fem.main, "pinn": pinn_against_fem.main}
+SHORT = ("fem", "pinn")
+TIMED = ("deepxde", "recipes")
 
 
 def main() -> int:
-    """Entry of `python -m benchmarks [fem] [pinn]`."""
-    chosen = sys.argv[1:] or list(BENCHMARKS)
-    unknown = [name for name in chosen if name not in BENCHMARKS]
+    """Entry of `python -m benchmarks [NAME ...] [--seconds S]`."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help=f"{', '.join(BENCHMARKS)}; default: fem pinn"
+    )
+    parser.add_argument("--seconds", type=float, help=f"budget of each training in {' and '.join(TIMED)}")
+    arguments = parser.parse_args()
+    unknown = [name for name in arguments.names if name not in BENCHMARKS]
     if unknown:
-        print(f"error: no benchmark {unknown[0]!r}; there are {', '.join(BENCHMARKS)}", file=sys.stderr)
-        return 2
-    for name in chosen:
-        Console().print(BENCHMARKS[name]())
+        parser.error(f"no benchmark {unknown[0]!r}; there are {', '.join(BENCHMARKS)}")
+    for name in arguments.names or SHORT:
+        budget = {"seconds": arguments.seconds} if arguments.seconds and name in TIMED else {}
+        try:
+            module = importlib.import_module(f"benchmarks.{BENCHMARKS[name]}")
+            Console().print(module.main(**budget))
+        except ModuleNotFoundError as error:
+            print(f"error: {name} needs {error.name}; pip install 'pinn-ray[bench]'", file=sys.stderr)
+            return 2
     return 0
 
 
