@@ -11,6 +11,7 @@ BENCHMARKS = {
     "pinn": "pinn_against_fem",
     "deepxde": "deepxde_against_ours",
     "recipes": "pinn_recipes",
+    "epochs": "deepxde_epochs",
 }
 """Names and modules; the modules' docstrings say what they do and how long they take."""
 

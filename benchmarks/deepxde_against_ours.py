@@ -31,7 +31,10 @@ POINT_SPACING = 1.0
 OURS: Mapping[str, Sequence[Solver]] = {
     "pinn-std": [PinnStdSolver(units=units, rounds=2, tolerance=1e-9) for units in (100, 250)]
     + [PinnStdSolver(rounds=rounds, tolerance=1e-9) for rounds in (2, 3, 4)],
-    "pinn-local": [PinnLocalSolver(wall_spacing=spacing) for spacing in (2.0, 1.4, 1.0, 0.7, 0.5)],
+    "pinn-local": [
+        PinnLocalSolver(wall_spacing=scale * 0.5, corner_spacing=scale * 0.02, growth=scale * 0.4)
+        for scale in (6.0, 4.0, 2.5, 1.5, 1.0)
+    ],
 }
 PICTURE = Path("out/benchmarks/deepxde.png")
 

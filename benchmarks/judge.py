@@ -91,7 +91,7 @@ class Watch:
         curve: What was judged so far; the last is the result.
     """
 
-    def __init__(self, judge: Judge, budget: float, looks: int = 24) -> None:
+    def __init__(self, judge: Judge, budget: float, looks: int = 12) -> None:
         """Start the clock.
 
         Args:
@@ -105,9 +105,13 @@ class Watch:
         judge.prepare()
         self._paused, self._started = 0.0, time.perf_counter()
 
+    def seconds(self) -> float:
+        """Time that the training has had so far."""
+        return time.perf_counter() - self._started - self._paused
+
     def __call__(self, field: DisplacementField) -> bool:
         """Show the field as it is now, after a step; whether time is left for another."""
-        seconds = time.perf_counter() - self._started - self._paused
+        seconds = self.seconds()
         if seconds >= self._due[0]:
             self.curve.append(self._judge(seconds, field))
             self._due = [due for due in self._due if due > seconds]
@@ -121,6 +125,5 @@ class Watch:
             if not self(field):
                 return self.curve
         if field is not None:
-            seconds = time.perf_counter() - self._started - self._paused
-            self.curve.append(self._judge(seconds, field))
+            self.curve.append(self._judge(self.seconds(), field))
         return self.curve

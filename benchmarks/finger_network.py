@@ -1,0 +1,169 @@
+"""The paper's kind of network with hard conditions, written plainly: what the recipes train.
+
+Two modified MLPs N of the scaled position give u = f (N - m(f N) / m(f) + t / m(f)), with the factor f of the
+clamp and the load's functional m, which is t, whatever the weights. The elastic energy is |r|² / 2 with three
+residuals at each quadrature point. Derivatives over the weights are torch's.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import torch
+
+from geometry.arrays import FloatArray
+from geometry.locate import Location
+from geometry.quadrature import body_quadrature
+from solvers.pinn.losses import stiffness_matrix
+from solvers.pinn.modified_mlp import ModifiedMlp
+from solvers.pinn.pieces import cut, in_threads
+from solvers.pinn.trial_space import BaseFactor
+from solvers.problem import Problem, contact_functional
+
+BASE_LENGTH = 5.0
+PIECE = 512
+
+
+@dataclass(frozen=True, eq=False)
+class FingerNetwork:
+    """Networks for a problem; parameters are flat, of shape (p,).
+
+    Attributes:
+        problem: What is solved, on the mesh whose element rule is used.
+        shape: The networks.
+        degree: Of the element rule.
+    """
+
+    problem: Problem
+    shape: ModifiedMlp
+    degree: int = 2
+
+    @cached_property
+    def points(self) -> torch.Tensor:
+        """Quadrature points, shape (q, 2), mm."""
+        return torch.tensor(body_quadrature(self.problem.mesh, self.degree).location.points)
+
+    @cached_property
+    def weights(self) -> torch.Tensor:
+        """Their weights, shape (q,), mm²."""
+        return torch.tensor(body_quadrature(self.problem.mesh, self.degree).weights)
+
+    @cached_property
+    def roots(self) -> torch.Tensor:
+        """What gives the residuals from (du/dx, du/dy, dv/dx, dv/dy), shape (3, 4), MPa^1/2."""
+        values, vectors = np.linalg.eigh(stiffness_matrix(self.problem.material.lame))
+        return torch.tensor(np.sqrt(values[1:, None]) * vectors.T[1:])
+
+    @cached_property
+    def _contact(self) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Points (k, 2), the functional over f, which acts on N, (k,), and what N's mean has to be, (2,)."""
+        points, weights = contact_functional(self.problem)
+        factored = BaseFactor.of(self.problem.mesh, BASE_LENGTH).at(points)[0][:, 0] * weights
+        targets = np.array([value or 0.0 for value in self.problem.load.displacement]) / factored.sum()
+        return torch.tensor(points), torch.tensor(factored / factored.sum()), torch.tensor(targets)
+
+    def initial(self, seed: int) -> torch.Tensor:
+        """Glorot-normal weights; the output layers are scaled to the stroke."""
+        parameters = self.shape.initial(seed, torch.float64)
+        self.shape.weights(parameters).output.mul_(float(np.abs(self.problem.load.values).max()))
+        return parameters.flatten()
+
+    def shift(self, parameters: torch.Tensor) -> torch.Tensor:
+        """What is added to both networks for the load's sake, shape (2,)."""
+        points, functional, targets = (array.to(parameters.dtype) for array in self._contact)
+        return targets - self._streams(parameters, points)[:, 0] @ functional
+
+    def field(self, parameters: torch.Tensor) -> "NetworkField":
+        """The displacement field."""
+        return NetworkField(self, parameters.detach().double())
+
+    def state(self, parameters: torch.Tensor, shift: torch.Tensor, points: torch.Tensor) -> torch.Tensor:
+        """Displacement and its derivatives along x and y at points (n, 2): shape (2, 3, n)."""
+        factor, slope = (part[:, 0] for part in BaseFactor.of(self.problem.mesh, BASE_LENGTH).at(points))
+        streams = self._streams(parameters, points)
+        value = streams[:, 0] + shift[:, None]
+        return torch.stack(
+            [factor * value, factor * streams[:, 1] + slope * value, factor * streams[:, 2]], dim=1
+        )
+
+    def residuals(
+        self, parameters: torch.Tensor, shift: torch.Tensor, points: torch.Tensor, weights: torch.Tensor
+    ) -> torch.Tensor:
+        """Residuals at points with weights, shape (3, n)."""
+        gradient = self.state(parameters, shift, points)[:, 1:].reshape(4, -1)
+        return weights.sqrt() * (self.roots.to(parameters.dtype) @ gradient)
+
+    def energy(self, parameters: torch.Tensor) -> tuple[float, torch.Tensor]:
+        """The energy per depth, N mm/mm, and its derivatives, shape (p,)."""
+        points, weights = self.points.to(parameters.dtype), self.weights.to(parameters.dtype)
+        trained = parameters.detach().requires_grad_()
+        shift = self.shift(trained)
+
+        def piece(rows: slice) -> tuple[float, torch.Tensor, torch.Tensor]:
+            leaf = shift.detach().requires_grad_()
+            residuals = self.residuals(trained, leaf, points[rows], weights[rows])
+            energy = 0.5 * (residuals * residuals).sum()
+            return energy.item(), *torch.autograd.grad(energy, (trained, leaf))
+
+        parts = in_threads(piece, cut(len(points), PIECE))
+        energies, gradients, of_shift = zip(*parts, strict=True)
+        through_shift = torch.autograd.grad(shift, trained, torch.stack(of_shift).sum(0))[0]
+        return sum(energies), torch.stack(gradients).sum(0) + through_shift
+
+    def _streams(self, parameters: torch.Tensor, points: torch.Tensor) -> torch.Tensor:
+        """The networks' outputs and their derivatives along x and y, shape (2, 3, n)."""
+        low, high = self.problem.mesh.points.min(axis=0), self.problem.mesh.points.max(axis=0)
+        half = float((high - low).max() / 2)
+        scaled = (points - points.new_tensor((low + high) / 2)) / half
+        first, gates, output = self.shape.weights(parameters.view(self.shape.networks, -1))
+        layers = _activated(
+            (torch.cat([scaled, scaled.new_ones(len(points), 1)], dim=1) @ first)[:, :, None],
+            first[:, :, :2, None].expand(-1, -1, -1, len(points), -1) / half,
+        )
+        base, step = layers[:, 0], layers[:, 1] - layers[:, 0]
+        hidden = _blend(base, step, layers[:, 2])
+        for k in range(gates.shape[1]):
+            before = hidden @ gates[:, k, None, :-1]
+            gate = _activated(before[:, :1] + gates[:, k, None, -1:], before[:, 1:])
+            hidden = _blend(base, step, gate)
+        result = (hidden * output[:, None, None, :-1]).sum(-1)
+        return torch.cat([result[:, :1] + output[:, -1:, None], result[:, 1:]], dim=1)
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkField:
+    """Trained networks as a displacement field."""
+
+    network: FingerNetwork
+    parameters: torch.Tensor
+
+    def displacement(self, location: Location) -> FloatArray:
+        """Displacement, shape (n, 2), mm."""
+        return self._state(location)[:, :, 0]
+
+    def gradient(self, location: Location) -> FloatArray:
+        """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
+        return self._state(location)[:, :, 1:]
+
+    def _state(self, location: Location) -> FloatArray:
+        points = torch.tensor(np.asarray(location.points))
+        with torch.no_grad():
+            shift = self.network.shift(self.parameters)
+
+        @torch.no_grad()
+        def piece(rows: slice) -> torch.Tensor:
+            return self.network.state(self.parameters, shift, points[rows])
+
+        return torch.cat(in_threads(piece, cut(len(points), PIECE)), dim=2).permute(2, 0, 1).numpy()
+
+
+def _activated(value: torch.Tensor, slopes: torch.Tensor) -> torch.Tensor:
+    """The hyperbolic tangent and its derivatives, streams along the axis before the points."""
+    activated = value.tanh()
+    return torch.cat([activated, (1 - activated * activated) * slopes], dim=-3)
+
+
+def _blend(base: torch.Tensor, step: torch.Tensor, gate: torch.Tensor) -> torch.Tensor:
+    """A + Z (B - A) with derivatives; streams are the second axis."""
+    blend = base + gate[:, :1] * step
+    return torch.cat([blend[:, :1], blend[:, 1:] + gate[:, 1:] * step[:, :1]], dim=1)

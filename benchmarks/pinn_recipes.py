@@ -1,0 +1,240 @@
+"""Recipes for training the networks: error against wall time on the default finger, in pinn_recipes.md.
+
+To add one, put a function into RECIPES: it is given the problem on the training mesh and a clock that says
+what share of its time is spent, and yields its field after every step. The clock stops while a field is
+judged. Each recipe takes `seconds`, and about ten more.
+"""
+
+import math
+import platform
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+
+import torch
+from rich.table import Table
+
+from benchmarks.finger_network import FingerNetwork
+from benchmarks.finger_residuals import everywhere, random_samples
+from benchmarks.judge import Judge, Judged, Watch
+from geometry.cache import finger_mesh
+from geometry.design import Design
+from geometry.settings import MeshSettings
+from solvers.optimisers.levenberg_marquardt import levenberg_marquardt
+from solvers.optimisers.self_scaled_broyden import self_scaled_broyden
+from solvers.optimisers.soap import Soap
+from solvers.optimisers.spring import spring
+from solvers.pinn.local import PinnLocalSolver
+from solvers.pinn.modified_mlp import ModifiedMlp
+from solvers.pinn.standard import PinnStdSolver
+from solvers.problem import Problem
+from solvers.solution import DisplacementField
+from solvers.solver import Solver
+
+SECONDS = 60.0
+TRAINING_SIZE = 1.0
+"""Size of the elements whose rule of degree 2 is used, mm."""
+
+SEED = 0
+REPORT = Path(__file__).with_name("pinn_recipes.md")
+
+Fields = Iterator[DisplacementField]
+Clock = Callable[[], float]
+"""The share of the budget that is spent."""
+
+Recipe = Callable[[Problem, Clock], Fields]
+
+
+def _network(problem: Problem, width: int = 32, degree: int = 2) -> FingerNetwork:
+    return FingerNetwork(problem, ModifiedMlp(width=width, layers=3), degree)
+
+
+def by_gradients(
+    optimiser: type[torch.optim.Optimizer],
+    rate: float,
+    *,
+    slope: float | None = None,
+    finish: bool = False,
+) -> Recipe:
+    """Full-batch training in single precision, the learning rate falling by half a cosine.
+
+    Args:
+        optimiser: Adam, SOAP, ...
+        rate: Learning rate at the start.
+        slope: Slopes of the first layers, 1/mm, whose ridges then go through points of the body.
+        finish: Whether the output layer is solved for exactly when nine tenths of the budget are spent.
+    """
+
+    def train(problem: Problem, clock: Clock) -> Fields:
+        network = _network(problem)
+        start = network.initial(SEED) if slope is None else through_points(network, slope)
+        parameters = start.float()
+        tensors = network.shape.weights(parameters.view(2, -1))
+        stepper = optimiser(tensors, lr=rate)
+        while (spent := clock() / (0.9 if finish else 1.0)) < 1:
+            stepper.param_groups[0]["lr"] = rate * 0.5 * (1 + math.cos(math.pi * spent))
+            gradient = network.energy(parameters)[1]
+            for tensor, of_tensor in zip(tensors, network.shape.weights(gradient.view(2, -1)), strict=True):
+                tensor.grad = of_tensor
+            stepper.step()
+            yield network.field(parameters)
+        if finish:
+            yield network.field(with_exact_output(network, parameters.double()))
+
+    return train
+
+
+def through_points(network: FingerNetwork, slope: float) -> torch.Tensor:
+    """Initial weights whose first layers are ridges of a slope, 1/mm, through random quadrature points."""
+    generator = torch.Generator().manual_seed(SEED)
+    parameters = network.initial(SEED)
+    first = network.shape.weights(parameters.view(2, -1)).first
+    count = first[:, :, 0].numel()
+    turn = torch.rand(count, generator=generator, dtype=torch.float64) * 2 * math.pi
+    low, high = network.points.min(dim=0).values, network.points.max(dim=0).values
+    half = (high - low).max() / 2
+    slopes = slope * half * torch.stack([turn.cos(), turn.sin()], dim=1)
+    points = network.points[torch.randint(len(network.points), (count,), generator=generator)]
+    biases = -(slopes * (points - (low + high) / 2) / half).sum(dim=1)
+    first.copy_(torch.cat([slopes, biases[:, None]], dim=1).view(2, 3, -1, 3).transpose(2, 3))
+    return parameters
+
+
+def with_exact_output(network: FingerNetwork, parameters: torch.Tensor) -> torch.Tensor:
+    """The parameters with the output layers of least energy: the residuals are affine in them."""
+    result = parameters.clone()
+    output = network.shape.weights(result.view(2, -1)).output
+    residuals = everywhere(network)
+    output.zero_()
+    constant = residuals.values(result)
+    columns = []
+    for k in range(output.numel()):
+        output[divmod(k, output.shape[1])] = 1.0
+        columns.append(residuals.values(result) - constant)
+        output.zero_()
+    best = torch.linalg.lstsq(torch.stack(columns, dim=1), -constant[:, None], driver="gelsd").solution
+    output.copy_(best.view_as(output))
+    return result
+
+
+def l_bfgs(problem: Problem, clock: Clock) -> Fields:
+    """L-BFGS of torch with a strong Wolfe line search, double precision."""
+    network = _network(problem)
+    parameters = network.initial(SEED)
+    stepper = torch.optim.LBFGS([parameters], max_iter=5, history_size=100, line_search_fn="strong_wolfe")
+
+    def closure() -> float:
+        value, parameters.grad = network.energy(parameters)
+        return value
+
+    while True:
+        stepper.step(closure)
+        yield network.field(parameters)
+
+
+def broyden(problem: Problem, clock: Clock) -> Fields:
+    """Self-scaled Broyden, double precision, after Adam for a fifth of the budget, as is usual."""
+    network = _network(problem)
+    field = None
+    for field in by_gradients(torch.optim.Adam, 1e-2)(problem, lambda: 5 * clock()):
+        yield field
+    start = field.parameters if field is not None else network.initial(SEED)
+    for iterate in self_scaled_broyden(network.energy, start):
+        yield network.field(iterate.parameters)
+
+
+def natural_gradient(problem: Problem, clock: Clock) -> Fields:
+    """SPRING with 300 random points a step."""
+    network = _network(problem)
+    samples = random_samples(network, 300, SEED)
+    for iterate in spring(samples, network.initial(SEED), rate=0.1, damping=1e-3, momentum=0.9):
+        yield network.field(iterate.parameters)
+
+
+def gauss_newton(problem: Problem, clock: Clock) -> Fields:
+    """Levenberg-Marquardt for networks of half the width, one point an element."""
+    network = _network(problem, width=16, degree=1)
+    for iterate in levenberg_marquardt(everywhere(network), network.initial(SEED)):
+        yield network.field(iterate.parameters)
+
+
+def whole(solver: Solver) -> Recipe:
+    """One of the project's own solvers, judged once, at its end; it sees the shared mesh."""
+
+    def train(problem: Problem, clock: Clock) -> Fields:
+        yield solver.solve(Problem(finger_mesh(Design()), problem.material, problem.load)).field
+
+    return train
+
+
+RECIPES: dict[str, Recipe] = {
+    "Adam, 1e-2": by_gradients(torch.optim.Adam, 1e-2),
+    "Adam, 1e-2, slopes 0.1/mm through points of the body": by_gradients(torch.optim.Adam, 1e-2, slope=0.1),
+    "Adam, 1e-2, output layer exact at the end": by_gradients(torch.optim.Adam, 1e-2, finish=True),
+    "SOAP, 1e-2": by_gradients(Soap, 1e-2),
+    "L-BFGS": l_bfgs,
+    "Adam, then self-scaled Broyden": broyden,
+    "SPRING, 300 random points": natural_gradient,
+    "Levenberg-Marquardt, width 16": gauss_newton,
+    "pinn-std, preset fast": whole(PinnStdSolver()),
+    "pinn-local": whole(PinnLocalSolver()),
+}
+
+REMARKS: dict[str, str] = {}
+"""What was learnt from a recipe, in a sentence."""
+
+
+def main(seconds: float = SECONDS) -> Table:
+    """Train by every recipe and write the report."""
+    judge = Judge.of()
+    problem = Problem(finger_mesh(Design(), settings=MeshSettings(size=TRAINING_SIZE)))
+    curves = {}
+    for name, recipe in RECIPES.items():
+        watch = Watch(judge, seconds)
+        try:
+            curves[name] = watch.follow(recipe(problem, _clock(watch, seconds)))
+        except torch.linalg.LinAlgError:  # the optimiser's matrices broke down: what it had is its result
+            curves[name] = watch.curve
+    header = ("recipe", "time, s", "L2 at 1/4, %", "at 1/2, %", "L2, %", "von Mises, %", "energy, %")
+    rows = [(name, *_columns(curve, seconds)) for name, curve in curves.items() if curve]
+    REPORT.write_text(_report(header, rows, seconds))
+    table = Table(*header, title=f"Recipes, {seconds:g} s each; written to {REPORT}")
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def _clock(watch: Watch, seconds: float) -> Clock:
+    return lambda: watch.seconds() / seconds
+
+
+def _columns(curve: list[Judged], seconds: float) -> tuple[str, ...]:
+    def error_at(share: float) -> str:
+        before = [look.displacement for look in curve if look.seconds <= 1.02 * share * seconds]
+        return f"{before[-1]:.2g}" if before else "-"
+
+    last = curve[-1]
+    errors = (f"{last.displacement:.2g}", f"{last.von_mises:.2g}", f"{last.energy:+.2g}")
+    return f"{last.seconds:.0f}", error_at(0.25), error_at(0.5), *errors
+
+
+def _report(header: tuple[str, ...], rows: list[tuple[str, ...]], seconds: float) -> str:
+    lines = [
+        "# Recipes",
+        "",
+        f"Made by `python -m benchmarks recipes --seconds {seconds:g}` on {datetime.now(UTC):%Y-%m-%d}: "
+        f"{platform.machine()}, {torch.get_num_threads()} threads, Python {platform.python_version()}, "
+        f"torch {version('torch')}, seed {SEED}.",
+        "",
+        "Default finger and load; clamp and load hold exactly. Unless a row says otherwise: two modified MLPs",
+        "with three gates of 32 neurons, and the energy by the rule of degree 2 on elements of "
+        f"{TRAINING_SIZE:g} mm. Errors",
+        "are relative L2, and the energy is relative, to quadratic finite elements graded to 0.02 mm at corners.",
+        "",
+        "| " + " | ".join(header) + " | remark |",
+        "|---|" + "---:|" * (len(header) - 1) + "---|",
+        *("| " + " | ".join(row) + f" | {REMARKS.get(row[0], '')} |" for row in rows),
+        "",
+    ]
+    return "\n".join(lines)
