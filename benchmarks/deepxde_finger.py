@@ -26,6 +26,7 @@ import torch
 from geometry.arrays import FloatArray
 from geometry.locate import Location
 from geometry.quadrature import body_quadrature
+from solvers.elasticity import Lame
 from solvers.pinn.trial_space import BaseFactor
 from solvers.problem import Problem, contact_functional
 
@@ -75,9 +76,16 @@ def train(problem: Problem, watch: Callable[[NetworkField], bool], *, seed: int 
         rule = body_quadrature(problem.mesh, 1)
         roots = np.sqrt(rule.weights * len(rule.weights))[:, None].astype(np.float32)
         points = rule.location.points.astype(np.float32)
+        parts = energy_residuals(dde, problem.material.lame)
+
+        def residuals(
+            points: torch.Tensor, values: torch.Tensor, weights: torch.Tensor
+        ) -> list[torch.Tensor]:
+            return [weights * part for part in parts(points, values)]
+
         data = dde.data.PDE(
             dde.geometry.PointCloud(points),
-            _residuals(dde, problem),
+            residuals,
             [],
             num_domain=0,
             anchors=points,
@@ -121,17 +129,16 @@ def conditioned(network: Any, problem: Problem) -> Callable[[torch.Tensor], torc
     return network
 
 
-def _residuals(dde: Any, problem: Problem) -> Callable[..., list[torch.Tensor]]:
-    """Square roots of the parts of the strain energy density, times the roots of the quadrature weights."""
-    λ, μ = problem.material.lame.λ, problem.material.lame.μ
+def energy_residuals(dde: Any, lame: Lame) -> Callable[..., list[torch.Tensor]]:
+    """The equations for DeepXDE: four residuals whose squares add up to the strain energy density, MPa."""
+    λ, μ = lame.λ, lame.μ
 
-    def residuals(points: torch.Tensor, values: torch.Tensor, roots: torch.Tensor) -> list[torch.Tensor]:
+    def parts(points: torch.Tensor, values: torch.Tensor) -> list[torch.Tensor]:
         xx, yy = (dde.grad.jacobian(values, points, i=k, j=k) for k in range(2))
         xy = (dde.grad.jacobian(values, points, i=0, j=1) + dde.grad.jacobian(values, points, i=1, j=0)) / 2
-        parts = ((λ / 2) ** 0.5 * (xx + yy), μ**0.5 * xx, μ**0.5 * yy, (2 * μ) ** 0.5 * xy)
-        return [roots * part for part in parts]
+        return [(λ / 2) ** 0.5 * (xx + yy), μ**0.5 * xx, μ**0.5 * yy, (2 * μ) ** 0.5 * xy]
 
-    return residuals
+    return parts
 
 
 def _tensor(array: FloatArray) -> torch.Tensor:

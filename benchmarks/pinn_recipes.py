@@ -227,10 +227,10 @@ def _report(header: tuple[str, ...], rows: list[tuple[str, ...]], seconds: float
         f"{platform.machine()}, {torch.get_num_threads()} threads, Python {platform.python_version()}, "
         f"torch {version('torch')}, seed {SEED}.",
         "",
-        "Default finger and load; clamp and load hold exactly. Unless a row says otherwise: two modified MLPs",
-        "with three gates of 32 neurons, and the energy by the rule of degree 2 on elements of "
-        f"{TRAINING_SIZE:g} mm. Errors",
-        "are relative L2, and the energy is relative, to quadratic finite elements graded to 0.02 mm at corners.",
+        "Default finger and load; clamp and load hold exactly. Unless a row says otherwise: two modified "
+        "MLPs with three gates of 32 neurons, and the energy by the rule of degree 2 on elements of "
+        f"{TRAINING_SIZE:g} mm. Errors are relative L2, and the energy is relative, to quadratic finite "
+        "elements graded to 0.02 mm at the corners.",
         "",
         "| " + " | ".join(header) + " | remark |",
         "|---|" + "---:|" * (len(header) - 1) + "---|",
