@@ -13,7 +13,7 @@ from compare.figures.style import HALO, INK, MUTED, WIDTH, axes_at, figure, head
 from compare.gridsearch_run import Measured, Run
 from compare.gridsearch_tables import best_of
 
-HEAD, CELL, FOOT, LEFT, GAP = 0.68, 0.34, 0.5, 0.7, 0.25
+HEAD, CELL, FOOT, LEFT, GAP = 0.68, 0.34, 0.5, 0.85, 0.25
 """Heights, the left margin and the gap between the maps, inches."""
 
 SMALLEST = 1e-12
@@ -44,7 +44,7 @@ def draw_grid(path: Path, *, runs: Sequence[Run]) -> None:
             if column:
                 axes.set_yticklabels([])
             else:
-                axes.set_ylabel("BC weight, MPa/mm²")
+                axes.set_ylabel("BC weight\nMPa/mm²")
 
 
 def _map(axes: Axes, runs: Sequence[Run], value: Callable[[Measured], float]) -> None:

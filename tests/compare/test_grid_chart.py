@@ -51,4 +51,5 @@ def test_a_search_whose_runs_all_diverged_has_a_picture(pages: dict[Path, Page],
     draw_grid(tmp_path / "grid.png", runs=[run_of(1.0, 10.0, None)])
     page = pages[tmp_path / "grid.png"]
     assert page.text.count("diverged") == 2
+    assert (page.cut_off(), page.overlaps()) == ([], [])
     assert all(not axes.patches for axes in page.figure.axes)
