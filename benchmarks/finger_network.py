@@ -64,9 +64,18 @@ class FingerNetwork:
 
     def initial(self, seed: int) -> torch.Tensor:
         """Glorot-normal weights; the output layers are scaled to the stroke."""
-        parameters = self.shape.initial(seed, torch.float64)
-        self.shape.weights(parameters).output.mul_(float(np.abs(self.problem.load.values).max()))
-        return parameters.flatten()
+        parameters = self.shape.initial(seed, torch.float64).flatten()
+        self.output_layers(parameters).mul_(float(np.abs(self.problem.load.values).max()))
+        return parameters
+
+    def tensors(self, parameters: torch.Tensor) -> list[torch.Tensor]:
+        """Weights and biases one by one, as views."""
+        weights = self.shape.weights(parameters.view(self.shape.networks, -1))
+        return [weights.first, *weights.gates, *weights.biases, weights.output, weights.output_bias]
+
+    def output_layers(self, parameters: torch.Tensor) -> torch.Tensor:
+        """Weights and bias of the output layers, a view of shape (2, width + 1)."""
+        return parameters.view(self.shape.networks, -1)[:, -self.shape.width - 1 :]
 
     def shift(self, parameters: torch.Tensor) -> torch.Tensor:
         """What is added to both networks for the load's sake, shape (2,)."""
@@ -115,19 +124,20 @@ class FingerNetwork:
         low, high = self.problem.mesh.points.min(axis=0), self.problem.mesh.points.max(axis=0)
         half = float((high - low).max() / 2)
         scaled = (points - points.new_tensor((low + high) / 2)) / half
-        first, gates, output = self.shape.weights(parameters.view(self.shape.networks, -1))
+        weights = self.shape.weights(parameters.view(self.shape.networks, -1))
+        first = weights.first
         layers = _activated(
             (torch.cat([scaled, scaled.new_ones(len(points), 1)], dim=1) @ first)[:, :, None],
             first[:, :, :2, None].expand(-1, -1, -1, len(points), -1) / half,
         )
         base, step = layers[:, 0], layers[:, 1] - layers[:, 0]
         hidden = _blend(base, step, layers[:, 2])
-        for k in range(gates.shape[1]):
-            before = hidden @ gates[:, k, None, :-1]
-            gate = _activated(before[:, :1] + gates[:, k, None, -1:], before[:, 1:])
+        for matrix, bias in zip(weights.gates, weights.biases, strict=True):
+            before = hidden @ matrix[:, None]
+            gate = _activated(before[:, :1] + bias[:, None], before[:, 1:])
             hidden = _blend(base, step, gate)
-        result = (hidden * output[:, None, None, :-1]).sum(-1)
-        return torch.cat([result[:, :1] + output[:, -1:, None], result[:, 1:]], dim=1)
+        result = (hidden @ weights.output[:, None])[..., 0]
+        return torch.cat([result[:, :1] + weights.output_bias[:, None], result[:, 1:]], dim=1)
 
 
 @dataclass(frozen=True, eq=False)

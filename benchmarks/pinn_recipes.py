@@ -70,12 +70,12 @@ def by_gradients(
         network = _network(problem)
         start = network.initial(SEED) if slope is None else through_points(network, slope)
         parameters = start.float()
-        tensors = network.shape.weights(parameters.view(2, -1))
+        tensors = network.tensors(parameters)
         stepper = optimiser(tensors, lr=rate)
         while (spent := clock() / (0.9 if finish else 1.0)) < 1:
             stepper.param_groups[0]["lr"] = rate * 0.5 * (1 + math.cos(math.pi * spent))
             gradient = network.energy(parameters)[1]
-            for tensor, of_tensor in zip(tensors, network.shape.weights(gradient.view(2, -1)), strict=True):
+            for tensor, of_tensor in zip(tensors, network.tensors(gradient), strict=True):
                 tensor.grad = of_tensor
             stepper.step()
             yield network.field(parameters)
@@ -104,7 +104,7 @@ def through_points(network: FingerNetwork, slope: float) -> torch.Tensor:
 def with_exact_output(network: FingerNetwork, parameters: torch.Tensor) -> torch.Tensor:
     """The parameters with the output layers of least energy: the residuals are affine in them."""
     result = parameters.clone()
-    output = network.shape.weights(result.view(2, -1)).output
+    output = network.output_layers(result)
     residuals = everywhere(network)
     output.zero_()
     constant = residuals.values(result)
@@ -114,7 +114,7 @@ def with_exact_output(network: FingerNetwork, parameters: torch.Tensor) -> torch
         columns.append(residuals.values(result) - constant)
         output.zero_()
     best = torch.linalg.lstsq(torch.stack(columns, dim=1), -constant[:, None], driver="gelsd").solution
-    output.copy_(best.view_as(output))
+    output.copy_(best.view(output.shape))
     return result
 
 
