@@ -1,189 +1,38 @@
-"""`pinn-local`: a finite-basis network whose output layer is solved exactly, in seconds."""
+"""`pinn-local`: a finite-basis network with Shepard's windows, its output layer solved exactly."""
 
-import time
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+import torch
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from geometry.quadrature import body_quadrature
-from solvers.pinn.conditions import contact_ends
-from solvers.pinn.grading import (
-    Spacing,
-    graded_quadrature,
-    graded_triangles,
-    mean_thickness,
-    singular_points,
-    spread_points,
-)
-from solvers.pinn.local_level import Level
-from solvers.pinn.local_newton import Path, equilibrium, follow_load
-from solvers.pinn.local_units import LocalField, LocalUnits
-from solvers.pinn.trial_space import BaseFactor
-from solvers.problem import Problem
-from solvers.solution import Solution, Status
-from solvers.solver import Progress, check_problem, silent
-
-QUADRATURE_DEGREE = 2
+from solvers.pinn.finite_basis import FiniteBasisSolver
+from solvers.pinn.windows import ShepardWindows
 
 
-@dataclass(frozen=True)
-class PinnLocalSolver:
-    """Windows spread over the body, denser at its re-entrant corners, each with a few random tanh ridges.
-
-    The energy of the linear law is quadratic in the output layer, which is found by one sparse factorisation;
-    the neo-Hookean one is minimised by Newton's method. The hidden weights stay as they were drawn. It is
-    solved on two levels of spacing, and the change between them tells whether the network is fine enough.
-    Spacings are in units of the body's mean thickness, so that one setting serves every design.
+@dataclass(frozen=True, kw_only=True)
+class PinnLocalSolver(FiniteBasisSolver):
+    """Round windows, normalised to sum to one; the rest is as in `FiniteBasisSolver`.
 
     Attributes:
-        wall_spacing: Spacing of the windows along walls.
-        corner_spacing: Spacing at singular points.
-        growth: Growth of the spacing per distance from them.
         radius: Radius of a window in spacings.
-        ridges: Ridges in a window.
-        slope: Slope of the ridges per radius.
-        coarser: How many times larger the spacings of the first level are.
-        tolerance: Relative L2 change of the displacement between the levels below which it has converged.
-        thinning: Smallest distance of two windows in spacings.
-        cell: Longest edge of a quadrature cell in spacings.
-        base_length: Distance from the base, mm, at which the hard condition's factor is one half.
-        seed: Of the random numbers.
     """
 
     wall_spacing: float = 0.5
     corner_spacing: float = 0.006
     growth: float = 0.5
     radius: float = 1.8
-    ridges: int = 5
-    slope: float = 0.7
-    coarser: float = 1.7
-    tolerance: float = 0.005
-    thinning: float = 0.75
+    slope: float = 0.4
     cell: float = 0.45
-    base_length: float = 5.0
-    seed: int = 0
     name: ClassVar[str] = "pinn-local"
-    laws: ClassVar[tuple[str, ...]] = ("linear", "neo-hookean")
-    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
 
     def __post_init__(self) -> None:
-        if self.seed < 0:
-            raise UserError(f"pinn-local: seed must be zero or more, got {self.seed}")
-        positive = ("wall_spacing", "corner_spacing", "slope", "tolerance", "thinning", "cell", "base_length")
-        for setting in positive:
-            if not getattr(self, setting) > 0:
-                raise UserError(f"pinn-local: {setting} must be positive, got {getattr(self, setting)}")
-        if self.ridges < 2 or self.radius < 1.2 or self.coarser <= 1 or self.growth < 0:
-            raise UserError("pinn-local needs ridges >= 2, radius >= 1.2, coarser > 1 and growth >= 0")
+        super().__post_init__()
+        if self.radius < 1.2:
+            raise UserError(f"pinn-local: windows overlap from a radius of 1.2 on, got {self.radius}")
 
-    def settings(self) -> dict[str, object]:
-        """Spacing, windows, ridges, criterion and seed."""
-        return asdict(self)
-
-    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
-        """Train the network; see `Solver`."""
-        check_problem(self, problem)
-        started = time.perf_counter()
-        rule = body_quadrature(problem.mesh, 1)
-        before, change = np.zeros_like(rule.location.points), float("inf")
-        history = []
-        coarse: LocalField | None = None
-        for number, scale in enumerate((self.coarser, 1.0)):
-            level = self._level(problem, scale)
-            path = _train(level, coarse, _part(progress, number))
-            field = coarse = level.field(path.output)
-            displacement = field.displacement(rule.location)
-            change = _relative(displacement - before, displacement, rule.weights)
-            before = displacement
-            energy = level.energy.total(path.output)
-            units = field.units.windows * field.units.per_window
-            history.append((units, energy, change, time.perf_counter() - started))
-            progress((number + 1) / 2, f"{units} units, energy {energy:.4f} N mm/mm")
-            if path.fraction < 1:
-                break
-        reaction = np.zeros(2)
-        reaction[problem.load.prescribed] = path.forces[:, 0]
-        return Solution(
-            solver=self.name,
-            problem=problem,
-            field=field,
-            energy=energy,
-            reaction=reaction,
-            status=self._status(path, change),
-            stats={
-                "seconds": time.perf_counter() - started,
-                "unknowns": field.output.numel(),
-                "units": units,
-                "windows": field.units.windows,
-                "quadrature_points": level.energy.points,
-                "newton_iterations": path.iterations,
-                "seed": self.seed,
-                "device": "cpu",
-            },
-            history=dict(
-                zip(("units", "energy", "relative_change", "seconds"), np.array(history).T, strict=True)
-            ),
-        )
-
-    def _level(self, problem: Problem, scale: float) -> Level:
-        mesh = problem.mesh
-        unit = scale * mean_thickness(mesh)
-        singular = singular_points(mesh)
-        if problem.load.kind == "patch":
-            singular = np.concatenate([singular, contact_ends(mesh)])
-        spacing = Spacing(
-            singular,
-            wall=self.wall_spacing * unit,
-            corner=self.corner_spacing * unit,
-            growth=self.growth * scale,
-        )
-        triangles = graded_triangles(mesh, spacing, self.cell)
-        centres = spread_points(triangles, mesh, spacing, self.thinning)
-        units = LocalUnits.around(
-            centres,
-            self.radius * spacing.at(centres),
-            ridges=self.ridges,
-            slope=self.slope,
-            factor=BaseFactor.of(mesh, self.base_length),
-            rng=np.random.default_rng(self.seed),
-        )
-        return Level.of(units, problem, *graded_quadrature(triangles, QUADRATURE_DEGREE))
-
-    def _status(self, path: Path, change: float) -> Status:
-        if path.fraction < 1:
-            return Status(
-                False,
-                f"stopped at {path.fraction:.1%} of the load: Newton's method fails beyond; "
-                "take a smaller spacing, the load patch or a smaller stroke",
-            )
-        message = (
-            f"{self.coarser:g} times finer windows changed the displacement by {change:.2%} "
-            f"(criterion {self.tolerance:.2%})"
-        )
-        converged = change <= self.tolerance
-        return Status(converged, message if converged else f"{message}; take a smaller spacing")
-
-
-def _train(level: Level, coarse: LocalField | None, progress: Progress) -> Path:
-    """Equilibrium on a level: at once for a linear law, else from a coarser level's or along the load."""
-    if level.energy.material.law == "linear":
-        return Path.start(level).to(1.0, level.step(level.rest), 1)
-    if coarse is not None:
-        state, iterations = equilibrium(level, level.nearest(coarse), 1.0)
-        if state is not None:
-            return Path.start(level).to(1.0, state, iterations)
-    return follow_load(level, progress)
-
-
-def _part(progress: Progress, number: int) -> Progress:
-    """The progress of one of the two levels."""
-    return lambda fraction, text: progress((number + fraction) / 2, text)
-
-
-def _relative(difference: FloatArray, field: FloatArray, weights: FloatArray) -> float:
-    """Relative L2 norm of a difference of fields (q, 2); infinite if there is no displacement."""
-    norms = [np.sqrt((weights[:, None] * values**2).sum()) for values in (difference, field)]
-    return float(norms[0] / norms[1]) if norms[1] > 0 else float("inf")
+    def windows(self, centres: FloatArray, spacing: FloatArray, rng: np.random.Generator) -> ShepardWindows:
+        """A round window for every centre; see `FiniteBasisSolver`."""
+        return ShepardWindows(torch.from_numpy(centres), torch.from_numpy(self.radius * spacing))

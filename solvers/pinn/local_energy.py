@@ -61,16 +61,16 @@ class LocalEnergy:
         """The energy by a quadrature rule: points (q, 2), mm, and weights (q,), mm^2."""
         cuts = cut_into_patches(points)
         places = [torch.from_numpy(points[cut]) for cut in cuts]
-        near = list(over_patches(units.near, places))
+        near = list(over_patches(units.windows.near, places))
         keys = []
         for windows in near:
             first, second = torch.triu_indices(len(windows), len(windows))
-            keys.append(windows[first] * units.windows + windows[second])
+            keys.append(windows[first] * units.windows.count + windows[second])
         known, number = torch.unique(torch.cat(keys), return_inverse=True)
         pairs = number.split([len(key) for key in keys])
         shares = [torch.from_numpy(weights[cut]) for cut in cuts]
         patches = [Patch(*parts) for parts in zip(places, shares, near, pairs, strict=True)]
-        rows, columns = np.divmod(known.numpy(), units.windows)
+        rows, columns = np.divmod(known.numpy(), units.windows.count)
         return cls(units, material, patches, rows, columns)
 
     @property
@@ -109,7 +109,7 @@ class LocalEnergy:
         # Windows that reach one patch need not overlap.
         filled = blocks.abs().amax(dim=(1, 2)).numpy() > 0
         parts = (self.rows[filled], self.columns[filled], blocks.numpy()[filled])
-        return first, BlockMatrix(self.units.windows, *parts)
+        return first, BlockMatrix(self.units.windows.count, *parts)
 
     def _of_patch(self, patch: Patch, output: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """What a patch adds to the first derivative (w, 2, m + 1) and to the blocks of its pairs."""

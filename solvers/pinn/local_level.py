@@ -50,7 +50,7 @@ class Level:
     def of(cls, units: LocalUnits, problem: Problem, points: FloatArray, weights: FloatArray) -> "Level":
         """The level of some units with a quadrature: points (q, 2), mm, and weights (q,), mm^2."""
         conditions = load_conditions(problem)
-        functionals = np.zeros((*conditions.values.shape, units.windows, 2, units.per_window))
+        functionals = np.zeros((*conditions.values.shape, units.windows.count, 2, units.per_window))
         for row, axis in enumerate(problem.load.prescribed):
             functionals[row, :, :, axis] = units.functionals(conditions.points, conditions.weights)
         return cls(
@@ -64,7 +64,7 @@ class Level:
     def rest(self) -> torch.Tensor:
         """The output layer without displacement."""
         units = self.energy.units
-        return torch.zeros(units.windows, 2, units.per_window, dtype=torch.float64)
+        return torch.zeros(units.windows.count, 2, units.per_window, dtype=torch.float64)
 
     def field(self, output: torch.Tensor) -> LocalField:
         """The displacement that an output layer gives."""

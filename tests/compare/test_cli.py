@@ -104,7 +104,7 @@ BAD = [
     ("compare --solvers fem,fem", "named twice: fem, fem"),
     ("compare --solvers fem --reference pinn-std", "reference 'pinn-std' is not among the solvers fem"),
     ("compare --solvers fem --solver-set degree=1", "write solver.setting=value"),
-    ("compare --solvers fem --solver-set pinn-std.units=9", "'pinn-std', which is not among the solvers fem"),
+    ("compare --solvers fem --solver-set pinn-std.ridges=9", "'pinn-std', which is not among the solvers fem"),
     ("compare --solvers fem --solver-set fem.order=1", "fem has no setting 'order'; it has degree"),
     ("compare --solvers fem --solver-set fem.degree=two", "fem: degree = 'two'"),
     ("compare --solvers fem --solver-set fem.degree=7", "degree 1 and 2, not 7"),
@@ -114,7 +114,7 @@ BAD = [
     ("compare --preset paper --solvers fem", "--preset paper: none of the solvers fem has it"),
     ("compare --solver-set pinn-std.preset=slow", "pinn-std has no preset 'slow'; it has fast, paper"),
     (
-        "compare --preset paper --solver-set pinn-std.units=9",
+        "compare --preset paper --solver-set pinn-std.ridges=9",
         "pinn-std has no setting 'units'; it has epochs",
     ),
     ("compare --preset paper --load patch", "pinn-std takes the loads mean, point, not 'patch'"),
@@ -363,7 +363,7 @@ def test_a_solver_that_did_not_converge_has_its_own_exit_code(folder, capsys, mo
 
 
 def test_a_training_that_is_too_short_does_not_converge(folder, capsys, without_pictures):
-    settings = ["pinn-std.units=10", "pinn-std.rounds=2"]
+    settings = ["pinn-std.wall_spacing=5", "pinn-std.corner_spacing=5"]
     options = [word for setting in settings for word in ("--solver-set", setting)]
     small = ["--solvers", "pinn-std", "--mesh-size", "1.0", "--measurements", "good.csv", "--quiet"]
     assert main(["compare", *small, *options]) == NOT_CONVERGED

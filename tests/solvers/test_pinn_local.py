@@ -12,6 +12,7 @@ from geometry.settings import MeshSettings
 from solvers.fem.linear import FemSolver
 from solvers.fem.nonlinear import FemNonlinearSolver
 from solvers.pinn import local_newton
+from solvers.pinn.base_factor import BaseFactor
 from solvers.pinn.grading import (
     Spacing,
     graded_quadrature,
@@ -25,7 +26,7 @@ from solvers.pinn.local_energy import LocalEnergy
 from solvers.pinn.local_units import LocalField, LocalUnits
 from solvers.pinn.patches import PATCH, cut_into_patches
 from solvers.pinn.sparse_cholesky import BlockMatrix
-from solvers.pinn.trial_space import BaseFactor
+from solvers.pinn.windows import ShepardWindows
 from solvers.problem import Load, Material, Problem
 from solvers.solution import State
 from tests.solvers.conftest import bar_mesh
@@ -39,11 +40,12 @@ def spacing(coarse_mesh) -> Spacing:
 @pytest.fixture(scope="module")
 def units(coarse_mesh, spacing) -> LocalUnits:
     centres = spread_points(graded_triangles(coarse_mesh, spacing, 0.6), coarse_mesh, spacing, 0.75)
+    distances = spacing.at(centres)
     return LocalUnits.around(
+        ShepardWindows(torch.from_numpy(centres), torch.from_numpy(1.8 * distances)),
         centres,
-        1.8 * spacing.at(centres),
+        0.4 / distances,
         ridges=3,
-        slope=0.7,
         factor=BaseFactor.of(coarse_mesh, 5.0),
         rng=np.random.default_rng(0),
     )
@@ -83,7 +85,7 @@ def test_spread_points_keep_their_distance_and_leave_no_hole(coarse_mesh, spacin
 
 def test_windows_sum_to_one(units, coarse_mesh):
     """With output weights on the constants alone the network is the base factor times a constant."""
-    output = torch.zeros(units.windows, 2, units.per_window, dtype=torch.float64)
+    output = torch.zeros(units.windows.count, 2, units.per_window, dtype=torch.float64)
     output[:, :, 0] = torch.tensor([2.0, -3.0])
     location = coarse_mesh.at_centroids()
     factor, _ = units.factor.at(location.points)
@@ -94,11 +96,11 @@ def test_windows_sum_to_one(units, coarse_mesh):
 
 def test_derivatives_are_those_of_differences(units, coarse_mesh):
     points = torch.from_numpy(coarse_mesh.at_centroids().points[::10].copy())
-    near, step = units.near(points), 1e-6
+    near, step = units.windows.near(points), 1e-6
     for axis, derivative in enumerate(units.derivatives(points, near)):
         shift = step * torch.eye(2, dtype=torch.float64)[axis]
         difference = (units.values(points + shift, near) - units.values(points - shift, near)) / (2 * step)
-        assert (difference - derivative).abs().max() < 1e-5
+        assert (difference.mT - derivative).abs().max() < 1e-5
 
 
 def test_a_point_in_no_window_is_refused(units):
@@ -120,7 +122,7 @@ def test_hessian_is_the_derivative_of_the_slope_and_that_of_the_energy(units, co
     energy = LocalEnergy.of(units, problem.material, rule.location.points, rule.weights)
     rng = np.random.default_rng(0)
     output, direction = (
-        torch.from_numpy(rng.normal(scale=size, size=(units.windows, 2, units.per_window)))
+        torch.from_numpy(rng.normal(scale=size, size=(units.windows.count, 2, units.per_window)))
         for size in (0.01, 1.0)
     )
 

@@ -1,0 +1,188 @@
+"""The gate of the modified MLP, applied to its own results: smooth windows that sum to one, made of gates.
+
+A gated layer of Wang, Teng and Perdikaris (SIAM J. Sci. Comput. 43 (2021) A3055-A3081) mixes two encoders by
+a gate Z that sees the input X itself: (1 - Z) A + Z B. Here A and B are in turn what two gates below let
+through, down to encoders that serve a small part of the body each:
+
+    H_g = (1 - Z_g) H_closed(g) + Z_g H_open(g)        Z_g = σ(X w_g + b_g)
+
+The share of an encoder e in the result is then the product of 1 - Z or Z over the gates above it,
+
+    share_e = exp(sum_g P_ge t_g - |P|_ge softplus(t_g))        t_g = X w_g + b_g
+
+with P_ge = 1 and |P|_ge = 1 where the gate's open side leads to e, 0 and 1 where the closed side does, and
+0 and 0 elsewhere. The shares are smooth and sum to one everywhere, whatever the weights: a hierarchical
+mixture of experts (M. I. Jordan and R. A. Jacobs, Neural Comput. 6 (1994) 181-214).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch.nn.functional import softplus
+
+from geometry.arrays import BoolArray, FloatArray, IntArray
+
+NEGLIGIBLE = 1e-8
+"""Share below which an encoder is left out at a patch of points."""
+DIRECTIONS = 6
+"""Directions of the cuts that are tried for a gate."""
+CUTS = 5
+"""Cuts that are tried in each direction."""
+MIDDLE = (0.3, 0.7)
+"""Quantiles of the centres between which they lie."""
+
+
+@dataclass(frozen=True, eq=False)
+class GateTree:
+    """Gates over c encoders.
+
+    Attributes:
+        gates: Slopes along x and y, 1/mm, and the bias of every gate, shape (c - 1, 3).
+        children: What a closed and an open gate let through, shape (c - 1, 2): the number of a gate, or
+            less than zero, the complement ~e of the number of an encoder.
+        paths: For every encoder the gates above it, padded with -1, shape (c, d).
+        opened: Whether the encoder is on their open sides, shape (c, d).
+    """
+
+    gates: torch.Tensor
+    children: torch.Tensor
+    paths: torch.Tensor
+    opened: torch.Tensor
+
+    @classmethod
+    def over(
+        cls, centres: FloatArray, spacing: FloatArray, *, width: float, rng: np.random.Generator
+    ) -> "GateTree":
+        """Gates that lead to an encoder for every centre.
+
+        Each gate halves a set of centres, along the line that leaves most room for a wide gate: away from
+        places where the spacing is fine.
+
+        Args:
+            centres: Shape (c, 2), mm.
+            spacing: Distance between neighbouring centres there, shape (c,), mm.
+            width: Distance over which Z goes from 0.27 to 0.73, in spacings at the line.
+            rng: Draws the directions of the lines.
+        """
+        gates: list[FloatArray] = []
+        children: list[list[int]] = []
+        paths: dict[int, list[tuple[int, bool]]] = {}
+        todo: list[tuple[IntArray, list[tuple[int, bool]]]] = [(np.arange(len(centres)), [])]
+        while todo:
+            inside, above = todo.pop()
+            number = len(gates) if len(inside) > 1 else ~int(inside[0])
+            if above:
+                gate, opened = above[-1]
+                children[gate][int(opened)] = number
+            if number < 0:
+                paths[~number] = above
+                continue
+            normal, offset, room, beyond = _roomiest_cut(centres[inside], spacing[inside], rng)
+            gates.append(np.append(normal, -offset) * 2 / (width * room))
+            children.append([0, 0])
+            todo += [(inside[beyond == side], [*above, (number, side)]) for side in (False, True)]
+        depth = max(map(len, paths.values()))
+        padded = [paths[e] + [(-1, False)] * (depth - len(paths[e])) for e in range(len(centres))]
+        steps = torch.tensor(padded, dtype=torch.int64).reshape(len(centres), depth, 2)
+        weights = torch.from_numpy(np.array(gates).reshape(-1, 3))
+        return cls(
+            weights,
+            torch.tensor(children, dtype=torch.int64).reshape(-1, 2),
+            steps[..., 0],
+            steps[..., 1] == 1,
+        )
+
+    @property
+    def count(self) -> int:
+        """Number of encoders, c."""
+        return len(self.paths)
+
+    def near(self, points: torch.Tensor) -> torch.Tensor:
+        """Numbers of the encoders that reach the box around points (n, 2), mm, in ascending order."""
+        (left, low), (right, high) = points.amin(dim=0), points.amax(dim=0)
+        corners = points.new_tensor([(left, low), (left, high), (right, low), (right, high)])
+        found = []
+        level = torch.tensor([0 if self.count > 1 else ~0])
+        bound = points.new_ones(1)
+        while len(level):
+            done = level < 0
+            found.append(~level[done])
+            level, bound = level[~done], bound[~done]
+            # A logit is linear in the position, so that a gate is most open, and most closed, at a corner.
+            gate = self._logits(corners, level).sigmoid_()
+            through = torch.cat([bound * (1 - gate.amin(dim=0)), bound * gate.amax(dim=0)])
+            reached = through > NEGLIGIBLE
+            level, bound = self.children[level].T.flatten()[reached], through[reached]
+        return torch.cat(found).sort().values
+
+    def shares(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
+        """Shares of the encoders `near` (w,) at points (n, 2), mm: (n, w)."""
+        gates, above, opened = self._above(near)
+        return self._shares(points, self._logits(points, gates), gates, above, opened)
+
+    def shares_with_slopes(
+        self, points: torch.Tensor, near: torch.Tensor
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Shares (n, w) and their derivatives along x and y, (2, n, w), 1/mm."""
+        gates, above, opened = self._above(near)
+        logits = self._logits(points, gates)
+        share = self._shares(points, logits, gates, above, opened)
+        slopes = self.gates[gates, :2].T
+        along = (slopes @ opened)[:, None] - (logits.sigmoid_() * slopes[:, None]) @ above
+        return share, along.mul_(share)
+
+    def _shares(
+        self,
+        points: torch.Tensor,
+        logits: torch.Tensor,
+        gates: torch.Tensor,
+        above: torch.Tensor,
+        opened: torch.Tensor,
+    ) -> torch.Tensor:
+        weights = self.gates[gates].T @ opened  # the sum of the logits of open gates is linear in X too
+        linear = torch.addmm(weights[2], points, weights[:2])
+        return torch.addmm(linear, softplus(logits), above, alpha=-1).exp_()
+
+    def _above(self, near: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """The gates above encoders (w,), and the matrices |P| and P of the module's formula, (k, w)."""
+        paths, opened = self.paths[near], self.opened[near]
+        on_path = paths >= 0
+        gates, row = paths[on_path].unique(return_inverse=True)
+        column = on_path.nonzero()[:, 0]
+        above = self.gates.new_zeros(2, len(gates), len(near))
+        above[0, row, column] = 1.0
+        above[1, row, column] = opened[on_path].to(above.dtype)
+        return gates, above[0], above[1]
+
+    def _logits(self, points: torch.Tensor, gates: torch.Tensor) -> torch.Tensor:
+        weights = self.gates[gates]
+        return torch.addmm(weights[:, 2], points, weights[:, :2].T)
+
+
+def _roomiest_cut(
+    centres: FloatArray, spacing: FloatArray, rng: np.random.Generator
+) -> tuple[FloatArray, float, float, BoolArray]:
+    """The cut through the middle of centres (n, 2) that leaves most room for a gate.
+
+    The room of a line is the smallest spacing near it; a centre farther from the line than its spacing
+    limits it only by that distance. The more centres lie near the line, the more are mixed there, which
+    counts against it.
+
+    Returns:
+        Normal of the line, shape (2,), its offset along the normal, the room, mm, and which centres lie
+        beyond it.
+    """
+    angles = rng.uniform(0, np.pi) + np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    normals = np.stack([np.cos(angles), np.sin(angles)])
+    along = centres @ normals
+    first, last = (int(np.clip(share * len(centres), 1, len(centres) - 1)) for share in MIDDLE)
+    ranks = np.unique(np.linspace(first, last, CUTS).astype(int))
+    ordered = np.sort(along, axis=0)
+    offsets = 0.5 * (ordered[ranks - 1] + ordered[ranks])
+    distance = np.abs(along[:, None] - offsets)
+    room = np.maximum(distance, spacing[:, None, None]).min(axis=0)
+    crowd = (distance < spacing[:, None, None]).sum(axis=0) / np.sqrt(len(centres))
+    cut, direction = np.unravel_index(np.argmax(np.log(room) - 0.3 * crowd), room.shape)
+    offset = float(offsets[cut, direction])
+    return normals[:, direction], offset, float(room[cut, direction]), along[:, direction] > offset
