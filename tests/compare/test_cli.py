@@ -98,13 +98,15 @@ BAD = [
     ("compare --stroke -10", "--stroke -10: the indenter presses"),  # not the displacement v
     ("compare --stroke nan", "--stroke nan"),
     ("compare --load pull", 'Choose from: "mean", "point", "patch"'),
-    ("compare --load patch --solvers pinn-std", "pinn-std takes the loads mean, point, not 'patch'"),
     ("compare --plane stress --solvers fem-nonlinear", "fem-nonlinear: .* plane strain only"),
     # solvers and their settings
     ("compare --solvers fem,fem", "named twice: fem, fem"),
     ("compare --solvers fem --reference pinn-std", "reference 'pinn-std' is not among the solvers fem"),
     ("compare --solvers fem --solver-set degree=1", "write solver.setting=value"),
-    ("compare --solvers fem --solver-set pinn-std.ridges=9", "'pinn-std', which is not among the solvers fem"),
+    (
+        "compare --solvers fem --solver-set pinn-std.ridges=9",
+        "'pinn-std', which is not among the solvers fem",
+    ),
     ("compare --solvers fem --solver-set fem.order=1", "fem has no setting 'order'; it has degree"),
     ("compare --solvers fem --solver-set fem.degree=two", "fem: degree = 'two'"),
     ("compare --solvers fem --solver-set fem.degree=7", "degree 1 and 2, not 7"),
@@ -115,7 +117,7 @@ BAD = [
     ("compare --solver-set pinn-std.preset=slow", "pinn-std has no preset 'slow'; it has fast, paper"),
     (
         "compare --preset paper --solver-set pinn-std.ridges=9",
-        "pinn-std has no setting 'units'; it has epochs",
+        "pinn-std has no setting 'ridges'; it has epochs",
     ),
     ("compare --preset paper --load patch", "pinn-std takes the loads mean, point, not 'patch'"),
     ("compare --device cuda", "--device cuda: none of the solvers fem,pinn-std can choose a device"),

@@ -95,7 +95,7 @@ def test_reaction_does_the_work(solution):
     """Clapeyron: half the force times the travel; exact for a linear law, nearly so for a small travel."""
     work = 0.5 * solution.reaction @ [0.0, -2.0]
     linear = solution.problem.material.law == "linear"
-    assert solution.energy == pytest.approx(work, rel=1e-6 if linear else 0.1)
+    assert solution.energy == pytest.approx(work, rel=1e-5 if linear else 0.1)
     assert solution.reaction[1] < 0
 
 
@@ -152,7 +152,10 @@ def test_points_outside_the_body_are_refused(solution):
 def test_one_point_and_many_points_agree(solution, coarse_mesh):
     many = solution.displacement(coarse_mesh.markers)
     np.testing.assert_allclose(
-        solution.displacement(coarse_mesh.markers[4:5]), many[4:5], rtol=1e-12, atol=1e-14
+        solution.displacement(coarse_mesh.markers[4:5]),
+        many[4:5],
+        rtol=0,
+        atol=1e-7,  # a network may leave out what is less than 1e-8 of the travel
     )
 
 
