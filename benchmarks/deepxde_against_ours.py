@@ -28,13 +28,19 @@ TRIAL_SECONDS = 3.0
 POINT_SPACING = 1.0
 """Size of the elements that DeepXDE's points are the centroids of, mm."""
 
+SCALES = (6.0, 4.0, 2.5, 1.5, 1.0)
+"""Spacings of our networks, in those of the default settings."""
+
 OURS: Mapping[str, Sequence[Solver]] = {
-    "pinn-std": [PinnStdSolver(units=units, rounds=2, tolerance=1e-9) for units in (100, 250)]
-    + [PinnStdSolver(rounds=rounds, tolerance=1e-9) for rounds in (2, 3, 4)],
-    "pinn-local": [
-        PinnLocalSolver(wall_spacing=scale * 0.5, corner_spacing=scale * 0.02, growth=scale * 0.4)
-        for scale in (6.0, 4.0, 2.5, 1.5, 1.0)
-    ],
+    kind.name: [
+        kind(
+            wall_spacing=scale * kind.wall_spacing,
+            corner_spacing=scale * kind.corner_spacing,
+            growth=scale * kind.growth,
+        )
+        for scale in SCALES
+    ]
+    for kind in (PinnStdSolver, PinnLocalSolver)
 }
 PICTURE = Path("out/benchmarks/deepxde.png")
 

@@ -27,7 +27,7 @@ from geometry.arrays import FloatArray
 from geometry.locate import Location
 from geometry.quadrature import body_quadrature
 from solvers.elasticity import Lame
-from solvers.pinn.trial_space import BaseFactor
+from solvers.pinn.base_factor import BaseFactor
 from solvers.problem import Problem, contact_functional
 
 os.environ.setdefault("DDE_BACKEND", "pytorch")  # read when DeepXDE is imported

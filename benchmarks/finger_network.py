@@ -14,10 +14,10 @@ import torch
 from geometry.arrays import FloatArray
 from geometry.locate import Location
 from geometry.quadrature import body_quadrature
+from solvers.pinn.base_factor import BaseFactor
 from solvers.pinn.losses import stiffness_matrix
 from solvers.pinn.modified_mlp import ModifiedMlp
 from solvers.pinn.pieces import cut, in_threads
-from solvers.pinn.trial_space import BaseFactor
 from solvers.problem import Problem, contact_functional
 
 BASE_LENGTH = 5.0

@@ -23,14 +23,9 @@ SEEDS = range(3)
 CASES: dict[str, list[Solver]] = {
     "fem, shared mesh": [FemSolver()],
     **{
-        f"pinn-std, {rounds * 500} units": [
-            PinnStdSolver(rounds=rounds, tolerance=1e-9, seed=seed) for seed in SEEDS
-        ]
-        for rounds in (2, 3, 4)
-    },
-    **{
-        f"pinn-local, spacing {spacing}": [PinnLocalSolver(wall_spacing=spacing, seed=seed) for seed in SEEDS]
-        for spacing in (1.0, 0.7, 0.5)
+        f"{kind.name}, spacing {spacing}": [kind(wall_spacing=spacing, seed=seed) for seed in SEEDS]
+        for kind, spacings in ((PinnStdSolver, (1.6, 1.1, 0.8)), (PinnLocalSolver, (1.0, 0.7, 0.5)))
+        for spacing in spacings
     },
 }
 

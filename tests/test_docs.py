@@ -104,7 +104,7 @@ def run_folder(tmp_path_factory) -> Path:
     from compare.cli import compare_main
 
     out = tmp_path_factory.mktemp("docs") / "run"
-    options = "--mesh-size 1 --solver-set pinn-std.wall_spacing=1.5 --solver-set pinn-std.corner_spacing=0.5 --quiet"
+    options = "--mesh-size 1 --solver-set pinn-std.corner_spacing=0.2 --quiet"
     assert compare_main([*options.split(), "--out", str(out)]) in (
         0,
         3,

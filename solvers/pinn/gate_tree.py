@@ -24,7 +24,7 @@ from torch.nn.functional import softplus
 from geometry.arrays import BoolArray, FloatArray, IntArray
 
 NEGLIGIBLE = 1e-8
-"""Share below which an encoder is left out at a patch of points."""
+"""Share below which an encoder is left out in a box of points."""
 DIRECTIONS = 6
 """Directions of the cuts that are tried for a gate."""
 CUTS = 5
@@ -98,23 +98,35 @@ class GateTree:
         """Number of encoders, c."""
         return len(self.paths)
 
-    def near(self, points: torch.Tensor) -> torch.Tensor:
-        """Numbers of the encoders that reach the box around points (n, 2), mm, in ascending order."""
-        (left, low), (right, high) = points.amin(dim=0), points.amax(dim=0)
-        corners = points.new_tensor([(left, low), (left, high), (right, low), (right, high)])
+    def near(self, boxes: torch.Tensor) -> list[torch.Tensor]:
+        """Numbers of the encoders that reach each of some boxes (b, 2, 2), mm, ascending, (w,) each.
+
+        A logit is linear in the position, so that its extremes in a box are known; their product over the
+        gates above an encoder bounds its share from above.
+        """
+        middle, half = boxes.mean(dim=1), 0.5 * (boxes[:, 1] - boxes[:, 0])
+        box = torch.arange(len(boxes))
+        node = torch.full_like(box, 0 if self.count > 1 else ~0)
+        bound = boxes.new_ones(len(boxes))
         found = []
-        level = torch.tensor([0 if self.count > 1 else ~0])
-        bound = points.new_ones(1)
-        while len(level):
-            done = level < 0
-            found.append(~level[done])
-            level, bound = level[~done], bound[~done]
-            # A logit is linear in the position, so that a gate is most open, and most closed, at a corner.
-            gate = self._logits(corners, level).sigmoid_()
-            through = torch.cat([bound * (1 - gate.amin(dim=0)), bound * gate.amax(dim=0)])
-            reached = through > NEGLIGIBLE
-            level, bound = self.children[level].T.flatten()[reached], through[reached]
-        return torch.cat(found).sort().values
+        while len(box):
+            done = node < 0
+            found.append(torch.stack([box[done], ~node[done]]))
+            box, node, bound = box[~done], node[~done], bound[~done]
+            slopes, bias = self.gates[node].split([2, 1], dim=1)
+            logit = (slopes * middle[box]).sum(dim=1) + bias[:, 0]
+            spread = (slopes.abs() * half[box]).sum(dim=1)
+            closed, opened = bound * (spread - logit).sigmoid(), bound * (spread + logit).sigmoid()
+            bound = torch.cat([closed, opened])
+            reached = bound > NEGLIGIBLE
+            box, node, bound = (
+                box.repeat(2)[reached],
+                self.children[node].T.flatten()[reached],
+                bound[reached],
+            )
+        pairs = torch.cat(found, dim=1)
+        pairs = pairs[:, (pairs[0] * self.count + pairs[1]).argsort()]
+        return list(pairs[1].split(pairs[0].bincount(minlength=len(boxes)).tolist()))
 
     def shares(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
         """Shares of the encoders `near` (w,) at points (n, 2), mm: (n, w)."""

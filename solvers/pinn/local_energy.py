@@ -8,7 +8,7 @@ import torch
 
 from geometry.arrays import FloatArray, IntArray
 from solvers.pinn.local_units import LocalField, LocalUnits
-from solvers.pinn.patches import cut_into_patches, over_patches
+from solvers.pinn.patches import boxes_around, cut_into_patches, over_patches
 from solvers.pinn.sparse_cholesky import BlockMatrix
 from solvers.problem import Material
 from solvers.tangent import energy_density, piola_stress_and_tangent
@@ -61,7 +61,7 @@ class LocalEnergy:
         """The energy by a quadrature rule: points (q, 2), mm, and weights (q,), mm^2."""
         cuts = cut_into_patches(points)
         places = [torch.from_numpy(points[cut]) for cut in cuts]
-        near = list(over_patches(units.windows.near, places))
+        near = units.windows.near(boxes_around(places))
         keys = []
         for windows in near:
             first, second = torch.triu_indices(len(windows), len(windows))
@@ -84,7 +84,7 @@ class LocalEnergy:
 
         def task(patch: Patch) -> float:
             density = energy_density(
-                field.gradient_of_patch(patch.points), self.material.lame, self.material.law
+                field.gradient_of_patch(patch.points, patch.near), self.material.lame, self.material.law
             )
             return float(patch.weights @ density)
 
@@ -117,7 +117,8 @@ class LocalEnergy:
         windows, units = along.shape[2:]
         gradient = torch.einsum("xnwu,wiu->nix", along, output)
         if self.origin is not None:
-            gradient -= self.origin.gradient_of_patch(patch.points)
+            (near,) = self.origin.units.windows.near(boxes_around([patch.points]))
+            gradient -= self.origin.gradient_of_patch(patch.points, near)
         stress, tangent = piola_stress_and_tangent(gradient, self.material.lame, self.material.law)
         first = torch.einsum("xnwu,nix->wiu", along, patch.weights[:, None, None] * stress)
         weighted = patch.weights[:, None, None, None, None] * tangent

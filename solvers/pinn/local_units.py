@@ -15,7 +15,7 @@ import torch
 from geometry.arrays import FloatArray
 from geometry.locate import Location
 from solvers.pinn.base_factor import BaseFactor
-from solvers.pinn.patches import cut_into_patches, over_patches
+from solvers.pinn.patches import boxes_around, cut_into_patches, over_patches
 from solvers.pinn.windows import Windows
 
 
@@ -88,10 +88,11 @@ class LocalUnits:
     def functionals(self, points: FloatArray, weights: FloatArray) -> FloatArray:
         """Sums of weights (k, n) times the units at points (n, 2), mm: (k, c, m + 1)."""
         found = torch.zeros(len(weights), self.windows.count, self.per_window, dtype=torch.float64)
-        for patch in cut_into_patches(points):
-            places, shares = torch.from_numpy(points[patch]), torch.from_numpy(weights[:, patch])
-            near = self.windows.near(places)
-            found.index_add_(1, near, torch.einsum("kn,nuw->kwu", shares, self.values(places, near)))
+        patches = cut_into_patches(points)
+        places = [torch.from_numpy(points[patch]) for patch in patches]
+        for patch, place, near in zip(patches, places, self.windows.near(boxes_around(places)), strict=True):
+            shares = torch.from_numpy(weights[:, patch])
+            found.index_add_(1, near, torch.einsum("kn,nuw->kwu", shares, self.values(place, near)))
         return np.asarray(found)
 
     def _units(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
@@ -125,18 +126,22 @@ class LocalField:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
         return self._sample(location.points, self.gradient_of_patch)
 
-    def displacement_of_patch(self, points: torch.Tensor) -> torch.Tensor:
-        """`displacement` for a few points, in the calling thread."""
-        near = self.units.windows.near(points)
+    def displacement_of_patch(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
+        """Displacement at a few points (n, 2), mm, that only the windows `near` (w,) reach: (n, 2), mm."""
         return self.units.values(points, near).flatten(1) @ self.output[near].permute(2, 0, 1).flatten(0, 1)
 
-    def gradient_of_patch(self, points: torch.Tensor) -> torch.Tensor:
-        """`gradient` for a few points, in the calling thread."""
-        near = self.units.windows.near(points)
+    def gradient_of_patch(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
+        """Its gradient at a few points (n, 2), mm, that only the windows `near` (w,) reach: (n, 2, 2)."""
         return torch.einsum("xnwu,wiu->nix", self.units.derivatives(points, near), self.output[near])
 
-    def _sample(self, points: FloatArray, field: Callable[[torch.Tensor], torch.Tensor]) -> FloatArray:
+    def _sample(
+        self, points: FloatArray, field: Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
+    ) -> FloatArray:
         patches = cut_into_patches(points)
-        parts = over_patches(lambda patch: field(torch.from_numpy(points[patch])).numpy(), patches)
-        order = np.argsort(np.concatenate(patches))
-        return np.asarray(np.concatenate(list(parts))[order])
+        places = [torch.from_numpy(points[patch]) for patch in patches]
+        near = self.units.windows.near(boxes_around(places))
+        parts = over_patches(lambda work: field(*work).numpy(), list(zip(places, near, strict=True)))
+        found: FloatArray = np.concatenate(list(parts))
+        result: FloatArray = np.empty_like(found)
+        result[np.concatenate(patches)] = found
+        return result

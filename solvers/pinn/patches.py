@@ -4,7 +4,7 @@ The units of a finite-basis network that reach one patch are a small dense block
 dense matrices like better than a sparse matrix of all points and units.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
@@ -32,6 +32,11 @@ def cut_into_patches(points: FloatArray) -> list[IntArray]:
         else:
             todo += [node.greater, node.lesser]
     return found
+
+
+def boxes_around(patches: Sequence[torch.Tensor]) -> torch.Tensor:
+    """Lower left and upper right corners of the boxes around patches of points (n, 2), shape (b, 2, 2)."""
+    return torch.stack([torch.stack(patch.aminmax(dim=0)) for patch in patches])
 
 
 def over_patches(task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:

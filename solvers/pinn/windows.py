@@ -16,8 +16,12 @@ class Windows(Protocol):
         """Number of windows, c."""
         ...
 
-    def near(self, points: torch.Tensor) -> torch.Tensor:
-        """Numbers of the windows that reach points (n, 2), mm, in ascending order, (w,)."""
+    def near(self, boxes: torch.Tensor) -> list[torch.Tensor]:
+        """Numbers of the windows that reach each of some boxes, ascending, (w,) each.
+
+        Args:
+            boxes: Their lower left and upper right corners, shape (b, 2, 2), mm.
+        """
         ...
 
     def shares(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
@@ -51,10 +55,13 @@ class ShepardWindows:
         """Number of windows, c."""
         return len(self.centres)
 
-    def near(self, points: torch.Tensor) -> torch.Tensor:
-        """Numbers of the windows that reach the box around points (n, 2), mm, in ascending order."""
-        nearest = self.centres.clamp(points.amin(dim=0), points.amax(dim=0))
-        return ((nearest - self.centres).square().sum(dim=1) < self.radii.square()).nonzero()[:, 0]
+    def near(self, boxes: torch.Tensor) -> list[torch.Tensor]:
+        """Numbers of the windows that reach each of some boxes (b, 2, 2), mm, ascending, (w,) each."""
+        found = []
+        for low, high in boxes:
+            distance = self.centres.clamp(low, high).sub_(self.centres)
+            found.append((distance.square_().sum(dim=1) < self.radii.square()).nonzero()[:, 0])
+        return found
 
     def shares(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
         """The windows `near` (w,) at points (n, 2), mm: (n, w).

@@ -24,7 +24,7 @@ from solvers.pinn.grading import (
 from solvers.pinn.local import PinnLocalSolver
 from solvers.pinn.local_energy import LocalEnergy
 from solvers.pinn.local_units import LocalField, LocalUnits
-from solvers.pinn.patches import PATCH, cut_into_patches
+from solvers.pinn.patches import PATCH, boxes_around, cut_into_patches
 from solvers.pinn.sparse_cholesky import BlockMatrix
 from solvers.pinn.windows import ShepardWindows
 from solvers.problem import Load, Material, Problem
@@ -96,7 +96,7 @@ def test_windows_sum_to_one(units, coarse_mesh):
 
 def test_derivatives_are_those_of_differences(units, coarse_mesh):
     points = torch.from_numpy(coarse_mesh.at_centroids().points[::10].copy())
-    near, step = units.windows.near(points), 1e-6
+    (near,), step = units.windows.near(boxes_around([points])), 1e-6
     for axis, derivative in enumerate(units.derivatives(points, near)):
         shift = step * torch.eye(2, dtype=torch.float64)[axis]
         difference = (units.values(points + shift, near) - units.values(points - shift, near)) / (2 * step)

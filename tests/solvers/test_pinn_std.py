@@ -13,6 +13,7 @@ from solvers.fem.linear import FemSolver
 from solvers.pinn import gate_tree, local_energy
 from solvers.pinn.gate_tree import GateTree
 from solvers.pinn.local import PinnLocalSolver
+from solvers.pinn.patches import boxes_around
 from solvers.pinn.standard import PinnStdSolver
 from solvers.problem import Load, Problem
 from solvers.solution import Solution
@@ -66,7 +67,7 @@ def test_shares_are_those_of_the_gates_applied_from_the_bottom_up(tree, points):
 
 
 def test_shares_sum_to_one_and_their_slopes_to_zero(tree, points):
-    near = tree.near(points[:1])
+    (near,) = tree.near(boxes_around([points[:1]]))
     shares, slopes = tree.shares_with_slopes(points[:1], near)
     assert len(near) < tree.count
     assert shares.sum().item() == pytest.approx(1, abs=gate_tree.NEGLIGIBLE * tree.count)
@@ -76,7 +77,7 @@ def test_shares_sum_to_one_and_their_slopes_to_zero(tree, points):
 def test_encoders_that_are_left_out_have_a_negligible_share(tree, points):
     patch = 4 + 0.05 * points
     shares = tree.shares(patch, torch.arange(tree.count))
-    left_out = np.setdiff1d(np.arange(tree.count), tree.near(patch).numpy())
+    left_out = np.setdiff1d(np.arange(tree.count), tree.near(boxes_around([patch]))[0].numpy())
     assert len(left_out) > tree.count / 3
     assert shares[:, left_out].max() <= gate_tree.NEGLIGIBLE
 
@@ -101,7 +102,7 @@ def test_an_encoder_has_its_largest_share_near_its_centre(tree, centres):
 
 def test_one_encoder_needs_no_gate(points):
     tree = GateTree.over(np.zeros((1, 2)), np.ones(1), width=1.0, rng=np.random.default_rng(0))
-    near = tree.near(points)
+    (near,) = tree.near(boxes_around([points]))
     assert near.tolist() == [0]
     torch.testing.assert_close(tree.shares(points, near), torch.ones(len(points), 1, dtype=torch.float64))
 
