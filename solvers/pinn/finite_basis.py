@@ -16,8 +16,6 @@ from solvers.pinn.grading import (
     Spacing,
     graded_quadrature,
     graded_triangles,
-    mean_thickness,
-    singular_points,
     spread_points,
 )
 from solvers.pinn.local_level import Level
@@ -29,6 +27,8 @@ from solvers.solution import Solution, Status
 from solvers.solver import Progress, check_problem, silent
 
 QUADRATURE_DEGREE = 2
+FINEST = 0.75
+"""Spacing of a third level, in that of the second, where the second is not enough."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,12 +37,13 @@ class FiniteBasisSolver(ABC):
 
     The energy of the linear law is quadratic in the output layer, which is found by one sparse factorisation;
     the neo-Hookean one is minimised by Newton's method. The hidden weights stay as they were drawn. It is
-    solved on two levels of spacing, and the change between them tells whether the network is fine enough.
-    Spacings are in units of the body's mean thickness, so that one setting serves every design.
+    solved on two levels of spacing, and the change between them tells whether the network is fine enough; if
+    not, there is a third. Spacings are in units of the body's thickness, so that one setting serves every
+    design.
 
     Attributes:
-        wall_spacing: Spacing of the windows along walls.
-        corner_spacing: Spacing at singular points.
+        wall_spacing: Spacing of the windows in the width of a wall or cavity, at most the mean thickness.
+        corner_spacing: Spacing at sharp corners in mean thicknesses of the body.
         growth: Growth of the spacing per distance from them.
         ridges: Ridges in a window.
         slope: Slope of the ridges per spacing.
@@ -98,9 +99,10 @@ class FiniteBasisSolver(ABC):
         before, change = np.zeros_like(rule.location.points), float("inf")
         history = []
         coarse: LocalField | None = None
-        for number, scale in enumerate((self.coarser, 1.0)):
+        scales = (self.coarser, 1.0, FINEST)
+        for number, scale in enumerate(scales):
             level = self._level(problem, scale)
-            path = _train(level, coarse, _part(progress, number))
+            path = _train(level, coarse, _part(progress, number / len(scales), 1 / len(scales)))
             field = coarse = level.field(path.output)
             displacement = field.displacement(rule.location)
             change = _relative(displacement - before, displacement, rule.weights)
@@ -108,8 +110,8 @@ class FiniteBasisSolver(ABC):
             energy = level.energy.total(path.output)
             units = field.units.windows.count * field.units.per_window
             history.append((units, energy, change, time.perf_counter() - started))
-            progress((number + 1) / 2, f"{units} units, energy {energy:.4f} N mm/mm")
-            if path.fraction < 1:
+            progress((number + 1) / len(scales), f"{units} units, energy {energy:.4f} N mm/mm")
+            if path.fraction < 1 or change <= self.tolerance:
                 break
         reaction = np.zeros(2)
         reaction[problem.load.prescribed] = path.forces[:, 0]
@@ -119,7 +121,7 @@ class FiniteBasisSolver(ABC):
             field=field,
             energy=energy,
             reaction=reaction,
-            status=self._status(path, change),
+            status=self._status(path, change, scales[max(number - 1, 0)] / scale),
             stats={
                 "seconds": time.perf_counter() - started,
                 "unknowns": field.output.numel(),
@@ -137,14 +139,12 @@ class FiniteBasisSolver(ABC):
 
     def _level(self, problem: Problem, scale: float) -> Level:
         mesh = problem.mesh
-        unit = scale * mean_thickness(mesh)
-        singular = singular_points(mesh)
-        if problem.load.kind == "patch":
-            singular = np.concatenate([singular, contact_ends(mesh)])
-        spacing = Spacing(
-            singular,
-            wall=self.wall_spacing * unit,
-            corner=self.corner_spacing * unit,
+        extra = contact_ends(mesh) if problem.load.kind == "patch" else np.empty((0, 2))
+        spacing = Spacing.of(
+            mesh,
+            extra,
+            wall=self.wall_spacing * scale,
+            corner=self.corner_spacing * scale,
             growth=self.growth * scale,
         )
         triangles = graded_triangles(mesh, spacing, self.cell)
@@ -161,7 +161,7 @@ class FiniteBasisSolver(ABC):
         )
         return Level.of(units, problem, *graded_quadrature(triangles, QUADRATURE_DEGREE))
 
-    def _status(self, path: Path, change: float) -> Status:
+    def _status(self, path: Path, change: float, ratio: float) -> Status:
         if path.fraction < 1:
             return Status(
                 False,
@@ -169,7 +169,7 @@ class FiniteBasisSolver(ABC):
                 "take a smaller spacing, the load patch or a smaller stroke",
             )
         message = (
-            f"{self.coarser:g} times finer windows changed the displacement by {change:.2%} "
+            f"{ratio:.2g} times finer windows changed the displacement by {change:.2%} "
             f"(criterion {self.tolerance:.2%})"
         )
         converged = change <= self.tolerance
@@ -187,9 +187,9 @@ def _train(level: Level, coarse: LocalField | None, progress: Progress) -> Path:
     return follow_load(level, progress)
 
 
-def _part(progress: Progress, number: int) -> Progress:
-    """The progress of one of the two levels."""
-    return lambda fraction, text: progress((number + fraction) / 2, text)
+def _part(progress: Progress, start: float, share: float) -> Progress:
+    """The progress of a part of the work."""
+    return lambda fraction, text: progress(start + share * fraction, text)
 
 
 def _relative(difference: FloatArray, field: FloatArray, weights: FloatArray) -> float:

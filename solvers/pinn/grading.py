@@ -1,39 +1,91 @@
-"""Where a network's units and quadrature points go: dense at re-entrant corners, where stress is singular."""
+"""Where a network's units and quadrature points go: dense in thin walls and at re-entrant corners."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from geometry.across import boundary_edges
+from geometry.across import boundary_edges, boundary_loops
 from geometry.arrays import FloatArray, IntArray
 from geometry.mesh import TriangleMesh
 from geometry.quadrature import triangle_rule
 
 CORNER_ANGLE = np.radians(10.0)
 """Turn of the boundary from which on it counts as a corner."""
+FACING = -0.9
+"""Cosine of the angle between the normals of two edges below which they face each other."""
+
+
+class Singularities(NamedTuple):
+    """Points where the strain is singular or nearly so.
+
+    Attributes:
+        points: Shape (s, 2), mm.
+        spacing: Wanted distance between neighbours there, mm.
+    """
+
+    points: FloatArray
+    spacing: float
 
 
 @dataclass(frozen=True, eq=False)
 class Spacing:
-    """Wanted distance between neighbours: `corner + growth * d` at distance d from a singularity, or `wall`.
+    """Wanted distance between neighbours: that of the nearest boundary, less near singularities.
+
+    At distance d from a singularity with spacing s it is at most s + growth * d.
 
     Attributes:
-        singular: Singular points, shape (s, 2), mm.
-        wall: Largest spacing, mm.
-        corner: Spacing at a singular point, mm.
-        growth: Growth of the spacing per distance.
+        boundary: Points of the boundary, shape (b, 2), mm.
+        walls: The spacing there, shape (b,), mm.
+        singularities: Of one kind each.
+        growth: Growth of the spacing per distance from a singularity.
     """
 
-    singular: FloatArray
-    wall: float
-    corner: float
+    boundary: FloatArray
+    walls: FloatArray
+    singularities: tuple[Singularities, ...]
     growth: float
+
+    @classmethod
+    def of(
+        cls, mesh: TriangleMesh, extra: FloatArray, *, wall: float, corner: float, growth: float
+    ) -> "Spacing":
+        """The spacing for a mesh, in units of its own thicknesses.
+
+        Args:
+            mesh: The body.
+            extra: More points that are as singular as corners, shape (e, 2), mm.
+            wall: Spacing in the width of a wall, of a narrower cavity beside it, or of the contact, or in the
+                radius of a fillet.
+            corner: Spacing at a sharp corner in mean thicknesses.
+            growth: Growth of the spacing per distance from singularities.
+        """
+        mean = mean_thickness(mesh)
+        boundary, widths = boundary_widths(mesh)
+        sharp, round_, radius = re_entrant_points(mesh)
+        contact = mesh.points[np.unique(mesh.boundary("contact"))]
+        kinds = [
+            Singularities(np.concatenate([sharp, extra]), corner * mean),
+            Singularities(contact, wall * float(np.ptp(contact[:, 0]))),
+        ]
+        if len(round_):
+            kinds.append(Singularities(round_, max(wall * radius, corner * mean)))
+        return cls(boundary, wall * np.minimum(widths, mean), tuple(kinds), growth)
 
     def at(self, points: FloatArray) -> FloatArray:
         """The spacing at points (n, 2), mm: (n,), mm."""
-        distance, _ = cKDTree(self.singular).query(points)
-        return np.asarray(np.minimum(self.wall, self.corner + self.growth * distance))
+        _, nearest = cKDTree(self.boundary).query(points)
+        found = self.walls[nearest]
+        for kind in self.singularities:
+            distance, _ = cKDTree(kind.points).query(points)
+            found = np.minimum(found, kind.spacing + self.growth * distance)
+        return np.asarray(found)
+
+    def distance(self, points: FloatArray) -> FloatArray:
+        """Distance of points (n, 2), mm, from the nearest singularity: (n,), mm."""
+        distance, _ = cKDTree(np.concatenate([kind.points for kind in self.singularities])).query(points)
+        return np.asarray(distance)
 
 
 def mean_thickness(mesh: TriangleMesh) -> float:
@@ -43,19 +95,73 @@ def mean_thickness(mesh: TriangleMesh) -> float:
     return float(2 * mesh.areas.sum() / perimeter)
 
 
+def boundary_widths(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
+    """Boundary points (b, 2), mm, and the width there, (b,), mm.
+
+    That is the distance from the nearest other closed boundary, which is across the wall, or the width of the
+    cavity beside it if that is less; infinite where there is neither.
+    """
+    loops = boundary_loops(mesh)
+    edges = mesh.points[boundary_edges(mesh.triangles)]
+    middles = edges.mean(axis=1)
+    _, nearest = cKDTree(mesh.points[np.concatenate(loops)]).query(edges[:, 0])
+    loop_of = np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])[nearest]
+    widths = np.full(len(middles), np.inf)
+    for number in range(len(loops)):
+        own = loop_of == number
+        if not own.all():
+            widths[own], _ = cKDTree(edges[~own, 0]).query(middles[own])
+        widths[own] = np.minimum(widths[own], _open_distance(edges[own]))
+    return middles, widths
+
+
+def _open_distance(edges: FloatArray) -> FloatArray:
+    """Distance from each edge (k, 2, 2) of a closed boundary to one that faces it outside, (k,), mm."""
+    start, along = edges[:, 0], edges[:, 1] - edges[:, 0]
+    middles, normals = edges.mean(axis=1), np.column_stack([along[:, 1], -along[:, 0]])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    offset = start[None] - middles[:, None]
+    # middle + t normal = start + s along, for every pair of a middle and an edge
+    determinant = _cross(normals[:, None], along[None])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = _cross(offset, along[None]) / determinant
+        s = _cross(offset, normals[:, None]) / determinant
+    facing = normals @ normals.T < FACING
+    hit = facing & (s >= 0) & (s <= 1) & (t > 1e-9) & np.isfinite(t)
+    return np.asarray(np.where(hit, t, np.inf).min(axis=1))
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
 def singular_points(mesh: TriangleMesh) -> FloatArray:
-    """Re-entrant corners and the ends of the clamped base, shape (s, 2), mm."""
+    """Re-entrant corners, points of re-entrant arcs and the ends of the clamped base, shape (s, 2), mm."""
+    sharp, round_, _ = re_entrant_points(mesh)
+    return np.concatenate([sharp, round_])
+
+
+def re_entrant_points(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray, float]:
+    """Re-entrant corners and the base's ends (s, 2), points of re-entrant arcs (a, 2), their radius, all mm.
+
+    The radius is the median over the arcs, NaN where there are none.
+    """
     edges = boundary_edges(mesh.triangles)
     follows = dict(edges.tolist())
     comes_before = {after: node for node, after in follows.items()}
     nodes = np.array(list(follows))
-    into = mesh.points[nodes] - mesh.points[[comes_before[node] for node in nodes]]
-    out = mesh.points[list(follows.values())] - mesh.points[nodes]
-    turn = np.arctan2(into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0], (into * out).sum(axis=1))
+    after, before = (np.array([step[node] for node in nodes]) for step in (follows, comes_before))
+    into, out = mesh.points[nodes] - mesh.points[before], mesh.points[after] - mesh.points[nodes]
+    turn = np.arctan2(_cross(into, out), (into * out).sum(axis=1))
     # The body is on the left of its boundary: a right turn opens it beyond a straight angle.
-    re_entrant = mesh.points[nodes[turn < -CORNER_ANGLE]]
+    bent = turn < -CORNER_ANGLE
+    is_bent = dict(zip(nodes.tolist(), bent.tolist(), strict=True))
+    arc = bent & np.array([is_bent[a] or is_bent[b] for a, b in zip(after, before, strict=True)])
+    lengths = 0.5 * (np.linalg.norm(into, axis=1) + np.linalg.norm(out, axis=1))
+    radius = float(np.median(lengths[arc] / -turn[arc])) if arc.any() else float("nan")
     base, times = np.unique(mesh.boundary("base"), return_counts=True)
-    return np.concatenate([re_entrant, mesh.points[base[times == 1]]])
+    sharp = np.concatenate([mesh.points[nodes[bent & ~arc]], mesh.points[base[times == 1]]])
+    return sharp, mesh.points[nodes[arc]], radius
 
 
 def graded_triangles(mesh: TriangleMesh, spacing: Spacing, share: float) -> FloatArray:
@@ -88,7 +194,7 @@ def spread_points(triangles: FloatArray, mesh: TriangleMesh, spacing: Spacing, s
     The mesh's boundary nodes are taken before all others, and near singular points before those far away.
     """
     points = np.unique(np.round(triangles.reshape(-1, 2), 9), axis=0)
-    distance, _ = cKDTree(spacing.singular).query(points)
+    distance = spacing.distance(points)
     inside = _distance_from_boundary(points, mesh) > 1e-9
     tree, radius = cKDTree(points), share * spacing.at(points)
     free = np.ones(len(points), dtype=bool)

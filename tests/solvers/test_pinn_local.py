@@ -15,9 +15,11 @@ from solvers.pinn import local_newton
 from solvers.pinn.base_factor import BaseFactor
 from solvers.pinn.grading import (
     Spacing,
+    boundary_widths,
     graded_quadrature,
     graded_triangles,
     mean_thickness,
+    re_entrant_points,
     singular_points,
     spread_points,
 )
@@ -34,7 +36,7 @@ from tests.solvers.conftest import bar_mesh
 
 @pytest.fixture(scope="module")
 def spacing(coarse_mesh) -> Spacing:
-    return Spacing(singular_points(coarse_mesh), wall=1.0, corner=0.1, growth=0.3)
+    return Spacing.of(coarse_mesh, np.empty((0, 2)), wall=0.5, corner=0.05, growth=0.3)
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +63,25 @@ def test_singular_points_are_the_cells_corners_and_the_bases_ends(coarse_mesh):
 def test_mean_thickness_of_a_long_bar_is_its_height():
     mesh = bar_mesh(400.0, 2.0, 200, 2, contact=(0.0, 4.0))
     assert mean_thickness(mesh) == pytest.approx(2 * 400 * 2 / (2 * 402), rel=1e-12)
+
+
+def test_widths_are_those_of_walls_and_of_narrower_cavities(coarse_mesh):
+    points, widths = boundary_widths(coarse_mesh)
+    front = (points[:, 1] == 0) & (points[:, 0] > 5) & (points[:, 0] < 65)
+    assert widths[front] == pytest.approx(2.0, rel=0.06), "node to node, across elements of 1 mm"
+    slit = Design(rib_count=20, rib_thickness=1.0, rib_angle=0)
+    points, widths = boundary_widths(finger_mesh(slit, settings=MeshSettings(size=0.5, coarsening=2)))
+    in_slits = (points[:, 1] < -5) & (points[:, 1] > -10) & (points[:, 0] > 10) & (points[:, 0] < 40)
+    pitch = (90 - 20 - 2 - 20 * 1.0) / 21
+    assert widths[in_slits].max() <= max(pitch, 1.0) * 1.2
+
+
+def test_points_of_a_fillet_are_no_sharp_corners():
+    mesh = finger_mesh(Design(fillet_radius=1.0), settings=MeshSettings(size=0.5))
+    sharp, round_, radius = re_entrant_points(mesh)
+    assert len(sharp) == 2, "the ends of the base"
+    assert len(round_) > 4 * 20
+    assert radius == pytest.approx(1.0, rel=0.1)
 
 
 def test_cut_triangles_keep_the_area_and_meet_the_spacing(coarse_mesh, spacing):
