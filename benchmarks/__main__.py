@@ -9,6 +9,9 @@ from rich.console import Console
 BENCHMARKS = {
     "fem": "fem_against_scikit_fem",
     "pinn": "pinn_against_fem",
+    "designs": "networks_on_designs",
+    "sizes": "network_sizes",
+    "inference": "inference",
     "deepxde": "deepxde_against_ours",
     "recipes": "pinn_recipes",
     "epochs": "deepxde_epochs",

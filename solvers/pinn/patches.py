@@ -14,17 +14,24 @@ from scipy.spatial import cKDTree
 from geometry.arrays import FloatArray, IntArray
 
 PATCH = 96
-"""Most points in a patch: with fewer, windows are in more patches; with more, far from some of the points."""
+"""Points in a patch: with fewer, windows are in more patches; with more, far from some of the points."""
+
+MANY, MOST = 1000, 1024
+"""Patches from which on they may hold more points, and the most points that one then holds."""
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
 def cut_into_patches(points: FloatArray) -> list[IntArray]:
-    """Numbers of the points (n, 2) of each patch; every point is in one of them."""
+    """Numbers of the points (n, 2) of each patch; every point is in one of them.
+
+    Very many points lie so densely that larger patches, which cost less each, are still small.
+    """
     if not len(points):
         return []
-    found, todo = [], [cKDTree(points, leafsize=PATCH).tree]
+    size = min(max(PATCH, len(points) // MANY), MOST)
+    found, todo = [], [cKDTree(points, leafsize=size, balanced_tree=False, compact_nodes=False).tree]
     while todo:
         node: Any = todo.pop()
         if node.lesser is None:

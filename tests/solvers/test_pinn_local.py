@@ -68,7 +68,7 @@ def test_mean_thickness_of_a_long_bar_is_its_height():
 def test_widths_are_those_of_walls_and_of_narrower_cavities(coarse_mesh):
     points, widths = boundary_widths(coarse_mesh)
     front = (points[:, 1] == 0) & (points[:, 0] > 5) & (points[:, 0] < 65)
-    assert widths[front] == pytest.approx(2.0, rel=0.06), "node to node, across elements of 1 mm"
+    assert widths[front] == pytest.approx(2.0, rel=0.13), "from node to node, elements of 1 mm"
     slit = Design(rib_count=20, rib_thickness=1.0, rib_angle=0)
     points, widths = boundary_widths(finger_mesh(slit, settings=MeshSettings(size=0.5, coarsening=2)))
     in_slits = (points[:, 1] < -5) & (points[:, 1] > -10) & (points[:, 0] > 10) & (points[:, 0] < 40)
@@ -80,7 +80,7 @@ def test_points_of_a_fillet_are_no_sharp_corners():
     mesh = finger_mesh(Design(fillet_radius=1.0), settings=MeshSettings(size=0.5))
     sharp, round_, radius = re_entrant_points(mesh)
     assert len(sharp) == 2, "the ends of the base"
-    assert len(round_) > 4 * 20
+    assert len(round_) >= 5 * 4 * 3
     assert radius == pytest.approx(1.0, rel=0.1)
 
 
