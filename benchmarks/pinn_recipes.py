@@ -18,6 +18,8 @@ from rich.table import Table
 from benchmarks.finger_network import FingerNetwork
 from benchmarks.finger_residuals import everywhere, random_samples
 from benchmarks.judge import Judge, Judged, Watch
+from benchmarks.random_gates import random_gates
+from benchmarks.trained_ridges import trained_ridges
 from geometry.cache import finger_mesh
 from geometry.design import Design
 from geometry.settings import MeshSettings
@@ -159,6 +161,16 @@ def gauss_newton(problem: Problem, clock: Clock) -> Fields:
         yield network.field(iterate.parameters)
 
 
+def dense_gates(problem: Problem, clock: Clock) -> Fields:
+    """Gates around random points, in rounds; on the shared mesh."""
+    yield from random_gates(Problem(finger_mesh(Design()), problem.material, problem.load), SEED)
+
+
+def ridges_by_l_bfgs(problem: Problem, clock: Clock) -> Fields:
+    """Variable projection: the output layer is exact at every step; on the shared mesh."""
+    yield from trained_ridges(Problem(finger_mesh(Design()), problem.material, problem.load), SEED)
+
+
 def whole(solver: Solver) -> Recipe:
     """One of the project's own solvers, judged once, at its end; it sees the shared mesh."""
 
@@ -177,6 +189,8 @@ RECIPES: dict[str, Recipe] = {
     "Adam, then self-scaled Broyden": broyden,
     "SPRING, 300 random points": natural_gradient,
     "Levenberg-Marquardt, width 16": gauss_newton,
+    "random gates that do not sum to one, dense exact output layer": dense_gates,
+    "pinn-std at twice the spacing, ridges trained by L-BFGS": ridges_by_l_bfgs,
     "pinn-std, preset fast": whole(PinnStdSolver()),
     "pinn-local": whole(PinnLocalSolver()),
 }

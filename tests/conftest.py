@@ -6,6 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from geometry.cache import finger_mesh
+from geometry.design import Design
+from geometry.mesh import TriangleMesh
+from geometry.settings import MeshSettings
+
 PLUGIN = Path(__file__).parent / "solvers" / "plugin"
 
 
@@ -22,3 +27,9 @@ def plugin_folder(tmp_path_factory) -> Path:
         capture_output=True,
     )
     return folder
+
+
+@pytest.fixture(scope="session")
+def coarse_mesh() -> TriangleMesh:
+    """The default finger with elements of 1 mm."""
+    return finger_mesh(Design(), settings=MeshSettings(size=1.0))

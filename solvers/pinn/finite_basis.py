@@ -101,7 +101,7 @@ class FiniteBasisSolver(ABC):
         coarse: LocalField | None = None
         scales = (self.coarser, 1.0, FINEST)
         for number, scale in enumerate(scales):
-            level = self._level(problem, scale)
+            level = self.level(problem, scale)
             path = _train(level, coarse, _part(progress, number / len(scales), 1 / len(scales)))
             field = coarse = level.field(path.output)
             displacement = field.displacement(rule.location)
@@ -137,7 +137,8 @@ class FiniteBasisSolver(ABC):
             ),
         )
 
-    def _level(self, problem: Problem, scale: float) -> Level:
+    def level(self, problem: Problem, scale: float) -> Level:
+        """The network with spacings of `scale` times the settings', its quadrature and its load."""
         mesh = problem.mesh
         extra = contact_ends(mesh) if problem.load.kind == "patch" else np.empty((0, 2))
         spacing = Spacing.of(

@@ -12,12 +12,6 @@ from solvers.problem import Problem
 
 
 @pytest.fixture(scope="session")
-def coarse_mesh() -> TriangleMesh:
-    """The default finger with elements of 1 mm."""
-    return finger_mesh(Design(), settings=MeshSettings(size=1.0))
-
-
-@pytest.fixture(scope="session")
 def medium_mesh() -> TriangleMesh:
     """The default finger with elements of 0.5 mm."""
     return finger_mesh(Design(), settings=MeshSettings(size=0.5))

@@ -1,0 +1,31 @@
+"""Variable projection: the derivative of the least energy by the ridges."""
+
+import pytest
+import torch
+
+from benchmarks.trained_ridges import lagrangian_gradient, with_ridges
+from solvers.pinn.standard import PinnStdSolver
+from solvers.problem import Problem
+
+
+def test_gradient_is_that_of_the_least_energy(coarse_mesh):
+    problem = Problem(coarse_mesh)
+    level = PinnStdSolver(corner_spacing=0.2, ridges=2).level(problem, 2.0)
+    drawn = level.energy.units.ridges
+
+    def least_energy(ridges: torch.Tensor) -> float:
+        now = with_ridges(level, problem, ridges)
+        return now.energy.total(now.step(now.rest).output)
+
+    solved = level.step(level.rest)
+    variable = drawn.clone().requires_grad_()
+    forces = torch.from_numpy(solved.forces[:, 0].copy())
+    lagrangian_gradient(level, variable, level.field(solved.output), forces, problem)
+    direction = (
+        torch.randn(drawn.shape, generator=torch.Generator().manual_seed(0), dtype=drawn.dtype) * drawn
+    )
+    step = 1e-4
+    difference = (least_energy(drawn + step * direction) - least_energy(drawn - step * direction)) / (
+        2 * step
+    )
+    assert float((variable.grad * direction).sum()) == pytest.approx(difference, rel=1e-3)
