@@ -8,7 +8,8 @@ import torch
 
 from geometry.arrays import FloatArray, IntArray
 from solvers.pinn.local_units import LocalField, LocalUnits
-from solvers.pinn.patches import boxes_around, cut_into_patches, over_patches
+from solvers.pinn.patches import boxes_around, cut_into_patches
+from solvers.pinn.pieces import one_by_one
 from solvers.pinn.sparse_cholesky import BlockMatrix
 from solvers.problem import Material
 from solvers.tangent import energy_density, piola_stress_and_tangent
@@ -88,7 +89,7 @@ class LocalEnergy:
             )
             return float(patch.weights @ density)
 
-        return sum(over_patches(task, self.patches))
+        return sum(one_by_one(task, self.patches))
 
     def derivatives(self, output: torch.Tensor) -> tuple[torch.Tensor, BlockMatrix]:
         """First and second derivative of the energy at an output layer (c, 2, m + 1).
@@ -103,7 +104,7 @@ class LocalEnergy:
         def task(patch: Patch) -> tuple[Patch, torch.Tensor, torch.Tensor]:
             return patch, *self._of_patch(patch, output[patch.near])
 
-        for patch, slope, curvature in over_patches(task, self.patches):
+        for patch, slope, curvature in one_by_one(task, self.patches):
             first.index_add_(0, patch.near, slope)
             blocks.index_add_(0, patch.pairs, curvature)
         # Windows that reach one patch need not overlap.

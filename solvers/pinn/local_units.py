@@ -15,7 +15,8 @@ import torch
 from geometry.arrays import FloatArray
 from geometry.locate import Location
 from solvers.pinn.base_factor import BaseFactor
-from solvers.pinn.patches import boxes_around, cut_into_patches, over_patches
+from solvers.pinn.patches import boxes_around, cut_into_patches
+from solvers.pinn.pieces import one_by_one
 from solvers.pinn.windows import Windows
 
 
@@ -128,7 +129,15 @@ class LocalField:
 
     def displacement_of_patch(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
         """Displacement at a few points (n, 2), mm, that only the windows `near` (w,) reach: (n, 2), mm."""
-        return self.units.values(points, near).flatten(1) @ self.output[near].permute(2, 0, 1).flatten(0, 1)
+        share = self.units.windows.shares(points, near).mul_(self.units.factor.at(points)[0])
+        constant, ridges = self.output[near].split([1, self.output.shape[2] - 1], dim=2)
+        slopes, bias = self.units.ridges[:, :, near].flatten(1).split([2, 1])
+        # c tanh(t) = 2 c σ(2 t) - c, see `LocalUnits`; the constant takes the -c.
+        logistic = torch.addmm(2 * bias, points, 2 * slopes).sigmoid_().view(len(points), -1, len(near))
+        found: torch.Tensor = share @ (constant[:, :, 0] - ridges.sum(dim=2))
+        weights = ridges.permute(2, 0, 1).flatten(0, 1)
+        found.addmm_(logistic.mul_(share[:, None]).flatten(1), weights, alpha=2)
+        return found
 
     def gradient_of_patch(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
         """Its gradient at a few points (n, 2), mm, that only the windows `near` (w,) reach: (n, 2, 2)."""
@@ -140,7 +149,7 @@ class LocalField:
         patches = cut_into_patches(points)
         places = [torch.from_numpy(points[patch]) for patch in patches]
         near = self.units.windows.near(boxes_around(places))
-        parts = over_patches(lambda work: field(*work).numpy(), list(zip(places, near, strict=True)))
+        parts = one_by_one(lambda work: field(*work).numpy(), list(zip(places, near, strict=True)))
         found: FloatArray = np.concatenate(list(parts))
         result: FloatArray = np.empty_like(found)
         result[np.concatenate(patches)] = found

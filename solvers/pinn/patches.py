@@ -4,9 +4,8 @@ The units of a finite-basis network that reach one patch are a small dense block
 dense matrices like better than a sparse matrix of all points and units.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any, TypeVar
+from collections.abc import Sequence
+from typing import Any
 
 import torch
 from scipy.spatial import cKDTree
@@ -18,9 +17,6 @@ PATCH = 96
 
 MANY, MOST = 1000, 1024
 """Patches from which on they may hold more points, and the most points that one then holds."""
-
-Item = TypeVar("Item")
-Result = TypeVar("Result")
 
 
 def cut_into_patches(points: FloatArray) -> list[IntArray]:
@@ -44,14 +40,3 @@ def cut_into_patches(points: FloatArray) -> list[IntArray]:
 def boxes_around(patches: Sequence[torch.Tensor]) -> torch.Tensor:
     """Lower left and upper right corners of the boxes around patches of points (n, 2), shape (b, 2, 2)."""
     return torch.stack([torch.stack(patch.aminmax(dim=0)) for patch in patches])
-
-
-def over_patches(task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-    """Results of `task` for each patch, in order, computed on every thread."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        with ThreadPoolExecutor(threads, initializer=torch.set_num_threads, initargs=(1,)) as pool:
-            yield from pool.map(task, items)
-    finally:
-        torch.set_num_threads(threads)

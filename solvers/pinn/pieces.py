@@ -13,6 +13,7 @@ from functools import cache
 from typing import TypeVar
 
 import torch
+from threadpoolctl import threadpool_limits
 
 PIECE = 2**14
 """Numbers in one array of a piece: an eighth of a megabyte."""
@@ -32,14 +33,32 @@ def cut(points: int, size: int) -> list[slice]:
 
 
 def in_threads(task: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
-    """`task` of every item, in the items' order, on every thread; torch's own threads rest meanwhile."""
+    """`task` of every item, in the items' order, on every thread."""
+    with _pool() as pool:
+        return list(pool.map(task, items))
+
+
+def one_by_one(task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+    """The same, each result given up as soon as the next one is asked for."""
+    with _pool() as pool:
+        yield from pool.map(task, items)
+
+
+@contextmanager
+def _pool() -> Iterator[ThreadPoolExecutor]:
+    """A thread for each that torch may use; the threads of torch and of its BLAS rest meanwhile.
+
+    With DOLFINx in the process torch's matrix products may be OpenBLAS's, which has threads of its own and
+    lets callers wait for one another: three times as slow, when measured.
+    """
     _keep_freed_memory()
     threads = torch.get_num_threads()
     with (
         torch_threads(1),
+        threadpool_limits(1, user_api="blas"),
         ThreadPoolExecutor(threads, initializer=torch.set_num_threads, initargs=(1,)) as pool,
     ):
-        return list(pool.map(task, items))
+        yield pool
 
 
 @cache

@@ -18,7 +18,7 @@ def test_settings_are_converted_from_text():
         ("fem", {"order": 2}, "fem has no setting 'order'; it has degree"),
         ("skfem-p1", {"mesh": 2}, "solver 'skfem-p1' cannot be made with "),  # no dataclass
         ("fem", {"degree": "two"}, "fem: degree = 'two': input should be a valid integer"),
-        ("pinn-std", {"units": 1.5}, "pinn-std: units = 1.5: "),
+        ("pinn-std", {"ridges": 1.5}, "pinn-std: ridges = 1.5: "),
         ("pinn-std", {"preset": "quick"}, "pinn-std has no preset 'quick'; it has fast, paper"),
         ("pinn-std", {"preset": "paper", "units": 9}, "pinn-std has no setting 'units'; it has epochs, "),
         ("fem", {"preset": "paper"}, "fem has no setting 'preset'; it has degree"),
