@@ -111,7 +111,7 @@ class FiniteBasisSolver(ABC):
             units = field.units.windows.count * field.units.per_window
             history.append((units, energy, change, time.perf_counter() - started))
             progress((number + 1) / len(scales), f"{units} units, energy {energy:.4f} N mm/mm")
-            if path.fraction < 1 or change <= self.tolerance:
+            if path.fraction < 1 or (number > 0 and change <= self.tolerance):
                 break
         reaction = np.zeros(2)
         reaction[problem.load.prescribed] = path.forces[:, 0]

@@ -76,6 +76,21 @@ def test_widths_are_those_of_walls_and_of_narrower_cavities(coarse_mesh):
     assert widths[in_slits].max() <= max(pitch, 1.0) * 1.2
 
 
+def test_sides_that_meet_in_a_corner_are_no_narrow_cavity(coarse_mesh):
+    """Only edges that face each other count: at an acute corner the normals meet at a point."""
+    _, widths = boundary_widths(coarse_mesh)
+    assert widths.min() > 1.8, "the walls of 2 mm are the narrowest"
+
+
+def test_there_is_a_third_level_only_where_two_are_not_enough(coarse_mesh):
+    small = {"wall_spacing": 1.2, "corner_spacing": 0.3, "ridges": 3}
+    levels = [
+        len(PinnLocalSolver(**small, tolerance=tolerance).solve(Problem(coarse_mesh)).history["units"])
+        for tolerance in (1e-9, 1.0)
+    ]
+    assert levels == [3, 2]
+
+
 def test_points_of_a_fillet_are_no_sharp_corners():
     mesh = finger_mesh(Design(fillet_radius=1.0), settings=MeshSettings(size=0.5))
     sharp, round_, radius = re_entrant_points(mesh)
