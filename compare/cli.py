@@ -68,9 +68,11 @@ def compare(
 
     design, mesh = finger.read(options.preset)
     material, load = physics.read(options.preset)
+    made = options.read(solvers)
+    physics.check_law(made)
     job = Job(
         design=design,
-        solvers=options.read(solvers),
+        solvers=made,
         mesh=mesh,
         material=material,
         load=load,
@@ -154,7 +156,9 @@ def solve(
     """Solve one finger with one solver and write its fields, without comparing anything."""
     from compare.evaluation import Evaluation
     from compare.fields import write_vtu
+    from compare.figures.force_chart import draw_force_displacement
     from compare.figures.labels import solver_label
+    from compare.force_displacement import force_curves, write_force_displacement
     from compare.stages import Stages
     from compare.verdict import certified
     from geometry.cache import finger_mesh
@@ -168,6 +172,7 @@ def solve(
     chosen_solvers = options.read(solver)
     if len(chosen_solvers) != 1:
         raise UserError(f"name one solver, not {solver!r}; `compare` takes several")
+    physics.check_law(chosen_solvers)
     (made,) = chosen_solvers
     with Stages(Console(stderr=True)) as stages:
         with stages.stage("mesh"):
@@ -178,10 +183,16 @@ def solve(
         with stages.stage("certificate"):
             (evaluation,) = certified([Evaluation.of(solution, triangles)], problem)
         write_vtu(out, triangles, evaluation)
+        written = [out]
+        if curves := force_curves([evaluation], load):
+            written += [out.with_name(f"{out.stem}_force_displacement.{kind}") for kind in ("csv", "png")]
+            write_force_displacement(written[1], curves, load, depth=chosen.depth)
+            draw_force_displacement(written[2], curves=curves, depth=chosen.depth)
     print(f"{solver_label(evaluation)}: {evaluation.message}")
     u, v = solution.reaction
     print(f"energy {solution.energy:.6g} N mm/mm, reaction ({u:.6g}, {v:.6g}) N/mm")
-    print(out)
+    for path in written:
+        print(path)
     return 0 if evaluation.converged else NOT_CONVERGED
 
 
@@ -233,6 +244,7 @@ def gridsearch(
         processes=count,
         threads=threads,
     )
+    physics.check_law([job.solver(point) for point in job.points])
     try:
         with Stages(Console(stderr=True)) as stages:
             runs = search(job, stages)

@@ -31,7 +31,7 @@ class Evaluation:
 
     Attributes:
         solver: Name of the solver.
-        law: Material law that it had: "linear" (strain is infinitesimal) or "neo-hookean" (Green-Lagrange).
+        law: Material law that it had: "linear" (infinitesimal strain) or of finite strain (Green-Lagrange).
         converged: Whether the solver's own criterion was met and, where there is a certificate, its limit.
         message: The solver's sentence on how it ended, and what the certificate adds.
         energy: Elastic energy per unit depth, N mm / mm.

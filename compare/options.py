@@ -1,7 +1,7 @@
 """Options that several commands share, and the objects that they stand for."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -15,6 +15,7 @@ from geometry.design import Design
 from geometry.errors import UserError
 from geometry.presets import load_design, parse_overrides
 from geometry.settings import MeshSettings
+from solvers.elasticity import LawName
 from solvers.problem import Load, Material
 from solvers.registry import PRESETS, make_solver
 from solvers.solver import Solver
@@ -75,6 +76,12 @@ class PhysicsOptions:
     plane: Annotated[
         Literal["strain", "stress"], Parameter(help="Plane strain, or plane stress as the paper's equations.")
     ] = "strain"
+    law: Annotated[
+        LawName | None,
+        Parameter(
+            show_default=False, help="Material law of the solvers that have it; each solver's usual one."
+        ),
+    ] = None
     load: Annotated[
         Literal["mean", "point", "patch"] | None,
         Parameter(
@@ -97,12 +104,21 @@ class PhysicsOptions:
         kind = self.load or job_defaults(preset).load
         try:
             return (
-                Material(young=self.young, poisson=self.poisson, plane=self.plane),
+                Material(young=self.young, poisson=self.poisson, plane=self.plane, law=self.law or "linear"),
                 Load(kind=kind, displacement=(None if self.slide else 0.0, -self.stroke)),
             )
         except ValidationError as error:
             first = error.errors()[0]
-            raise UserError(f"--{first['loc'][0]} {first['input']}: {first['msg'].lower()}") from None
+            said = first["msg"].removeprefix("Value error, ")
+            if not first["loc"]:  # a rule between options
+                raise UserError(said) from None
+            raise UserError(f"--{first['loc'][0]} {first['input']}: {said.lower()}") from None
+
+    def check_law(self, solvers: Sequence[Solver]) -> None:
+        """Refuse a law that none of the solvers has."""
+        if self.law is not None and not any(self.law in solver.laws for solver in solvers):
+            known = "; ".join(f"{solver.name} has {', '.join(solver.laws)}" for solver in solvers)
+            raise UserError(f"--law {self.law}: none of the solvers has it ({known})")
 
 
 @Parameter(name="*", group=TRAINING)

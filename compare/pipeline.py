@@ -12,6 +12,7 @@ from compare.atomic import write_json
 from compare.evaluation import Evaluation
 from compare.fields import write_vtu
 from compare.figures import draw_all
+from compare.force_displacement import force_curves, write_force_displacement
 from compare.metrics import pick_reference
 from compare.output_folder import RUN_FILE, SOLUTIONS, TRAINING, check_output, replaced_folder, take_training
 from compare.provenance import file_digest, machine, package_versions, sources_digest
@@ -107,6 +108,7 @@ def run(job: Job, stages: Stages) -> Outcome:
                 folder / "figures",
                 design=job.design,
                 mesh=mesh,
+                load=job.load,
                 evaluations=evaluations,
                 observations=observations,
                 reference=reference,
@@ -122,6 +124,10 @@ def run(job: Job, stages: Stages) -> Outcome:
                 observations=observations,
                 reference=reference,
             )
+            if curves := force_curves(evaluations, job.load):
+                write_force_displacement(
+                    folder / "force_displacement.csv", curves, job.load, depth=job.design.depth
+                )
             numbers = metrics(
                 design=job.design,
                 material=job.material,

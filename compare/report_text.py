@@ -30,9 +30,11 @@ def _value(value: object, unit: str) -> str:
     return number + {"": "", "deg": "°"}.get(unit, f" {unit}")
 
 
+FINITE_STRAIN = "finite strain: the strain is Green-Lagrange, the stress Cauchy"
 LAWS = {
     "linear": "linear elastic (Hooke), infinitesimal strain",
-    "neo-hookean": "neo-Hookean, finite strain: the strain is Green-Lagrange, the stress Cauchy",
+    "neo-hookean": f"neo-Hookean, {FINITE_STRAIN}",
+    "st-venant-kirchhoff": f"St Venant-Kirchhoff, {FINITE_STRAIN}",
 }
 
 

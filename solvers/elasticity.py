@@ -2,13 +2,15 @@
 
 Every function takes the displacement gradient `H[..., i, j] = du_i/dx_j` and uses nothing but arithmetic and
 indexing on it, so that any of the three libraries can be passed. Linear elasticity is Hooke's law for the
-plane states (Timoshenko and Goodier, Theory of Elasticity, 3rd ed., chapter 2); the neo-Hookean law is the
-compressible one of Bonet and Wood (Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed.,
-section 6.4.3), in plane strain.
+plane states (Timoshenko and Goodier, Theory of Elasticity, 3rd ed., chapter 2). The finite-strain laws are
+those of Bonet and Wood (Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed.), in plane strain:
+the compressible neo-Hookean (section 6.4.3) and the St Venant-Kirchhoff law (chapter 6).
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
+
+LawName = Literal["linear", "neo-hookean", "st-venant-kirchhoff"]
 
 Field = Any
 """A NumPy array, a torch tensor or a UFL expression."""
@@ -110,6 +112,54 @@ def neo_hookean_stress(gradient: Field, lame: Lame, log: Callable[[Field], Field
         xy=lame.μ / jacobian * (b + c + a * c + b * d),
         zz=pressure,
     )
+
+
+def st_venant_kirchhoff_energy_density(gradient: Field, lame: Lame) -> Field:
+    """ψ = λ/2 (tr E)^2 + μ E : E per reference volume, MPa, with the Green-Lagrange strain E.
+
+    Not for strong compression: the energy stays finite as J tends to zero.
+    """
+    strain = green_lagrange_strain(gradient)
+    trace = strain.xx + strain.yy
+    shear = strain.xx * strain.xx + strain.yy * strain.yy + 2 * strain.xy * strain.xy
+    return 0.5 * lame.λ * trace * trace + lame.μ * shear
+
+
+def st_venant_kirchhoff_stress(gradient: Field, lame: Lame) -> Plane:
+    """Cauchy stress F S F^T / J, MPa, of the second Piola-Kirchhoff stress S = λ tr(E) I + 2 μ E."""
+    a, b, c, d = 1 + gradient[..., 0, 0], gradient[..., 0, 1], gradient[..., 1, 0], 1 + gradient[..., 1, 1]
+    strain, jacobian = green_lagrange_strain(gradient), deformation_jacobian(gradient)
+    trace = lame.λ * (strain.xx + strain.yy)
+    xx, yy, xy = trace + 2 * lame.μ * strain.xx, trace + 2 * lame.μ * strain.yy, 2 * lame.μ * strain.xy
+    return Plane(
+        xx=(a * a * xx + 2 * a * b * xy + b * b * yy) / jacobian,
+        yy=(c * c * xx + 2 * c * d * xy + d * d * yy) / jacobian,
+        xy=(a * c * xx + (a * d + b * c) * xy + b * d * yy) / jacobian,
+        zz=trace / jacobian,
+    )
+
+
+def strain_of(law: LawName, gradient: Field, lame: Lame) -> Plane:
+    """The strain of a law: infinitesimal for the linear one, else Green-Lagrange."""
+    return small_strain(gradient, lame) if law == "linear" else green_lagrange_strain(gradient)
+
+
+def energy_density_of(law: LawName, gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> Field:
+    """Strain energy of a law per reference volume, MPa; `log` is the library's own."""
+    if law == "linear":
+        return linear_energy_density(gradient, lame)
+    if law == "st-venant-kirchhoff":
+        return st_venant_kirchhoff_energy_density(gradient, lame)
+    return neo_hookean_energy_density(gradient, lame, log)
+
+
+def stress_of(law: LawName, gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> Plane:
+    """Cauchy stress of a law, MPa; `log` is the library's own."""
+    if law == "linear":
+        return linear_stress(gradient, lame)
+    if law == "st-venant-kirchhoff":
+        return st_venant_kirchhoff_stress(gradient, lame)
+    return neo_hookean_stress(gradient, lame, log)
 
 
 def von_mises(stress: Plane, sqrt: Callable[[Field], Field]) -> Field:

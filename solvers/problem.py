@@ -15,7 +15,7 @@ from geometry.errors import UserError
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
 from geometry.quadrature import edge_quadrature
-from solvers.elasticity import Lame, lame_constants
+from solvers.elasticity import Lame, LawName, lame_constants
 
 
 class Material(BaseModel):
@@ -27,7 +27,7 @@ class Material(BaseModel):
         young: Young's modulus E, MPa.
         poisson: Poisson's ratio (the paper's μ).
         plane: Plane "strain" (thick finger) or plane "stress" (the equations that the paper prints).
-        law: "linear" (Hooke) or "neo-hookean" (finite strain).
+        law: "linear" (Hooke), or one of finite strain: "neo-hookean" or "st-venant-kirchhoff".
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -35,12 +35,12 @@ class Material(BaseModel):
     young: float = Field(default=11.4, gt=0, description="Young's modulus, MPa")
     poisson: float = Field(default=0.45, gt=-1, lt=0.5, description="Poisson's ratio")
     plane: Literal["strain", "stress"] = "strain"
-    law: Literal["linear", "neo-hookean"] = "linear"
+    law: LawName = "linear"
 
     @model_validator(mode="after")
     def _supported(self) -> Self:
-        if self.law == "neo-hookean" and self.plane == "stress":
-            raise ValueError("the neo-hookean law is given for plane strain only; take plane = strain")
+        if self.law != "linear" and self.plane == "stress":
+            raise ValueError(f"the {self.law} law is given for plane strain only; take plane = strain")
         return self
 
     @property

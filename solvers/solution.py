@@ -9,16 +9,7 @@ from numpy.typing import ArrayLike
 
 from geometry.arrays import FloatArray
 from geometry.locate import Location
-from solvers.elasticity import (
-    Plane,
-    green_lagrange_strain,
-    linear_energy_density,
-    linear_stress,
-    neo_hookean_energy_density,
-    neo_hookean_stress,
-    small_strain,
-    von_mises,
-)
+from solvers.elasticity import Plane, energy_density_of, strain_of, stress_of, von_mises
 from solvers.problem import Problem
 
 
@@ -117,21 +108,14 @@ class State:
     @classmethod
     def from_gradient(cls, gradient: FloatArray, problem: Problem) -> "State":
         """The state that the problem's material has at displacement gradients of shape (n, 2, 2)."""
-        lame = problem.material.lame
-        if problem.material.law == "neo-hookean":
-            strain = green_lagrange_strain(gradient)
-            stress = neo_hookean_stress(gradient, lame, np.log)
-            energy_density = neo_hookean_energy_density(gradient, lame, np.log)
-        else:
-            strain = small_strain(gradient, lame)
-            stress = linear_stress(gradient, lame)
-            energy_density = linear_energy_density(gradient, lame)
+        law, lame = problem.material.law, problem.material.lame
+        stress = stress_of(law, gradient, lame, np.log)
         return cls(
-            strain=_in_plane(strain),
+            strain=_in_plane(strain_of(law, gradient, lame)),
             stress=_in_plane(stress),
             stress_zz=np.asarray(stress.zz, dtype=np.float64),
             von_mises=von_mises(stress, np.sqrt),
-            energy_density=energy_density,
+            energy_density=energy_density_of(law, gradient, lame, np.log),
         )
 
 

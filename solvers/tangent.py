@@ -6,18 +6,16 @@ Source: J. Bonet, R. D. Wood, Nonlinear Continuum Mechanics for Finite Element A
 
 import torch
 
-from solvers.elasticity import Lame, linear_energy_density, neo_hookean_energy_density
+from solvers.elasticity import Lame, LawName, energy_density_of
 
 
-def energy_density(gradient: torch.Tensor, lame: Lame, law: str) -> torch.Tensor:
-    """ψ of the law "linear" or "neo-hookean" at displacement gradients (n, 2, 2): (n,), MPa."""
-    if law == "linear":
-        return torch.as_tensor(linear_energy_density(gradient, lame))
-    return torch.as_tensor(neo_hookean_energy_density(gradient, lame, torch.log))
+def energy_density(gradient: torch.Tensor, lame: Lame, law: LawName) -> torch.Tensor:
+    """ψ of a law at displacement gradients (n, 2, 2): (n,), MPa."""
+    return torch.as_tensor(energy_density_of(law, gradient, lame, torch.log))
 
 
 def piola_stress_and_tangent(
-    gradient: torch.Tensor, lame: Lame, law: str
+    gradient: torch.Tensor, lame: Lame, law: LawName
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """P = dψ/dH and A = dP/dH of the laws of `solvers.elasticity`.
 

@@ -12,6 +12,7 @@ from compare.evaluation import Evaluation
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
 from geometry.parameters import Parameters
+from solvers.problem import Load
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,7 @@ def draw_all(
     *,
     design: Parameters,
     mesh: TriangleMesh,
+    load: Load,
     evaluations: Sequence[Evaluation],
     observations: Observations,
     reference: Evaluation,
@@ -45,6 +47,7 @@ def draw_all(
         folder: Where to write; created if it is missing.
         design: The finger.
         mesh: The mesh that the solvers shared.
+        load: What moved the finger.
         evaluations: One for each solver, in the order of panels and colours.
         observations: What the markers did.
         reference: One of the evaluations, which the others are compared with.
@@ -55,7 +58,7 @@ def draw_all(
     """
     from compare.figures.gallery import Gallery
 
-    gallery = Gallery(folder, design, mesh, tuple(evaluations), observations, reference)
+    gallery = Gallery(folder, design, mesh, load, tuple(evaluations), observations, reference)
     tasks = gallery.tasks()
     figures: list[Figure] = []
     for number, (what, draw) in enumerate(tasks):

@@ -13,13 +13,16 @@ from compare.figures.design_drawing import draw_design
 from compare.figures.energy_chart import draw_energy
 from compare.figures.excess import DECADES, draw_excess
 from compare.figures.fields import QUANTITIES, Quantity, draw_field, field_extent
+from compare.figures.force_chart import draw_force_displacement
 from compare.figures.labels import solver_label
 from compare.figures.marker_chart import draw_marker_errors
 from compare.figures.mesh_drawing import draw_mesh, mesh_numbers
 from compare.figures.overlay import draw_overlay
+from compare.force_displacement import force_curves
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
 from geometry.parameters import Parameters
+from solvers.problem import Load
 
 Task = tuple[str, Callable[[], Figure | None]]
 
@@ -31,6 +34,7 @@ class Gallery:
     folder: Path
     design: Parameters
     mesh: TriangleMesh
+    load: Load
     evaluations: tuple[Evaluation, ...]
     observations: Observations
     reference: Evaluation
@@ -44,6 +48,7 @@ class Gallery:
             ("picture of the deformed finger", self.overlay),
             ("chart of the errors at the markers", self.marker_errors),
             *fields,
+            ("chart of force over displacement", self.force_displacement),
             ("picture of the excess energy", self.excess),
             ("chart of the energy", self.energy),
             ("drawing of the design", self.drawing),
@@ -109,6 +114,21 @@ class Gallery:
             f"mean. One scale for all: {PERCENT:g} % of the area of {solver_label(self.reference)} lie "
             f"within it, the peaks at the corners take the end colours. At a sharp corner the field has no "
             f"bound: the largest mean of a triangle, printed beside, grows with refinement.{beside}{mixed}",
+        )
+
+    def force_displacement(self) -> Figure | None:
+        """Force over displacement of the indenter, where a solver follows the load."""
+        curves = force_curves(self.evaluations, self.load)
+        if not curves:
+            return None
+        path = self.folder / "force_displacement.png"
+        draw_force_displacement(path, curves=curves, depth=self.design.depth)
+        return Figure(
+            path,
+            "Force over displacement",
+            f"Force of the indenter along its travel: per mm of depth (left), and for the finger’s "
+            f"{self.design.depth:g} mm (right). A point is an equilibrium that a solver found as the load "
+            f"grew; a linear solver’s line (dashed) is straight by its law.",
         )
 
     def excess(self) -> Figure | None:

@@ -1,5 +1,6 @@
 """`fem-nonlinear`: finite-strain elasticity with DOLFINx, the project's virtual experiment."""
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
@@ -11,7 +12,7 @@ import ufl
 from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
 from geometry.quadrature import body_quadrature
-from solvers.elasticity import Lame, deformation_jacobian, neo_hookean_energy_density
+from solvers.elasticity import Lame, deformation_jacobian, energy_density_of
 from solvers.fem.bridge import DistributedSpace, Factorisation
 from solvers.fem.conditions import (
     held_components,
@@ -30,7 +31,7 @@ QUADRATURE_DEGREE = 4
 
 @dataclass(frozen=True)
 class FemNonlinearSolver:
-    """Neo-Hookean plane strain by Newton's method, the load applied in adaptive steps.
+    """Neo-Hookean or St Venant-Kirchhoff plane strain by Newton's method, the load applied in adaptive steps.
 
     Every step starts from the last two states extrapolated; the first from the linear solution. A step whose
     Newton iteration fails, or turns an element inside out, is halved. A `patch` whose tangential component is
@@ -52,7 +53,7 @@ class FemNonlinearSolver:
     tolerance: float = 1e-8
     max_iterations: int = 12
     name: ClassVar[str] = "fem-nonlinear"
-    laws: ClassVar[tuple[str, ...]] = ("neo-hookean",)
+    laws: ClassVar[tuple[str, ...]] = ("neo-hookean", "st-venant-kirchhoff")
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
 
     def __post_init__(self) -> None:
@@ -66,7 +67,7 @@ class FemNonlinearSolver:
         return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
-        """Solve the finite-strain problem; see `Solver`. The material law must be neo-Hookean."""
+        """Solve the finite-strain problem; see `Solver`. The material law must be one of finite strain."""
         check_problem(self, problem)
         started = time.perf_counter()
         space = LagrangeSpace(problem.mesh, self.degree)
@@ -74,7 +75,8 @@ class FemNonlinearSolver:
         path = [_Step(fraction=0.0, nodal=np.zeros((len(space.nodes), 2)), residual=None)]
         step, failures, iterations = self.first_step, 0, 0
         while path[-1].fraction < 1:
-            fraction = min(path[-1].fraction + step, 1.0)
+            rest = 1 - path[-1].fraction
+            fraction = 1 - rest * (1 - 1 / math.ceil(rest / step - 1e-9))  # equal steps to the end
             nodal, residual, taken = newton.iterate(_extrapolate(path, fraction), fraction)
             iterations += taken
             if residual is None:
@@ -165,7 +167,7 @@ class _Newton:
         constants = Lame(self._distributed.constant(lame.λ), self._distributed.constant(lame.μ), lame.λ_out)
         u = self._distributed.function
         measure = ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
-        energy = neo_hookean_energy_density(ufl.grad(u), constants, ufl.ln) * measure
+        energy = energy_density_of(problem.material.law, ufl.grad(u), constants, ufl.ln) * measure
         residual = ufl.derivative(energy, u, ufl.TestFunction(u.function_space))
         tangent = ufl.derivative(residual, u, ufl.TrialFunction(u.function_space))
         self._energy, self._residual, self._tangent = map(self._distributed.form, (energy, residual, tangent))

@@ -18,6 +18,7 @@ MODULES = (
     "marker_chart",
     "fields",
     "energy_chart",
+    "force_chart",
     "excess",
     "design_drawing",
     "mesh_drawing",

@@ -1,5 +1,6 @@
 """The command line as a user meets it: what it refuses, prints and returns."""
 
+import csv
 import json
 import os
 import re
@@ -99,6 +100,14 @@ BAD = [
     ("compare --stroke nan", "--stroke nan"),
     ("compare --load pull", 'Choose from: "mean", "point", "patch"'),
     ("compare --plane stress --solvers fem-nonlinear", "fem-nonlinear: .* plane strain only"),
+    ("compare --law hooke", 'Choose from: "linear", "neo-hookean", "st-venant-kirchhoff"'),
+    (
+        "compare --law st-venant-kirchhoff",
+        r"none of the solvers has it \(fem has linear; pinn-std has linear, neo-hookean\)",
+    ),
+    ("solve fem --law neo-hookean", r"--law neo-hookean: none of the solvers has it \(fem has linear\)"),
+    ("gridsearch --law neo-hookean", r"--law neo-hookean: none of the solvers has it \(pinn-std has linear"),
+    ("compare --plane stress --law neo-hookean", "the neo-hookean law is given for plane strain only"),
     # solvers and their settings
     ("compare --solvers fem,fem", "named twice: fem, fem"),
     ("compare --solvers fem --reference pinn-std", "reference 'pinn-std' is not among the solvers fem"),
@@ -419,6 +428,19 @@ def test_one_solver_alone(folder, capsys):
     assert pyvista.read("fields/fem.vtu").n_cells > 1000
 
 
+def test_one_solver_that_follows_the_load_has_its_forces_beside_the_fields(folder, capsys):
+    options = "--mesh-size 1.0 --load patch --slide --stroke 2 --law st-venant-kirchhoff"
+    assert main(["solve", "fem-nonlinear", *options.split(), "--out", "fields/pressed.vtu"]) == 0
+    written = [
+        "fields/pressed.vtu",
+        *(f"fields/pressed_force_displacement.{kind}" for kind in ("csv", "png")),
+    ]
+    assert capsys.readouterr().out.splitlines()[-3:] == written
+    rows = list(csv.DictReader(Path(written[1]).read_text().splitlines()))
+    assert rows[0]["law"] == "st-venant-kirchhoff"
+    assert rows[-1]["travel_mm"] == "2.0"
+
+
 def test_the_mesh_alone(folder, capsys):
     assert main(["mesh", "--mesh-size", "1.0", "--out", "here"]) == 0
     assert "triangles, area" in capsys.readouterr().out
@@ -505,8 +527,8 @@ def test_help_names_every_option_of_the_main_job(capsys):
     assert main(["compare", "--help"]) == 0
     text = capsys.readouterr().out
     options = (
-        "design set mesh-size young poisson plane load stroke slide solvers solver-set seed preset device "
-        "measurements reference out resume quiet json"
+        "design set mesh-size young poisson plane law load stroke slide solvers solver-set seed preset "
+        "device measurements reference out resume quiet json"
     )
     assert all(f"--{option} " in text for option in options.split())
     assert "[default: ()]" not in text

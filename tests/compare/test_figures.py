@@ -20,7 +20,7 @@ from compare.verdict import certified
 from geometry.design import Design
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
-from solvers.problem import Problem
+from solvers.problem import Load, Problem
 
 
 def with_certificate(evaluation: Evaluation, mesh: TriangleMesh) -> Evaluation:
@@ -45,12 +45,16 @@ def figures(
     failed: Evaluation,
     observe: Callable[..., Observations],
 ) -> dict[str, Figure]:
-    """All pictures of three solvers, of which one failed, with one marker not seen."""
+    """All pictures of three solvers, of which one followed the load and failed, with one marker not seen."""
+    steps = np.array([0.0, 0.2, 0.6])
+    record = {"load_fraction": steps, "energy": steps**2, "reaction_x": 0 * steps, "reaction_y": -(steps**2)}
+    followed = replace(with_certificate(failed, mesh), history=record)
     drawn = draw_all(
         tmp_path_factory.mktemp("figures"),
         design=Design(),
         mesh=mesh,
-        evaluations=[fem, with_certificate(pinn, mesh), with_certificate(failed, mesh)],
+        load=Load(),
+        evaluations=[fem, with_certificate(pinn, mesh), followed],
         observations=observe(fem.marker_displacement, hidden=(1,)),
         reference=fem,
         progress=lambda done, what: said.append((done, what)),
@@ -59,7 +63,7 @@ def figures(
 
 
 FIELDS = tuple(quantity.name for quantity in QUANTITIES)
-ALL = ("overlay", "marker_errors", *FIELDS, "excess", "energy", "design", "mesh")
+ALL = ("overlay", "marker_errors", *FIELDS, "force_displacement", "excess", "energy", "design", "mesh")
 
 
 def test_the_pictures_come_in_the_order_of_the_report(figures: dict[str, Figure]) -> None:
@@ -100,6 +104,7 @@ def test_six_solvers_find_room_too(
         tmp_path,
         design=Design(),
         mesh=mesh,
+        load=Load(),
         evaluations=[fem, pinn, failed, *more],
         observations=observations,
         reference=fem,
@@ -169,6 +174,6 @@ def test_the_overlay_shows_the_whole_of_every_solution_that_converged(
 
 
 def test_the_reference_energy_is_a_line(figures: dict[str, Figure], pages: dict[Path, Page]) -> None:
-    energies, distances = pages[figures["energy"].path].figure.axes
+    energies, distances, *_ = pages[figures["energy"].path].figure.axes
     assert [2.0, 2.0] in [list(line.get_ydata()) for line in energies.get_lines()]
     np.testing.assert_allclose(distances.get_lines()[0].get_ydata(), [44.0, 1.0, 0.21])

@@ -110,10 +110,12 @@ def rows(path: Path) -> list[dict[str, str]]:
 
 def test_every_file_of_the_design_is_there(finished):
     pictures = (
-        "design energy marker_errors mesh overlay strain_principal strain_xx strain_xy strain_yy von_mises"
+        "design energy force_displacement marker_errors mesh overlay strain_principal strain_xx strain_xy "
+        "strain_yy von_mises"
     )
     assert sorted(files(finished)) == sorted(
         ["report.html", "metrics.json", "run.json", "markers.csv", "summary.csv", "observations.csv"]
+        + ["force_displacement.csv"]
         + [f"figures/{name}.png" for name in pictures.split()]
         + ["fields/fem.vtu", "fields/fem-nonlinear.vtu", "solutions/fem.npz", "solutions/fem-nonlinear.npz"]
     )

@@ -6,17 +6,22 @@ import torch
 
 from solvers.elasticity import (
     Plane,
+    energy_density_of,
     lame_constants,
     linear_energy_density,
     linear_stress,
-    neo_hookean_energy_density,
-    neo_hookean_stress,
     small_strain,
+    stress_of,
     von_mises,
 )
 from solvers.problem import Material
 
 YOUNG, POISSON = 11.4, 0.45
+FINITE = ("neo-hookean", "st-venant-kirchhoff")
+
+
+def rotation(angle: float) -> np.ndarray:
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
 
 
 def test_printed_constants_of_the_paper_are_plane_stress():
@@ -60,34 +65,65 @@ def test_infinitesimal_rotation_has_no_stress():
     assert max(abs(component).max() for component in stress) == 0.0
 
 
+@pytest.mark.parametrize("law", FINITE)
 @pytest.mark.parametrize("angle", [0.3, 2.0, 3.1])
-def test_finite_rotation_has_no_stress_in_the_neo_hookean_law(angle):
-    rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    stress = neo_hookean_stress(rotation[None] - np.eye(2), lame_constants(YOUNG, POISSON, "strain"), np.log)
+def test_finite_rotation_has_no_stress(law, angle):
+    lame = lame_constants(YOUNG, POISSON, "strain")
+    stress = stress_of(law, rotation(angle)[None] - np.eye(2), lame, np.log)
     assert max(abs(component).max() for component in stress) < 1e-13
 
 
-def test_neo_hookean_stress_is_the_derivative_of_its_energy():
+@pytest.mark.parametrize("law", FINITE)
+def test_rotated_state_has_the_same_energy_and_the_rotated_stress(law):
+    """Objectivity: F -> Q F leaves ψ as it is and makes σ into Q σ Q^T."""
+    lame, q = lame_constants(YOUNG, POISSON, "strain"), rotation(0.7)
+    deformation = np.eye(2) + np.random.default_rng(3).uniform(-0.3, 0.3, (20, 2, 2))
+    before, after = deformation - np.eye(2), q @ deformation - np.eye(2)
+    np.testing.assert_allclose(
+        energy_density_of(law, after, lame, np.log), energy_density_of(law, before, lame, np.log), rtol=1e-12
+    )
+    tensors = []
+    for gradient in (before, after):
+        xx, yy, xy, zz = stress_of(law, gradient, lame, np.log)
+        tensors.append((np.array([[xx, xy], [xy, yy]]).transpose(2, 0, 1), zz))
+    np.testing.assert_allclose(tensors[1][0], q @ tensors[0][0] @ q.T, atol=1e-12)
+    np.testing.assert_allclose(tensors[1][1], tensors[0][1], rtol=1e-12)
+
+
+@pytest.mark.parametrize("law", FINITE)
+def test_stress_is_the_derivative_of_the_energy(law):
     lame = lame_constants(YOUNG, POISSON, "strain")
     gradient = torch.tensor(np.random.default_rng(1).uniform(-0.2, 0.2, (20, 2, 2)), requires_grad=True)
-    neo_hookean_energy_density(gradient, lame, torch.log).sum().backward()
+    energy_density_of(law, gradient, lame, torch.log).sum().backward()
     deformation = np.eye(2) + gradient.detach().numpy()
     # Cauchy stress = P F^T / J with the first Piola stress P = dψ/dF.
     cauchy = gradient.grad.numpy() @ deformation.transpose(0, 2, 1)
     cauchy /= np.linalg.det(deformation)[:, None, None]
-    stress = neo_hookean_stress(gradient.detach().numpy(), lame, np.log)
+    stress = stress_of(law, gradient.detach().numpy(), lame, np.log)
     np.testing.assert_allclose(stress.xx, cauchy[:, 0, 0], rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(stress.yy, cauchy[:, 1, 1], rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(stress.xy, cauchy[:, 0, 1], rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(stress.xy, cauchy[:, 1, 0], rtol=1e-10, atol=1e-12)
 
 
-def test_neo_hookean_law_tends_to_hooke():
+@pytest.mark.parametrize("law", FINITE)
+def test_finite_strain_tends_to_hooke(law):
     lame = lame_constants(YOUNG, POISSON, "strain")
     gradient = 1e-6 * np.random.default_rng(2).normal(size=(20, 2, 2))
-    linear, finite = linear_stress(gradient, lame), neo_hookean_stress(gradient, lame, np.log)
+    linear, finite = linear_stress(gradient, lame), stress_of(law, gradient, lame, np.log)
     for a, b in zip(linear, finite, strict=True):
         np.testing.assert_allclose(b, a, atol=1e-9)
+
+
+def test_st_venant_kirchhoff_stretch_has_the_stress_of_the_closed_form():
+    """Stretch s along x: E_xx = (s^2 - 1) / 2, σ_xx = (λ + 2 μ) E_xx s, σ_yy = σ_zz = λ E_xx / s."""
+    lame, s = lame_constants(YOUNG, POISSON, "strain"), 1.4
+    stress = stress_of("st-venant-kirchhoff", np.array([[[s - 1, 0.0], [0.0, 0.0]]]), lame, np.log)
+    strain = 0.5 * (s * s - 1)
+    assert stress.xx[0] == pytest.approx((lame.λ + 2 * lame.μ) * strain * s, rel=1e-12)
+    assert stress.yy[0] == pytest.approx(lame.λ * strain / s, rel=1e-12)
+    assert stress.zz[0] == pytest.approx(lame.λ * strain / s, rel=1e-12)
+    assert stress.xy[0] == 0.0
 
 
 def test_von_mises_needs_the_out_of_plane_stress():
@@ -99,6 +135,7 @@ def test_von_mises_needs_the_out_of_plane_stress():
     assert von_mises(Plane(*map(np.array, (xx, yy, xy, zz))), np.sqrt) == pytest.approx(expected, rel=1e-12)
 
 
-def test_neo_hookean_plane_stress_is_refused():
-    with pytest.raises(ValueError, match="plane strain only"):
-        Material(plane="stress", law="neo-hookean")
+@pytest.mark.parametrize("law", FINITE)
+def test_finite_strain_in_plane_stress_is_refused(law):
+    with pytest.raises(ValueError, match=f"the {law} law is given for plane strain only"):
+        Material(plane="stress", law=law)
