@@ -161,6 +161,7 @@ class Factorisation:
         preconditioner = self._ksp.getPC()
         preconditioner.setType(PETSc.PC.Type.CHOLESKY)
         preconditioner.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+        preconditioner.destroy()  # the name only: petsc4py would keep it, and the factors, for ever
         self._ksp.setErrorIfNotConverged(True)
         try:
             self._ksp.setUp()

@@ -67,11 +67,13 @@ class LocalEnergy:
         for windows in near:
             first, second = torch.triu_indices(len(windows), len(windows))
             keys.append(windows[first] * units.windows.count + windows[second])
-        known, number = torch.unique(torch.cat(keys), return_inverse=True)
-        pairs = number.split([len(key) for key in keys])
+        count = units.windows.count
+        diagonal = torch.arange(count) * (count + 1)
+        known, number = torch.unique(torch.cat([*keys, diagonal]), return_inverse=True)
+        pairs = number[:-count].split([len(key) for key in keys])
         shares = [torch.from_numpy(weights[cut]) for cut in cuts]
         patches = [Patch(*parts) for parts in zip(places, shares, near, pairs, strict=True)]
-        rows, columns = np.divmod(known.numpy(), units.windows.count)
+        rows, columns = np.divmod(known.numpy(), count)
         return cls(units, material, patches, rows, columns)
 
     @property
@@ -107,8 +109,8 @@ class LocalEnergy:
         for patch, slope, curvature in one_by_one(task, self.patches):
             first.index_add_(0, patch.near, slope)
             blocks.index_add_(0, patch.pairs, curvature)
-        # Windows that reach one patch need not overlap.
-        filled = blocks.abs().amax(dim=(1, 2)).numpy() > 0
+        # Windows that reach one patch need not overlap; one that reaches none keeps its empty diagonal.
+        filled = (blocks.abs().amax(dim=(1, 2)).numpy() > 0) | (self.rows == self.columns)
         parts = (self.rows[filled], self.columns[filled], blocks.numpy()[filled])
         return first, BlockMatrix(self.units.windows.count, *parts)
 

@@ -41,7 +41,8 @@ class BlockMatrix:
         Raises:
             UserError: If the factorisation fails.
         """
-        scale = 1 / np.sqrt(np.abs(self.diagonal()))
+        diagonal = np.abs(self.diagonal())
+        scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
         scaled = self.blocks * scale[self.rows, :, None] * scale[self.columns, None, :]
         scaled[self.rows == self.columns] += regularisation * np.eye(scaled.shape[-1])
         starts = np.searchsorted(self.rows, np.arange(self.size + 1))
@@ -71,6 +72,7 @@ class BlockMatrix:
         except PETSc.Error as error:
             raise UserError("MUMPS cannot factorise the network's output layer; take fewer units") from error
         finally:
-            for item in (vector, result, ksp, stored):
+            # petsc4py would keep the preconditioner, and the factors, for ever.
+            for item in (vector, result, preconditioner, ksp, stored):
                 item.destroy()
         return np.asarray(solution * scale.ravel(), dtype=np.float64)

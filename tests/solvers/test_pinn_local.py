@@ -1,5 +1,8 @@
 """`pinn-local`: windows that sum to one, graded points, and its distance from finite elements."""
 
+import resource
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
@@ -189,6 +192,32 @@ def test_block_matrix_is_solved_as_the_dense_matrix():
     right = rng.normal(size=(2, 12))
     found = BlockMatrix(4, rows, columns, blocks).solve(right, 0.0)
     np.testing.assert_allclose(found, np.linalg.solve(dense, right.T).T, rtol=1e-9)
+
+
+def test_factors_are_freed():
+    """Those of one solve take 18 MB."""
+    blocks = np.eye(1500)[None] + 1e-4
+    matrix, one = BlockMatrix(1, np.zeros(1, dtype=int), np.zeros(1, dtype=int), blocks), np.ones((1, 1500))
+    matrix.solve(one, 0.0)
+
+    def resident() -> int:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+
+    before = resident()
+    for _ in range(10):
+        matrix.solve(one, 0.0)
+    assert resident() - before < 50e6
+
+
+def test_a_window_without_quadrature_points_does_no_harm(coarse_mesh):
+    solver = PinnLocalSolver(wall_spacing=3.0, corner_spacing=0.5, growth=3.0)
+    units = solver.level(Problem(coarse_mesh), 1.0).energy.units
+    corner = coarse_mesh.points[:1] + 0.05
+    energy = LocalEnergy.of(units, Material(), corner, np.ones(1))
+    hessian = energy.derivatives(torch.ones(units.windows.count, 2, units.per_window).double())[1]
+    found = hessian.solve(np.ones((1, 2 * units.windows.count * units.per_window)), 1e-12)
+    assert hessian.size == units.windows.count > len(energy.patches[0].near)
+    assert np.isfinite(found).all()
 
 
 @pytest.mark.slow
