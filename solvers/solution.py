@@ -39,6 +39,30 @@ class Status:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
+class ErrorEstimate:
+    """How far a solution is from the exact one of its problem, as its solver estimates it.
+
+    Attributes:
+        energy_norm: Error in the energy norm over the norm of the solution.
+        displacement: Relative L2 error of the displacement over the body.
+        von_mises: Relative L2 error of the von Mises stress over the body.
+        markers: Exact minus computed displacement at the mesh's markers, shape (m, 2), mm.
+        field: A field that is nearer to the exact one: its distance from the solution's is the error.
+    """
+
+    energy_norm: float
+    displacement: float
+    von_mises: float
+    markers: FloatArray
+    field: DisplacementField
+
+    @property
+    def at_markers(self) -> float:
+        """Largest error of u or v at a marker, mm."""
+        return float(np.abs(self.markers).max())
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class Solution:
     """A displacement field with its problem and how it was found.
 
@@ -51,6 +75,7 @@ class Solution:
         status: How the solve ended.
         stats: Numbers that describe the solve: `seconds`, `unknowns`, ...
         history: Columns of the training or load-stepping record, all of one length; empty for a direct solve.
+        error: The discretisation error, where the solver estimates it.
     """
 
     solver: str
@@ -61,6 +86,7 @@ class Solution:
     status: Status
     stats: Mapping[str, float | int | str]
     history: Mapping[str, FloatArray] = dataclasses.field(default_factory=dict)
+    error: ErrorEstimate | None = None
 
     def displacement(self, points: ArrayLike | Location) -> FloatArray:
         """Displacement at points of shape (n, 2), mm: shape (n, 2), mm.
