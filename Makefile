@@ -2,7 +2,7 @@
 # Arguments go through ARGS, as in: make compare ARGS="--design slender"
 BIN := .venv/bin
 
-.PHONY: help setup compare test lint bench clean
+.PHONY: help setup compare test verification lint bench clean
 .DEFAULT_GOAL := help
 
 help: ## list these targets
@@ -16,6 +16,9 @@ compare: setup ## the main job: compare all solvers on the default finger
 
 test: setup ## run the tests
 	$(BIN)/pytest $(ARGS)
+
+verification: setup ## measure fem against known answers, write docs/verification.md
+	$(BIN)/python -m tests.verification
 
 lint: setup ## check style, format and types
 	$(BIN)/ruff check

@@ -20,6 +20,7 @@ from solvers.fem.conditions import (
 )
 from solvers.fem.error_estimate import ErrorEstimator
 from solvers.fem.lagrange import LagrangeField, LagrangeSpace
+from solvers.fem.locking import locking_advice
 from solvers.problem import Problem
 from solvers.solution import ErrorEstimate, Solution, Status
 from solvers.solver import Progress, check_problem, silent
@@ -68,13 +69,18 @@ class FemSolver:
         if self.estimate and problem.load.kind != "point":
             error = ErrorEstimator(problem, space).estimate(nodal, lambda force: least.unbalanced(force)[1])
         least.factors.destroy()
+        sentence = [
+            "solved directly",
+            _uncertainty(problem, error),
+            locking_advice(self.degree, problem.material),
+        ]
         return Solution(
             solver=self.name,
             problem=problem,
             field=LagrangeField(space, nodal),
             energy=0.5 * float((nodal * residual).sum()),
             reaction=reaction_by_residual_work(space, residual),
-            status=Status(True, f"solved directly; {_uncertainty(problem, error)}"),
+            status=Status(True, "; ".join(filter(None, sentence))),
             stats={
                 "seconds": solved - started,
                 "estimate_seconds": time.perf_counter() - solved,

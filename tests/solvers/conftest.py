@@ -1,5 +1,7 @@
 """Meshes and references for the tests of the solvers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from geometry.mesh import TriangleMesh
 from geometry.settings import MeshSettings
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
+from tests.verification.meshes import mapped_mesh, quadrilateral
 
 
 @pytest.fixture(scope="session")
@@ -35,27 +38,19 @@ def bar_mesh(
         rows: Elements across it.
         contact: Ends of the contact, mm; they must be multiples of length / columns.
     """
-    x, y = np.meshgrid(np.linspace(0, length, columns + 1), np.linspace(-height, 0, rows + 1), indexing="ij")
-    points = np.column_stack([x.ravel(), y.ravel()])
-    inner = (points[:, 0] > 0) & (points[:, 0] < length) & (points[:, 1] < 0) & (points[:, 1] > -height)
-    jitter = np.random.default_rng(0).uniform(-0.2, 0.2, points.shape) * [length / columns, height / rows]
-    points[inner] += jitter[inner]
-    number = np.arange(len(points)).reshape(columns + 1, rows + 1)
-    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
-    triangles = np.concatenate(
-        [np.stack(corners, axis=-1).reshape(-1, 3) for corners in ((a, b, c), (a, c, d))]
-    )
-    top = np.column_stack([number[:-1, -1], number[1:, -1]])
-    middles = points[top, 0].mean(axis=1)
-    return TriangleMesh(
-        points=points,
-        triangles=triangles,
+    body = quadrilateral([(0, -height), (length, -height), (length, 0), (0, 0)])
+    mesh = mapped_mesh(body, columns, rows)
+    top = mesh.boundary("top")
+    middles = mesh.points[top, 0].mean(axis=1)
+    nodes = np.unique(top)
+    return replace(
+        mesh,
         boundaries={
-            "base": np.column_stack([number[0, :-1], number[0, 1:]]),
+            "base": mesh.boundary("left"),
             "front": top,
             "contact": top[(middles > contact[0]) & (middles < contact[1])],
-            "end": np.column_stack([number[-1, :-1], number[-1, 1:]]),
+            "end": mesh.boundary("right"),
         },
-        marker_nodes=number[1:, rows // 2],
-        contact_node=int(number[np.argmin(np.abs(x[:, 0] - sum(contact) / 2)), -1]),
+        contact_node=int(nodes[np.argmin(np.abs(mesh.points[nodes, 0] - sum(contact) / 2))]),
+        _cache={},
     )

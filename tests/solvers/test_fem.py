@@ -1,7 +1,8 @@
-"""`fem` against exact solutions, another program, refinement and itself on two ranks."""
+"""`fem`: refinement, plane states, advice, two ranks; `tests/verification` has the exact solutions."""
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -9,66 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import skfem
-from skfem.models.elasticity import linear_elasticity
 
 from geometry.cache import finger_mesh
 from geometry.design import Design
 from geometry.errors import UserError
 from geometry.settings import MeshSettings
 from solvers.elasticity import Plane, linear_stress
-from solvers.fem.conditions import load_functionals
-from solvers.fem.lagrange import LagrangeSpace
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
-from tests.solvers.conftest import bar_mesh
-
-
-@pytest.mark.parametrize("degree", [1, 2])
-@pytest.mark.parametrize("plane", ["strain", "stress"])
-def test_patch_test(degree, plane):
-    """A bar without lateral contraction, pulled at its end, has the same strain in every element."""
-    mesh = bar_mesh(8.0, 3.0, 8, 3, contact=(0.0, 8.0))
-    mesh = replace(mesh, boundaries={**mesh.boundaries, "contact": mesh.boundaries["end"]}, _cache={})
-    problem = Problem(mesh, Material(poisson=0.0, plane=plane), Load(kind="patch", displacement=(0.1, 0.0)))
-    solution = FemSolver(degree=degree).solve(problem)
-    expected = np.broadcast_to([[0.1 / 8, 0], [0, 0]], (len(mesh.triangles), 2, 2))
-    np.testing.assert_allclose(solution.gradient(mesh.at_centroids()), expected, atol=1e-13)
-    force = problem.material.young * 0.1 / 8 * 3.0
-    np.testing.assert_allclose(solution.reaction, [force, 0.0], atol=1e-12)
-    assert solution.energy == pytest.approx(0.5 * force * 0.1, rel=1e-12)
-
-
-@pytest.mark.parametrize("kind", ["mean", "point"])
-@pytest.mark.parametrize("plane", ["strain", "stress"])
-def test_scikit_fem_finds_the_same_solution(coarse_mesh, kind, plane):
-    """Quadratic elements assembled and solved by another program: only the load's functional is shared."""
-    problem = Problem(coarse_mesh, Material(plane=plane), Load(kind=kind))
-    solution = FemSolver().solve(problem)
-    space = LagrangeSpace(coarse_mesh, 2)
-    basis = skfem.Basis(
-        skfem.MeshTri(coarse_mesh.points.T.copy(), coarse_mesh.triangles.T.copy()),
-        skfem.ElementVector(skfem.ElementTriP2()),
-    )
-    lame = problem.material.lame
-    stiffness = skfem.asm(linear_elasticity(lame.λ, lame.μ), basis)
-    # The two programs number the middles of edges differently: match the nodes by position.
-    dofs = np.zeros((len(space.nodes), 2), dtype=int)
-    for axis in range(2):
-        of_axis = np.concatenate([basis.nodal_dofs[axis], basis.facet_dofs[axis]])
-        order = {tuple(np.round(basis.doflocs[:, dof], 9)): dof for dof in of_axis}
-        dofs[:, axis] = [order[tuple(position)] for position in np.round(space.nodes, 9)]
-    loads = np.zeros((stiffness.shape[0], 2))
-    for column, functional in enumerate(load_functionals(problem, space)):
-        loads[dofs.ravel(), column] = functional.ravel()
-    clamped = dofs[space.boundary_nodes("base")].ravel()
-    influence = np.column_stack(
-        [skfem.solve(*skfem.condense(stiffness, load, D=clamped)) for load in loads.T]
-    )
-    forces = np.linalg.solve(loads.T @ influence, problem.load.values)
-    expected = (influence @ forces)[dofs]
-    assert np.linalg.norm(solution.field.values - expected) / np.linalg.norm(expected) < 1e-8
-    np.testing.assert_allclose(solution.reaction, forces, rtol=1e-8)
 
 
 def test_stress_state_is_three_dimensional(medium_fem, medium_mesh):
@@ -137,6 +86,22 @@ def test_young_cancels_from_the_displacement(coarse_mesh):
 def test_degree_three_is_refused():
     with pytest.raises(UserError, match="degree 1 and 2, not 3"):
         FemSolver(degree=3)
+
+
+@pytest.mark.parametrize(
+    ("degree", "poisson", "plane", "said"),
+    [
+        (1, 0.45, "strain", "lock .* 0.45: their energy is about 1.7 times .* take degree=2"),
+        (1, 0.4999, "strain", "lock .* more than 5 times"),
+        (1, 0.4, "strain", None),
+        (1, 0.45, "stress", None),  # nothing keeps the volume
+        (2, 0.4999, "strain", None),
+    ],
+)
+def test_status_says_that_linear_elements_lock(coarse_mesh, degree, poisson, plane, said):
+    problem = Problem(coarse_mesh, Material(poisson=poisson, plane=plane))
+    message = FemSolver(degree=degree).solve(problem).status.message
+    assert re.search(said, message) if said else "lock" not in message
 
 
 def test_part_without_support_is_reported(coarse_mesh):

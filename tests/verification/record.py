@@ -1,0 +1,112 @@
+"""What a case of verification hands over: numbers, each beside what it has to be."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """Bounds of a number, and the words for them."""
+
+    low: float
+    high: float
+    words: str
+
+
+def about(value: float, tolerance: float) -> Expectation:
+    """A value with an absolute tolerance."""
+    return Expectation(value - tolerance, value + tolerance, f"{value:g} ± {tolerance:.2g}")
+
+
+def between(low: float, high: float) -> Expectation:
+    """Two bounds."""
+    return Expectation(low, high, f"{low:g} to {high:g}")
+
+
+def at_most(high: float) -> Expectation:
+    """An upper bound of a number that cannot be negative."""
+    return Expectation(0.0, high, f"at most {high:g}".replace("e-0", "e-"))
+
+
+@dataclass(frozen=True)
+class Row:
+    """One measured number.
+
+    Attributes:
+        quantity: What was measured, with its unit if it has one.
+        measured: The number.
+        expected: What it has to be.
+        degree: Of the elements.
+        plane: "strain" or "stress".
+    """
+
+    quantity: str
+    measured: float
+    expected: Expectation
+    degree: int
+    plane: str
+
+    @property
+    def passed(self) -> bool:
+        """Whether the number is what it has to be; a NaN is not."""
+        return self.expected.low <= self.measured <= self.expected.high
+
+    @property
+    def shown(self) -> str:
+        """The number; only the power of ten of one that is near rounding, which differs by machine."""
+        if self.measured < 1e-6:
+            return f"below 1e{np.ceil(np.log10(max(self.measured, 1e-16))):.0f}"
+        return f"{self.measured:#.4g}" if self.measured > 0.01 else f"{self.measured:.2g}"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A boundary-value problem with a known answer.
+
+    Attributes:
+        name: A few words.
+        answer: What kind of answer it is.
+        source: Where the answer comes from.
+        text: What is solved and why the bounds are what they are, in Markdown.
+        measure: Solves it.
+    """
+
+    name: str
+    answer: str
+    source: str
+    text: str
+    measure: Callable[[], tuple[Row, ...]]
+
+    @cache  # noqa: B019 - a handful of cases that live as long as the program
+    def rows(self) -> tuple[Row, ...]:
+        """The measured numbers, measured once."""
+        return self.measure()
+
+
+def slope_rows(
+    errors: list[tuple[float, float]],
+    degree: int,
+    plane: str,
+    displacement: Expectation,
+    stress: Expectation,
+    note: str = "",
+) -> list[Row]:
+    """Orders of convergence from the last two of errors on meshes that were each refined twofold.
+
+    Args:
+        errors: Of the displacement in L2 and of the stress in the energy norm, mesh by mesh.
+        degree: Of the elements.
+        plane: "strain" or "stress".
+        displacement: What the order in L2 has to be.
+        stress: What the order in the energy norm has to be.
+        note: Added to the names.
+    """
+    slopes = np.log2(np.array(errors[-2]) / np.array(errors[-1]))
+    names = ("slope of displacement, L2", "slope of stress, energy norm")
+    return [
+        Row(name + note, float(slope), expected, degree, plane)
+        for name, slope, expected in zip(names, slopes, (displacement, stress), strict=True)
+    ]

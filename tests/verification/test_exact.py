@@ -1,0 +1,38 @@
+"""The closed forms are solutions: a misprint in one must not pass for a bug of the finite elements."""
+
+import numpy as np
+import pytest
+
+from solvers.problem import Material
+from tests.verification.cantilever import end_loaded
+from tests.verification.hooke import PlaneLaw
+from tests.verification.manufactured import waves
+from tests.verification.plate_with_hole import kirsch
+
+CLOSED_FORMS = {
+    "waves": lambda material: waves(PlaneLaw.of(material)),
+    "cantilever": end_loaded,
+    "hole": lambda material: kirsch(PlaneLaw.of(material)),
+}
+STEP = 1e-5
+AXES = np.eye(2)
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+@pytest.mark.parametrize("name", CLOSED_FORMS)
+def test_closed_form_obeys_hooke_and_is_in_equilibrium(name, plane):
+    material = Material(poisson=0.37, plane=plane)
+    exact = CLOSED_FORMS[name](material)
+    points = np.random.default_rng(0).uniform(1, 3, (50, 2))
+
+    def derivative(function):
+        pairs = [function(points + STEP * axis) - function(points - STEP * axis) for axis in AXES]
+        return np.stack(pairs, axis=-1) / (2 * STEP)
+
+    stress = exact.stress(points)
+    scale = np.abs(stress).max()
+    of_displacement = PlaneLaw.of(material).stress(derivative(exact.displacement))
+    np.testing.assert_allclose(of_displacement, stress, atol=1e-8 * scale)
+    divergence = np.einsum("nijj->ni", derivative(exact.stress))
+    force = exact.body_force(points) if exact.body_force else np.zeros_like(points)
+    np.testing.assert_allclose(divergence + force, 0, atol=1e-8 * scale)

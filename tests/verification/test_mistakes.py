@@ -1,0 +1,55 @@
+"""Mistakes made on purpose: each has to be seen by the cases that are there to see it."""
+
+import pytest
+import ufl
+
+from geometry.errors import UserError
+from solvers import elasticity
+from solvers.fem import linear
+from tests.verification.cantilever import CANTILEVER
+from tests.verification.cook import COOK
+from tests.verification.manufactured import MANUFACTURED
+from tests.verification.plate_with_hole import KIRSCH
+
+
+def passes(case, **properties):
+    """Whether all rows pass that have the properties."""
+    rows = [
+        row
+        for row in case.measure()
+        if all(getattr(row, name) == value for name, value in properties.items())
+    ]
+    assert rows
+    return all(row.passed for row in rows)
+
+
+def too_much_λ(gradient, lame):
+    return elasticity.linear_energy_density(gradient, lame._replace(λ=1.01 * lame.λ))
+
+
+def half_the_shear(gradient, lame):
+    shear = elasticity.small_strain(gradient, lame).xy
+    return elasticity.linear_energy_density(gradient, lame) - lame.μ * shear * shear
+
+
+def plane_strain_always(young, poisson, plane):
+    return elasticity.lame_constants(young, poisson, "strain")
+
+
+@pytest.mark.parametrize(("mistake", "case"), [(too_much_λ, MANUFACTURED), (half_the_shear, CANTILEVER)])
+def test_wrong_law(mistake, case, monkeypatch):
+    monkeypatch.setattr(linear, "linear_energy_density", mistake)
+    assert not passes(case, degree=2)
+
+
+@pytest.mark.parametrize("case", [COOK, KIRSCH], ids=lambda case: case.name)
+def test_plane_strain_for_plane_stress(case, monkeypatch):
+    monkeypatch.setattr("solvers.problem.lame_constants", plane_strain_always)
+    assert not passes(case, degree=2, plane="stress")
+
+
+def test_too_few_integration_points(monkeypatch):
+    """One point a triangle leaves quadratic elements with motions that cost no energy."""
+    monkeypatch.setattr(linear.ufl, "dx", ufl.dx(metadata={"quadrature_degree": 1}))
+    with pytest.raises(UserError, match="cannot factorise"):
+        MANUFACTURED.measure()
