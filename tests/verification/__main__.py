@@ -1,14 +1,11 @@
 """Measure every case and write docs/verification.md; ends with 1 if a number is out of its bounds."""
 
 import sys
-from pathlib import Path
 
 from rich.console import Console
 
 from tests.verification.cases import CASES
-from tests.verification.document import page
-
-PAGE = Path(__file__).parents[2] / "docs" / "verification.md"
+from tests.verification.document import PAGE, page
 
 
 def main() -> int:

@@ -4,12 +4,14 @@ from itertools import product
 
 import numpy as np
 import skfem
-from scipy.sparse.linalg import splu
+from scipy.sparse import csc_matrix
+from scipy.sparse.linalg import SuperLU, splu
 from skfem.models.elasticity import linear_elasticity
 
-from geometry.arrays import FloatArray
+from geometry.arrays import FloatArray, IntArray
 from geometry.cache import finger_mesh
 from geometry.design import Design
+from geometry.mesh import TriangleMesh
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem, contact_extent, contact_functional
 from tests.verification.record import Case, Row, at_most
@@ -39,22 +41,16 @@ def another_program() -> tuple[Row, ...]:
 
 def scikit_fem(problem: Problem, degree: int) -> tuple[FloatArray, FloatArray, float]:
     """Nodes (n, 2), mm, their displacements (n, 2), mm, and the energy, N mm / mm."""
-    mesh, lame = problem.mesh, problem.material.lame
-    scalar = skfem.ElementTriP1() if degree == 1 else skfem.ElementTriP2()
-    basis = skfem.Basis(
-        skfem.MeshTri(mesh.points.T.copy(), mesh.triangles.T.copy()), skfem.ElementVector(scalar)
-    )
+    basis, clamped, pressed = basis_of(problem.mesh, degree)
+    lame = problem.material.lame
     stiffness = skfem.asm(linear_elasticity(lame.λ, lame.μ), basis).tocsc()
-    middle, width = contact_extent(mesh)
-    clamped = basis.get_dofs(lambda x: np.isclose(x[0], 0)).flatten()
-    pressed = basis.get_dofs(lambda x: np.isclose(x[1], 0) & (np.abs(x[0] - middle) < width / 2))
     moved = np.zeros(basis.N)
     if problem.load.kind == "patch":
         for name, value in zip("12", problem.load.values, strict=True):
             moved[pressed.all(f"u^{name}")] = value
         clamped = np.union1d(clamped, pressed.flatten())
     free = np.setdiff1d(np.arange(basis.N), clamped)
-    factors = splu(stiffness[np.ix_(free, free)], permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    factors = factorised(stiffness, free)
     if problem.load.kind == "patch":
         moved[free] = factors.solve(-(stiffness @ moved)[free])
     else:
@@ -65,8 +61,31 @@ def scikit_fem(problem: Problem, degree: int) -> tuple[FloatArray, FloatArray, f
         forces = np.linalg.solve(functionals[:, free] @ responses, problem.load.values)
         moved[free] = responses @ forces
     energy = 0.5 * float(moved @ (stiffness @ moved))
-    u, v = (basis.get_dofs(elements=True).all(name) for name in ("u^1", "u^2"))
+    u, v = components(basis)
     return basis.doflocs[:, u].T, np.column_stack([moved[u], moved[v]]), energy
+
+
+def basis_of(mesh: TriangleMesh, degree: int) -> tuple[skfem.Basis, IntArray, skfem.DofsView]:
+    """scikit-fem's elements on a finger, its degrees of freedom at the base and those at the contact."""
+    scalar = skfem.ElementTriP1() if degree == 1 else skfem.ElementTriP2()
+    basis = skfem.Basis(
+        skfem.MeshTri(mesh.points.T.copy(), mesh.triangles.T.copy()), skfem.ElementVector(scalar)
+    )
+    middle, width = contact_extent(mesh)
+    clamped = basis.get_dofs(lambda x: np.isclose(x[0], 0)).flatten()
+    pressed = basis.get_dofs(lambda x: np.isclose(x[1], 0) & (np.abs(x[0] - middle) < width / 2))
+    return basis, clamped, pressed
+
+
+def components(basis: skfem.Basis) -> tuple[IntArray, IntArray]:
+    """The degrees of freedom along x and along y, node by node."""
+    u, v = (basis.get_dofs(elements=True).all(name) for name in ("u^1", "u^2"))
+    return u, v
+
+
+def factorised(matrix: csc_matrix, free: IntArray) -> SuperLU:
+    """The factors of the free part of a symmetric matrix."""
+    return splu(matrix[np.ix_(free, free)], permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
 
 ANOTHER_PROGRAM = Case(

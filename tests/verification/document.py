@@ -1,16 +1,19 @@
 """docs/verification.md, from the measured cases."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from tests.verification.record import Case, Row
+
+PAGE = Path(__file__).parents[2] / "docs" / "verification.md"
 
 HEAD = """\
 # Verification of the finite elements
 
 Every other number of this project is judged against `fem`. This page is the evidence that `fem` solves the
 equations that it claims to solve: problems whose answer is known from elsewhere, solved by the code that
-`fem` runs. [Theory](theory.md) has the equations. Whether the equations are those of a printed finger is
-another question, which needs a camera.
+`fem` runs, and for finite strain `fem-nonlinear`. [Theory](theory.md) has the equations. Whether the
+equations are those of a printed finger is another question, which needs a camera.
 
 `make verification` solves all of it again, in less than a minute, and rewrites this page; `make test
 ARGS=tests/verification` fails if a number leaves its bounds or if the page is out of date. Body forces and

@@ -4,9 +4,8 @@ import re
 
 import pytest
 
-from tests.verification.__main__ import PAGE
 from tests.verification.cases import CASES
-from tests.verification.document import page
+from tests.verification.document import PAGE, page
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

@@ -6,6 +6,7 @@ import pytest
 from solvers.problem import Material
 from tests.verification.cantilever import end_loaded
 from tests.verification.hooke import PlaneLaw
+from tests.verification.hyperelastic import Hyperelastic
 from tests.verification.manufactured import waves
 from tests.verification.plate_with_hole import kirsch
 
@@ -36,3 +37,22 @@ def test_closed_form_obeys_hooke_and_is_in_equilibrium(name, plane):
     divergence = np.einsum("nijj->ni", derivative(exact.stress))
     force = exact.body_force(points) if exact.body_force else np.zeros_like(points)
     np.testing.assert_allclose(divergence + force, 0, atol=1e-8 * scale)
+
+
+@pytest.mark.parametrize("law", ["neo-hookean", "st-venant-kirchhoff"])
+@pytest.mark.parametrize("size", [2, 3])
+def test_stress_is_the_derivative_of_the_energy(law, size):
+    elastic = Hyperelastic.of(Material(law=law))
+    rng = np.random.default_rng(0)
+    deformation, change = np.eye(size) + 0.2 * rng.normal(size=(2, 20, size, size))
+
+    def derivative(function):
+        return (function(deformation + STEP * change) - function(deformation - STEP * change)) / (2 * STEP)
+
+    stress = elastic.nominal_stress(deformation)
+    np.testing.assert_allclose(
+        derivative(elastic.energy_density), (stress * change).sum(axis=(1, 2)), rtol=1e-6
+    )
+    np.testing.assert_allclose(
+        derivative(elastic.nominal_stress), elastic.change_of_stress(deformation)(change), atol=1e-6
+    )
