@@ -82,7 +82,7 @@ KIRSCH = Case(
     text="""
 A quarter of a plate of half width 4 mm with a hole of radius 1 mm, ν = 0.3: symmetry on the axes, the exact
 tractions of the infinite plate on the outer edges, and a hole that is a polygon of straight chords. Slopes
-between 32 and 64 distorted cells a quarter. The chords leave a sliver of thickness h² between them and the
+between 32 and 64 distorted cells a quarter. The chords leave a sliver of order h² between them and the
 circle, and turn the normal by an angle of order h that changes its sign within every chord. The first changes
 all displacements by a part of order h²: the slope of P2 in L2 is 2 and not 3. The second averages out over
 each chord, so that the slope of the stress is still 2. A finger with fillets has the same error; straight

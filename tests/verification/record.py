@@ -41,6 +41,7 @@ class Row:
         expected: What it has to be.
         degree: Of the elements.
         plane: "strain" or "stress".
+        error: Relative error on the finest mesh, beside a slope.
     """
 
     quantity: str
@@ -48,6 +49,7 @@ class Row:
     expected: Expectation
     degree: int
     plane: str
+    error: float | None = None
 
     @property
     def passed(self) -> bool:
@@ -59,7 +61,8 @@ class Row:
         """The number; only the power of ten of one that is near rounding, which differs by machine."""
         if self.measured < 1e-6:
             return f"below 1e{np.ceil(np.log10(max(self.measured, 1e-16))):.0f}"
-        return f"{self.measured:#.4g}" if self.measured > 0.01 else f"{self.measured:.2g}"
+        number = f"{self.measured:#.5g}" if self.measured > 0.01 else f"{self.measured:.2g}"
+        return number if self.error is None else f"{self.measured:.3f} (error {self.error:.1e})"
 
 
 @dataclass(frozen=True)
@@ -104,9 +107,8 @@ def slope_rows(
         stress: What the order in the energy norm has to be.
         note: Added to the names.
     """
-    slopes = np.log2(np.array(errors[-2]) / np.array(errors[-1]))
     names = ("slope of displacement, L2", "slope of stress, energy norm")
     return [
-        Row(name + note, float(slope), expected, degree, plane)
-        for name, slope, expected in zip(names, slopes, (displacement, stress), strict=True)
+        Row(name + note, float(np.log2(coarse / fine)), expected, degree, plane, fine)
+        for name, coarse, fine, expected in zip(names, *errors[-2:], (displacement, stress), strict=True)
     ]
