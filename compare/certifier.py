@@ -30,7 +30,7 @@ class Certifier:
         field = LagrangeField(self._space, self._solution)
         self._displacement = field.displacement(self._rule.location)
         self._von_mises = State.from_gradient(self._gradient(self._solution), problem).von_mises
-        self._regions = body_regions(problem.mesh)
+        self._regions = body_regions(problem)
 
     def certificate(self, evaluation: Evaluation) -> Certificate:
         """The certificate of an evaluation of the linear law on the problem's mesh.

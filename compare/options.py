@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf
+from math import cos, inf, radians, sin
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -90,6 +90,10 @@ class PhysicsOptions:
         ),
     ] = None
     stroke: Annotated[float, Parameter(help="How far the indenter presses, mm.")] = 10.0
+    direction: Annotated[
+        float,
+        Parameter(help="Where it presses to: 0 straight into the finger, 90 along it to the tip, degrees."),
+    ] = 0.0
     slide: Annotated[
         bool,
         Parameter(negative="", show_default=False, help="Let the contact slide along the finger: u free."),
@@ -101,11 +105,20 @@ class PhysicsOptions:
             raise UserError(f"--stroke {self.stroke:g}: the indenter presses; give its travel, above 0 mm")
         if self.young == inf:
             raise UserError("--young inf: a rigid finger does not bend; give a finite Young's modulus, MPa")
+        if not -90 < self.direction < 90:
+            raise UserError(f"--direction {self.direction:g}: give an angle between -90 and 90 degrees")
+        if self.slide and self.direction:
+            raise UserError(
+                "--slide leaves the travel along the finger free, so that --direction says nothing"
+            )
+        along, into = sin(radians(self.direction)), cos(radians(self.direction))
         kind = self.load or job_defaults(preset).load
         try:
             return (
                 Material(young=self.young, poisson=self.poisson, plane=self.plane, law=self.law or "linear"),
-                Load(kind=kind, displacement=(None if self.slide else 0.0, -self.stroke)),
+                Load(
+                    kind=kind, displacement=(None if self.slide else self.stroke * along, -self.stroke * into)
+                ),
             )
         except ValidationError as error:
             first = error.errors()[0]

@@ -5,8 +5,8 @@ from scipy.spatial import cKDTree
 
 from geometry.across import boundary_loops
 from geometry.arrays import BoolArray
-from geometry.mesh import TriangleMesh
 from solvers.pinn.grading import mean_thickness, singular_points
+from solvers.problem import Problem, contact_nodes
 
 NEAR = 0.5
 """How far from a corner or the contact still counts as there, in mean wall thicknesses."""
@@ -20,18 +20,19 @@ REGIONS = {
 """Every region and how to say in words what is there."""
 
 
-def body_regions(mesh: TriangleMesh) -> dict[str, BoolArray]:
+def body_regions(problem: Problem) -> dict[str, BoolArray]:
     """The triangles of every region that the mesh has, masks of shape (t,), by the names of `REGIONS`.
 
     A triangle with its centroid within `NEAR` of a re-entrant corner or an end of the base belongs to the
     corners; of the others, one within `NEAR` of the contact's nodes to the contact; of the others, one beyond
     the last cavity to the tip; all others are walls and ribs.
     """
+    mesh = problem.mesh
     centroids = mesh.at_centroids().points
     near = NEAR * mean_thickness(mesh)
     cavities = boundary_loops(mesh)[1:]
     last = max((mesh.points[cavity, 0].max() for cavity in cavities), default=np.inf)
-    contact = mesh.points[np.unique(mesh.boundary("contact"))]
+    contact = mesh.points[contact_nodes(problem)]
     belongs = {
         "corners": cKDTree(singular_points(mesh)).query(centroids)[0] <= near,
         "contact": cKDTree(contact).query(centroids)[0] <= near,

@@ -61,7 +61,8 @@ def load_sentence(load: Load, design: Parameters) -> str:
         for name, value in zip("uv", load.displacement, strict=True)
     ]
     moved = ", ".join(parts).replace(" ", "\N{NO-BREAK SPACE}").replace(",\N{NO-BREAK SPACE}", ", ")
-    about = f"about x = {design.contact_abscissa:g} mm on the front face"
+    middle = design.contact_abscissa if load.position is None else load.position
+    about = f"about x = {middle:g} mm on the front face"
     return f"{where}: {moved}, {about} (load “{load.kind}”)."
 
 

@@ -60,8 +60,19 @@ def edge_quadrature(mesh: TriangleMesh, name: str, points_per_edge: int = 4) -> 
     Returns:
         Points (q, 2), mm, and weights (q,), mm.
     """
-    abscissae, weights = roots_legendre(points_per_edge)
-    start, end = (mesh.points[mesh.boundary(name)[:, k]] for k in range(2))
+    edges = mesh.points[mesh.boundary(name)]
+    return segment_quadrature(edges[:, 0], edges[:, 1], points_per_edge)
+
+
+def segment_quadrature(
+    start: FloatArray, end: FloatArray, points_per_segment: int = 4
+) -> tuple[FloatArray, FloatArray]:
+    """Gauss-Legendre rule on segments from `start` to `end`, both (s, 2), mm.
+
+    Returns:
+        Points (q, 2), mm, and weights (q,), mm.
+    """
+    abscissae, weights = roots_legendre(points_per_segment)
     points = start[:, None] + (0.5 * (1 + abscissae))[None, :, None] * (end - start)[:, None]
     lengths = np.linalg.norm(end - start, axis=1)
     return points.reshape(-1, 2), np.outer(lengths, 0.5 * weights).ravel()

@@ -10,11 +10,11 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from geometry.arrays import FloatArray
+from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
-from geometry.quadrature import edge_quadrature
+from geometry.quadrature import segment_quadrature
 from solvers.elasticity import Lame, LawName, lame_constants
 
 
@@ -58,17 +58,24 @@ class Load(BaseModel):
             the paper; its limit under mesh refinement does not exist. `patch`: every point of the contact has
             the displacement.
         displacement: Prescribed (u, v), mm.
+        position: Abscissa of the contact's middle on the front face, mm; None means where the mesh has its
+            boundary `contact`, whose width the contact has in any case. A `patch` cannot be elsewhere.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["mean", "point", "patch"] = "mean"
     displacement: tuple[float | None, float | None] = (0.0, -10.0)
+    position: float | None = None
 
     @model_validator(mode="after")
     def _acts(self) -> Self:
         if all(value is None for value in self.displacement):
             raise ValueError("the load leaves both components free; prescribe u, v or both (mm)")
+        if self.kind == "patch" and self.position is not None:
+            raise ValueError(
+                "a patch lies on whole elements: mesh the finger with its contact_position there"
+            )
         return self
 
     @property
@@ -93,7 +100,8 @@ class Problem:
         observations: Marker displacements, for the solvers that assimilate them.
 
     Raises:
-        UserError: If part of the mesh is not connected to the base, so that it could move freely.
+        UserError: If part of the mesh is not connected to the base, so that it could move freely, or if the
+            contact is not on the front face.
     """
 
     mesh: TriangleMesh
@@ -113,6 +121,14 @@ class Problem:
                 f"part of the mesh is not connected to the base: {int(free.sum())} nodes, "
                 f"one of them at ({x:.6g}, {y:.6g}) mm"
             )
+        left, right = contact_ends(self)
+        front = self.mesh.points[self.mesh.boundary("front").ravel(), 0]
+        slack = 1e-9 * (front.max() - front.min())
+        if left < front.min() - slack or right > front.max() + slack:
+            raise UserError(
+                f"the contact from x = {left:.6g} to {right:.6g} mm is not on the front face, "
+                f"which runs from {front.min():.6g} to {front.max():.6g} mm"
+            )
 
     @property
     def digest(self) -> str:
@@ -125,10 +141,26 @@ class Problem:
         return sha.hexdigest()
 
 
-def contact_extent(mesh: TriangleMesh) -> tuple[float, float]:
-    """Middle abscissa and width of the contact, mm."""
-    x = mesh.points[mesh.boundary("contact").ravel(), 0]
-    return float(0.5 * (x.min() + x.max())), float(x.max() - x.min())
+POINTS_ON_EDGE = 12
+"""Quadrature points on an edge of the contact: enough where one edge holds the whole contact."""
+
+
+def contact_ends(problem: Problem) -> tuple[float, float]:
+    """Abscissae of the contact's two ends, mm."""
+    x = problem.mesh.points[problem.mesh.boundary("contact").ravel(), 0]
+    if problem.load.position is None:
+        return float(x.min()), float(x.max())
+    half = 0.5 * (x.max() - x.min())
+    return float(problem.load.position - half), float(problem.load.position + half)
+
+
+def contact_nodes(problem: Problem) -> IntArray:
+    """Nodes of the front face between the contact's ends and, if it has none there, the nearest."""
+    left, right = contact_ends(problem)
+    nodes = np.unique(problem.mesh.boundary("front"))
+    outside = np.abs(problem.mesh.points[nodes, 0] - 0.5 * (left + right)) - 0.5 * (right - left)
+    near = outside <= max(float(outside.min()), 1e-9 * (right - left))
+    return np.asarray(nodes[near], dtype=np.int64)
 
 
 def contact_functional(problem: Problem) -> tuple[FloatArray, FloatArray]:
@@ -136,15 +168,31 @@ def contact_functional(problem: Problem) -> tuple[FloatArray, FloatArray]:
 
     For `mean` the weight along the contact of width b, at distance s from its middle, is the raised cosine
     (1 + cos(2 pi s / b)) / b: smooth, zero at both ends, with integral one. For `point` it is the middle
-    node.
+    node, or the point at `position`.
 
     Returns:
         Points (q, 2), mm, and weights (q,) that sum to one.
     """
-    mesh = problem.mesh
-    if problem.load.kind == "point":
+    mesh, load = problem.mesh, problem.load
+    if load.kind == "point" and load.position is None:
         return mesh.points[[mesh.contact_node]], np.ones(1)
-    points, lengths = edge_quadrature(mesh, "contact")
-    middle, width = contact_extent(mesh)
+    left, right = contact_ends(problem)
+    middle, width = 0.5 * (left + right), right - left
+    if load.kind == "point":
+        return _front_between(mesh, middle, np.inf)[0][:1], np.ones(1)
+    points, lengths = segment_quadrature(*_front_between(mesh, left, right), POINTS_ON_EDGE)
     weights = lengths * (1 + np.cos(2 * np.pi * (points[:, 0] - middle) / width)) / width
     return points, weights / weights.sum()
+
+
+def _front_between(mesh: TriangleMesh, left: float, right: float) -> tuple[FloatArray, FloatArray]:
+    """The pieces of the front's edges between two abscissae: their ends, each (s, 2), mm, along x."""
+    ends = mesh.points[mesh.boundary("front")]
+    ends = np.take_along_axis(ends, ends[:, :, :1].argsort(axis=1), axis=1)
+    ends = ends[ends[:, 0, 0].argsort()]
+    start, end = ends[:, 0], ends[:, 1]
+    length = end[:, :1] - start[:, :1]
+    cuts = [np.clip((x - start[:, :1]) / length, 0, 1) for x in (left, right)]
+    inside = (cuts[1] - cuts[0])[:, 0] > 1e-9
+    first, last = (start + cut * (end - start) for cut in cuts)
+    return first[inside], last[inside]

@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.mesh import TriangleMesh
-from solvers.problem import Problem, contact_functional
+from solvers.problem import Problem, contact_functional, contact_nodes
 
 MOMENTS = 12
 """Moments of the displacement that a rigid patch prescribes for each component."""
@@ -39,13 +38,13 @@ def load_conditions(problem: Problem) -> Conditions:
         points, weights = contact_functional(problem)
         return Conditions(points, weights[None], values)
     angles = np.pi * (np.arange(2 * MOMENTS) + 0.5) / (2 * MOMENTS)
-    left, right = contact_ends(problem.mesh)
+    left, right = contact_end_points(problem)
     points = left + 0.5 * (1 + np.cos(angles))[:, None] * (right - left)
     weights = np.cos(np.outer(np.arange(MOMENTS), angles)) / len(angles)
     return Conditions(points, weights, np.pad(values, ((0, 0), (0, MOMENTS - 1))))
 
 
-def contact_ends(mesh: TriangleMesh) -> FloatArray:
-    """The two ends of the contact, shape (2, 2), mm."""
-    nodes = mesh.points[np.unique(mesh.boundary("contact"))]
+def contact_end_points(problem: Problem) -> FloatArray:
+    """The first and the last node of the contact, shape (2, 2), mm."""
+    nodes = problem.mesh.points[contact_nodes(problem)]
     return nodes[[nodes[:, 0].argmin(), nodes[:, 0].argmax()]]

@@ -11,7 +11,6 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.quadrature import body_quadrature
 from solvers.pinn.base_factor import BaseFactor
-from solvers.pinn.conditions import contact_ends
 from solvers.pinn.grading import (
     Spacing,
     graded_quadrature,
@@ -21,12 +20,12 @@ from solvers.pinn.grading import (
 from solvers.pinn.local_level import Level
 from solvers.pinn.local_newton import Path, equilibrium, follow_load
 from solvers.pinn.local_units import LocalField, LocalUnits
+from solvers.pinn.pieces import pool
 from solvers.pinn.windows import Windows
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, check_problem, silent
 
-QUADRATURE_DEGREE = 2
 FINEST = 0.75
 """Spacing of a third level, in that of the second, where the second is not enough."""
 
@@ -94,6 +93,10 @@ class FiniteBasisSolver(ABC):
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Train the network; see `Solver`."""
         check_problem(self, problem)
+        with pool():
+            return self._solve(problem, progress)
+
+    def _solve(self, problem: Problem, progress: Progress) -> Solution:
         started = time.perf_counter()
         rule = body_quadrature(problem.mesh, 1)
         before, change = np.zeros_like(rule.location.points), float("inf")
@@ -140,10 +143,8 @@ class FiniteBasisSolver(ABC):
     def level(self, problem: Problem, scale: float) -> Level:
         """The network with spacings of `scale` times the settings', its quadrature and its load."""
         mesh = problem.mesh
-        extra = contact_ends(mesh) if problem.load.kind == "patch" else np.empty((0, 2))
         spacing = Spacing.of(
-            mesh,
-            extra,
+            problem,
             wall=self.wall_spacing * scale,
             corner=self.corner_spacing * scale,
             growth=self.growth * scale,
@@ -160,7 +161,7 @@ class FiniteBasisSolver(ABC):
             factor=BaseFactor.of(mesh, self.base_length),
             rng=rng,
         )
-        return Level.of(units, problem, *graded_quadrature(triangles, QUADRATURE_DEGREE))
+        return Level.of(units, problem, *graded_quadrature(triangles, spacing, self.cell))
 
     def _status(self, path: Path, change: float, ratio: float) -> Status:
         if path.fraction < 1:

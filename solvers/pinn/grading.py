@@ -10,6 +10,8 @@ from geometry.across import boundary_edges, boundary_loops
 from geometry.arrays import FloatArray, IntArray
 from geometry.mesh import TriangleMesh
 from geometry.quadrature import triangle_rule
+from solvers.pinn.conditions import contact_end_points
+from solvers.problem import Problem, contact_ends, contact_nodes
 
 CORNER_ANGLE = np.radians(10.0)
 """Turn of the boundary from which on it counts as a corner."""
@@ -48,26 +50,26 @@ class Spacing:
     growth: float
 
     @classmethod
-    def of(
-        cls, mesh: TriangleMesh, extra: FloatArray, *, wall: float, corner: float, growth: float
-    ) -> "Spacing":
-        """The spacing for a mesh, in units of its own thicknesses.
+    def of(cls, problem: Problem, *, wall: float, corner: float, growth: float) -> "Spacing":
+        """The spacing for a body, in units of its own thicknesses.
 
         Args:
-            mesh: The body.
-            extra: More points that are as singular as corners, shape (e, 2), mm.
+            problem: The body and its load; the ends of a rigid patch are as singular as sharp corners.
             wall: Spacing in the width of a wall, of a narrower cavity beside it, or of the contact, or in the
                 radius of a fillet.
             corner: Spacing at a sharp corner in mean thicknesses.
             growth: Growth of the spacing per distance from singularities.
         """
+        mesh = problem.mesh
         mean = mean_thickness(mesh)
         boundary, widths = boundary_widths(mesh)
         sharp, round_, radius = re_entrant_points(mesh)
-        contact = mesh.points[np.unique(mesh.boundary("contact"))]
+        if problem.load.kind == "patch":
+            sharp = np.concatenate([sharp, contact_end_points(problem)])
+        left, right = contact_ends(problem)
         kinds = [
-            Singularities(np.concatenate([sharp, extra]), corner * mean),
-            Singularities(contact, wall * float(np.ptp(contact[:, 0]))),
+            Singularities(sharp, corner * mean),
+            Singularities(mesh.points[contact_nodes(problem)], wall * (right - left)),
         ]
         if len(round_):
             kinds.append(Singularities(round_, max(wall * radius, corner * mean)))
@@ -169,8 +171,7 @@ def graded_triangles(mesh: TriangleMesh, spacing: Spacing, share: float) -> Floa
     todo = mesh.points[mesh.triangles]
     done = []
     while len(todo):
-        longest = np.linalg.norm(todo - np.roll(todo, 1, axis=1), axis=2).max(axis=1)
-        cut = longest > share * spacing.at(todo.mean(axis=1))
+        cut = _longest_edge(todo) > share * spacing.at(todo.mean(axis=1))
         done.append(todo[~cut])
         corners = todo[cut]
         middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
@@ -179,13 +180,28 @@ def graded_triangles(mesh: TriangleMesh, spacing: Spacing, share: float) -> Floa
     return np.concatenate(done)
 
 
-def graded_quadrature(triangles: FloatArray, degree: int) -> tuple[FloatArray, FloatArray]:
-    """The element rule of `degree` in triangles (t, 3, 2): points (q, 2), mm, and weights (q,), mm^2."""
+def graded_quadrature(triangles: FloatArray, spacing: Spacing, share: float) -> tuple[FloatArray, FloatArray]:
+    """Points (q, 2), mm, and weights (q,), mm^2, in triangles (t, 3, 2).
+
+    Three points of degree 2, but one in a triangle whose edges are below a quarter of `share` of the spacing:
+    of such there are sixteen where one would do.
+    """
+    small = _longest_edge(triangles) <= 0.25 * share * spacing.at(triangles.mean(axis=1))
+    parts = [_element_rule(triangles[small], 1), _element_rule(triangles[~small], 2)]
+    points, weights = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return points, weights
+
+
+def _element_rule(triangles: FloatArray, degree: int) -> tuple[FloatArray, FloatArray]:
     barycentric, weights = triangle_rule(degree)
     first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     areas = 0.5 * (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
     points = np.einsum("qc,tcx->tqx", barycentric, triangles).reshape(-1, 2)
     return points, np.outer(areas, weights).ravel()
+
+
+def _longest_edge(triangles: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1))
 
 
 def spread_points(triangles: FloatArray, mesh: TriangleMesh, spacing: Spacing, share: float) -> FloatArray:

@@ -7,6 +7,7 @@ dense matrices like better than a sparse matrix of all points and units.
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import torch
 from scipy.spatial import cKDTree
 
@@ -39,4 +40,7 @@ def cut_into_patches(points: FloatArray) -> list[IntArray]:
 
 def boxes_around(patches: Sequence[torch.Tensor]) -> torch.Tensor:
     """Lower left and upper right corners of the boxes around patches of points (n, 2), shape (b, 2, 2)."""
-    return torch.stack([torch.stack(patch.aminmax(dim=0)) for patch in patches])
+    starts = np.cumsum([0, *(len(patch) for patch in patches[:-1])])
+    points = np.concatenate([patch.numpy() for patch in patches])
+    ends = [extreme.reduceat(points, starts) for extreme in (np.minimum, np.maximum)]
+    return torch.from_numpy(np.stack(ends, axis=1))

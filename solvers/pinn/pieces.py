@@ -9,6 +9,7 @@ import ctypes
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from typing import TypeVar
 
@@ -17,6 +18,8 @@ from threadpoolctl import threadpool_limits
 
 PIECE = 2**14
 """Numbers in one array of a piece: an eighth of a megabyte."""
+
+_POOL: ContextVar[ThreadPoolExecutor | None] = ContextVar("_POOL", default=None)
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -34,31 +37,41 @@ def cut(points: int, size: int) -> list[slice]:
 
 def in_threads(task: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
     """`task` of every item, in the items' order, on every thread."""
-    with _pool() as pool:
-        return list(pool.map(task, items))
+    with pool() as threads:
+        return list(threads.map(task, items))
 
 
 def one_by_one(task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
     """The same, each result given up as soon as the next one is asked for."""
-    with _pool() as pool:
-        yield from pool.map(task, items)
+    with pool() as threads:
+        yield from threads.map(task, items)
 
 
 @contextmanager
-def _pool() -> Iterator[ThreadPoolExecutor]:
+def pool() -> Iterator[ThreadPoolExecutor]:
     """A thread for each that torch may use; the threads of torch and of its BLAS rest meanwhile.
 
-    With DOLFINx in the process torch's matrix products may be OpenBLAS's, which has threads of its own and
-    lets callers wait for one another: three times as slow, when measured.
+    Within it the functions of this module use it, and what lies between them has one thread: on busy cores
+    torch's own threads wait for one another after every small operation, which was measured to cost more
+    than half of the time. With DOLFINx in the process torch's matrix products may be OpenBLAS's, which has
+    threads of its own and lets callers wait for one another: three times as slow, when measured.
     """
+    outer = _POOL.get()
+    if outer is not None:
+        yield outer
+        return
     _keep_freed_memory()
     threads = torch.get_num_threads()
     with (
         torch_threads(1),
         threadpool_limits(1, user_api="blas"),
-        ThreadPoolExecutor(threads, initializer=torch.set_num_threads, initargs=(1,)) as pool,
+        ThreadPoolExecutor(threads, initializer=torch.set_num_threads, initargs=(1,)) as made,
     ):
-        yield pool
+        token = _POOL.set(made)
+        try:
+            yield made
+        finally:
+            _POOL.reset(token)
 
 
 @cache

@@ -8,7 +8,7 @@ from geometry.arrays import FloatArray
 from geometry.quadrature import body_quadrature
 from solvers.elasticity import linear_energy_density, linear_stress
 from solvers.pinn.training import Training
-from solvers.problem import Problem, contact_extent, contact_functional
+from solvers.problem import Problem, contact_ends, contact_functional
 from solvers.solution import DisplacementField, Status
 
 ENERGY_CHANGE = 0.01
@@ -57,8 +57,7 @@ def _section_force(
     displacement that grows linearly from the base to the contact, where it is a unit translation.
     """
     start = float(problem.mesh.points[problem.mesh.boundary("base").ravel(), 0].max())
-    middle, width = contact_extent(problem.mesh)
-    end = middle - width / 2
+    end, _ = contact_ends(problem)
     between = (points[:, 0] > start) & (points[:, 0] < end)
     stress = linear_stress(gradient[between], problem.material.lame)
     force = np.zeros(2)

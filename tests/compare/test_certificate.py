@@ -234,13 +234,13 @@ def perfect() -> Certificate:
 
 def test_the_regions_are_the_whole_body_once(finger: TriangleMesh, mesh: TriangleMesh) -> None:
     for body, names in ((finger, list(REGIONS)), (mesh, ["corners", "contact", "walls"])):
-        regions = body_regions(body)
+        regions = body_regions(Problem(body))
         assert list(regions) == names  # a bar has no cavity, so nothing lies beyond the last one
         np.testing.assert_array_equal(sum(here.astype(int) for here in regions.values()), 1)
 
 
 def test_the_regions_are_where_they_are_called(finger: TriangleMesh) -> None:
-    regions = body_regions(finger)
+    regions = body_regions(Problem(finger))
     x, y = finger.at_centroids().points.T
     assert x[regions["tip"]].min() >= 90 - 20
     assert np.abs(x[regions["contact"]] - 35).max() < 1 + 1.5

@@ -98,6 +98,8 @@ BAD = [
     ("compare --stroke 0", "--stroke 0: the indenter presses"),
     ("compare --stroke -10", "--stroke -10: the indenter presses"),  # not the displacement v
     ("compare --stroke nan", "--stroke nan"),
+    ("compare --direction 90", "--direction 90: give an angle between -90 and 90 degrees"),
+    ("compare --direction 5 --slide", "--slide leaves the travel along the finger free"),
     ("compare --load pull", 'Choose from: "mean", "point", "patch"'),
     ("compare --plane stress --solvers fem-nonlinear", "fem-nonlinear: .* plane strain only"),
     ("compare --law hooke", 'Choose from: "linear", "neo-hookean", "st-venant-kirchhoff"'),
@@ -248,9 +250,14 @@ def test_the_options_reach_the_job(folder, capsys, without_pictures):
     told = json.loads(capsys.readouterr().out)
     assert told["design"]["rib_count"] == 5
     assert told["material"] == {"young": 3, "poisson": 0.3, "plane": "stress", "law": "linear"}
-    assert told["load"] == {"kind": "point", "displacement": [None, -4]}
+    assert told["load"] == {"kind": "point", "displacement": [None, -4], "position": None}
     assert told["solvers"]["fem"]["stats"]["degree"] == 1
     assert json.loads(Path("here/run.json").read_text())["mesh"]["size"] == 1
+
+
+def test_the_direction_turns_the_travel_toward_the_tip():
+    _, load = PhysicsOptions(stroke=5.0, direction=30.0).read()
+    assert load.displacement == pytest.approx((2.5, -2.5 * 3**0.5))
 
 
 @pytest.mark.parametrize(
@@ -527,8 +534,8 @@ def test_help_names_every_option_of_the_main_job(capsys):
     assert main(["compare", "--help"]) == 0
     text = capsys.readouterr().out
     options = (
-        "design set mesh-size young poisson plane law load stroke slide solvers solver-set seed preset "
-        "device measurements reference out resume quiet json"
+        "design set mesh-size young poisson plane law load stroke direction slide solvers solver-set seed "
+        "preset device measurements reference out resume quiet json"
     )
     assert all(f"--{option} " in text for option in options.split())
     assert "[default: ()]" not in text

@@ -39,7 +39,7 @@ from tests.solvers.conftest import bar_mesh
 
 @pytest.fixture(scope="module")
 def spacing(coarse_mesh) -> Spacing:
-    return Spacing.of(coarse_mesh, np.empty((0, 2)), wall=0.5, corner=0.05, growth=0.3)
+    return Spacing.of(Problem(coarse_mesh), wall=0.5, corner=0.05, growth=0.3)
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +104,7 @@ def test_points_of_a_fillet_are_no_sharp_corners():
 
 def test_cut_triangles_keep_the_area_and_meet_the_spacing(coarse_mesh, spacing):
     triangles = graded_triangles(coarse_mesh, spacing, 0.6)
-    points, weights = graded_quadrature(triangles, 2)
+    points, weights = graded_quadrature(triangles, spacing, 0.6)
     assert weights.sum() == pytest.approx(coarse_mesh.areas.sum(), rel=1e-12)
     x, y = points.T
     rule = body_quadrature(coarse_mesh, 2)
@@ -112,6 +112,17 @@ def test_cut_triangles_keep_the_area_and_meet_the_spacing(coarse_mesh, spacing):
     assert (weights * x * y).sum() == pytest.approx(expected, rel=1e-12)
     longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
     assert (longest <= 0.6 * spacing.at(triangles.mean(axis=1))).all()
+
+
+def test_triangles_far_smaller_than_the_spacing_take_one_point(coarse_mesh, spacing):
+    triangles = graded_triangles(coarse_mesh, spacing, 0.6)
+    coarse = Spacing.of(Problem(coarse_mesh), wall=5.0, corner=0.05, growth=3.0)
+    longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
+    small = longest <= 0.15 * coarse.at(triangles.mean(axis=1))
+    points, weights = graded_quadrature(triangles, coarse, 0.6)
+    assert 0.2 < small.mean() < 0.99
+    assert len(points) == small.sum() + 3 * (~small).sum()
+    assert weights.sum() == pytest.approx(coarse_mesh.areas.sum(), rel=1e-12)
 
 
 def test_spread_points_keep_their_distance_and_leave_no_hole(coarse_mesh, spacing):

@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from solvers.problem import Load, Material, Problem, contact_extent, contact_functional
+from geometry.errors import UserError
+from solvers.problem import Load, Material, Problem, contact_ends, contact_functional, contact_nodes
 
 
 def test_the_mean_is_weighted_by_a_raised_cosine(coarse_mesh):
     """Its moments over a contact of width b about the middle: 1, 0 and b^2 (1/12 - 1/(2 pi^2))."""
-    points, weights = contact_functional(Problem(coarse_mesh))
-    middle, width = contact_extent(coarse_mesh)
-    assert (middle, width) == pytest.approx((35.0, 2.0))
-    offset = points[:, 0] - middle
+    problem = Problem(coarse_mesh)
+    points, weights = contact_functional(problem)
+    assert contact_ends(problem) == pytest.approx((34.0, 36.0))
+    offset, width = points[:, 0] - 35.0, 2.0
     assert weights.sum() == pytest.approx(1.0, rel=1e-12)
     assert weights @ offset == pytest.approx(0.0, abs=1e-12)
     assert weights @ offset**2 == pytest.approx(width**2 * (1 / 12 - 1 / (2 * np.pi**2)), rel=1e-4)
@@ -34,6 +35,41 @@ def test_the_digest_depends_on_everything_that_defines_the_problem(coarse_mesh, 
     ]
     assert len({problem.digest for problem in problems}) == len(problems)
     assert Problem(coarse_mesh).digest == problems[0].digest
+
+
+@pytest.mark.parametrize("position", [35.0, 47.3, 1.0, 89.0])
+def test_the_mean_can_be_taken_anywhere_on_the_front_face(coarse_mesh, position):
+    """Elements are cut at the contact's ends, so that the moments do not depend on where they lie."""
+    problem = Problem(coarse_mesh, load=Load(position=position))
+    points, weights = contact_functional(problem)
+    assert contact_ends(problem) == pytest.approx((position - 1, position + 1))
+    assert weights @ points == pytest.approx([position, 0.0], abs=1e-9)
+    second = 4 * (1 / 12 - 1 / (2 * np.pi**2))
+    assert weights @ (points[:, 0] - position) ** 2 == pytest.approx(second, rel=1e-3)
+    assert np.abs(coarse_mesh.points[contact_nodes(problem)] - [position, 0]).max() < 1 + 1e-9
+
+
+def test_where_the_mesh_has_its_contact_the_position_changes_nothing(coarse_mesh):
+    for kind in ("mean", "point"):
+        own = contact_functional(Problem(coarse_mesh, load=Load(kind=kind)))
+        given = contact_functional(Problem(coarse_mesh, load=Load(kind=kind, position=35.0)))
+        for ours, theirs in zip(own, given, strict=True):
+            np.testing.assert_allclose(ours, theirs, atol=1e-12)
+
+
+def test_a_point_load_between_two_nodes_is_at_its_position(coarse_mesh):
+    points, weights = contact_functional(Problem(coarse_mesh, load=Load(kind="point", position=41.23)))
+    np.testing.assert_allclose(points, [[41.23, 0.0]], atol=1e-12)
+    assert weights.tolist() == [1.0]
+
+
+def test_a_contact_beyond_the_finger_is_refused(coarse_mesh):
+    with pytest.raises(
+        UserError, match=r"from x = 88\.5 to 90\.5 mm is not on the front face, which runs from 0 to 90"
+    ):
+        Problem(coarse_mesh, load=Load(position=89.5))
+    with pytest.raises(ValidationError, match="mesh the finger with its contact_position there"):
+        Load(kind="patch", position=40.0)
 
 
 @pytest.mark.parametrize(
