@@ -13,7 +13,7 @@ from geometry.cache import finger_mesh
 from geometry.design import Design
 from geometry.mesh import TriangleMesh
 from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Material, Problem, contact_extent, contact_functional
+from solvers.problem import Load, Material, Problem, contact_functional
 from tests.verification.record import Case, Row, at_most
 
 LOADS = ("mean", "point", "patch")
@@ -71,9 +71,9 @@ def basis_of(mesh: TriangleMesh, degree: int) -> tuple[skfem.Basis, IntArray, sk
     basis = skfem.Basis(
         skfem.MeshTri(mesh.points.T.copy(), mesh.triangles.T.copy()), skfem.ElementVector(scalar)
     )
-    middle, width = contact_extent(mesh)
+    contact = mesh.points[mesh.boundary("contact").ravel(), 0]
     clamped = basis.get_dofs(lambda x: np.isclose(x[0], 0)).flatten()
-    pressed = basis.get_dofs(lambda x: np.isclose(x[1], 0) & (np.abs(x[0] - middle) < width / 2))
+    pressed = basis.get_dofs(lambda x: np.isclose(x[1], 0) & (x[0] > contact.min()) & (x[0] < contact.max()))
     return basis, clamped, pressed
 
 
