@@ -8,6 +8,7 @@ from rich.console import Console
 
 BENCHMARKS = {
     "fem": "fem_against_scikit_fem",
+    "million": "million_triangles",
     "pinn": "pinn_against_fem",
     "designs": "networks_on_designs",
     "sizes": "network_sizes",

@@ -11,7 +11,7 @@ from geometry.quadrature import body_quadrature
 from solvers.elasticity import linear_energy_density
 from solvers.fem.conditions import reaction_by_residual_work
 from solvers.fem.lagrange import LagrangeField, LagrangeSpace
-from solvers.fem.linear import LeastEnergy, LinearSystem
+from solvers.fem.least_energy import LeastEnergy, LinearSystem
 from solvers.problem import Problem
 from solvers.solution import State
 

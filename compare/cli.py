@@ -7,7 +7,8 @@ from typing import Annotated
 from cyclopts import App, Group, Parameter
 from rich.console import Console
 
-from compare.exits import EXIT_CODES, NOT_CONVERGED, guarded, say
+from compare.exits import EXIT_CODES, NOT_CONVERGED, say
+from compare.launch import launched
 from compare.options import FingerOptions, PhysicsOptions, SolverOptions, existing
 from geometry.errors import UserError
 
@@ -278,7 +279,7 @@ def solvers() -> int:
 
 def main(arguments: list[str] | None = None) -> int:
     """Entry of `pinnray`."""
-    return guarded(lambda: pinnray(arguments, exit_on_error=False, print_error=False))
+    return launched(lambda: pinnray(arguments, exit_on_error=False, print_error=False))
 
 
 def compare_main(arguments: list[str] | None = None) -> int:

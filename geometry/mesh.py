@@ -82,8 +82,9 @@ class TriangleMesh:
     @cached_property
     def edges(self) -> IntArray:
         """Every edge once, as sorted node numbers, shape (e, 2)."""
-        pairs = self.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-        return np.asarray(np.unique(np.sort(pairs, axis=1), axis=0), dtype=np.int64)
+        first, second = np.sort(self.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1).T
+        numbers = np.unique(first * len(self.points) + second)  # many times faster than unique pairs
+        return np.stack(np.divmod(numbers, len(self.points)), axis=1)
 
     @cached_property
     def digest(self) -> str:
@@ -164,6 +165,11 @@ class TriangleMesh:
             marker_nodes=new[self.marker_nodes],
             contact_node=int(new[self.contact_node]),
         )
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """How to send the mesh to another process: its arrays; what follows from them is not sent."""
+        arrays = (self.points, self.triangles, dict(self.boundaries), self.marker_nodes, self.contact_node)
+        return TriangleMesh, arrays
 
     def save(self, path: Path) -> None:
         """Write the mesh as a NumPy archive."""

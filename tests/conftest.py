@@ -1,7 +1,10 @@
 """What the tests of several folders share."""
 
+import os
+import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -10,6 +13,7 @@ from geometry.cache import finger_mesh
 from geometry.design import Design
 from geometry.mesh import TriangleMesh
 from geometry.settings import MeshSettings
+from geometry.worker import child_environment
 
 PLUGIN = Path(__file__).parent / "solvers" / "plugin"
 
@@ -33,3 +37,26 @@ def plugin_folder(tmp_path_factory) -> Path:
 def coarse_mesh() -> TriangleMesh:
     """The default finger with elements of 1 mm."""
     return finger_mesh(Design(), settings=MeshSettings(size=1.0))
+
+
+@pytest.fixture(scope="session")
+def start_ranks() -> Callable[..., subprocess.Popen[str]]:
+    """`start_ranks(count, *arguments)`: Python with arguments on so many MPI ranks, as one process."""
+    launcher = shutil.which("mpirun")
+    assert launcher, "mpirun comes with DOLFINx"
+
+    def start(count: int, *arguments: str) -> subprocess.Popen[str]:
+        # This process may have initialised MPI itself, and what that left in the environment would confuse
+        # the launcher.
+        return subprocess.Popen(
+            [
+                *(launcher, "--quiet", "--allow-run-as-root", "--oversubscribe", "-n", str(count)),
+                *(sys.executable, *arguments),
+            ],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=child_environment(os.environ),
+        )
+
+    return start

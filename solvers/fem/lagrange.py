@@ -42,8 +42,7 @@ class LagrangeSpace:
         """Nodes of every element, shape (t, 3) or (t, 6)."""
         if self.degree == 1:
             return self.mesh.triangles
-        edges = np.sort(self.mesh.triangles[:, EDGES], axis=2)
-        return np.concatenate([self.mesh.triangles, self._edge_numbers(edges)], axis=1)
+        return np.concatenate([self.mesh.triangles, self.edge_nodes(self.mesh.triangles[:, EDGES])], axis=1)
 
     def boundary_nodes(self, name: str) -> IntArray:
         """Nodes on a named boundary, each once."""
@@ -51,7 +50,14 @@ class LagrangeSpace:
         nodes = np.unique(edges)
         if self.degree == 1:
             return nodes
-        return np.concatenate([nodes, self._edge_numbers(np.sort(edges, axis=1))])
+        return np.concatenate([nodes, self.edge_nodes(edges)])
+
+    def edge_nodes(self, edges: IntArray) -> IntArray:
+        """Nodes in the middles of edges given as pairs of nodes, shape (..., 2), for degree 2."""
+        count = len(self.mesh.points)
+        low, high = edges.min(axis=-1), edges.max(axis=-1)
+        keys = self.mesh.edges[:, 0] * count + self.mesh.edges[:, 1]
+        return np.asarray(count + np.searchsorted(keys, low * count + high), dtype=np.int64)
 
     def at_nodes(self) -> Location:
         """The location of every node, in the order of the nodes."""
@@ -97,14 +103,6 @@ class LagrangeSpace:
         columns = self.cell_nodes[location.cells]
         rows = np.arange(len(location) + 1) * columns.shape[1]
         return csr_matrix((values.ravel(), columns.ravel(), rows), shape=(len(location), len(self.nodes)))
-
-    def _edge_numbers(self, edges: IntArray) -> IntArray:
-        """Node numbers of the middles of edges given as sorted node pairs, shape (..., 2)."""
-        count = len(self.mesh.points)
-        keys = self.mesh.edges[:, 0] * count + self.mesh.edges[:, 1]
-        return np.asarray(
-            count + np.searchsorted(keys, edges[..., 0] * count + edges[..., 1]), dtype=np.int64
-        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from solvers.fem.conditions import (
     reaction_by_residual_work,
 )
 from solvers.fem.lagrange import LagrangeField, LagrangeSpace
+from solvers.fem.ranks import on_all_ranks
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, check_problem, silent
@@ -69,6 +70,9 @@ class FemNonlinearSolver:
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve the finite-strain problem; see `Solver`. The material law must be one of finite strain."""
         check_problem(self, problem)
+        return on_all_ranks(self._solve, problem, progress)
+
+    def _solve(self, problem: Problem, progress: Progress) -> Solution:
         started = time.perf_counter()
         space = LagrangeSpace(problem.mesh, self.degree)
         newton = _Newton(self, problem, space)

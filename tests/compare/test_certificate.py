@@ -22,7 +22,8 @@ from geometry.mesh import TriangleMesh
 from geometry.settings import MeshSettings
 from solvers.fem.conditions import load_functionals
 from solvers.fem.lagrange import LagrangeField, LagrangeSpace
-from solvers.fem.linear import FemSolver, LeastEnergy
+from solvers.fem.least_energy import LeastEnergy
+from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, Status
 

@@ -10,7 +10,8 @@ from geometry.design import Design
 from geometry.settings import MeshSettings
 from solvers.fem.error_estimate import ErrorEstimator
 from solvers.fem.lagrange import LagrangeField, LagrangeSpace
-from solvers.fem.linear import FemSolver, LeastEnergy, LinearSystem
+from solvers.fem.least_energy import LeastEnergy, LinearSystem
+from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, State
 from tests.solvers.conftest import bar_mesh

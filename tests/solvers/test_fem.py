@@ -1,11 +1,6 @@
-"""`fem`: refinement, plane states, advice, two ranks; `tests/verification` has the exact solutions."""
+"""`fem`: refinement, plane states, advice; `tests/verification` has the exact solutions."""
 
-import json
-import os
 import re
-import shutil
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -115,43 +110,6 @@ def test_part_without_support_is_reported(coarse_mesh):
     )
     with pytest.raises(UserError, match="not connected to the base"):
         Problem(twice)
-
-
-@pytest.mark.mpi
-def test_two_ranks_give_the_same_numbers(coarse_mesh, tmp_path):
-    launcher = shutil.which("mpirun")
-    # This process has initialised MPI itself; what that left in the environment would confuse the launcher.
-    environment = {
-        key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))
-    }
-    assert launcher, "mpirun comes with DOLFINx"
-    coarse_mesh.save(tmp_path / "mesh.npz")
-    code = (
-        "import json, sys\n"
-        "from pathlib import Path\n"
-        "from mpi4py import MPI\n"
-        "from geometry.mesh import TriangleMesh\n"
-        "from solvers.fem.linear import FemSolver\n"
-        "from solvers.problem import Problem\n"
-        "mesh = TriangleMesh.load(Path(sys.argv[1]))\n"
-        "solution = FemSolver().solve(Problem(mesh))\n"
-        "if MPI.COMM_WORLD.rank == 0:\n"
-        "    print(json.dumps([solution.energy, solution.displacement(mesh.markers).tolist()]))\n"
-    )
-    done = subprocess.run(
-        [
-            *(launcher, "--allow-run-as-root", "--oversubscribe", "-n", "2"),
-            *(sys.executable, "-c", code, str(tmp_path / "mesh.npz")),
-        ],
-        capture_output=True,
-        text=True,
-        check=True,
-        env=environment,
-    )
-    energy, displacement = json.loads(done.stdout.splitlines()[-1])
-    alone = FemSolver().solve(Problem(coarse_mesh))
-    assert energy == pytest.approx(alone.energy, rel=1e-10)
-    np.testing.assert_allclose(displacement, alone.displacement(coarse_mesh.markers), atol=1e-8)
 
 
 def test_stress_helper_is_the_one_law():

@@ -15,7 +15,7 @@ from geometry.locate import Location
 from geometry.mesh import TriangleMesh
 from geometry.quadrature import Quadrature, edge_quadrature
 from solvers.fem.lagrange import LagrangeField, LagrangeSpace
-from solvers.fem.linear import LinearSystem
+from solvers.fem.least_energy import LinearSystem
 from solvers.problem import Material, Problem
 from solvers.solution import State
 from tests.verification.hooke import PlaneLaw

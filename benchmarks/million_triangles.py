@@ -1,0 +1,106 @@
+"""A finger of a million triangles on one and on two MPI ranks, factorised and iterated: time and memory.
+
+Takes several minutes, and 8 GB of memory. The mesh is made once and kept; its time is in the title if it was.
+"""
+
+import json
+import os
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from rich.table import Table
+
+from geometry.cache import finger_mesh
+from geometry.design import Design
+from geometry.mesh import TriangleMesh
+from geometry.settings import MeshSettings
+from geometry.worker import child_environment
+from solvers.fem.linear import FemSolver
+from solvers.problem import Problem
+
+SIZE_MM = 0.0333
+PATIENCE_S = 3600.0
+CASES = [
+    (degree, linear_solver, ranks)
+    for degree in (1, 2)
+    for linear_solver in ("direct", "iterative")
+    for ranks in (1, 2)
+]
+
+
+def main() -> Table:
+    """Solve in processes of their own, so that the memory of each is its own."""
+    started = time.perf_counter()
+    mesh = finger_mesh(Design(), settings=MeshSettings(size=SIZE_MM), timeout_s=PATIENCE_S)
+    seconds = time.perf_counter() - started
+    table = Table(title=f"{len(mesh.triangles):,} triangles (mesh made or read in {seconds:.0f} s)")
+    for column in (
+        *("degree", "unknowns", "linear solver", "ranks", "reading, s", "solve, s", "iterations"),
+        *("memory of rank 0, GB", "of all, GB", "markers differ by, mm"),
+    ):
+        table.add_column(column, justify="right")
+    first: dict[int, list[list[float]]] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "mesh.npz"
+        mesh.save(path)
+        for degree, linear_solver, ranks in CASES:
+            found = _on_ranks(ranks, path, degree, linear_solver)
+            reference = first.setdefault(degree, found["markers"])
+            difference = np.abs(np.subtract(found["markers"], reference)).max()
+            table.add_row(
+                str(degree),
+                f"{found['unknowns']:,}",
+                linear_solver,
+                str(ranks),
+                f"{found['reading']:.1f}",
+                f"{found['seconds']:.1f}",
+                str(found["iterations"] or "-"),
+                f"{found['memory'][0]:.2f}",
+                f"{sum(found['memory']):.2f}",
+                f"{difference:.0e}",
+            )
+    return table
+
+
+def _on_ranks(ranks: int, path: Path, degree: int, linear_solver: str) -> dict:
+    launcher = shutil.which("mpirun") or "mpirun"
+    arguments = [sys.executable, "-m", "benchmarks.million_triangles", str(path), str(degree), linear_solver]
+    done = subprocess.run(
+        [launcher, "--quiet", "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), *arguments],
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+        env={**child_environment(os.environ), "OMP_NUM_THREADS": "1"},
+    )
+    return json.loads(done.stdout)
+
+
+def _solve(path: str, degree: str, linear_solver: str) -> None:
+    """What every rank does."""
+    from mpi4py import MPI
+
+    started = time.perf_counter()
+    problem = Problem(TriangleMesh.load(Path(path)))
+    reading = time.perf_counter() - started
+    solution = FemSolver(int(degree), estimate=False, linear_solver=linear_solver).solve(problem)
+    memory = MPI.COMM_WORLD.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20)
+    if MPI.COMM_WORLD.rank == 0:
+        report = {
+            "reading": reading,
+            "seconds": solution.stats["seconds"],
+            "unknowns": solution.stats["unknowns"],
+            "iterations": solution.stats.get("iterations", 0),
+            "memory": memory,
+            "markers": solution.field.values[problem.mesh.marker_nodes].tolist(),
+        }
+        print(json.dumps(report))
+
+
+if __name__ == "__main__":
+    _solve(*sys.argv[1:])

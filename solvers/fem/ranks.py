@@ -1,0 +1,163 @@
+"""MPI ranks that serve a command: rank 0 runs it, the others take part in its solves and nothing else.
+
+Without a `Crew` every rank runs the whole program, and its finite-element spaces are distributed over all
+ranks. With one (`mpirun -n 2 compare ...`) a space is rank 0's own, but for those made `on_all_ranks`.
+"""
+
+import math
+import os
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from mpi4py import MPI
+
+from geometry.worker import child_environment
+from solvers.problem import Problem
+from solvers.solver import Progress, silent
+
+TASK, DISMISSAL = 1, 2
+"""Tags of messages from rank 0: a task with its problem, the exit code of the command."""
+
+FAULT = 1
+"""Exit code of a program that has a fault."""
+
+PATIENCE_S = 5.0
+"""How long a rank on which a task failed waits for its end on the others, before it ends them."""
+
+POLL_S = 0.005
+"""Idle ranks sleep so long between looks at their messages; MPI would look all the time, and heat a core."""
+
+Answer = TypeVar("Answer")
+
+
+def communicator() -> MPI.Comm:
+    """The ranks that share a new finite-element space: all, or this one alone if the crew is idle."""
+    crew = _crew.get()
+    return MPI.COMM_WORLD if crew is None or crew.at_work else MPI.COMM_SELF
+
+
+def on_all_ranks(task: Callable[[Problem, Progress], Answer], problem: Problem, progress: Progress) -> Answer:
+    """Do a collective task; rank 0 of a crew has the others do it too.
+
+    Args:
+        task: A method of an object that can be pickled, or a function of a module.
+        problem: Its argument, the same on all ranks.
+        progress: Called on this rank.
+    """
+    crew = _crew.get()
+    if crew is None or crew.at_work:
+        return task(problem, progress)
+    return crew.call(task, problem, progress)
+
+
+def lead(command: Callable[[], Any], guarded: Callable[[Callable[[], Any]], int]) -> int:
+    """Run a command on rank 0 of several, served by the others; the exit code is the same on all of them.
+
+    Args:
+        command: What rank 0 does.
+        guarded: Runs it and says what went wrong, in one line where a user can mend it.
+    """
+    crew = Crew(MPI.COMM_WORLD.Dup())
+    # What this process starts from now on must not take itself for a rank of this run.
+    for name in set(os.environ) - set(child_environment(os.environ)):
+        del os.environ[name]
+    leads = crew.comm.rank == 0
+    # After Ctrl-C the launcher sends SIGTERM to all: rank 0 ends as if it were interrupted itself.
+    if leads:
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    else:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    token = _crew.set(crew)
+    try:
+        code = guarded(command if leads else crew.serve)
+    except Exception:
+        traceback.print_exc()
+        code = FAULT
+    finally:
+        _crew.reset(token)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    if crew.broken:
+        MPI.COMM_WORLD.Abort(code)
+    if leads:
+        crew.dismiss(code)
+    return code
+
+
+@dataclass
+class Crew:
+    """The ranks that serve a command.
+
+    Attributes:
+        comm: For messages between them.
+        at_work: Whether this rank is in a collective task.
+        broken: Whether another rank may be waiting for this one in a task that this one has left.
+    """
+
+    comm: MPI.Comm
+    at_work: bool = False
+    broken: bool = False
+
+    def call(
+        self, task: Callable[[Problem, Progress], Answer], problem: Problem, progress: Progress
+    ) -> Answer:
+        """Do a task on all ranks, of which this is rank 0."""
+        for rank in range(1, self.comm.size):
+            self.comm.send((task, problem), dest=rank, tag=TASK)
+        return self._do(task, problem, progress)
+
+    def serve(self) -> int:
+        """Do what rank 0 sends until it dismisses this rank; the exit code that it gives.
+
+        Raises:
+            Exception: What a task raised here and not on rank 0.
+        """
+        status = MPI.Status()
+        while True:
+            while not self.comm.Iprobe(source=0):
+                time.sleep(POLL_S)
+            message = self.comm.recv(source=0, status=status)
+            if status.tag == DISMISSAL:
+                return int(message)
+            task, problem = message
+            try:
+                self._do(task, problem, silent)
+            except Exception:
+                if self.broken:
+                    raise
+
+    def dismiss(self, code: int) -> None:
+        """Let the other ranks end with an exit code."""
+        for rank in range(1, self.comm.size):
+            self.comm.send(code, dest=rank, tag=DISMISSAL)
+
+    def _do(
+        self, task: Callable[[Problem, Progress], Answer], problem: Problem, progress: Progress
+    ) -> Answer:
+        self.broken = self.at_work = True
+        try:
+            answer = task(problem, progress)
+        except Exception:
+            self._meet(PATIENCE_S)
+            raise
+        finally:
+            self.at_work = False
+        self._meet(math.inf)
+        return answer
+
+    def _meet(self, patience: float) -> None:
+        """Wait so many seconds for the task to end, well or not, on every rank."""
+        request = self.comm.Ibarrier()
+        until = time.monotonic() + patience
+        while self.broken and time.monotonic() < until:
+            self.broken = not request.Test()
+            time.sleep(POLL_S)
+
+
+_crew: ContextVar[Crew | None] = ContextVar("crew", default=None)

@@ -1,0 +1,50 @@
+"""`compare` on one and on two MPI ranks."""
+
+import json
+
+import numpy as np
+import pytest
+
+SMALL = "--design default --mesh-size 1 --solvers fem,fem-nonlinear"
+
+pytestmark = [pytest.mark.mpi, pytest.mark.slow]
+
+
+def numbers(path):
+    """The cells of a CSV file that are numbers."""
+    rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines() if line[0] != "#"]
+    return np.array([[float(cell) for cell in row if is_number(cell)] for row in rows[1:]])
+
+
+def is_number(cell):
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+@pytest.mark.slow
+def test_one_and_two_ranks_give_the_same_tables(start_ranks, tmp_path):
+    """To 1e-8 mm: the order of sums differs."""
+    for ranks in (1, 2):
+        process = start_ranks(
+            ranks, "-m", "compare.cli", *f"compare {SMALL} --quiet --out {tmp_path}/{ranks}".split()
+        )
+        output, errors = process.communicate()
+        assert (process.returncode, output, errors) == (0, "", "")
+    one, two = (numbers(tmp_path / str(ranks) / "markers.csv") for ranks in (1, 2))
+    assert one.shape[0] == 18
+    np.testing.assert_allclose(two, one, rtol=0, atol=1e-8)
+    energies = [
+        [entry["energy"] for entry in json.loads(path.read_text(encoding="utf-8"))["solvers"].values()]
+        for path in sorted(tmp_path.glob("*/metrics.json"))
+    ]
+    np.testing.assert_allclose(*energies, rtol=1e-9)
+
+
+def test_bad_input_on_two_ranks_is_one_line(start_ranks):
+    process = start_ranks(2, "-m", "compare.cli", "compare", "--young", "-1")
+    output, errors = process.communicate()
+    assert (process.returncode, output) == (2, "")
+    assert len(errors.splitlines()) == 1, errors
