@@ -78,5 +78,5 @@ def test_an_interruption_ends_all(start):
     assert process.stdout.readline() == "waiting\n"
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=100)
-    assert process.returncode == 130
-    assert "interrupted" in errors.splitlines()
+    assert process.returncode != 0  # the launcher's own: Open MPI 4 says 1, whatever the ranks say
+    assert errors.splitlines() == ["interrupted"]
