@@ -33,6 +33,7 @@ def relative(difference, reference):
     [
         ([Load(), Load(displacement=(0.0, -3.0)), Load(displacement=(1.0, 2.0))], 1),  # strokes
         ([Load(), Load(displacement=(None, -10.0)), Load(kind="point")], 1),  # other functionals
+        ([Load(), Load(position=50.3), Load(position=21.0)], 1),  # contacts elsewhere
         ([Load(kind="patch"), Load(kind="patch", displacement=(0.0, -3.0))], 1),
         ([Load(), Load(kind="patch"), Load(kind="patch", displacement=(None, -3.0))], 3),  # nodes held
     ],
