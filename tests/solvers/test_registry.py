@@ -7,7 +7,8 @@ from solvers.registry import PRESETS, make_solver, solver_names, usable_solvers
 
 
 def test_settings_are_converted_from_text():
-    assert make_solver("fem", degree="1", estimate="no").settings() == {"degree": 1, "estimate": False}
+    made = make_solver("fem", degree="1", estimate="no", linear_solver="direct")
+    assert made.settings() == {"degree": 1, "estimate": False, "linear_solver": "direct"}
 
 
 @pytest.mark.parametrize(
