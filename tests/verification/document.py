@@ -27,9 +27,9 @@ errors are relative; "plane" is the plane state.
 TAIL = """\
 ## Would a mistake be seen?
 
-The tests make mistakes on purpose and demand that the rows above fail: λ too large by 1 %, the shear's energy
-halved, plane strain taken for plane stress, one integration point a triangle
-(`tests/verification/test_mistakes.py`).
+The tests make mistakes on purpose and demand that rows above fail: λ too large by 1 % (the slope of P2 in L2
+falls from 3 to 0), the shear's energy halved, plane strain taken for plane stress, one integration point a
+triangle (`tests/verification/test_mistakes.py`).
 """
 
 
