@@ -86,6 +86,12 @@ class TriangleMesh:
         numbers = np.unique(first * len(self.points) + second)  # many times faster than unique pairs
         return np.stack(np.divmod(numbers, len(self.points)), axis=1)
 
+    def edge_numbers(self, pairs: IntArray) -> IntArray:
+        """Rows of `edges` of edges given as node pairs, shape (..., 2), in any order: shape (...)."""
+        count, ordered = len(self.points), np.sort(pairs, axis=-1)
+        keys = self.edges[:, 0] * count + self.edges[:, 1]
+        return np.asarray(np.searchsorted(keys, ordered[..., 0] * count + ordered[..., 1]), dtype=np.int64)
+
     @cached_property
     def digest(self) -> str:
         """SHA-256 over every array, in hexadecimal; equal for equal meshes."""

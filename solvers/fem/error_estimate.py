@@ -116,6 +116,17 @@ class ErrorEstimator:
             field=ImprovedField(self.space, nodal + displacement, self.recovery.gradient(nodal)),
         )
 
+    def shares(self, nodal: FloatArray, dual: FloatArray) -> FloatArray:
+        """What every triangle adds to the error of a functional, shape (t,).
+
+        Args:
+            nodal: The solution, shape (N, 2), mm.
+            dual: The functional's dual solution K^-1 j, shape (N, 2).
+        """
+        stress = State.from_gradient(self.gradient_error(nodal), self.problem).stress
+        products = np.einsum("qij,qij->q", stress, self.gradient_error(dual)) * self.rule.weights
+        return np.asarray(products.reshape(len(self.space.mesh.triangles), -1).sum(axis=1))
+
     @cached_property
     def _shapes(self) -> csr_matrix:
         return self.space.shape_functions(self.rule.location)
