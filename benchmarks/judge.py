@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from compare.differences import field_difference
 from compare.evaluation import Evaluation
-from compare.metrics import field_difference
 from geometry.cache import finger_mesh
 from geometry.design import Design
 from geometry.mesh import TriangleMesh

@@ -3,8 +3,8 @@
 import numpy as np
 
 from compare.certificate import ROUNDING, Certificate, Region
+from compare.differences import field_difference
 from compare.evaluation import QUADRATURE_DEGREE, Evaluation
-from compare.metrics import field_difference
 from compare.regions import body_regions
 from geometry.arrays import FloatArray
 from geometry.quadrature import body_quadrature

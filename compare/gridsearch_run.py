@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from compare.atomic import write_json
-from compare.metrics import field_difference
+from compare.differences import field_difference
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.mesh import TriangleMesh

@@ -1,10 +1,11 @@
 """How far each solver is from the measurements and from the reference."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from compare.differences import FieldDifference, ReferenceDifferences, field_difference
 from compare.evaluation import Evaluation
 from geometry.arrays import FloatArray
 from geometry.observations import Observations
@@ -30,40 +31,6 @@ class MarkerErrors(NamedTuple):
     mae_v: float
     mae_sum: float
     mae_rss: float
-
-
-class FieldDifference(NamedTuple):
-    """A field against the reference's, over the whole body.
-
-    Attributes:
-        rel_l2: Area-weighted L2 norm of the difference over that of the reference.
-        mean: Area-weighted mean of the pointwise absolute difference, in the field's unit.
-        p95: Area-weighted 95th percentile of it.
-    """
-
-    rel_l2: float
-    mean: float
-    p95: float
-
-
-class ReferenceDifferences(NamedTuple):
-    """A solver against the reference solver, on the shared mesh.
-
-    Attributes:
-        displacement: Of the displacement vector, mm.
-        von_mises: Of the von Mises stress, MPa.
-        stress: Of the in-plane Cauchy stress components, by name, MPa.
-        strain: Of the in-plane strain components, by name.
-        mae_markers: Mean over the markers of |du| + |dv|, mm.
-        energy: Relative difference of the energy (signed).
-    """
-
-    displacement: FieldDifference
-    von_mises: FieldDifference
-    stress: Mapping[str, FieldDifference]
-    strain: Mapping[str, FieldDifference]
-    mae_markers: float
-    energy: float
 
 
 def marker_errors(evaluation: Evaluation, observations: Observations) -> MarkerErrors:
@@ -101,35 +68,7 @@ def reference_differences(evaluation: Evaluation, reference: Evaluation) -> Refe
     )
 
 
-def field_difference(values: FloatArray, reference: FloatArray, weights: FloatArray) -> FieldDifference:
-    """Difference of two fields given at quadrature points.
-
-    Args:
-        values: Shape (q,) or (q, k).
-        reference: Of the same shape.
-        weights: Quadrature weights, shape (q,), mm^2.
-    """
-    size = _magnitude(values - reference)
-    norm = np.sqrt((weights * _magnitude(reference) ** 2).sum())
-    return FieldDifference(
-        rel_l2=float(np.sqrt((weights * size**2).sum()) / norm) if norm > 0 else float("nan"),
-        mean=float((weights * size).sum() / weights.sum()),
-        p95=weighted_percentile(size, weights, 95),
-    )
-
-
-def weighted_percentile(values: FloatArray, weights: FloatArray, percent: float) -> float:
-    """The value below which `percent` of the total weight lies."""
-    order = np.argsort(values)
-    share = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(share, percent / 100 * share[-1])])
-
-
 def pick_reference(evaluations: Sequence[Evaluation], wanted: str | None = None) -> Evaluation:
     """The evaluation called `wanted`, else `fem`, else the first."""
     named = {evaluation.solver: evaluation for evaluation in evaluations}
     return named.get(wanted or "fem", evaluations[0])
-
-
-def _magnitude(values: FloatArray) -> FloatArray:
-    return np.abs(values) if values.ndim == 1 else np.asarray(np.linalg.norm(values, axis=1))

@@ -10,10 +10,11 @@ from compare import report_text as text
 from compare.atomic import atomic_path
 from compare.certificate import Certificate
 from compare.certificate_text import certificate_sentences
+from compare.differences import ReferenceDifferences
 from compare.evaluation import Evaluation
 from compare.figures import Figure
 from compare.figures.labels import solver_label
-from compare.metrics import MarkerErrors, ReferenceDifferences, marker_errors, reference_differences
+from compare.metrics import MarkerErrors, marker_errors, reference_differences
 from compare.regions import NEAR
 from compare.tables import seconds
 from geometry.mesh import TriangleMesh

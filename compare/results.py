@@ -4,8 +4,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from compare.differences import FieldDifference
 from compare.evaluation import Evaluation
-from compare.metrics import FieldDifference, marker_errors, reference_differences
+from compare.metrics import marker_errors, reference_differences
 from geometry.design import Design
 from geometry.observations import Observations
 from solvers.problem import Load, Material

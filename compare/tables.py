@@ -9,9 +9,10 @@ from rich.table import Table
 
 from compare.atomic import atomic_path
 from compare.certificate import Certificate
+from compare.differences import FieldDifference
 from compare.evaluation import Evaluation
 from compare.figures.labels import solver_label
-from compare.metrics import FieldDifference, marker_errors, reference_differences
+from compare.metrics import marker_errors, reference_differences
 from geometry.observations import Observations
 
 Cell = str | int | float | bool

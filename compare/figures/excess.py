@@ -7,13 +7,13 @@ import matplotlib as mpl
 import numpy as np
 
 from compare.certificate import Certificate
+from compare.differences import weighted_percentile
 from compare.evaluation import Evaluation
 from compare.figures import body
 from compare.figures.canvas import Canvas
 from compare.figures.colours import PERCENT, Scale
 from compare.figures.labels import solver_label
 from compare.figures.style import MUTED, WIDTH, axes_at, figure, heading
-from compare.metrics import weighted_percentile
 from geometry.arrays import FloatArray
 from geometry.mesh import TriangleMesh
 

@@ -8,13 +8,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as MplFigure
 
+from compare.differences import field_difference
 from compare.evaluation import Evaluation
 from compare.figures import body
 from compare.figures.canvas import Canvas, Extent
 from compare.figures.colours import PERCENT, Scale, sequential, symmetric
 from compare.figures.labels import solver_label
 from compare.figures.style import MUTED, WIDTH, axes_at, figure, heading
-from compare.metrics import COMPONENTS, field_difference
+from compare.metrics import COMPONENTS
 from geometry.arrays import FloatArray
 from geometry.mesh import TriangleMesh
 

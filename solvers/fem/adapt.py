@@ -109,13 +109,17 @@ def adapted(
     if not 0 < tolerance < inf:
         raise UserError(f"a tolerance of {tolerance:g} mm at the markers: give a length above 0 mm")
     if problem.load.kind == "point":
-        raise UserError("the solution of a point load has no limit under refinement; take the load mean or patch")
+        raise UserError(
+            "the solution of a point load has no limit under refinement; take the load mean or patch"
+        )
     rounds: list[Round] = []
     while True:
         found, shares = _solve(problem, degree, tolerance)
         mesh = problem.mesh
         rounds.append(found)
-        progress(_done(rounds, tolerance), f"{found.triangles} triangles, {found.at_markers:.2g} mm at the markers")
+        progress(
+            _done(rounds, tolerance), f"{found.triangles} triangles, {found.at_markers:.2g} mm at the markers"
+        )
         if found.at_markers <= tolerance or len(rounds) == most_rounds:
             break
         finer = refined(mesh, largest(shares, SHARE), section)

@@ -4,14 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from compare.differences import field_difference, weighted_percentile
 from compare.evaluation import Evaluation
-from compare.metrics import (
-    field_difference,
-    marker_errors,
-    pick_reference,
-    reference_differences,
-    weighted_percentile,
-)
+from compare.metrics import marker_errors, pick_reference, reference_differences
 from geometry.observations import Observations
 
 
