@@ -155,12 +155,12 @@ def solve(
     out: Annotated[Path, Parameter(help="The VTU file for the fields.")] = Path("out/solution.vtu"),
 ) -> int:
     """Solve one finger with one solver and write its fields, without comparing anything."""
-    from compare.evaluation import Evaluation
     from compare.fields import write_vtu
     from compare.figures.force_chart import draw_force_displacement
     from compare.figures.labels import solver_label
     from compare.force_displacement import force_curves, write_force_displacement
     from compare.stages import Stages
+    from compare.uncertainty import evaluated
     from compare.verdict import certified
     from geometry.cache import finger_mesh
     from solvers.problem import Problem
@@ -182,7 +182,7 @@ def solve(
             problem = Problem(triangles, with_law(material, made), load)
             solution = made.solve(problem, progress)
         with stages.stage("certificate"):
-            (evaluation,) = certified([Evaluation.of(solution, triangles)], problem)
+            (evaluation,) = certified([evaluated(solution, triangles)], problem)
         write_vtu(out, triangles, evaluation)
         written = [out]
         if curves := force_curves([evaluation], load):

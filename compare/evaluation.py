@@ -12,9 +12,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import TypeAdapter
 
 from compare.atomic import atomic_path
 from compare.certificate import Certificate
+from compare.differences import ReferenceDifferences
 from geometry.arrays import FloatArray
 from geometry.mesh import TriangleMesh
 from geometry.quadrature import body_quadrature
@@ -23,6 +25,7 @@ from solvers.solution import Solution
 
 QUADRATURE_DEGREE = 2
 HISTORY_PREFIX = "history_"
+UNCERTAINTY: TypeAdapter[ReferenceDifferences | None] = TypeAdapter(ReferenceDifferences | None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +51,8 @@ class Evaluation:
         stress_zz: Shape (q,), MPa.
         von_mises: Shape (q,), MPa.
         energy_density: Shape (q,), MPa.
+        uncertainty: The solver's estimate of its own error, as differences of the exact solution from it.
+        marker_uncertainty: The same at the markers, absolute, shape (m, 2), mm.
         certificate: What the result is worth by the energy of finite elements; not part of the archive.
     """
 
@@ -69,6 +74,8 @@ class Evaluation:
     stress_zz: FloatArray
     von_mises: FloatArray
     energy_density: FloatArray
+    uncertainty: ReferenceDifferences | None = None
+    marker_uncertainty: FloatArray | None = None
     certificate: Certificate | None = None
 
     @classmethod
@@ -148,7 +155,8 @@ class Evaluation:
             for name in list(arrays)
             if name.startswith(HISTORY_PREFIX)
         }
-        return cls(history=history, **header, **arrays)
+        header["uncertainty"] = UNCERTAINTY.validate_python(header["uncertainty"])
+        return cls(history=history, **(header | arrays))
 
 
 def _plain(value: float | int | str) -> float | int | str:

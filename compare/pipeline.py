@@ -20,6 +20,7 @@ from compare.report import ReportContent, write_report
 from compare.results import metrics
 from compare.stages import Stages
 from compare.tables import write_markers, write_summary
+from compare.uncertainty import evaluated
 from compare.verdict import certified
 from compare.virtual_experiment import virtual_experiment
 from geometry.cache import finger_mesh
@@ -242,7 +243,7 @@ def _evaluate(
             raise
         # A solver that hands its work to another one may return the other's name.
         solution = replace(solution, solver=solver.name)
-        evaluation = Evaluation.of(solution, problem.mesh, observations.points)
+        evaluation = evaluated(solution, problem.mesh, observations.points)
         evaluation.save(kept, key)
     return evaluation
 

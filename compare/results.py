@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from compare.differences import FieldDifference
+from compare.differences import FieldDifference, ReferenceDifferences
 from compare.evaluation import Evaluation
 from compare.metrics import marker_errors, reference_differences
 from geometry.design import Design
@@ -72,16 +72,36 @@ def _solver(
             **means,
         },
         "held_out": None if assimilates else means,
-        "to_reference": {
-            "rel_l2_displacement": differences.displacement.rel_l2,
-            "rel_l2_von_mises": differences.von_mises.rel_l2,
-            "mae_markers": differences.mae_markers,
-            "rel_energy": differences.energy,
-            "displacement": differences.displacement._asdict(),
-            "von_mises": differences.von_mises._asdict(),
-            "stress": _by_component(differences.stress),
-            "strain": _by_component(differences.strain),
-        },
+        "uncertainty": _own_uncertainty(evaluation),
+        "to_reference": _differences(differences)
+        | {"reference_uncertainty": reference.uncertainty and _differences(reference.uncertainty)},
+    }
+
+
+def _own_uncertainty(evaluation: Evaluation) -> dict[str, Any] | None:
+    own, markers = evaluation.uncertainty, evaluation.marker_uncertainty
+    if own is None or markers is None:
+        return None
+    return {
+        "energy_norm": math.sqrt(abs(own.energy)),
+        "rel_l2_displacement": own.displacement.rel_l2,
+        "rel_l2_von_mises": own.von_mises.rel_l2,
+        "mae_markers": own.mae_markers,
+        "markers_u": markers[:, 0].tolist(),
+        "markers_v": markers[:, 1].tolist(),
+    }
+
+
+def _differences(differences: ReferenceDifferences) -> dict[str, Any]:
+    return {
+        "rel_l2_displacement": differences.displacement.rel_l2,
+        "rel_l2_von_mises": differences.von_mises.rel_l2,
+        "mae_markers": differences.mae_markers,
+        "rel_energy": differences.energy,
+        "displacement": differences.displacement._asdict(),
+        "von_mises": differences.von_mises._asdict(),
+        "stress": _by_component(differences.stress),
+        "strain": _by_component(differences.strain),
     }
 
 

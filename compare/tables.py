@@ -9,7 +9,7 @@ from rich.table import Table
 
 from compare.atomic import atomic_path
 from compare.certificate import Certificate
-from compare.differences import FieldDifference
+from compare.differences import ReferenceDifferences
 from compare.evaluation import Evaluation
 from compare.figures.labels import solver_label
 from compare.metrics import marker_errors, reference_differences
@@ -65,7 +65,8 @@ def mae_table(evaluations: Sequence[Evaluation], observations: Observations, ref
         title=f"Mean absolute error at {markers}, mm ({observations.label} displacements)",
         caption=(
             "sum: mean of |Δu| + |Δv| (the paper's text); rss: √(u² + v²) of the two means (its Table I).\n"
-            f"L²: relative difference of the displacement from the reference, {solver_label(reference)}.\n"
+            f"L²: relative difference of the displacement from the reference, {solver_label(reference)}"
+            f"{_own_error(reference)}.\n"
             "above fem: energy of the displacement on fem's elements above the least there."
         ),
         box=SIMPLE_HEAD,
@@ -82,13 +83,24 @@ def mae_table(evaluations: Sequence[Evaluation], observations: Observations, ref
         table.add_row(
             solver_label(evaluation).replace(" (", "\n("),
             *(f"{value:.3f}" for value in (errors.mae_u, errors.mae_v, errors.mae_sum, errors.mae_rss)),
-            "–" if evaluation is reference else f"{100 * distance:.3g}",
+            "–" if evaluation is reference else _with_own_error(distance, reference),
             f"{evaluation.energy:.4g}",
             above_fem(evaluation),
             seconds(evaluation),
             style=None if evaluation.converged else "yellow",
         )
     return table
+
+
+def _own_error(reference: Evaluation) -> str:
+    return (
+        ", ± its own\nestimated error: a smaller difference does not count" if reference.uncertainty else ""
+    )
+
+
+def _with_own_error(distance: float, reference: Evaluation) -> str:
+    own = reference.uncertainty
+    return f"{100 * distance:.3g}" + (f" ±{100 * own.displacement.rel_l2:.1g}" if own else "")
 
 
 def seconds(evaluation: Evaluation) -> str:
@@ -112,12 +124,10 @@ def _summary(evaluation: Evaluation, observations: Observations, reference: Eval
     row |= {"observations": observations.label, "reference": reference.solver}
     row |= {"mae_u_mm": errors.mae_u, "mae_v_mm": errors.mae_v}
     row |= {"mae_sum_mm": errors.mae_sum, "mae_rss_mm": errors.mae_rss}
-    row |= _difference("displacement", to.displacement, "mm") | _difference("von_mises", to.von_mises, "MPa")
-    for name, difference in to.stress.items():
-        row |= _difference(f"stress_{name}", difference, "MPa")
-    for name, difference in to.strain.items():
-        row |= _difference(f"strain_{name}", difference, "1")
-    row |= {"to_reference_markers_mae_sum_mm": to.mae_markers, "to_reference_energy_rel": to.energy}
+    row |= _differences("to_reference", to)
+    empty = dict.fromkeys(_differences("reference_uncertainty", to), "")
+    own = reference.uncertainty
+    row |= _differences("reference_uncertainty", own) if own else empty
     row |= {"energy_N_mm_per_mm": evaluation.energy}
     row |= _certificate(evaluation.certificate)
     row |= {f"reaction_{axis}_N_per_mm": float(evaluation.reaction[n]) for n, axis in enumerate("uv")}
@@ -137,10 +147,17 @@ def _certificate(certificate: Certificate | None) -> dict[str, Cell]:
     return dict(zip(headers, values, strict=True))
 
 
-def _difference(name: str, difference: FieldDifference, unit: str) -> dict[str, Cell]:
-    """Three cells; dimensionless quantities carry the unit 1."""
-    return {
-        f"to_reference_{name}_rel_l2": difference.rel_l2,
-        f"to_reference_{name}_mean_{unit}": difference.mean,
-        f"to_reference_{name}_p95_{unit}": difference.p95,
+def _differences(what: str, differences: ReferenceDifferences) -> dict[str, Cell]:
+    """Three cells a field and two more; dimensionless quantities carry the unit 1."""
+    fields = {"displacement": (differences.displacement, "mm"), "von_mises": (differences.von_mises, "MPa")}
+    fields |= {f"stress_{name}": (difference, "MPa") for name, difference in differences.stress.items()}
+    fields |= {f"strain_{name}": (difference, "1") for name, difference in differences.strain.items()}
+    row: dict[str, Cell] = {}
+    for name, (difference, unit) in fields.items():
+        row[f"{what}_{name}_rel_l2"] = difference.rel_l2
+        row[f"{what}_{name}_mean_{unit}"] = difference.mean
+        row[f"{what}_{name}_p95_{unit}"] = difference.p95
+    return row | {
+        f"{what}_markers_mae_sum_mm": differences.mae_markers,
+        f"{what}_energy_rel": differences.energy,
     }

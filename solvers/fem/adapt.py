@@ -22,7 +22,7 @@ from geometry.section import Section
 from solvers.fem.error_estimate import ErrorEstimator
 from solvers.fem.lagrange import LagrangeSpace
 from solvers.fem.linear import LeastEnergy, LinearSystem
-from solvers.problem import Problem
+from solvers.problem import Load, Problem
 from solvers.solver import Progress, silent
 
 SHARE = 0.6
@@ -73,8 +73,8 @@ class Adaptation:
         first, last = self.rounds[0], self.rounds[-1]
         if not self.reached:
             return (
-                f"the markers are known to {last.at_markers:.2g} mm, not to the {self.tolerance:g} mm asked for: "
-                f"refinement stopped at {last.triangles} triangles; take a larger tolerance"
+                f"the markers are known to {last.at_markers:.2g} mm, not to the {self.tolerance:g} mm asked "
+                f"for: refinement stopped at {last.triangles} triangles; take a larger tolerance"
             )
         return (
             f"the markers are known to {last.at_markers:.2g} mm (asked for: {self.tolerance:g} mm); "
@@ -104,7 +104,7 @@ def adapted(
         progress: Told of every round.
 
     Raises:
-        UserError: If the tolerance is not a length, or the load has no limit to be near to.
+        UserError: As `check_adaptable`.
     """
     if not 0 < tolerance < inf:
         raise UserError(f"a tolerance of {tolerance:g} mm at the markers: give a length above 0 mm")
@@ -127,6 +127,14 @@ def adapted(
             break
         problem = replace(problem, mesh=finer)
     return Adaptation(tolerance, tuple(rounds), mesh)
+
+
+def check_adaptable(tolerance: float, load: Load) -> None:
+    """Raise a `UserError` if the tolerance is not a length, mm, or the load has no limit to be near to."""
+    if not 0 < tolerance < inf:
+        raise UserError(f"a tolerance of {tolerance:g} mm at the markers: give a length above 0 mm")
+    if load.kind == "point":
+        raise UserError("a point load has no limit under refinement to adapt a mesh to; take mean or patch")
 
 
 def largest(shares: FloatArray, part: float) -> BoolArray:
