@@ -9,8 +9,9 @@ from rich.console import Console
 
 from compare.exits import EXIT_CODES, NOT_CONVERGED, say
 from compare.launch import launched
-from compare.options import FingerOptions, PhysicsOptions, SolverOptions, existing
+from compare.options import Adapt, FingerOptions, PhysicsOptions, SolverOptions, existing
 from geometry.errors import UserError
+from solvers.adaptation import Adaptation
 
 OUTPUT = Group("Output", sort_key=4, default_parameter=Parameter(negative="", show_default=False))
 
@@ -29,6 +30,7 @@ def compare(
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
     *,
+    adapt: Adapt = None,
     solvers: Annotated[
         str, Parameter(help="Names with commas between; `pinnray solvers` lists them.")
     ] = "fem,pinn-std",
@@ -75,6 +77,7 @@ def compare(
         design=design,
         solvers=made,
         mesh=mesh,
+        adapt=adapt,
         material=material,
         load=load,
         measurements=existing(measurements),
@@ -98,7 +101,7 @@ def compare(
     unconverged = [evaluation for evaluation in outcome.evaluations if not evaluation.converged]
     for evaluation in unconverged:
         say(f"error: {evaluation.solver} did not converge: {evaluation.message}")
-    return NOT_CONVERGED if unconverged else 0
+    return NOT_CONVERGED if unconverged or not adapted_enough(outcome.adaptation) else 0
 
 
 @pinnray.command
@@ -124,25 +127,37 @@ def design(
 @pinnray.command
 def mesh(
     finger: FingerOptions = FingerOptions(),
+    physics: PhysicsOptions = PhysicsOptions(),
     *,
+    adapt: Adapt = None,
     out: Annotated[Path, Parameter(help="Folder for the files.")] = Path("out/mesh"),
 ) -> int:
-    """Mesh the finger: the shared mesh as a VTU and a NumPy file, and a picture of it."""
+    """Mesh the finger: the shared mesh as a VTU and a NumPy file, and a picture of it.
+
+    Material and load matter for --adapt only.
+    """
+    from compare.adaptation import shared_mesh, write_rounds
     from compare.fields import write_mesh
     from compare.figures.mesh_drawing import draw_mesh
-    from geometry.cache import finger_mesh
+    from compare.stages import Stages
 
     chosen, settings = finger.read()
-    triangles = finger_mesh(chosen, settings=settings)
+    material, load = physics.read()
+    with Stages(Console(stderr=True)) as stages:
+        triangles, adaptation = shared_mesh(
+            chosen, settings, stages, tolerance=adapt, material=material, load=load
+        )
     out.mkdir(parents=True, exist_ok=True)
+    if adaptation is not None:
+        write_rounds(out / "adapt.csv", adaptation)
     write_mesh(out / "mesh.vtu", triangles)
     triangles.save(out / "mesh.npz")
     draw_mesh(out / "mesh.png", triangles)
     nodes, area = len(triangles.points), triangles.areas.sum()
     print(f"{nodes} nodes, {len(triangles.triangles)} triangles, area {area:.4f} mm^2")
-    for name in ("mesh.vtu", "mesh.npz", "mesh.png"):
+    for name in ("mesh.vtu", "mesh.npz", "mesh.png", *(["adapt.csv"] if adaptation else [])):
         print(out / name)
-    return 0
+    return 0 if adapted_enough(adaptation) else NOT_CONVERGED
 
 
 @pinnray.command(help_epilogue=EXIT_CODES)
@@ -152,9 +167,11 @@ def solve(
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
     *,
+    adapt: Adapt = None,
     out: Annotated[Path, Parameter(help="The VTU file for the fields.")] = Path("out/solution.vtu"),
 ) -> int:
     """Solve one finger with one solver and write its fields, without comparing anything."""
+    from compare.adaptation import shared_mesh
     from compare.fields import write_vtu
     from compare.figures.force_chart import draw_force_displacement
     from compare.figures.labels import solver_label
@@ -162,7 +179,6 @@ def solve(
     from compare.stages import Stages
     from compare.uncertainty import evaluated
     from compare.verdict import certified
-    from geometry.cache import finger_mesh
     from solvers.problem import Problem
     from solvers.solver import with_law
 
@@ -176,8 +192,9 @@ def solve(
     physics.check_law(chosen_solvers)
     (made,) = chosen_solvers
     with Stages(Console(stderr=True)) as stages:
-        with stages.stage("mesh"):
-            triangles = finger_mesh(chosen, settings=settings)
+        triangles, adaptation = shared_mesh(
+            chosen, settings, stages, tolerance=adapt, material=material, load=load, solvers=[made]
+        )
         with stages.stage(made.name) as progress:
             problem = Problem(triangles, with_law(material, made), load)
             solution = made.solve(problem, progress)
@@ -194,7 +211,7 @@ def solve(
     print(f"energy {solution.energy:.6g} N mm/mm, reaction ({u:.6g}, {v:.6g}) N/mm")
     for path in written:
         print(path)
-    return 0 if evaluation.converged else NOT_CONVERGED
+    return 0 if evaluation.converged and adapted_enough(adaptation) else NOT_CONVERGED
 
 
 @pinnray.command(help_epilogue=EXIT_CODES)
@@ -275,6 +292,14 @@ def solvers() -> int:
             table.add_row(name, ", ".join(solver.laws), ", ".join(solver.loads), settings)
     Console().print(table)
     return 0
+
+
+def adapted_enough(adaptation: Adaptation | None) -> bool:
+    """Whether the tolerance of --adapt was reached, if there is one; a line on standard error if not."""
+    if adaptation is None or adaptation.reached:
+        return True
+    say(f"error: --adapt {adaptation.tolerance:g}: {adaptation.message}")
+    return False
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -25,6 +25,18 @@ PHYSICS = Group("Physics", sort_key=2)
 TRAINING = Group("Solvers' settings", sort_key=3)
 
 
+Adapt = Annotated[
+    float | None,
+    Parameter(
+        group=FINGER,
+        show_default=False,
+        help="Refine the mesh until fem knows the displacements of the markers to this, mm, by its own "
+        "estimate of its error.",
+    ),
+]
+"""An option of the commands that solve on the mesh that they make."""
+
+
 @Parameter(name="*", group=FINGER)
 @dataclass(frozen=True, kw_only=True)
 class FingerOptions:

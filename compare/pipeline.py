@@ -8,6 +8,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from compare.adaptation import shared_mesh, write_rounds
 from compare.atomic import write_json
 from compare.evaluation import Evaluation
 from compare.fields import write_vtu
@@ -23,12 +24,12 @@ from compare.tables import write_markers, write_summary
 from compare.uncertainty import evaluated
 from compare.verdict import certified
 from compare.virtual_experiment import virtual_experiment
-from geometry.cache import finger_mesh
 from geometry.design import Design
 from geometry.errors import OutsideBodyError, UserError
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
 from geometry.settings import MeshSettings
+from solvers.adaptation import Adaptation, check_adaptable
 from solvers.problem import Load, Material, Problem
 from solvers.solver import Solver, check_load, with_law
 from solvers.training import TrainedSolver, TrainingContext
@@ -43,6 +44,7 @@ class Job:
         design: The finger.
         solvers: The solvers, in the order of tables and pictures.
         mesh: Element sizes.
+        adapt: Tolerance to which `fem` shall know the markers, mm, for which the mesh is refined; None: not.
         material: The elastic constants; each solver takes the law that it has.
         load: What moves the finger.
         measurements: CSV file of marker displacements; None for a virtual experiment.
@@ -54,6 +56,7 @@ class Job:
     design: Design
     solvers: Sequence[Solver]
     mesh: MeshSettings = field(default_factory=MeshSettings)
+    adapt: float | None = None
     material: Material = field(default_factory=Material)
     load: Load = field(default_factory=Load)
     measurements: Path | None = None
@@ -71,12 +74,14 @@ class Outcome:
         evaluations: One for each solver.
         observations: What they were compared with.
         reference: One of the evaluations.
+        adaptation: How the mesh was refined, if that was asked for.
     """
 
     metrics: dict[str, Any]
     evaluations: Sequence[Evaluation]
     observations: Observations
     reference: Evaluation
+    adaptation: Adaptation | None = None
 
 
 def run(job: Job, stages: Stages) -> Outcome:
@@ -89,10 +94,19 @@ def run(job: Job, stages: Stages) -> Outcome:
     _check(job)
     given = read_measurements(job.measurements) if job.measurements else None
     with replaced_folder(job.out, keep=_names(job) if job.resume else ()) as folder:
-        with stages.stage("mesh"):
-            mesh = finger_mesh(job.design, settings=job.mesh)
-            if given:
-                _check_inside(given, mesh)
+        mesh, adaptation = shared_mesh(
+            job.design,
+            job.mesh,
+            stages,
+            tolerance=job.adapt,
+            material=job.material,
+            load=job.load,
+            solvers=job.solvers,
+        )
+        if given:
+            _check_inside(given, mesh)
+        if adaptation is not None:
+            write_rounds(folder / "adapt.csv", adaptation)
         problem = Problem(mesh, job.material, job.load)
         with stages.stage("measurements") as progress:
             observations = given or virtual_experiment(problem, progress)
@@ -145,6 +159,7 @@ def run(job: Job, stages: Stages) -> Outcome:
                 "mesh_sha256": mesh.digest,
                 "problem_sha256": problem.digest,
                 "mesh": job.mesh.model_dump(),
+                "adapt": adaptation and {"tolerance_mm": adaptation.tolerance, "end": adaptation.message},
                 "material": job.material.model_dump(),
                 "load": job.load.model_dump(),
                 "measurements_sha256": file_digest(folder / "observations.csv"),
@@ -172,6 +187,7 @@ def run(job: Job, stages: Stages) -> Outcome:
                     reference=reference,
                     figures=figures,
                     provenance=provenance,
+                    adaptation=adaptation,
                 ),
             )
             files = {
@@ -180,7 +196,7 @@ def run(job: Job, stages: Stages) -> Outcome:
                 if path.is_file() and path.name != RUN_FILE
             }
             write_json(folder / RUN_FILE, {"schema": 1, **provenance, "files_sha256": files})
-    return Outcome(numbers, evaluations, observations, reference)
+    return Outcome(numbers, evaluations, observations, reference, adaptation)
 
 
 def _check(job: Job) -> None:
@@ -190,6 +206,8 @@ def _check(job: Job) -> None:
     names = _names(job)
     if len(set(names)) < len(names):
         raise UserError(f"a solver is named twice: {', '.join(names)}")
+    if job.adapt is not None:
+        check_adaptable(job.adapt, job.load)
     if job.reference is not None and job.reference not in names:
         raise UserError(f"the reference {job.reference!r} is not among the solvers {', '.join(names)}")
     for solver in job.solvers:

@@ -17,9 +17,11 @@ from compare.figures.labels import solver_label
 from compare.metrics import MarkerErrors, marker_errors, reference_differences
 from compare.regions import NEAR
 from compare.tables import seconds
+from compare.uncertainty import indistinct
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
 from geometry.parameters import Parameters
+from solvers.adaptation import Adaptation
 from solvers.problem import Load, Material
 
 
@@ -38,6 +40,7 @@ class ReportContent:
         figures: Pictures in the order in which they appear.
         provenance: What to state of the run (seed, versions, hashes, times); a mapping becomes a group.
         assimilating: Names of the solvers that used the markers: their errors there are training errors.
+        adaptation: How the mesh was refined, if that was asked for.
     """
 
     design: Parameters
@@ -50,6 +53,7 @@ class ReportContent:
     figures: Sequence[Figure]
     provenance: Mapping[str, object]
     assimilating: frozenset[str] = field(default_factory=frozenset)
+    adaptation: Adaptation | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +66,7 @@ class SolverEntry:
     evaluation: Evaluation
     errors: MarkerErrors
     differences: ReferenceDifferences
+    indistinct: str
     reaction: tuple[float, float]
     seconds: str
     certificate: Certificate | None
@@ -98,6 +103,9 @@ def render(content: ReportContent) -> str:
         observations=content.observations,
         reference=content.reference,
         reference_label=solver_label(content.reference),
+        own=content.reference.uncertainty,
+        own_error=text.own_error_sentence(solver_label(content.reference), content.reference),
+        beside=text.beside,
         entries=[_entry(evaluation, content) for evaluation in content.evaluations],
         design_rows=text.design_rows(content.design),
         paper_rows=[(symbol, value) for _, symbol, value in text.design_rows(content.design) if symbol],
@@ -112,13 +120,19 @@ def render(content: ReportContent) -> str:
 
 
 def _entry(evaluation: Evaluation, content: ReportContent) -> SolverEntry:
+    differences = reference_differences(evaluation, content.reference)
     return SolverEntry(
         label=solver_label(evaluation),
         assimilates=evaluation.solver in content.assimilating,
         is_reference=evaluation is content.reference,
         evaluation=evaluation,
         errors=marker_errors(evaluation, content.observations),
-        differences=reference_differences(evaluation, content.reference),
+        differences=differences,
+        indistinct=text.indistinct_sentence(
+            solver_label(evaluation),
+            solver_label(content.reference),
+            [] if evaluation is content.reference else indistinct(differences, content.reference.uncertainty),
+        ),
         reaction=text.without_rounding(evaluation.reaction),
         seconds=seconds(evaluation),
         certificate=evaluation.certificate,

@@ -1,12 +1,13 @@
 """Words and numbers of the report."""
 
 import base64
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from markupsafe import Markup
 
+from compare.evaluation import Evaluation
 from geometry.arrays import FloatArray
 from geometry.observations import Observations
 from geometry.parameters import Parameters, fact
@@ -133,6 +134,43 @@ def without_rounding(force: FloatArray) -> tuple[float, float]:
 def percent(value: float) -> str:
     """A share as a percentage with three significant digits."""
     return f"{number(100 * value, 3)} %"
+
+
+def beside(value: float, own: float | None) -> Markup:
+    """A difference and, if there is one, the own error of what it is a difference from, as HTML.
+
+    A difference that is smaller than that error is set in grey.
+    """
+    if own is None:
+        return Markup("{}").format(number(value, 3))
+    kind = "within" if abs(value) < abs(own) else "beyond"
+    return Markup('<span class="{}">{}</span><br><span class="unit">±&nbsp;{}</span>').format(
+        kind, number(value, 3), number(abs(own), 2)
+    )
+
+
+def own_error_sentence(label: str, evaluation: Evaluation) -> str:
+    """What a solver says of its own error."""
+    own, markers = evaluation.uncertainty, evaluation.marker_uncertainty
+    if own is None or markers is None:
+        return f"{label} gives no estimate of its own error."
+    return (
+        f"The error of {label} itself, by its own estimate: {percent(own.displacement.rel_l2)} in the "
+        f"displacement, {percent(own.von_mises.rel_l2)} in the von Mises stress (relative L²), "
+        f"{percent(np.sqrt(abs(own.energy)))} in the energy norm, {distance(markers.max())} mm at most at a "
+        "marker."
+    ).replace(" %", "\N{NO-BREAK SPACE}%")
+
+
+def indistinct_sentence(label: str, reference: str, names: Sequence[str]) -> str:
+    """Where a solver differs from the reference by less than the reference's own error; empty if nowhere."""
+    if not names:
+        return ""
+    said = ", ".join(names[:-1]) + (" and " if names[:-1] else "") + names[-1]
+    return (
+        f"{label} differs from {reference} by less than the own error of {reference} in: {said}. There the "
+        "comparison does not say which of the two is nearer to the exact solution."
+    )
 
 
 def distance(value: float) -> str:

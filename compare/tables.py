@@ -65,8 +65,8 @@ def mae_table(evaluations: Sequence[Evaluation], observations: Observations, ref
         title=f"Mean absolute error at {markers}, mm ({observations.label} displacements)",
         caption=(
             "sum: mean of |Δu| + |Δv| (the paper's text); rss: √(u² + v²) of the two means (its Table I).\n"
-            f"L²: relative difference of the displacement from the reference, {solver_label(reference)}"
-            f"{_own_error(reference)}.\n"
+            f"L²: relative difference of the displacement from the reference, {solver_label(reference)}.\n"
+            f"{_own_error(reference)}"
             "above fem: energy of the displacement on fem's elements above the least there."
         ),
         box=SIMPLE_HEAD,
@@ -99,6 +99,7 @@ def _own_error(reference: Evaluation) -> str:
 
 
 def _with_own_error(distance: float, reference: Evaluation) -> str:
+    """The relative difference in %, and that of the reference from the exact solution."""
     own = reference.uncertainty
     return f"{100 * distance:.3g}" + (f" ±{100 * own.displacement.rel_l2:.1g}" if own else "")
 

@@ -1,4 +1,4 @@
-"""What a reference does not know itself: its solver's estimate of its own error, in the terms of a comparison."""
+"""A solver's estimate of its own error, in the terms of a comparison."""
 
 from dataclasses import replace
 

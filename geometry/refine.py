@@ -87,7 +87,8 @@ def _cut_edges(mesh: TriangleMesh, edges: IntArray, middle: IntArray) -> IntArra
     between = middle[mesh.edge_numbers(edges)]
     first = np.where(between < 0, edges[:, 1], between)
     halves = np.stack([edges[:, 0], first, first, edges[:, 1]], axis=1).reshape(-1, 2)
-    return halves[np.stack([np.ones(len(edges), dtype=bool), between >= 0], axis=1).ravel()]
+    kept = np.stack([np.ones(len(edges), dtype=bool), between >= 0], axis=1).ravel()
+    return np.asarray(halves[kept], dtype=np.int64)
 
 
 def _middles(mesh: TriangleMesh, cut: BoolArray, section: Section | None) -> FloatArray:

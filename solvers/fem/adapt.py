@@ -8,21 +8,19 @@ Source: W. Dörfler, A convergent adaptive algorithm for Poisson's equation, SIA
 1106-1124, section 4.2 (the share); R. Becker, R. Rannacher, Acta Numerica 10 (2001) 1-102, section 4.
 """
 
-from dataclasses import dataclass, replace
-from math import inf, log
-from typing import NamedTuple
+from dataclasses import replace
+from math import log
 
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
-from geometry.errors import UserError
-from geometry.mesh import TriangleMesh
 from geometry.refine import refined
 from geometry.section import Section
+from solvers.adaptation import Adaptation, Round, check_adaptable
 from solvers.fem.error_estimate import ErrorEstimator
 from solvers.fem.lagrange import LagrangeSpace
-from solvers.fem.linear import LeastEnergy, LinearSystem
-from solvers.problem import Load, Problem
+from solvers.fem.least_energy import LeastEnergy, LinearSystem
+from solvers.problem import Problem
 from solvers.solver import Progress, silent
 
 SHARE = 0.6
@@ -30,56 +28,6 @@ SHARE = 0.6
 
 MOST_TRIANGLES = 200_000
 MOST_ROUNDS = 30
-
-
-class Round(NamedTuple):
-    """One solution on the way.
-
-    Attributes:
-        triangles: Of its mesh.
-        nodes: Of its mesh.
-        at_markers: Largest estimated error of u or v at a marker, mm.
-        energy_norm: Estimated relative error in the energy norm.
-    """
-
-    triangles: int
-    nodes: int
-    at_markers: float
-    energy_norm: float
-
-
-@dataclass(frozen=True, eq=False)
-class Adaptation:
-    """A refined mesh and how it came about.
-
-    Attributes:
-        tolerance: What was asked for, mm.
-        rounds: The first mesh's first, the refined one's last.
-        mesh: The refined mesh.
-    """
-
-    tolerance: float
-    rounds: tuple[Round, ...]
-    mesh: TriangleMesh
-
-    @property
-    def reached(self) -> bool:
-        """Whether the estimate is within the tolerance."""
-        return self.rounds[-1].at_markers <= self.tolerance
-
-    @property
-    def message(self) -> str:
-        """How it ended, in a sentence without its full stop."""
-        first, last = self.rounds[0], self.rounds[-1]
-        if not self.reached:
-            return (
-                f"the markers are known to {last.at_markers:.2g} mm, not to the {self.tolerance:g} mm asked "
-                f"for: refinement stopped at {last.triangles} triangles; take a larger tolerance"
-            )
-        return (
-            f"the markers are known to {last.at_markers:.2g} mm (asked for: {self.tolerance:g} mm); "
-            f"{first.triangles} triangles became {last.triangles}"
-        )
 
 
 def adapted(
@@ -104,14 +52,9 @@ def adapted(
         progress: Told of every round.
 
     Raises:
-        UserError: As `check_adaptable`.
+        UserError: As `solvers.adaptation.check_adaptable`.
     """
-    if not 0 < tolerance < inf:
-        raise UserError(f"a tolerance of {tolerance:g} mm at the markers: give a length above 0 mm")
-    if problem.load.kind == "point":
-        raise UserError(
-            "the solution of a point load has no limit under refinement; take the load mean or patch"
-        )
+    check_adaptable(tolerance, problem.load)
     rounds: list[Round] = []
     while True:
         found, shares = _solve(problem, degree, tolerance)
@@ -127,14 +70,6 @@ def adapted(
             break
         problem = replace(problem, mesh=finer)
     return Adaptation(tolerance, tuple(rounds), mesh)
-
-
-def check_adaptable(tolerance: float, load: Load) -> None:
-    """Raise a `UserError` if the tolerance is not a length, mm, or the load has no limit to be near to."""
-    if not 0 < tolerance < inf:
-        raise UserError(f"a tolerance of {tolerance:g} mm at the markers: give a length above 0 mm")
-    if load.kind == "point":
-        raise UserError("a point load has no limit under refinement to adapt a mesh to; take mean or patch")
 
 
 def largest(shares: FloatArray, part: float) -> BoolArray:

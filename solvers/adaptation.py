@@ -1,0 +1,67 @@
+"""How a mesh was refined until the displacements of the markers are known."""
+
+from dataclasses import dataclass
+from math import inf
+from typing import NamedTuple
+
+from geometry.errors import UserError
+from geometry.mesh import TriangleMesh
+from solvers.problem import Load
+
+
+class Round(NamedTuple):
+    """One solution on the way.
+
+    Attributes:
+        triangles: Of its mesh.
+        nodes: Of its mesh.
+        at_markers: Largest estimated error of u or v at a marker, mm.
+        energy_norm: Estimated relative error in the energy norm.
+    """
+
+    triangles: int
+    nodes: int
+    at_markers: float
+    energy_norm: float
+
+
+@dataclass(frozen=True, eq=False)
+class Adaptation:
+    """A refined mesh and how it came about.
+
+    Attributes:
+        tolerance: What was asked for, mm.
+        rounds: The first mesh's first, the refined one's last.
+        mesh: The refined mesh.
+    """
+
+    tolerance: float
+    rounds: tuple[Round, ...]
+    mesh: TriangleMesh
+
+    @property
+    def reached(self) -> bool:
+        """Whether the estimate is within the tolerance."""
+        return self.rounds[-1].at_markers <= self.tolerance
+
+    @property
+    def message(self) -> str:
+        """How it ended, in a sentence without its full stop."""
+        first, last = self.rounds[0], self.rounds[-1]
+        if not self.reached:
+            return (
+                f"the markers are known to {last.at_markers:.2g} mm, not to the {self.tolerance:g} mm asked "
+                f"for: refinement stopped at {last.triangles} triangles; take a larger tolerance"
+            )
+        return (
+            f"the markers are known to {last.at_markers:.2g} mm (asked for: {self.tolerance:g} mm); "
+            f"{first.triangles} triangles became {last.triangles}"
+        )
+
+
+def check_adaptable(tolerance: float, load: Load) -> None:
+    """Raise a `UserError` if the tolerance is not a length, mm, or the load has no limit to be near to."""
+    if not 0 < tolerance < inf:
+        raise UserError(f"a tolerance of {tolerance:g} mm at the markers: give a length above 0 mm")
+    if load.kind == "point":
+        raise UserError("a point load has no limit under refinement to adapt a mesh to; take mean or patch")
