@@ -12,7 +12,7 @@ from geometry.errors import UserError
 BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 2, 3, 130
 EXIT_CODES = (
     "Exit codes: 0 all well; 1 a fault of the program; 2 bad input, with one line that says what and how to "
-    "mend it; 3 done, but a solver did not converge; 130 interrupted."
+    "mend it; 3 done, but a solver did not converge or --adapt did not reach its tolerance; 130 interrupted."
 )
 
 

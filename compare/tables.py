@@ -93,9 +93,10 @@ def mae_table(evaluations: Sequence[Evaluation], observations: Observations, ref
 
 
 def _own_error(reference: Evaluation) -> str:
-    return (
-        ", ± its own\nestimated error: a smaller difference does not count" if reference.uncertainty else ""
-    )
+    """What ± stands for, if it appears."""
+    if reference.uncertainty is None:
+        return ""
+    return f"±: error of {solver_label(reference)} itself, estimated; a smaller difference says nothing.\n"
 
 
 def _with_own_error(distance: float, reference: Evaluation) -> str:

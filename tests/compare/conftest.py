@@ -8,12 +8,13 @@ import pytest
 from drawn_pages import Page, watching
 
 from compare.evaluation import Evaluation
+from compare.uncertainty import evaluated
 from geometry.arrays import FloatArray
 from geometry.locate import Location
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Problem
-from solvers.solution import Solution, Status
+from solvers.solution import ErrorEstimate, Solution, Status
 
 COLUMNS, ROWS = 24, 8
 
@@ -34,6 +35,13 @@ class BendingField:
         gradient[:, 0, 1] = self.scale * 0.02 * y
         gradient[:, 1, 0] = -self.scale * 0.04 * x
         return gradient
+
+
+def error_of(scale: float, exact: float, mesh: TriangleMesh) -> ErrorEstimate:
+    """The error of the known solution times one factor where that times another would be exact."""
+    off = abs(exact / scale - 1)
+    markers = (BendingField(exact - scale)).displacement(mesh.locate(mesh.markers))
+    return ErrorEstimate(off, off, off, markers, BendingField(exact))
 
 
 @pytest.fixture(scope="session")
@@ -61,7 +69,10 @@ def mesh() -> TriangleMesh:
 
 @pytest.fixture(scope="session")
 def evaluate(mesh: TriangleMesh) -> Callable[..., Evaluation]:
-    """`evaluate("name", scale=1.0, ...)`: the evaluation of the known solution times a factor."""
+    """`evaluate("name", scale=1.0, ...)`: the evaluation of the known solution times a factor.
+
+    With `off`, the solver says that the exact solution is larger by that share.
+    """
 
     def make(
         solver: str,
@@ -70,6 +81,7 @@ def evaluate(mesh: TriangleMesh) -> Callable[..., Evaluation]:
         converged: bool = True,
         message: str = "solved directly",
         history: dict[str, FloatArray] | None = None,
+        off: float | None = None,
     ) -> Evaluation:
         solution = Solution(
             solver=solver,
@@ -80,8 +92,9 @@ def evaluate(mesh: TriangleMesh) -> Callable[..., Evaluation]:
             status=Status(converged, message),
             stats={"seconds": 1.25, "unknowns": 450},
             history=history or {},
+            error=None if off is None else error_of(scale, scale * (1 + off), mesh),
         )
-        return Evaluation.of(solution, mesh)
+        return evaluated(solution, mesh)
 
     return make
 
@@ -90,6 +103,12 @@ def evaluate(mesh: TriangleMesh) -> Callable[..., Evaluation]:
 def fem(evaluate: Callable[..., Evaluation]) -> Evaluation:
     """The reference."""
     return evaluate("fem")
+
+
+@pytest.fixture(scope="session")
+def estimated(evaluate: Callable[..., Evaluation]) -> Evaluation:
+    """The reference with an estimate of its own error: the exact solution is 1 % larger everywhere."""
+    return evaluate("fem", off=0.01)
 
 
 @pytest.fixture(scope="session")

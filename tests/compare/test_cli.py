@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,9 @@ from compare.cli import compare_main, main
 from compare.exits import BAD_INPUT, INTERRUPTED, NOT_CONVERGED
 from compare.options import FingerOptions, PhysicsOptions, SolverOptions
 from geometry.cache import finger_mesh
+from geometry.mesh import TriangleMesh
 from geometry.presets import preset_names
+from solvers.fem import adapt
 from solvers.fem.linear import FemSolver
 from solvers.fem.nonlinear import FemNonlinearSolver
 from solvers.registry import PRESETS, solver_names
@@ -91,6 +94,10 @@ BAD = [
     ("compare --mesh-size 0", "--mesh-size = 0 mm is outside its range"),
     ("compare --mesh-size nan", "--mesh-size = nan is not a finite number"),
     ("compare --mesh-size fine", 'unable to convert "fine" into float'),
+    ("compare --adapt 0", "a tolerance of 0 mm at the markers"),
+    ("compare --adapt -1", "a tolerance of -1 mm at the markers"),
+    ("compare --adapt 0.001 --load point", "a point load has no limit under refinement"),
+    ("mesh --adapt 0.001 --load point", "a point load has no limit under refinement"),
     # material and load
     ("compare --young -1", "--young -1.0: input should be greater than 0"),
     ("compare --young inf", "--young inf"),
@@ -534,7 +541,7 @@ def test_help_names_every_option_of_the_main_job(capsys):
     assert main(["compare", "--help"]) == 0
     text = capsys.readouterr().out
     options = (
-        "design set mesh-size young poisson plane law load stroke direction slide solvers solver-set seed "
+        "design set mesh-size adapt young poisson plane law load stroke direction slide solvers solver-set seed "
         "preset device measurements reference out resume quiet json"
     )
     assert all(f"--{option} " in text for option in options.split())
@@ -544,3 +551,13 @@ def test_help_names_every_option_of_the_main_job(capsys):
 def test_every_preset_is_accepted():
     for name in preset_names():
         assert FingerOptions(design=name).read()[0].name == name
+
+
+def test_a_tolerance_that_is_not_reached_ends_with_its_own_code(monkeypatch, tmp_path, capsys):
+    """Everything is written, and the line says how far it came."""
+    monkeypatch.setattr(adapt, "adapted", partial(adapt.adapted, most_rounds=2))
+    options = ["--mesh-size", "1", "--adapt", "1e-6", "--out", str(tmp_path / "mesh")]
+    assert main(["mesh", *options]) == NOT_CONVERGED
+    assert "error: --adapt 1e-06: the markers are known to 0.00" in capsys.readouterr().err
+    assert len((tmp_path / "mesh" / "adapt.csv").read_text(encoding="utf-8").splitlines()) == 3
+    assert len(TriangleMesh.load(tmp_path / "mesh" / "mesh.npz").triangles) > 3520

@@ -16,6 +16,7 @@ from compare.verdict import certified
 from geometry.design import Design
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
+from solvers.adaptation import Adaptation, Round
 from solvers.problem import Load, Material, Problem
 
 VOID = {"meta", "img", "br", "link", "hr", "input"}
@@ -93,8 +94,8 @@ def test_it_holds_the_errors_under_both_definitions(content: ReportContent) -> N
 def test_it_compares_with_the_reference(content: ReportContent) -> None:
     text = Page(render(content)).text
     assert "Comparison with fem" in text
-    assert "10.0 %" in text  # relative L2 of a solution that is a tenth larger
-    assert "21.0 %" in text  # its energy
+    assert "pinn-std 10.0 " in text  # per cent: relative L2 of a solution that is a tenth larger
+    assert " 21.0 " in text  # its energy
     assert "−0.5500" in text  # its reaction
 
 
@@ -175,6 +176,39 @@ def test_without_certificates_there_is_no_table_of_them(content: ReportContent) 
     page = Page(render(content))
     assert "pinn-std has no certificate: DOLFINx, which makes it, is not installed." in page.text
     assert {"certificate", "regions"}.isdisjoint(page.values("id"))
+
+
+def test_the_own_error_of_the_reference_stands_beside_every_difference(
+    content: ReportContent, estimated: Evaluation, evaluate: Callable[..., Evaluation]
+) -> None:
+    near = evaluate("pinn-std", 1.005)
+    page = Page(render(replace(content, evaluations=[estimated, near], reference=estimated)))
+    text = page.text.replace("\N{NO-BREAK SPACE}", " ")
+    assert "The error of fem itself, by its own estimate: 1.00 % in the displacement" in text
+    assert text.count("±") > 12  # six and six differences, and the note
+    assert "0.500 ± 1.0" in text
+    assert "within" in page.values("class")
+    assert "pinn-std differs from fem by less than the own error of fem in: displacement, " in text
+    assert "fem differs from fem" not in text
+    assert page.unbalanced == []
+
+
+def test_without_an_estimate_there_is_no_plus_or_minus(content: ReportContent) -> None:
+    page = Page(render(content))
+    assert "fem gives no estimate of its own error." in page.text
+    assert "±" not in page.text
+
+
+@pytest.mark.parametrize(("tolerance", "warned"), [(1e-3, False), (1e-6, True)])
+def test_refinement_is_told_round_by_round(
+    content: ReportContent, mesh: TriangleMesh, tolerance: float, warned: bool
+) -> None:
+    rounds = (Round(100, 70, 0.0123, 0.2), Round(250, 160, 0.00045, 0.1))
+    page = Page(render(replace(content, adaptation=Adaptation(tolerance, rounds, mesh))))
+    assert {"adapt"} <= set(page.values("id"))
+    assert ("not-adapted" in page.values("id")) is warned
+    assert "1 250 160 0.00045 10.0 %" in page.text
+    assert page.unbalanced == []
 
 
 def test_a_single_solver_is_compared_with_nothing(content: ReportContent, fem: Evaluation) -> None:

@@ -25,6 +25,21 @@ CERTIFICATE = {
     "load": list,
     "regions": {"corners": REGION, "contact": REGION, "walls": REGION},
 }
+DIFFERENCES = {
+    "rel_l2_displacement": Real,
+    "rel_l2_von_mises": Real,
+    "mae_markers": Real,
+    "rel_energy": Real,
+    "displacement": DIFFERENCE,
+    "von_mises": DIFFERENCE,
+    "stress": COMPONENTS,
+    "strain": COMPONENTS,
+}
+UNCERTAINTY = {
+    **dict.fromkeys(("energy_norm", "rel_l2_displacement", "rel_l2_von_mises", "mae_markers"), Real),
+    "markers_u": list,
+    "markers_v": list,
+}
 SOLVER = {
     "law": str,
     "status": str,
@@ -36,16 +51,8 @@ SOLVER = {
     "certificate": CERTIFICATE,
     "markers": {"ae_u": list, "ae_v": list, **ERRORS},
     "held_out": ERRORS,
-    "to_reference": {
-        "rel_l2_displacement": Real,
-        "rel_l2_von_mises": Real,
-        "mae_markers": Real,
-        "rel_energy": Real,
-        "displacement": DIFFERENCE,
-        "von_mises": DIFFERENCE,
-        "stress": COMPONENTS,
-        "strain": COMPONENTS,
-    },
+    "uncertainty": UNCERTAINTY,
+    "to_reference": {**DIFFERENCES, "reference_uncertainty": DIFFERENCES},
 }
 SCHEMA = {
     "schema": int,
@@ -54,7 +61,7 @@ SCHEMA = {
     "load": {"kind": str, "displacement": tuple},
     "measurements": {"source": str, "description": str, "markers": int},
     "reference": str,
-    "solvers": {"fem": SOLVER, "pinn-std": SOLVER},
+    "solvers": {"fem": SOLVER, "pinn-std": {**SOLVER, "uncertainty": type(None)}},
 }
 """Scripts rely on these: a key may be added, but not renamed or removed under the same `schema`."""
 
@@ -69,7 +76,7 @@ def assert_schema(value, expected, where="metrics"):
 
 
 @pytest.fixture
-def numbers(fem, pinn, observations, mesh):
+def numbers(estimated, pinn, observations, mesh):
     """`numbers(...)`: the metrics of both solvers, with some arguments changed."""
 
     def make(**changes):
@@ -78,8 +85,8 @@ def numbers(fem, pinn, observations, mesh):
             "material": Material(),
             "load": Load(),
             "observations": observations,
-            "evaluations": certified([fem, pinn], Problem(mesh)),
-            "reference": fem,
+            "evaluations": certified([estimated, pinn], Problem(mesh)),
+            "reference": estimated,
         }
         return metrics(**{**arguments, **changes})
 

@@ -104,3 +104,23 @@ def test_the_terminal_table_fits_eighty_columns(
     assert "fem-nonlinear" in text
     assert "…" not in text
     assert max(map(len, text.splitlines())) <= 80
+
+
+def test_the_own_error_of_the_reference_stands_beside_the_difference(
+    estimated: Evaluation, pinn: Evaluation, observations: Observations, tmp_path: Path
+) -> None:
+    text = printed(mae_table([estimated, pinn], observations, estimated), width=80)
+    assert "10 ±1" in text
+    assert "±: error of fem itself" in text
+    write_summary(
+        tmp_path / "s.csv", evaluations=[estimated, pinn], observations=observations, reference=estimated
+    )
+    _, row = read(tmp_path / "s.csv")
+    assert float(row["reference_uncertainty_displacement_rel_l2"]) == pytest.approx(0.01)
+    assert float(row["reference_uncertainty_energy_rel"]) == pytest.approx(-1e-4)
+
+
+def test_a_reference_without_an_estimate_leaves_its_cells_empty(summary: Rows) -> None:
+    cells = {name: cell for name, cell in summary[1].items() if name.startswith("reference_uncertainty")}
+    assert len(cells) > 20
+    assert set(cells.values()) == {""}

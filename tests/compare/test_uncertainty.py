@@ -1,0 +1,58 @@
+"""A solver's own error beside every difference from it."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compare.differences import ReferenceDifferences
+from compare.evaluation import Evaluation
+from compare.metrics import reference_differences
+from compare.uncertainty import indistinct
+
+
+def test_it_is_the_difference_of_the_improved_solution(estimated: Evaluation) -> None:
+    """One per cent more of everything; the energy falls by the square."""
+    own = estimated.uncertainty
+    assert own is not None
+    assert own.displacement.rel_l2 == pytest.approx(0.01)
+    assert own.von_mises.rel_l2 == pytest.approx(0.01)
+    assert own.stress["xy"].rel_l2 == pytest.approx(0.01)
+    assert own.energy == pytest.approx(-1e-4)
+    assert estimated.marker_uncertainty is not None
+    np.testing.assert_allclose(estimated.marker_uncertainty, 0.01 * np.abs(estimated.marker_displacement))
+    assert own.mae_markers == pytest.approx(estimated.marker_uncertainty.sum(axis=1).mean())
+
+
+def test_a_solver_without_an_estimate_has_none(fem: Evaluation) -> None:
+    assert (fem.uncertainty, fem.marker_uncertainty) == (None, None)
+
+
+@pytest.mark.parametrize("name", ["estimated", "fem"])
+def test_it_comes_back_from_disk(name: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    before: Evaluation = request.getfixturevalue(name)
+    before.save(tmp_path / "fem.npz", "key")
+    after = Evaluation.load(tmp_path / "fem.npz", "key")
+    assert after is not None
+    assert isinstance(after.uncertainty, ReferenceDifferences | None)
+    assert json.dumps(after.uncertainty) == json.dumps(before.uncertainty)
+    np.testing.assert_array_equal(after.marker_uncertainty, before.marker_uncertainty)
+
+
+@pytest.mark.parametrize(
+    ("scale", "expected"),
+    [
+        # the energy of the evaluations is 2 scale^2, its error 1e-4 of it
+        (1.00004, ["displacement", "von Mises stress", "energy", "displacement of the markers"]),
+        (1.005, ["displacement", "von Mises stress", "displacement of the markers"]),
+        (1.02, []),
+    ],
+)
+def test_what_is_smaller_than_the_own_error_is_named(
+    evaluate: Callable[..., Evaluation], estimated: Evaluation, scale: float, expected: list[str]
+) -> None:
+    differences = reference_differences(evaluate("pinn-std", scale), estimated)
+    assert indistinct(differences, estimated.uncertainty) == expected
+    assert indistinct(differences, None) == []
