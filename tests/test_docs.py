@@ -105,7 +105,8 @@ def run_folder(tmp_path_factory) -> Path:
 
     out = tmp_path_factory.mktemp("docs") / "run"
     options = (
-        "--solvers fem,fem-nonlinear,pinn-std --mesh-size 1 --solver-set pinn-std.corner_spacing=0.2 --quiet"
+        "--solvers fem,fem-nonlinear,pinn-std --mesh-size 1 --adapt 0.008 "
+        "--solver-set pinn-std.corner_spacing=0.2 --quiet"
     )
     assert compare_main([*options.split(), "--out", str(out)]) in (
         0,

@@ -541,8 +541,8 @@ def test_help_names_every_option_of_the_main_job(capsys):
     assert main(["compare", "--help"]) == 0
     text = capsys.readouterr().out
     options = (
-        "design set mesh-size adapt young poisson plane law load stroke direction slide solvers solver-set seed "
-        "preset device measurements reference out resume quiet json"
+        "design set mesh-size adapt young poisson plane law load stroke direction slide solvers solver-set "
+        "seed preset device measurements reference out resume quiet json"
     )
     assert all(f"--{option} " in text for option in options.split())
     assert "[default: ()]" not in text
