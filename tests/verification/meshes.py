@@ -21,7 +21,8 @@ def mapped_mesh(mapping: Callable[[FloatArray], FloatArray], columns: int, rows:
         rows: Elements along the second.
 
     Returns:
-        Boundaries `left`, `right`, `bottom` and `top` by the sides of the square; `base` is `left`.
+        Boundaries `left`, `right`, `bottom` and `top` by the sides of the square; the `base` is the bottom,
+        the `front` with its `contact` the top.
     """
     s, t = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1), indexing="ij")
     square = np.column_stack([s.ravel(), t.ravel()])
@@ -37,7 +38,7 @@ def mapped_mesh(mapping: Callable[[FloatArray], FloatArray], columns: int, rows:
         triangles=np.concatenate(
             [np.stack(corners, axis=-1).reshape(-1, 3) for corners in ((a, b, c), (a, c, d))]
         ),
-        boundaries={"base": edges["left"], **edges},
+        boundaries={"base": edges["bottom"], "front": edges["top"], "contact": edges["top"], **edges},
         marker_nodes=number[1:, rows // 2],
         contact_node=int(number[columns // 2, -1]),
     )

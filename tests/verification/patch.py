@@ -1,6 +1,5 @@
 """Patch tests: a state of constant stress on distorted elements."""
 
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -52,17 +51,16 @@ def uniform(law: PlaneLaw) -> Exact:
 
 def pulled_bar(degree: int, plane: str) -> float:
     """The largest relative error in strain, reaction and energy of a bar without lateral contraction."""
-    length, height, pull = 8.0, 3.0, 0.1
-    mesh = mapped_mesh(quadrilateral([(0, 0), (length, 0), (length, height), (0, height)]), 8, 3)
-    mesh = replace(mesh, boundaries={**mesh.boundaries, "contact": mesh.boundary("right")}, _cache={})
+    length, width, pull = 8.0, 3.0, 0.1
+    mesh = mapped_mesh(quadrilateral([(0, 0), (width, 0), (width, length), (0, length)]), 3, 8)
     material = Material(poisson=0.0, plane=plane)
     solution = FemSolver(degree=degree, estimate=False).solve(
-        Problem(mesh, material, Load(kind="patch", displacement=(pull, 0.0)))
+        Problem(mesh, material, Load(kind="patch", displacement=(0.0, pull)))
     )
     strain = pull / length
-    force = material.young * strain * height
-    gradient = solution.gradient(mesh.at_centroids()) - [[strain, 0], [0, 0]]
-    reaction = solution.reaction - [force, 0]
+    force = material.young * strain * width
+    gradient = solution.gradient(mesh.at_centroids()) - [[0, 0], [0, strain]]
+    reaction = solution.reaction - [0, force]
     return float(
         max(
             np.abs(gradient).max() / strain,
