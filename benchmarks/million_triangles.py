@@ -24,7 +24,7 @@ from geometry.worker import child_environment
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
 
-SIZE_MM = 0.0333
+SIZE_MM = 0.0325
 PATIENCE_S = 3600.0
 CASES = [
     (degree, linear_solver, ranks)
