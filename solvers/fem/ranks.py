@@ -15,6 +15,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+import petsc4py
 from mpi4py import MPI
 
 from geometry.worker import child_environment
@@ -63,6 +64,7 @@ def lead(command: Callable[[], Any], guarded: Callable[[Callable[[], Any]], int]
         command: What rank 0 does.
         guarded: Runs it and says what went wrong, in one line where a user can mend it.
     """
+    petsc4py.init()  # on all ranks together: one alone would wait for the others when it first solves
     crew = Crew(MPI.COMM_WORLD.Dup())
     # What this process starts from now on must not take itself for a rank of this run.
     for name in set(os.environ) - set(child_environment(os.environ)):

@@ -1,4 +1,7 @@
-"""What the tests of MPI ranks run on them: `python -m tests.solvers.rank_programs PROGRAM MESH.npz`."""
+"""What the tests of MPI ranks run on them: `python -m tests.solvers.rank_programs PROGRAM MESH.npz`.
+
+Like `compare`, a program imports a solver only where it needs it: on rank 0, before the others do.
+"""
 
 import json
 import os
@@ -10,10 +13,9 @@ from mpi4py import MPI
 
 from geometry.errors import UserError
 from geometry.mesh import TriangleMesh
-from solvers.fem.linear import FemSolver
-from solvers.fem.nonlinear import FemNonlinearSolver
 from solvers.fem.ranks import communicator, lead, on_all_ranks
 from solvers.problem import Load, Material, Problem
+from solvers.registry import make_solver
 from solvers.solution import Solution
 
 RANK = MPI.COMM_WORLD.rank
@@ -43,8 +45,12 @@ def rank_0_fails(problem, progress) -> None:
 
 def solve() -> int:
     """Only rank 0 gets here; the exit code is its own."""
+    solvers = [make_solver(name) for name in ("fem", "fem-nonlinear")]
     report = {
-        "solutions": [numbers(FemSolver().solve(Problem(MESH))), numbers(FemNonlinearSolver().solve(STIFF))],
+        "solutions": [
+            numbers(solver.solve(problem))
+            for solver, problem in zip(solvers, (Problem(MESH), STIFF), strict=True)
+        ],
         "sharing": [communicator().size, on_all_ranks(sharing, Problem(MESH), print), communicator().size],
         "launcher": [name for name in os.environ if name.startswith("OMPI_COMM")],
     }
@@ -54,13 +60,16 @@ def solve() -> int:
 
 def everywhere() -> None:
     """Every rank runs the whole program."""
-    report = {"solutions": [numbers(FemSolver().solve(Problem(MESH)))], "sharing": [communicator().size]}
+    report = {
+        "solutions": [numbers(make_solver("fem").solve(Problem(MESH)))],
+        "sharing": [communicator().size],
+    }
     if RANK == 0:
         print(json.dumps(report))
 
 
 def refused() -> int:
-    FemSolver().solve(STIFF)
+    make_solver("fem").solve(STIFF)
     return 0
 
 
