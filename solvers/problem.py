@@ -56,17 +56,21 @@ class Load(BaseModel):
         kind: `mean`: the weighted mean displacement over the contact is prescribed (`contact_weight`); well
             posed, the default. `point`: the displacement of the contact's middle node is prescribed, as in
             the paper; its limit under mesh refinement does not exist. `patch`: every point of the contact has
-            the displacement.
+            the displacement. `cylinder`: a rigid cylinder without friction, which touches the front face at
+            the contact's middle from outside, moves by the displacement; which part of the face it presses
+            on is found.
         displacement: Prescribed (u, v), mm.
         position: Abscissa of the contact's middle on the front face, mm; None means where the mesh has its
             boundary `contact`, whose width the contact has in any case. A `patch` cannot be elsewhere.
+        radius: Of the cylinder, mm; None for the other kinds.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    kind: Literal["mean", "point", "patch"] = "mean"
+    kind: Literal["mean", "point", "patch", "cylinder"] = "mean"
     displacement: tuple[float | None, float | None] = (0.0, -10.0)
     position: float | None = None
+    radius: float | None = Field(default=None, gt=0, allow_inf_nan=False)
 
     @model_validator(mode="after")
     def _acts(self) -> Self:
@@ -76,6 +80,12 @@ class Load(BaseModel):
             raise ValueError(
                 "a patch lies on whole elements: mesh the finger with its contact_position there"
             )
+        if (self.kind == "cylinder") != (self.radius is not None):
+            raise ValueError("a radius belongs to the load cylinder, and to no other; give it in mm")
+        if self.kind == "cylinder" and None in self.displacement:
+            raise ValueError("a cylinder is moved in u and v and has no friction: the finger slides along it")
+        if self.kind == "cylinder" and not any(self.displacement):
+            raise ValueError("the cylinder does not move; prescribe a displacement (mm)")
         return self
 
     @property

@@ -127,11 +127,33 @@ class DistributedSpace:
             )
         return conditions
 
-    def assemble_matrix(self, form: Any, conditions: Sequence[Any]) -> PETSc.Mat:
-        """Matrix with rows and columns of clamped components replaced by the identity."""
-        matrix = dolfinx.fem.petsc.assemble_matrix(form, bcs=list(conditions))
+    def assemble_matrix(
+        self, form: Any, conditions: Sequence[Any], *, into: PETSc.Mat | None = None
+    ) -> PETSc.Mat:
+        """Matrix with rows and columns of clamped components replaced by the identity.
+
+        Args:
+            form: The compiled bilinear form.
+            conditions: What is clamped.
+            into: An earlier matrix of the same form, which is overwritten; a new one if None.
+        """
+        assemble: Any = dolfinx.fem.petsc.assemble_matrix
+        if into is None:
+            matrix = assemble(form, bcs=list(conditions))
+        else:
+            into.zeroEntries()
+            matrix = assemble(into, form, bcs=list(conditions))
         matrix.assemble()
         return matrix
+
+    def add_blocks(self, matrix: PETSc.Mat, nodes: IntArray, blocks: FloatArray) -> None:
+        """Add blocks of shape (m, 2, 2) to a matrix, each on the diagonal of one of m different nodes."""
+        row_of_node = np.full(len(self.space.nodes), -1, dtype=np.int32)
+        row_of_node[self._node_of_dof[: self._owned]] = np.arange(self._owned)
+        for row, block in zip(row_of_node[nodes], blocks, strict=True):
+            if row >= 0:
+                matrix.setValuesBlockedLocal(row, row, block, addv=PETSc.InsertMode.ADD_VALUES)
+        matrix.assemble()
 
     def assemble_nodal(self, form: Any) -> FloatArray:
         """A linear form on every shape function, shape (N, 2)."""
@@ -193,6 +215,11 @@ class Factorisation:
         preconditioner.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
         preconditioner.destroy()  # the name only: petsc4py would keep it, and the factors, for ever
         self._ksp.setErrorIfNotConverged(True)
+        self.update()
+
+    def update(self) -> None:
+        """Factorise again after the matrix has got new values in its old places: the analysis is kept."""
+        self._ksp.setOperators(self._matrix)
         try:
             self._ksp.setUp()
         except PETSc.Error as error:

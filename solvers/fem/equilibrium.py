@@ -1,0 +1,150 @@
+"""The finite-strain problem at one stage of its load: potential, forces, tangent and constraints.
+
+With displacements c, multipliers f of the constraints b_k . c = d_k, and the potential Π of the elastic
+energy and, for a cylinder, of contact, equilibrium is
+
+    dΠ/dc - f_k b_k = 0        b_k . c = d_k
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+
+from geometry.arrays import BoolArray, FloatArray
+from geometry.quadrature import body_quadrature
+from solvers.elasticity import Lame, deformation_jacobian, energy_density_of
+from solvers.fem.bridge import DistributedSpace, Factorisation
+from solvers.fem.conditions import held_components, load_functionals, patch_displacement
+from solvers.fem.contact import CylinderContact
+from solvers.fem.lagrange import LagrangeSpace
+from solvers.problem import Problem
+
+QUADRATURE_DEGREE = 4
+"""Of the energy's integral: exact for quadratic elements with the quadratic part of the law."""
+PROBE = 1e-4
+"""Fraction of the load in the difference that stands for a derivative of the internal forces at rest."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """What is given at one stage of the load.
+
+    Attributes:
+        fraction: Of the load.
+        multipliers: Of the contact, shape (m,), N/mm; empty without one.
+    """
+
+    fraction: float
+    multipliers: FloatArray
+
+
+class Equilibrium:
+    """The discrete problem; nodal arrays of shape (N, 2) are the same on every rank.
+
+    Attributes:
+        distributed: The elements in DOLFINx.
+        clamped: Components that a Dirichlet condition holds, mask of shape (N, 2).
+        held: Their displacement under the full load, shape (N, 2), mm.
+        functionals: The constraints b_k, shape (k, N, 2).
+        targets: Their values d_k under the full load, shape (k,), mm.
+        contact: The cylinder, if there is one.
+    """
+
+    def __init__(self, problem: Problem, space: LagrangeSpace) -> None:
+        """Compile the forms."""
+        kind, shape = problem.load.kind, (len(space.nodes), 2)
+        constrained = kind in ("mean", "point")
+        self.distributed = DistributedSpace(space)
+        self.clamped: BoolArray = held_components(problem, space)
+        self.held = patch_displacement(problem, space) if kind == "patch" else np.zeros(shape)
+        self.functionals = load_functionals(problem, space) if constrained else np.zeros((0, *shape))
+        self.targets = problem.load.values if constrained else np.zeros(0)
+        self.contact = CylinderContact.of(problem, space) if kind == "cylinder" else None
+        self._derivatives = space.shape_gradients(body_quadrature(problem.mesh, QUADRATURE_DEGREE).location)
+        lame = problem.material.lame
+        constants = Lame(self.distributed.constant(lame.λ), self.distributed.constant(lame.μ), lame.λ_out)
+        u = self.distributed.function
+        measure = ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
+        energy = energy_density_of(problem.material.law, ufl.grad(u), constants, ufl.ln) * measure
+        residual = ufl.derivative(energy, u, ufl.TestFunction(u.function_space))
+        tangent = ufl.derivative(residual, u, ufl.TrialFunction(u.function_space))
+        self._energy, self._residual, self._tangent = map(self.distributed.form, (energy, residual, tangent))
+        self._conditions = [
+            condition
+            for axis in (0, 1)
+            for condition in self.distributed.clamp(np.flatnonzero(self.clamped[:, axis]), (axis,))
+        ]
+        matrix = self.distributed.assemble_matrix(self._tangent, self._conditions)
+        self.matrix = matrix
+        self.factors = Factorisation(self.distributed, matrix, self.clamped, positive_definite=False)
+
+    def energy(self, nodal: FloatArray) -> float:
+        """Elastic energy per depth, N mm / mm."""
+        self.distributed.set_function(nodal)
+        return self.distributed.assemble_scalar(self._energy)
+
+    def internal_force(self, nodal: FloatArray) -> FloatArray:
+        """Derivative of the elastic energy, shape (N, 2), N/mm."""
+        self.distributed.set_function(nodal)
+        return self.distributed.assemble_nodal(self._residual)
+
+    def unbalanced(self, nodal: FloatArray, forces: FloatArray, stage: Stage) -> tuple[FloatArray, float]:
+        """What is left of equilibrium, shape (N, 2), N/mm, zero where clamped; the largest internal force.
+
+        Args:
+            nodal: Displacements, shape (N, 2), mm.
+            forces: Multipliers of the constraints, shape (k,), N/mm.
+            stage: Of the load.
+        """
+        internal = self.internal_force(nodal)
+        balance = internal - np.einsum("k,knx->nx", forces, self.functionals)
+        if self.contact is not None:
+            balance[self.contact.nodes] += self.contact.gradient(nodal, stage.fraction, stage.multipliers)
+        return np.where(self.clamped, 0.0, balance), float(np.abs(internal).max())
+
+    def missing(self, nodal: FloatArray, stage: Stage) -> FloatArray:
+        """By how much the constraints are missed, shape (k,), mm."""
+        return np.asarray(stage.fraction * self.targets - np.einsum("knx,nx->k", self.functionals, nodal))
+
+    def factorise(self, nodal: FloatArray, stage: Stage) -> None:
+        """Factorise the tangent at displacements of shape (N, 2), mm."""
+        self.distributed.set_function(nodal)
+        self.distributed.assemble_matrix(self._tangent, self._conditions, into=self.matrix)
+        if self.contact is not None:
+            nodes = self.contact.nodes
+            blocks = self.contact.tangent(nodal, stage.fraction, stage.multipliers)
+            free = ~self.clamped[nodes]
+            self.distributed.add_blocks(self.matrix, nodes, blocks * (free[:, :, None] & free[:, None, :]))
+        self.factors.update()
+
+    def possible(self, nodal: FloatArray) -> bool:
+        """Whether the deformation turns no quadrature point inside out."""
+        gradient = np.stack([derivative @ nodal for derivative in self._derivatives], axis=-1)
+        return bool(np.isfinite(nodal).all() and (deformation_jacobian(gradient) > 0).all())
+
+    def linear_guess(self, fraction: float) -> tuple[FloatArray, FloatArray]:
+        """Where the undeformed tangent, which must be factorised, leads at a fraction of the load.
+
+        For a cylinder that is as if it touched the one node under its middle.
+
+        Returns:
+            Displacements, shape (N, 2), mm, that meet the constraints, and multipliers, shape (k,), N/mm.
+        """
+        nodal = fraction * self.held
+        if nodal.any():
+            step = PROBE * self.held
+            stiffness = (self.internal_force(step) - self.internal_force(-step)) / (2 * PROBE)
+            nodal = nodal + self.factors.solve(-fraction * stiffness)
+        functionals, targets = self.functionals, self.targets
+        if self.contact is not None:
+            functionals = np.zeros((1, *nodal.shape))
+            functionals[0, self.contact.nearest, 1] = 1.0
+            targets = self.contact.travel[1:]
+        if not len(targets):
+            return nodal, targets
+        responses = np.array([self.factors.solve(functional) for functional in functionals])
+        compliance = np.einsum("inx,jnx->ij", functionals, responses)
+        forces = np.linalg.solve(compliance, fraction * targets)
+        nodal = nodal + np.einsum("k,knx->nx", forces, responses)
+        return nodal, forces[: len(self.targets)]

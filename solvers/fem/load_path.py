@@ -1,0 +1,152 @@
+"""From rest to the full load in steps that adapt to how hard they are."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from solvers.fem.conditions import reaction_by_residual_work
+from solvers.fem.contact import ContactRegion
+from solvers.fem.equilibrium import Equilibrium, Stage
+from solvers.fem.lagrange import LagrangeSpace
+from solvers.fem.snes import BorderedNewton
+from solvers.problem import Problem
+from solvers.solver import Progress
+
+QUICK = 5
+"""Newton iterations of a step after which the next one may be twice as long."""
+UPDATES = 30
+"""Solves in a step, each with better multipliers of the contact, before the step counts as failed."""
+PENETRATION = 1e-5
+"""How far a node may lie within the cylinder, and one that is pressed outside of it, mm."""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Fractions of the load: of the first step, of the longest and of the shortest one."""
+
+    first: float
+    longest: float
+    shortest: float
+
+
+@dataclass(frozen=True, eq=False)
+class PathPoint:
+    """Equilibrium at a fraction of the load.
+
+    Attributes:
+        fraction: Of the load.
+        nodal: Displacements, shape (N, 2), mm.
+        forces: Multipliers of the constraints, shape (k,), N/mm.
+        contact: Forces of the cylinder on the nodes of the front, shape (m,), N/mm.
+    """
+
+    fraction: float
+    nodal: FloatArray
+    forces: FloatArray
+    contact: FloatArray
+
+
+class LoadPath:
+    """Equilibria that a problem runs through as its load grows.
+
+    Every step starts from the last two states extrapolated, the first from the linear solution. A step whose
+    Newton iteration fails is halved.
+
+    Attributes:
+        equilibrium: The discrete problem.
+        points: What was found, from rest.
+        halved: How many steps failed.
+        iterations: Newton iterations of all steps.
+        reason: How the last step that failed did, in PETSc's words.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        space: LagrangeSpace,
+        steps: Steps,
+        *,
+        tolerance: float,
+        max_iterations: int,
+    ) -> None:
+        """Prepare the path; the tolerance and the number of iterations are those of `BorderedNewton`."""
+        self._steps, self._space = steps, space
+        self.equilibrium = Equilibrium(problem, space)
+        self._newton = BorderedNewton(
+            self.equilibrium,
+            scale=problem.material.young,
+            tolerance=tolerance,
+            max_iterations=max_iterations,
+        )
+        contact = self.equilibrium.contact
+        self._longest = steps.longest if contact is None else min(steps.longest, contact.longest_step)
+        pressed = np.zeros(0 if contact is None else len(contact.nodes))
+        rest = np.zeros((len(space.nodes), 2))
+        self.points = [PathPoint(0.0, rest, np.zeros(len(self.equilibrium.targets)), pressed)]
+        self.halved = self.iterations = 0
+        self.reason = ""
+
+    def follow(self, progress: Progress) -> None:
+        """Go to the full load, or as far as there is equilibrium."""
+        step = min(self._steps.first, self._longest)
+        while (rest := 1 - self.points[-1].fraction) > 0:
+            fraction = 1 - rest * (1 - 1 / math.ceil(rest / step - 1e-9))  # equal steps to the end
+            before = self.iterations
+            point, hardest = self._step(fraction)
+            if point is None:
+                self.halved += 1
+                step /= 2
+                if step < self._steps.shortest:
+                    return
+                continue
+            self.points.append(point)
+            progress(fraction, f"{fraction:.0%} of the load, {self.iterations - before} Newton iterations")
+            step = min(self._longest, step * (2 if hardest <= QUICK else 1))
+
+    def _step(self, fraction: float) -> tuple[PathPoint | None, int]:
+        """Equilibrium at a fraction of the load, None if there is none; iterations of the hardest solve."""
+        nodal, forces, pressed = self._guess(fraction)
+        hardest = 0
+        for _ in range(UPDATES):
+            balance = self._newton.solve(nodal, forces, Stage(fraction, pressed))
+            self.iterations += balance.iterations
+            hardest = max(hardest, balance.iterations)
+            if not balance.converged:
+                self.reason = balance.reason
+                return None, hardest
+            nodal, forces = balance.nodal, balance.forces
+            contact = self.equilibrium.contact
+            if contact is None:
+                return PathPoint(fraction, nodal, forces, pressed), hardest
+            pressed = contact.forces(nodal, fraction, pressed)
+            gap, _ = contact.gaps(nodal, fraction)
+            if max(np.abs(gap[pressed > 0]).max(initial=0.0), -gap.min()) <= PENETRATION:
+                return PathPoint(fraction, nodal, forces, pressed), hardest
+        self.reason = "contact_not_settled"
+        return None, hardest
+
+    def _guess(self, fraction: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Displacements and multipliers at a fraction of the load: the last two states continued."""
+        last = self.points[-1]
+        if len(self.points) == 1:
+            return *self.equilibrium.linear_guess(fraction), last.contact
+        before = self.points[-2]
+        slope = (fraction - last.fraction) / (last.fraction - before.fraction)
+        return (
+            last.nodal + slope * (last.nodal - before.nodal),
+            last.forces + slope * (last.forces - before.forces),
+            last.contact,
+        )
+
+    def reaction(self, point: PathPoint) -> FloatArray:
+        """Force of the indenter on the finger, shape (2,), N/mm."""
+        return reaction_by_residual_work(self._space, self.equilibrium.internal_force(point.nodal))
+
+    def region(self, point: PathPoint) -> ContactRegion | None:
+        """Where a cylinder touches the finger; None where it does not, or there is none."""
+        contact = self.equilibrium.contact
+        if contact is None:
+            return None
+        return ContactRegion.of(contact, point.nodal, point.fraction, point.contact)
