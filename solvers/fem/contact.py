@@ -59,11 +59,6 @@ class CylinderContact:
         )
 
     @property
-    def nearest(self) -> int:
-        """The node under the cylinder's middle before the load."""
-        return int(self.nodes[np.abs(self.positions[:, 0] - self.centre[0]).argmin()])
-
-    @property
     def longest_step(self) -> float:
         """The fraction of the load in which the cylinder moves by half its radius."""
         return float(0.5 * self.radius / np.linalg.norm(self.travel))
@@ -84,18 +79,16 @@ class CylinderContact:
         gap, _ = self.gaps(nodal, fraction)
         return np.maximum(0.0, multipliers - self.stiffness * gap)
 
-    def energy(self, nodal: FloatArray, fraction: float, multipliers: FloatArray) -> float:
-        """What contact adds to the energy that equilibrium minimises: sum of (q^2 - λ^2) / 2 k, N mm/mm."""
-        force = self.forces(nodal, fraction, multipliers)
-        return float((force**2 - multipliers**2).sum() / (2 * self.stiffness))
-
     def gradient(self, nodal: FloatArray, fraction: float, multipliers: FloatArray) -> FloatArray:
-        """Derivative of the energy by the displacements of the m nodes: - q n, shape (m, 2), N/mm."""
+        """What contact adds to the balance of the m nodes: - q n, shape (m, 2), N/mm.
+
+        It is the derivative of the sum of (q^2 - λ^2) / 2 k.
+        """
         _, normal = self.gaps(nodal, fraction)
         return -self.forces(nodal, fraction, multipliers)[:, None] * normal
 
     def tangent(self, nodal: FloatArray, fraction: float, multipliers: FloatArray) -> FloatArray:
-        """Second derivative, a block for each node: k n n^T - q (I - n n^T) / distance, shape (m, 2, 2)."""
+        """Its derivative by the displacement, a block for each node: k n n^T - q (I - n n^T) / distance, shape (m, 2, 2)."""
         gap, normal = self.gaps(nodal, fraction)
         force = np.maximum(0.0, multipliers - self.stiffness * gap)
         across = np.einsum("mi,mj->mij", normal, normal)
@@ -152,14 +145,19 @@ class ContactRegion:
 
     @classmethod
     def of(
-        cls, contact: CylinderContact, nodal: FloatArray, fraction: float, multipliers: FloatArray
+        cls, contact: CylinderContact, nodal: FloatArray, fraction: float, force: FloatArray
     ) -> "ContactRegion | None":
         """The region in a state of equilibrium; none where the cylinder does not touch the finger.
 
         Its ends are taken half way between a point that touches and the next one that does not.
+
+        Args:
+            contact: The cylinder.
+            nodal: Displacements of all nodes, shape (N, 2), mm.
+            fraction: Of the load.
+            force: On the nodes of the front, shape (m,), N/mm.
         """
         gap, normal = contact.gaps(nodal, fraction)
-        force = contact.forces(nodal, fraction, multipliers)
         touching = np.flatnonzero(force > 0)
         if not len(touching):
             return None

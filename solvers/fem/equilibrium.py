@@ -123,28 +123,45 @@ class Equilibrium:
         gradient = np.stack([derivative @ nodal for derivative in self._derivatives], axis=-1)
         return bool(np.isfinite(nodal).all() and (deformation_jacobian(gradient) > 0).all())
 
-    def linear_guess(self, fraction: float) -> tuple[FloatArray, FloatArray]:
+    def linear_guess(self, fraction: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Where the undeformed tangent, which must be factorised, leads at a fraction of the load.
 
-        For a cylinder that is as if it touched the one node under its middle.
+        For a cylinder that is as if it touched only the node that it has come nearest to.
 
         Returns:
-            Displacements, shape (N, 2), mm, that meet the constraints, and multipliers, shape (k,), N/mm.
+            Displacements, shape (N, 2), mm, that meet the constraints; multipliers of the constraints, shape
+            (k,), and of the contact, shape (m,), N/mm.
         """
         nodal = fraction * self.held
         if nodal.any():
             step = PROBE * self.held
             stiffness = (self.internal_force(step) - self.internal_force(-step)) / (2 * PROBE)
             nodal = nodal + self.factors.solve(-fraction * stiffness)
-        functionals, targets = self.functionals, self.targets
         if self.contact is not None:
-            functionals = np.zeros((1, *nodal.shape))
-            functionals[0, self.contact.nearest, 1] = 1.0
-            targets = self.contact.travel[1:]
-        if not len(targets):
-            return nodal, targets
+            return self._pressed_at_one_node(self.contact, fraction)
+        nodal, forces = self._constrained(nodal, self.functionals, fraction * self.targets)
+        return nodal, forces, np.zeros(0)
+
+    def _pressed_at_one_node(
+        self, contact: CylinderContact, fraction: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        rest = np.zeros(self.clamped.shape)
+        gap, normal = contact.gaps(rest, fraction)
+        nearest = gap.argmin()
+        functional = rest.copy()
+        functional[contact.nodes[nearest]] = normal[nearest]
+        nodal, force = self._constrained(rest, functional[None], np.maximum(-gap[[nearest]], 0.0))
+        pressed = np.zeros(len(gap))
+        pressed[nearest] = force[0]
+        return nodal, np.zeros(0), pressed
+
+    def _constrained(
+        self, nodal: FloatArray, functionals: FloatArray, values: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Displacements, shape (N, 2), mm, with values (k,) of functionals (k, N, 2); the forces, shape (k,)."""
+        if not len(values):
+            return nodal, values
         responses = np.array([self.factors.solve(functional) for functional in functionals])
         compliance = np.einsum("inx,jnx->ij", functionals, responses)
-        forces = np.linalg.solve(compliance, fraction * targets)
-        nodal = nodal + np.einsum("k,knx->nx", forces, responses)
-        return nodal, forces[: len(self.targets)]
+        forces = np.linalg.solve(compliance, values)
+        return nodal + np.einsum("k,knx->nx", forces, responses), forces

@@ -131,7 +131,7 @@ class LoadPath:
         """Displacements and multipliers at a fraction of the load: the last two states continued."""
         last = self.points[-1]
         if len(self.points) == 1:
-            return *self.equilibrium.linear_guess(fraction), last.contact
+            return self.equilibrium.linear_guess(fraction)
         before = self.points[-2]
         slope = (fraction - last.fraction) / (last.fraction - before.fraction)
         return (

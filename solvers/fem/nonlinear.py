@@ -106,7 +106,7 @@ def _status(path: LoadPath, regions: Sequence[ContactRegion | None]) -> Status:
     contact = path.equilibrium.contact
     fraction = path.points[-1].fraction
     if fraction < 1:
-        wider = "a wider contact" if contact is None else "a larger radius"
+        wider = "a wider contact" if contact is None else "another radius"
         return Status(
             False,
             f"stopped at {fraction:.1%} of the load: Newton's method fails beyond (SNES: {path.reason}); "

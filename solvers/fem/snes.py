@@ -9,6 +9,8 @@ from petsc4py import PETSc
 from geometry.arrays import FloatArray
 from solvers.fem.equilibrium import Equilibrium, Stage
 
+SMALL = 1e-4
+"""Internal force over Young's modulus, mm, below which it counts as that: rounding of positions is a force."""
 SHORTEST = 2.0**-10
 """Fraction of a Newton step below which shortening it any further is no use."""
 
@@ -42,7 +44,8 @@ class BorderedNewton:
 
         (b_i . x_j) y_f = -R_f / s - b . a        y_c = a + x_k y_fk
 
-    A step that would turn an element inside out is halved before the line search begins.
+    A step that would turn an element inside out is halved before the line search begins, which looks at the
+    size of R.
     """
 
     def __init__(
@@ -146,7 +149,7 @@ class BorderedNewton:
         residual = snes.getFunction()[0].norm(PETSc.NormType.INFINITY)
         if not np.isfinite(residual):
             return int(reasons.DIVERGED_FNORM_NAN)
-        if residual <= self._tolerance * self._size:
+        if residual <= self._tolerance * max(self._size, SMALL * self._scale):
             return int(reasons.CONVERGED_FNORM_RELATIVE)
         return int(reasons.CONVERGED_ITERATING)
 

@@ -1,0 +1,118 @@
+"""The discrete finite-strain problem: derivatives by Taylor's theorem, objectivity, SNES and its failures."""
+
+import numpy as np
+import pytest
+
+from solvers.fem.equilibrium import Equilibrium, Stage
+from solvers.fem.lagrange import LagrangeSpace
+from solvers.fem.snes import Balance, BorderedNewton
+from solvers.problem import Load, Material, Problem
+from tests.solvers.conftest import bar_mesh
+
+LAWS = ("neo-hookean", "st-venant-kirchhoff")
+STEPS = 0.1 * 0.5 ** np.arange(4)
+REST = Stage(0.0, np.zeros(0))
+
+
+def equilibrium(law, load=Load(kind="patch")) -> Equilibrium:
+    mesh = bar_mesh(8.0, 2.0, 8, 2, contact=(3.0, 5.0))
+    return Equilibrium(Problem(mesh, Material(law=law, poisson=0.3), load), LagrangeSpace(mesh, 2))
+
+
+def fields(problem: Equilibrium, *seeds: int, size: float = 0.02) -> list[np.ndarray]:
+    """Random displacements that are zero where clamped, smooth enough to turn no element inside out."""
+    return [
+        np.where(problem.clamped, 0.0, np.random.default_rng(seed).normal(size=problem.clamped.shape)) * size
+        for seed in seeds
+    ]
+
+
+def times_tangent(problem: Equilibrium, direction: np.ndarray) -> np.ndarray:
+    vector, product = problem.matrix.createVecs()
+    problem.distributed.distribute(direction, vector)
+    problem.matrix.mult(vector, product)
+    return problem.distributed.gather(product)
+
+
+def slopes(remainders) -> np.ndarray:
+    remainders = np.abs(remainders)
+    return np.log2(remainders[:-1] / remainders[1:])
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_energy_has_the_internal_force_and_the_tangent_as_derivatives(law):
+    """Taylor: what is left without the second derivative falls with t^2, with it with t^3."""
+    problem = equilibrium(law)
+    start, direction = fields(problem, 0, 1)
+    energy, force = problem.energy(start), problem.internal_force(start)
+    problem.factorise(start, REST)
+    first, second = (force * direction).sum(), (direction * times_tangent(problem, direction)).sum()
+    changes = np.array([problem.energy(start + t * direction) - energy for t in STEPS])
+    np.testing.assert_allclose(slopes(changes - STEPS * first), 2, atol=0.1)
+    np.testing.assert_allclose(slopes(changes - STEPS * first - 0.5 * STEPS**2 * second), 3, atol=0.1)
+
+
+def test_balance_with_a_cylinder_has_its_tangent_as_derivative():
+    """With some nodes in contact and the cylinder shifted, so that its normals turn."""
+    load = Load(kind="cylinder", radius=3.0, displacement=(0.1, -0.2))
+    problem = equilibrium("neo-hookean", load)
+    stage = Stage(1.0, np.full(len(problem.contact.nodes), 0.05))
+    start, direction = fields(problem, 0, 1, size=0.01)
+    pressed = problem.contact.forces(start, stage.fraction, stage.multipliers) > 0
+    assert 0 < pressed.sum() < len(pressed)
+    none = np.zeros(0)
+    balance, _ = problem.unbalanced(start, none, stage)
+    problem.factorise(start, stage)
+    change = times_tangent(problem, direction)
+    steps = 0.1 * STEPS  # so small that no node comes into contact or leaves it
+    left = [
+        np.linalg.norm(problem.unbalanced(start + t * direction, none, stage)[0] - balance - t * change)
+        for t in steps
+    ]
+    np.testing.assert_allclose(slopes(left), 2, atol=0.1)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_rotated_body_has_the_same_energy_and_rotated_forces(law):
+    problem = equilibrium(law)
+    (start,) = fields(problem, 0)
+    nodes, angle = problem.distributed.space.nodes, 1.2
+    q = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    turned = (nodes + start) @ q.T - nodes
+    assert problem.energy(turned) == pytest.approx(problem.energy(start), rel=1e-10)
+    np.testing.assert_allclose(
+        problem.internal_force(turned), problem.internal_force(start) @ q.T, atol=1e-10
+    )
+
+
+def newton(problem: Equilibrium, iterations: int = 12) -> BorderedNewton:
+    return BorderedNewton(problem, scale=11.4, tolerance=1e-8, max_iterations=iterations)
+
+
+def started(solver: BorderedNewton, problem: Equilibrium) -> Balance:
+    """From the linear guess to the full load."""
+    nodal, forces, pressed = problem.linear_guess(1.0)
+    return solver.solve(nodal, forces, Stage(1.0, pressed))
+
+
+def test_newton_meets_constraints_and_balance_and_converges_quadratically():
+    problem = equilibrium("neo-hookean", Load(kind="mean", displacement=(0.1, -0.4)))
+    balance = started(newton(problem), problem)
+    assert (balance.converged, balance.reason) == (True, "converged_fnorm_relative")
+    assert balance.iterations <= 5
+    left, size = problem.unbalanced(balance.nodal, balance.forces, Stage(1.0, np.zeros(0)))
+    assert np.abs(left).max() < 1e-8 * size
+    np.testing.assert_allclose(problem.missing(balance.nodal, Stage(1.0, np.zeros(0))), 0, atol=1e-10)
+
+
+def test_newton_says_that_it_takes_too_long():
+    problem = equilibrium("neo-hookean", Load(kind="mean", displacement=(0.1, -0.4)))
+    balance = started(newton(problem, 1), problem)
+    assert (balance.converged, balance.reason) == (False, "diverged_max_it")
+
+
+def test_newton_does_not_start_from_an_element_turned_inside_out():
+    problem = equilibrium("neo-hookean", Load(kind="mean", displacement=(0.1, -0.4)))
+    (torn,) = fields(problem, 0, size=2.0)
+    balance = newton(problem).solve(torn, np.zeros(2), Stage(1.0, np.zeros(0)))
+    assert (balance.converged, balance.reason) == (False, "diverged_function_domain")
