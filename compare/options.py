@@ -20,6 +20,9 @@ from solvers.problem import Load, Material
 from solvers.registry import PRESETS, make_solver
 from solvers.solver import Solver
 
+RADIUS = 5.0
+"""Of a cylinder for which none is given, mm."""
+
 FINGER = Group("Finger", sort_key=1)
 PHYSICS = Group("Physics", sort_key=2)
 TRAINING = Group("Solvers' settings", sort_key=3)
@@ -95,11 +98,14 @@ class PhysicsOptions:
         ),
     ] = None
     load: Annotated[
-        Literal["mean", "point", "patch"] | None,
+        Literal["mean", "point", "patch", "cylinder"] | None,
         Parameter(
             help="mean: weighted mean displacement of the contact, the default; point: the paper's, whose "
-            "limit under refinement does not exist; patch: rigid."
+            "limit under refinement does not exist; patch: rigid; cylinder: rigid, frictionless."
         ),
+    ] = None
+    radius: Annotated[
+        float | None, Parameter(show_default=False, help="Of --load cylinder, mm; 5 if not given.")
     ] = None
     stroke: Annotated[float, Parameter(help="How far the indenter presses, mm.")] = 10.0
     direction: Annotated[
@@ -125,11 +131,14 @@ class PhysicsOptions:
             )
         along, into = sin(radians(self.direction)), cos(radians(self.direction))
         kind = self.load or job_defaults(preset).load
+        radius = RADIUS if kind == "cylinder" and self.radius is None else self.radius
         try:
             return (
                 Material(young=self.young, poisson=self.poisson, plane=self.plane, law=self.law or "linear"),
                 Load(
-                    kind=kind, displacement=(None if self.slide else self.stroke * along, -self.stroke * into)
+                    kind=kind,
+                    displacement=(None if self.slide else self.stroke * along, -self.stroke * into),
+                    radius=radius,
                 ),
             )
         except ValidationError as error:

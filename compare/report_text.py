@@ -54,6 +54,8 @@ def load_sentence(load: Load, design: Parameters) -> str:
         "mean": f"The weighted mean displacement of the {width} is prescribed",
         "point": "The displacement of one point, the contact’s middle, is prescribed",
         "patch": f"Every point of the {width} has the prescribed displacement",
+        "cylinder": f"A rigid cylinder of radius {load.radius or 0:g} mm presses without friction where it "
+        "touches the front face, and moves by the prescribed displacement",
     }[load.kind]
     parts = [
         f"{name} is free"

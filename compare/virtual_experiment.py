@@ -49,7 +49,9 @@ def virtual_experiment(problem: Problem, progress: Progress = silent) -> Observa
     richer = Problem(
         mesh=problem.mesh,
         material=problem.material.model_copy(update={"law": "neo-hookean", "plane": "strain"}),
-        load=problem.load.model_copy(update={"kind": "patch", "displacement": (None, normal)}),
+        load=problem.load.model_copy(
+            update={"kind": "patch", "displacement": (None, normal), "radius": None}
+        ),
     )
     entry = cache_folder() / f"experiment-{_key(solver, richer)}.csv"
     if entry.exists():

@@ -13,7 +13,7 @@ import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
 from solvers.fem.lagrange import LagrangeSpace
-from solvers.problem import Problem, contact_extent
+from solvers.problem import Problem, contact_ends
 
 STIFFNESS = 10.0
 """k over Young's modulus: a larger one needs fewer updates of the multipliers but more Newton iterations."""
@@ -47,11 +47,10 @@ class CylinderContact:
         load = problem.load
         nodes = space.boundary_nodes("front")
         nodes = nodes[np.argsort(space.nodes[nodes, 0])]
-        middle, _ = contact_extent(problem.mesh)
         return cls(
             nodes=nodes,
             positions=space.nodes[nodes],
-            centre=np.array([middle, load.radius]),
+            centre=np.array([np.mean(contact_ends(problem)), load.radius]),
             travel=load.values,
             radius=float(load.radius or 0),
             stiffness=STIFFNESS * problem.material.young,
@@ -88,7 +87,7 @@ class CylinderContact:
         return -self.forces(nodal, fraction, multipliers)[:, None] * normal
 
     def tangent(self, nodal: FloatArray, fraction: float, multipliers: FloatArray) -> FloatArray:
-        """Its derivative by the displacement, a block for each node: k n n^T - q (I - n n^T) / distance, shape (m, 2, 2)."""
+        """Derivative of the gradient, a block k n n^T - q (I - n n^T) / |away| a node, shape (m, 2, 2)."""
         gap, normal = self.gaps(nodal, fraction)
         force = np.maximum(0.0, multipliers - self.stiffness * gap)
         across = np.einsum("mi,mj->mij", normal, normal)

@@ -158,7 +158,7 @@ class Equilibrium:
     def _constrained(
         self, nodal: FloatArray, functionals: FloatArray, values: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Displacements, shape (N, 2), mm, with values (k,) of functionals (k, N, 2); the forces, shape (k,)."""
+        """Displacements, shape (N, 2), mm, with values (k,) of functionals (k, N, 2); their forces, (k,)."""
         if not len(values):
             return nodal, values
         responses = np.array([self.factors.solve(functional) for functional in functionals])

@@ -10,7 +10,7 @@ from geometry.arrays import FloatArray
 from solvers.fem.equilibrium import Equilibrium, Stage
 
 SMALL = 1e-4
-"""Internal force over Young's modulus, mm, below which it counts as that: rounding of positions is a force."""
+"""Least size of the internal forces over Young's modulus, mm: rounding of positions makes forces too."""
 SHORTEST = 2.0**-10
 """Fraction of a Newton step below which shortening it any further is no use."""
 

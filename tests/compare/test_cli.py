@@ -108,6 +108,10 @@ BAD = [
     ("compare --direction 90", "--direction 90: give an angle between -90 and 90 degrees"),
     ("compare --direction 5 --slide", "--slide leaves the travel along the finger free"),
     ("compare --load pull", 'Choose from: "mean", "point", "patch"'),
+    ("compare --load cylinder", "fem takes the loads mean, point, patch, not 'cylinder'"),
+    ("compare --radius 5", "a radius belongs to the load cylinder, and to no other"),
+    ("solve fem-nonlinear --load cylinder --radius 0", "--radius 0.0: input should be greater than 0"),
+    ("solve fem-nonlinear --load cylinder --slide", "a cylinder .* has no friction"),
     ("compare --plane stress --solvers fem-nonlinear", "fem-nonlinear: .* plane strain only"),
     ("compare --law hooke", 'Choose from: "linear", "neo-hookean", "st-venant-kirchhoff"'),
     (
@@ -257,7 +261,7 @@ def test_the_options_reach_the_job(folder, capsys, without_pictures):
     told = json.loads(capsys.readouterr().out)
     assert told["design"]["rib_count"] == 5
     assert told["material"] == {"young": 3, "poisson": 0.3, "plane": "stress", "law": "linear"}
-    assert told["load"] == {"kind": "point", "displacement": [None, -4], "position": None}
+    assert told["load"] == {"kind": "point", "displacement": [None, -4], "position": None, "radius": None}
     assert told["solvers"]["fem"]["stats"]["degree"] == 1
     assert json.loads(Path("here/run.json").read_text())["mesh"]["size"] == 1
 
@@ -541,8 +545,8 @@ def test_help_names_every_option_of_the_main_job(capsys):
     assert main(["compare", "--help"]) == 0
     text = capsys.readouterr().out
     options = (
-        "design set mesh-size adapt young poisson plane law load stroke direction slide solvers solver-set "
-        "seed preset device measurements reference out resume quiet json"
+        "design set mesh-size adapt young poisson plane law load radius stroke direction slide solvers "
+        "solver-set seed preset device measurements reference out resume quiet json"
     )
     assert all(f"--{option} " in text for option in options.split())
     assert "[default: ()]" not in text

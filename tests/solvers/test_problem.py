@@ -78,7 +78,7 @@ def test_a_contact_beyond_the_finger_is_refused(coarse_mesh):
         (lambda: Material(young=-1.0), "greater than 0"),
         (lambda: Material(poisson=0.5), "less than 0.5"),  # incompressible: no displacement formulation
         (lambda: Load(displacement=(None, None)), "leaves both components free"),
-        (lambda: Load(kind="magnet"), "'mean', 'point' or 'patch'"),
+        (lambda: Load(kind="magnet"), "'mean', 'point', 'patch' or 'cylinder'"),
     ],
 )
 def test_impossible_materials_and_loads_are_refused(make, message):
