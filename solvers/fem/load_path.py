@@ -88,6 +88,11 @@ class LoadPath:
         self.halved = self.iterations = 0
         self.reason = ""
 
+    def close(self) -> None:
+        """Free what PETSc holds, on all ranks at once."""
+        self._newton.close()
+        self.equilibrium.factors.destroy()
+
     def follow(self, progress: Progress) -> None:
         """Go to the full load, or as far as there is equilibrium."""
         step = min(self._steps.first, self._longest)

@@ -75,6 +75,7 @@ class FemNonlinearSolver:
         reactions = np.array([path.reaction(point) for point in points])
         last = points[-1]
         regions = [path.region(point) for point in points]
+        path.close()
         return Solution(
             solver=self.name,
             problem=problem,

@@ -69,13 +69,13 @@ class BorderedNewton:
         own = self._part.getLocalSize()
         border = len(equilibrium.targets) if comm.rank == self._last else 0
         self._unknown = PETSc.Vec().createMPI((own + border, PETSc.DETERMINE), comm=comm)
-        residual = self._unknown.duplicate()
+        self._residual = self._unknown.duplicate()
         sizes = self._unknown.getSizes()
-        jacobian = PETSc.Mat().createPython((sizes, sizes), context=self, comm=comm)
-        jacobian.setUp()
+        self._jacobian = PETSc.Mat().createPython((sizes, sizes), context=self, comm=comm)
+        self._jacobian.setUp()
         self._snes = PETSc.SNES().create(comm)
-        self._snes.setFunction(self._evaluate, residual)
-        self._snes.setJacobian(self._factorise, jacobian)
+        self._snes.setFunction(self._evaluate, self._residual)
+        self._snes.setJacobian(self._factorise, self._jacobian)
         self._snes.setLineSearchPreCheck(self._shorten)
         self._snes.setConvergenceTest(self._ended)
         self._snes.setTolerances(max_it=max_iterations)
@@ -84,6 +84,13 @@ class BorderedNewton:
         elimination = linear.getPC()
         elimination.setType(PETSc.PC.Type.PYTHON)
         elimination.setPythonContext(self)
+        elimination.destroy()  # the names only: petsc4py would keep them for ever
+        linear.destroy()
+
+    def close(self) -> None:
+        """Free what PETSc holds, on all ranks at once."""
+        for item in (self._snes, self._jacobian, self._residual, self._unknown, self._part):
+            item.destroy()
 
     def solve(self, nodal: FloatArray, forces: FloatArray, stage: Stage) -> Balance:
         """Find equilibrium at a stage from displacements that meet its constraints."""
@@ -112,10 +119,11 @@ class BorderedNewton:
         """J times a step, as the line search calls it."""
         nodal, forces = self._split(step)
         distributed, functionals = self._equilibrium.distributed, self._equilibrium.functionals
-        vector, force = self._equilibrium.matrix.createVecs()
-        distributed.distribute(nodal, vector)
-        self._equilibrium.matrix.mult(vector, force)
+        distributed.distribute(nodal, self._part)
+        force = self._part.duplicate()
+        self._equilibrium.matrix.mult(self._part, force)
         balance = distributed.gather(force) - np.einsum("k,knx->nx", forces, functionals)
+        force.destroy()
         missed = -self._scale * np.einsum("knx,nx->k", functionals, nodal)
         self._join(np.where(self._equilibrium.clamped, 0.0, balance), missed, product)
 
