@@ -12,6 +12,7 @@ from geometry.errors import UserError
 from solvers.fem.contact import ContactRegion
 from solvers.fem.lagrange import LagrangeField, LagrangeSpace
 from solvers.fem.load_path import LoadPath, Steps
+from solvers.fem.locking import locking_advice
 from solvers.fem.ranks import on_all_ranks
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
@@ -82,7 +83,7 @@ class FemNonlinearSolver:
             field=LagrangeField(space, last.nodal),
             energy=energies[-1],
             reaction=reactions[-1],
-            status=_status(path, regions),
+            status=_status(path, regions, locking_advice(self.degree, problem.material)),
             stats={
                 "seconds": time.perf_counter() - started,
                 "unknowns": last.nodal.size,
@@ -102,8 +103,8 @@ class FemNonlinearSolver:
         )
 
 
-def _status(path: LoadPath, regions: Sequence[ContactRegion | None]) -> Status:
-    """Whether the path led to the full load, and what to try where it did not."""
+def _status(path: LoadPath, regions: Sequence[ContactRegion | None], advice: str) -> Status:
+    """Whether the path led to the full load, and what to try where it did not; else other advice."""
     contact = path.equilibrium.contact
     fraction = path.points[-1].fraction
     if fraction < 1:
@@ -125,7 +126,7 @@ def _status(path: LoadPath, regions: Sequence[ContactRegion | None]) -> Status:
     if (region := regions[-1]) is not None:
         parts = f" in {region.parts} parts" if region.parts > 1 else ""
         taken += f"; contact from x = {region.start:.4g} to {region.end:.4g} mm{parts}"
-    return Status(True, taken)
+    return Status(True, "; ".join(filter(None, [taken, advice])))
 
 
 def _contact_history(path: LoadPath, regions: Sequence[ContactRegion | None]) -> dict[str, FloatArray]:

@@ -1,87 +1,16 @@
-"""The rigid cylinder: against Hertz, and what contact without friction must obey wherever it is found."""
+"""The rigid cylinder: what contact without friction must obey (`tests/verification` has Hertz)."""
 
 import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
 from geometry.errors import UserError
-from geometry.mesh import TriangleMesh
 from solvers.fem.equilibrium import Equilibrium
 from solvers.fem.linear import FemSolver
 from solvers.fem.load_path import PENETRATION
 from solvers.fem.nonlinear import FemNonlinearSolver
 from solvers.problem import Load, Material, Problem, contact_ends
 from tests.solvers.conftest import bar_mesh
-
-YOUNG, POISSON = 11.4, 0.3
-NEO_HOOKEAN = Material(young=YOUNG, poisson=POISSON, law="neo-hookean")
-RADIUS = 20.0
-
-
-def graded(finest: float, fine_until: float, end: float, growth: float = 1.35) -> np.ndarray:
-    """Positions from 0 to `end`, with steps that are `finest` up to `fine_until` and grow beyond."""
-    positions, step = list(np.arange(0, fine_until + finest / 2, finest)), finest
-    while positions[-1] < end:
-        step *= growth
-        positions.append(positions[-1] + step)
-    return np.array(positions) * end / positions[-1]
-
-
-def block(finest: float) -> TriangleMesh:
-    """A block of 60 mm by 30 mm, clamped below, with fine elements under the middle of its top."""
-    side, depth = graded(finest, 0.8, 30.0), graded(finest, 0.4, 30.0)
-    x, y = np.meshgrid(np.concatenate([-side[:0:-1], side]) + 30.0, -depth[::-1], indexing="ij")
-    number = np.arange(x.size).reshape(x.shape)
-    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
-    corners = [np.stack(three, axis=-1).reshape(-1, 3) for three in ((a, b, c), (a, c, d))]
-    top = np.column_stack([number[:-1, -1], number[1:, -1]])
-    middle = len(side) - 1
-    return TriangleMesh(
-        points=np.column_stack([x.ravel(), y.ravel()]),
-        triangles=np.concatenate(corners),
-        boundaries={
-            "base": np.column_stack([number[:-1, 0], number[1:, 0]]),
-            "front": top,
-            "contact": top[middle - 1 : middle + 1],
-        },
-        marker_nodes=number[[middle], -2],
-        contact_node=int(number[middle, -1]),
-    )
-
-
-@pytest.fixture(scope="module")
-def hertz():
-    load = Load(kind="cylinder", radius=RADIUS, displacement=(0.0, -0.035))
-    return FemNonlinearSolver().solve(Problem(block(0.05), NEO_HOOKEAN, load))
-
-
-def test_half_width_and_peak_pressure_are_those_of_hertz(hertz):
-    """K. L. Johnson, Contact Mechanics, section 4.2(c): a^2 = 4 P R / (π E*), p0 = 2 P / (π a).
-
-    The strain, a / 2 R = 1.4 %, is what Hertz neglects.
-    """
-    half_width, pressure = hertz_of(hertz)
-    assert hertz.stats["contact_width_mm"] / 2 == pytest.approx(
-        half_width, abs=hertz.stats["contact_spacing_mm"] / 2
-    )
-    assert hertz.stats["contact_pressure_MPa"] == pytest.approx(pressure, rel=0.015)
-    assert hertz.stats["contact_parts"] == 1
-
-
-def test_stress_under_the_cylinder_is_the_ellipse_of_hertz(hertz):
-    """p = p0 √(1 - (x / a)^2), taken from the stress in the block and not from the contact's own forces."""
-    half_width, pressure = hertz_of(hertz)
-    x = np.linspace(-0.85, 0.85, 41)
-    below = np.column_stack([30 + half_width * x, np.full(len(x), -1e-6)])
-    stress = hertz.state(below).stress
-    np.testing.assert_allclose(-stress[:, 1, 1], pressure * np.sqrt(1 - x**2), atol=0.03 * pressure)
-
-
-def hertz_of(solution) -> tuple[float, float]:
-    """Half-width, mm, and peak pressure, MPa, that belong to the solution's force."""
-    force, modulus = -solution.reaction[1], YOUNG / (1 - POISSON**2)
-    half_width = np.sqrt(4 * force * RADIUS / (np.pi * modulus))
-    return half_width, 2 * force / (np.pi * half_width)
 
 
 @pytest.fixture(scope="module")
@@ -139,7 +68,9 @@ def test_a_cylinder_that_moves_away_does_not_touch(coarse_mesh):
 def test_contact_that_leaves_the_front_face_is_not_converged():
     bar = bar_mesh(8.0, 2.0, 8, 2, contact=(6.0, 8.0))
     load = Load(kind="cylinder", radius=5.0, displacement=(1.0, -0.3))
-    solution = FemNonlinearSolver(degree=1).solve(Problem(bar, NEO_HOOKEAN, load))
+    solution = FemNonlinearSolver(degree=1).solve(
+        Problem(bar, Material(poisson=0.3, law="neo-hookean"), load)
+    )
     assert not solution.status.converged
     assert "the contact reaches an end of the front face" in solution.status.message
 

@@ -59,6 +59,13 @@ def test_work_of_the_indenter_is_the_stored_energy(medium_mesh):
     assert done == pytest.approx(solution.energy, rel=2e-3)
 
 
+@pytest.mark.parametrize("degree", [1, 2])
+def test_status_says_that_linear_elements_lock(coarse_mesh, degree):
+    load = Load(kind="patch", displacement=(None, -1.0))
+    message = FemNonlinearSolver(degree=degree).solve(Problem(coarse_mesh, NEO_HOOKEAN, load)).status.message
+    assert ("linear elements lock" in message) == (degree == 1)
+
+
 def test_history_starts_at_rest_and_ends_at_the_full_load(pressed):
     assert pressed.status.converged
     fractions = pressed.history["load_fraction"]

@@ -58,9 +58,9 @@ class Row:
 
     @property
     def shown(self) -> str:
-        """The number; only the power of ten of one that is near rounding, which differs by machine."""
+        """The number; only a power of ten of one that is near rounding, which differs by machine."""
         if self.measured < 1e-6:
-            return f"below 1e{np.ceil(np.log10(max(self.measured, 1e-16))):.0f}"
+            return f"below 1e{np.ceil(np.log10(max(self.measured, 1e-12))):.0f}"
         number = f"{self.measured:#.5g}" if self.measured > 0.01 else f"{self.measured:.2g}"
         return number if self.error is None else f"{self.measured:.3f} (error {self.error:.1e})"
 
