@@ -1,9 +1,8 @@
 """The finger in DeepXDE, set up as well as its users could: two networks that minimise the strain energy.
 
 The energy is a sum of squares of four residuals at the centroids of coarse elements, weighted by the square
-roots of their areas (three points an element cost three times as much a step); coordinates are scaled to
-the finger's length and displacements to the stroke; the clamp is the factor d / (d + 5 mm) of the distance
-to the base. The load is one of
+roots of their areas; coordinates are scaled to the finger's length and displacements to the stroke; the
+clamp is the factor d / (d + 5 mm) of the distance to the base. The load is one of
 
 - `mean`, the default load of this project, exactly: both networks are shifted by what makes the mean over the
   contact right;

@@ -10,7 +10,7 @@ With the step s, the change y of the gradient g, and
 the update is H <- (H - Hy (Hy)^T / y·Hy + φ y·Hy v v^T) / τ + s s^T / s·y; φ = τ = 1 is BFGS.
 
 Sources: J. F. Urbán, P. Stefanou, J. A. Pons: Unveiling the optimization process of physics informed neural
-networks: How accurate and competitive can PINNs be?, J. Comput. Phys. 523 (2025) 113656, section 3
+networks: How accurate and competitive can PINNs be?, J. Comput. Phys. 523 (2025) 113656
 (SSBroyden), after M. Al-Baali, H. Khalfan: Wide interval for efficient self-scaling quasi-Newton
 algorithms, Optim. Methods Softw. 20 (2005) 679-691. The first H is scaled as in J. Nocedal, S. Wright:
 Numerical Optimization, 2nd ed., (6.20).
