@@ -60,7 +60,7 @@ class FiniteBasisSolver(ABC):
     ridges: int = 5
     slope: float
     coarser: float = 1.7
-    tolerance: float = 0.005
+    tolerance: float = 0.01
     thinning: float = 0.75
     cell: float
     base_length: float = 5.0
