@@ -89,6 +89,9 @@ def main() -> Table:
     return table
 
 
+TICKS = {"units": (1000, 3000, 10_000, 20_000), "quadrature points": (20_000, 50_000, 100_000, 200_000)}
+
+
 def _draw(curves: dict[tuple[str, str], np.ndarray]) -> None:
     mpl.use("Agg")
     import matplotlib.pyplot as plt
@@ -106,11 +109,15 @@ def _draw(curves: dict[tuple[str, str], np.ndarray]) -> None:
         axes[1, column].set_yscale("log")
         if study != "ribs":
             axes[1, column].set_xscale("log")
+            axes[1, column].set_xticks(TICKS[study], [f"{tick:,}" for tick in TICKS[study]], minor=False)
+            axes[1, column].xaxis.set_minor_formatter(plt.NullFormatter())
         axes[1, column].set_xlabel(study)
     axes[0, 0].set_ylabel("relative L² difference, %")
     axes[1, 0].set_ylabel("time, s")
-    axes[0, 2].legend(fontsize=8)
-    axes[1, 2].legend(fontsize=8)
+    axes[1, 0].set_yticks([2, 5, 10], ["2", "5", "10"])
+    axes[1, 0].yaxis.set_minor_formatter(plt.NullFormatter())
+    axes[0, 2].legend(fontsize=8, loc="upper right", ncols=2)
+    axes[1, 0].legend(fontsize=8)
     PICTURE.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(PICTURE, dpi=150)
     plt.close(figure)
