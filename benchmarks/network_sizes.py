@@ -116,7 +116,7 @@ def _draw(curves: dict[tuple[str, str], np.ndarray]) -> None:
     axes[1, 0].set_ylabel("time, s")
     axes[1, 0].set_yticks([2, 5, 10], ["2", "5", "10"])
     axes[1, 0].yaxis.set_minor_formatter(plt.NullFormatter())
-    axes[0, 2].legend(fontsize=8, loc="upper right", ncols=2)
+    axes[0, 2].legend(fontsize=7, loc="upper right", ncols=2)
     axes[1, 0].legend(fontsize=8)
     PICTURE.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(PICTURE, dpi=150)
