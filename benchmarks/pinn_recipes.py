@@ -197,15 +197,23 @@ RECIPES: dict[str, Recipe] = {
 
 REMARKS = {
     "Adam, 1e-2": "far from converged: stiffness and bending differ by orders of magnitude",
-    "Adam, 1e-2, slopes 0.1/mm through points of the body": "a start that knows the body gains most, then it stalls",
+    "Adam, 1e-2, slopes 0.1/mm through points of the body": (
+        "a start that knows the body gains most, then it stalls"
+    ),
     "Adam, 1e-2, output layer exact at the end": "hardly helps: the hidden features are the bottleneck",
     "SOAP, 1e-2": "the best of the gradient methods here; the rate was not tuned",
     "L-BFGS": "line searches stall",
     "Adam, then self-scaled Broyden": "a dense matrix of all parameters; ahead of L-BFGS",
-    "SPRING, 300 random points": "the fastest start of all from random weights; the noise of the samples limits the end",
+    "SPRING, 300 random points": (
+        "the fastest start of all from random weights; the noise of the samples limits the end"
+    ),
     "Levenberg-Marquardt, width 16": "still falling, but a step costs the square of the parameters",
-    "random gates that do not sum to one, dense exact output layer": "exact output layer, no training: a dense system limits the number of units",
-    "pinn-std at twice the spacing, ridges trained by L-BFGS": "variable projection works, and pays less than twice the units",
+    "random gates that do not sum to one, dense exact output layer": (
+        "exact output layer, no training: a dense system limits the number of units"
+    ),
+    "pinn-std at twice the spacing, ridges trained by L-BFGS": (
+        "variable projection works, and pays less than twice the units"
+    ),
     "pinn-std, preset fast": "gates that sum to one, sparse exact output layer",
     "pinn-local": "the same with bumps instead of gates",
 }
