@@ -9,6 +9,7 @@ import contextlib
 import io
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 
 import numpy as np
 import torch
@@ -20,6 +21,7 @@ from geometry.design import Design
 from geometry.settings import MeshSettings
 from solvers.pinn.collocation import base_points
 from solvers.pinn.paper import PaperPinnSolver
+from solvers.pinn.pieces import pool
 from solvers.problem import Load, Problem, contact_functional
 from tests.solvers.autograd_reference import PlainMlp, PlainPinn
 
@@ -56,7 +58,7 @@ def _ours(problem: Problem, threads: int, epochs: int) -> float:
         parameters.grad = loss(parameters).gradient
         adam.step()
 
-    return _seconds(step, threads, epochs)
+    return _seconds(step, threads, epochs, during=pool)
 
 
 def _plain(problem: Problem, threads: int, epochs: int) -> float:
@@ -100,15 +102,21 @@ def _deepxde(problem: Problem, threads: int, epochs: int) -> float:
     return _seconds(lambda: model.train_step(*batch), threads, epochs)
 
 
-def _seconds(step: Callable[[], object], threads: int, epochs: int) -> float:
+def _seconds(
+    step: Callable[[], object],
+    threads: int,
+    epochs: int,
+    during: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
+) -> float:
     """Mean time of a step with so many threads, the first not counted."""
     before = torch.get_num_threads()
     torch.set_num_threads(threads)
     try:
-        step()
-        started = time.perf_counter()
-        for _ in range(epochs):
+        with during():
             step()
-        return (time.perf_counter() - started) / epochs
+            started = time.perf_counter()
+            for _ in range(epochs):
+                step()
+            return (time.perf_counter() - started) / epochs
     finally:
         torch.set_num_threads(before)

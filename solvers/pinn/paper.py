@@ -16,7 +16,7 @@ from solvers.pinn.loss_gradient import Loss
 from solvers.pinn.losses import DisplacementTerm, EnergyTerm, LossTerm, stiffness_matrix
 from solvers.pinn.mlp_field import MlpField
 from solvers.pinn.modified_mlp import ModifiedMlp
-from solvers.pinn.pieces import torch_threads
+from solvers.pinn.pieces import pool, torch_threads
 from solvers.pinn.processes import ONE_PROCESS, Processes
 from solvers.pinn.training import OPTIMISERS, Recipe, Store, Training
 from solvers.pinn.training_progress import TrainingProgress
@@ -119,7 +119,7 @@ class PaperPinnSolver:
         started = time.perf_counter()
         processes = Processes.of_environment()
         area = float(problem.mesh.areas.sum())
-        with torch_threads(self.threads) as threads:
+        with torch_threads(self.threads) as threads, pool():
             loss = self.loss(problem, processes)
             initial = self.network.initial(self.seed, PRECISIONS[self.precision]).to(self.device)
             training = Training(loss, initial, self._recipe(), area, self._store(problem, processes))
