@@ -11,6 +11,7 @@ part 1, Int. J. Numer. Meth. Engng 33 (1992) 1331-1364, sections 3 and 4; the we
 """
 
 from dataclasses import dataclass
+from itertools import combinations_with_replacement, product
 from typing import NamedTuple
 
 import numpy as np
@@ -44,7 +45,7 @@ class GradientRecovery:
         samples = space.mesh.at_barycentric(rule)
         fits = _fit(space.mesh, space.degree, samples.points.reshape(-1, len(rule), 2))
         columns = len(samples)
-        smoothing = csr_matrix((fits.weights[:, 0], fits.sample, fits.start), (len(fits.scale), columns))
+        smoothing = csr_matrix((fits.weights[0], fits.sample, fits.start), (len(fits.scale), columns))
         if space.degree == 2:
             smoothing = vstack([smoothing, _at_edges(space.mesh, fits, columns)], format="csr")
         return cls(space.shape_gradients(samples), smoothing)
@@ -62,7 +63,7 @@ class GradientRecovery:
 
 
 class _Fits(NamedTuple):
-    """The polynomial of vertex i is the sum of weights[k] f(sample[k]), start[i] <= k < start[i + 1]."""
+    """The polynomial of vertex i is the sum of weights[:, k] f(sample[k]), start[i] <= k < start[i + 1]."""
 
     start: IntArray
     sample: IntArray
@@ -84,9 +85,15 @@ def _fit(mesh: TriangleMesh, degree: int, samples: FloatArray) -> _Fits:
     distance = np.linalg.norm(offset, axis=1)
     scale = np.add.reduceat(distance, start[:-1]) / np.diff(start)
     terms = _monomials(offset / scale[vertex, None], degree)
-    weighted = terms / distance[:, None]
-    normal = np.add.reduceat(weighted[:, :, None] * terms[:, None, :], start[:-1], axis=0)
-    weights = np.einsum("nij,nj->ni", np.linalg.inv(normal)[vertex], weighted)
+    weighted, size = terms / distance, len(terms)
+    # Entry by entry: all of all samples at once would take gigabytes on a mesh of a million triangles.
+    normal = np.empty((vertices, size, size))
+    for i, j in combinations_with_replacement(range(size), 2):
+        normal[:, i, j] = normal[:, j, i] = np.add.reduceat(weighted[i] * terms[j], start[:-1])
+    inverse = np.linalg.inv(normal)
+    weights = np.zeros_like(terms)
+    for i, j in product(range(size), repeat=2):
+        weights[i] += inverse[:, i, j][vertex] * weighted[j]
     return _Fits(start, sample, weights, scale)
 
 
@@ -98,12 +105,14 @@ def _at_edges(mesh: TriangleMesh, fits: _Fits, columns: int) -> csr_matrix:
     count = np.diff(fits.start)[ends]
     behind = np.concatenate([[0], np.cumsum(count)])
     entries = np.arange(behind[-1]) + np.repeat(fits.start[ends] - behind[:-1], count)
-    values = np.einsum("ni,ni->n", np.repeat(terms, count, axis=0), fits.weights[entries])
+    values = sum(
+        np.repeat(term, count) * weight[entries] for term, weight in zip(terms, fits.weights, strict=True)
+    )
     return csr_matrix((values, fits.sample[entries], behind[::2]), (len(mesh.edges), columns))
 
 
 def _monomials(place: FloatArray, degree: int) -> FloatArray:
-    """1, x, y and, for degree 2, x^2, x y, y^2 at places of shape (n, 2): shape (n, 3) or (n, 6)."""
+    """1, x, y and, for degree 2, x^2, x y, y^2 at places of shape (n, 2): shape (3, n) or (6, n)."""
     x, y = place.T
     columns = [np.ones_like(x), x, y]
-    return np.stack(columns if degree == 1 else [*columns, x * x, x * y, y * y], axis=1)
+    return np.stack(columns if degree == 1 else [*columns, x * x, x * y, y * y])
