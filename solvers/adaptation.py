@@ -65,3 +65,7 @@ def check_adaptable(tolerance: float, load: Load) -> None:
         raise UserError(f"a tolerance of {tolerance:g} mm at the markers: give a length above 0 mm")
     if load.kind == "point":
         raise UserError("a point load has no limit under refinement to adapt a mesh to; take mean or patch")
+    if load.kind not in ("mean", "patch"):
+        raise UserError(
+            f"the mesh is adapted by the estimate of fem, which has no load {load.kind}; take mean or patch"
+        )

@@ -118,6 +118,16 @@ class Equilibrium:
             self.distributed.add_blocks(self.matrix, nodes, blocks * (free[:, :, None] & free[:, None, :]))
         self.factors.update()
 
+    def response(self, force: FloatArray) -> FloatArray:
+        """Change of the displacements under more nodal forces, by the tangent that is factorised, (N, 2), mm.
+
+        Args:
+            force: Shape (N, 2), N/mm.
+        """
+        nodal = self.factors.solve(force)
+        values = np.einsum("knx,nx->k", self.functionals, nodal)
+        return self._constrained(nodal, self.functionals, -values)[0]
+
     def possible(self, nodal: FloatArray) -> bool:
         """Whether the deformation turns no quadrature point inside out."""
         gradient = np.stack([derivative @ nodal for derivative in self._derivatives], axis=-1)

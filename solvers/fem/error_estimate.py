@@ -12,7 +12,8 @@ functional:
 
     j(e) = j . d,    K d = R^T C R u
 
-so that d is the estimated error of the displacement itself, at markers and everywhere.
+so that d is the estimated error of the displacement itself, at markers and everywhere. At finite strain K and
+C are the tangents at the solution.
 """
 
 from collections.abc import Callable
@@ -25,6 +26,7 @@ from scipy.sparse import csr_matrix
 from geometry.arrays import FloatArray
 from geometry.locate import Location
 from geometry.quadrature import Quadrature, body_quadrature
+from solvers.elasticity import deformation_jacobian
 from solvers.fem.lagrange import LagrangeField, LagrangeSpace
 from solvers.fem.recovery import GradientRecovery
 from solvers.problem import Problem
@@ -32,6 +34,10 @@ from solvers.solution import ErrorEstimate, State
 
 QUADRATURE_DEGREE = 4
 """Exact for the energy of the estimated error: smoothed gradients are polynomials of degree 2."""
+
+
+STEP = 1e-6
+"""Part of the gradient's error in the difference that stands for a derivative of the stress."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +48,13 @@ class ImprovedField:
         space: The elements.
         values: Nodal displacements, shape (N, 2), mm.
         gradients: Nodal values of the smoothed gradient, shape (N, 2, 2).
+        own: What takes its place where it would turn the material inside out; None at small strain.
     """
 
     space: LagrangeSpace
     values: FloatArray
     gradients: FloatArray
+    own: LagrangeField | None = None
 
     def displacement(self, location: Location) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
@@ -55,7 +63,11 @@ class ImprovedField:
     def gradient(self, location: Location) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
         flat = self.space.shape_functions(location) @ self.gradients.reshape(-1, 4)
-        return np.asarray(flat.reshape(-1, 2, 2))
+        smooth = np.asarray(flat.reshape(-1, 2, 2))
+        if self.own is None:
+            return smooth
+        possible = deformation_jacobian(smooth) > 0
+        return np.where(possible[:, None, None], smooth, self.own.gradient(location))
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +75,7 @@ class ErrorEstimator:
     """Estimates for fields of one finite-element space.
 
     Attributes:
-        problem: Whose linear stress and whose markers count.
+        problem: Whose material counts.
         space: The elements.
     """
 
@@ -94,27 +106,60 @@ class ErrorEstimator:
         return np.asarray(self.recovery.transposed(smooth) - own)
 
     def estimate(self, nodal: FloatArray, solve: Callable[[FloatArray], FloatArray]) -> ErrorEstimate:
-        """The estimated error of a linear solution.
+        """The estimated error of a solution.
 
         Args:
             nodal: Its nodal displacements, shape (N, 2), mm.
-            solve: From nodal forces (N, 2), N/mm, to the nodal displacements (N, 2), mm, under them with
-                nothing prescribed at base and contact but zero.
+            solve: From nodal forces (N, 2), N/mm, to the change of the nodal displacements (N, 2), mm, that
+                they cause there while nothing that is prescribed at base and contact changes.
         """
-        difference = self.gradient_error(nodal)
-        own = LagrangeField(self.space, nodal).gradient(self.rule.location)
-        error, state, better = (
-            State.from_gradient(gradient, self.problem) for gradient in (difference, own, own + difference)
-        )
-        displacement = solve(self.force(error.stress))
-        energy, total = (self._integral(each.energy_density) for each in (error, state))
+        own = LagrangeField(self.space, nodal)
+        gradient, difference = own.gradient(self.rule.location), self.gradient_error(nodal)
+        state = State.from_gradient(gradient, self.problem)
+        stress, von_mises = self._changes(gradient, difference)
+        displacement = solve(self.force(stress))
+        energy = 0.5 * self._integral(np.einsum("qij,qij->q", stress, difference))
+        better = nodal + displacement
         return ErrorEstimate(
-            energy_norm=float(np.sqrt(energy / total)),
+            energy_norm=float(np.sqrt(energy / self._integral(state.energy_density))),
             displacement=self._relative(self._shapes @ displacement, self._shapes @ nodal),
-            von_mises=self._relative(better.von_mises - state.von_mises, state.von_mises),
+            von_mises=self._relative(von_mises, state.von_mises),
             markers=displacement[self.space.mesh.marker_nodes],
-            field=ImprovedField(self.space, nodal + displacement, self.recovery.gradient(nodal)),
+            field=ImprovedField(
+                self.space,
+                better,
+                self.recovery.gradient(nodal),
+                None if self.problem.material.law == "linear" else own,
+            ),
         )
+
+    def _changes(self, gradient: FloatArray, difference: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """By how much the first Piola-Kirchhoff stress and the von Mises stress change with the gradient.
+
+        At finite strain to first order: the whole difference, large in corners, might turn material inside
+        out.
+
+        Args:
+            gradient: At the quadrature points, shape (q, 2, 2).
+            difference: Its change, shape (q, 2, 2).
+
+        Returns:
+            Shapes (q, 2, 2) and (q,), MPa.
+        """
+        step = 1.0 if self.problem.material.law == "linear" else STEP
+        before, after = (self._stresses(gradient + part * difference) for part in (0.0, step))
+        return (after[0] - before[0]) / step, (after[1] - before[1]) / step
+
+    def _stresses(self, gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """First Piola-Kirchhoff stress J σ F^-T, which is σ at small strain, and von Mises stress, MPa."""
+        state = State.from_gradient(gradient, self.problem)
+        if self.problem.material.law == "linear":
+            return state.stress, state.von_mises
+        deformation = np.eye(2) + gradient
+        cofactors = np.empty_like(deformation)
+        cofactors[:, 0, 0], cofactors[:, 1, 1] = deformation[:, 1, 1], deformation[:, 0, 0]
+        cofactors[:, 0, 1], cofactors[:, 1, 0] = -deformation[:, 1, 0], -deformation[:, 0, 1]
+        return state.stress @ cofactors, state.von_mises
 
     def shares(self, nodal: FloatArray, dual: FloatArray) -> FloatArray:
         """What every triangle adds to the error of a functional, shape (t,).

@@ -10,12 +10,14 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from solvers.fem.contact import ContactRegion
+from solvers.fem.equilibrium import Stage
+from solvers.fem.error_estimate import ErrorEstimator
 from solvers.fem.lagrange import LagrangeField, LagrangeSpace
 from solvers.fem.load_path import LoadPath, Steps
 from solvers.fem.locking import locking_advice
 from solvers.fem.ranks import on_all_ranks
 from solvers.problem import Problem
-from solvers.solution import Solution, Status
+from solvers.solution import ErrorEstimate, Solution, Status
 from solvers.solver import Progress, check_problem, silent
 
 
@@ -76,6 +78,8 @@ class FemNonlinearSolver:
         reactions = np.array([path.reaction(point) for point in points])
         last = points[-1]
         regions = [path.region(point) for point in points]
+        solved = time.perf_counter()
+        error = _error(path, problem, space)
         path.close()
         return Solution(
             solver=self.name,
@@ -85,7 +89,8 @@ class FemNonlinearSolver:
             reaction=reactions[-1],
             status=_status(path, regions, locking_advice(self.degree, problem.material)),
             stats={
-                "seconds": time.perf_counter() - started,
+                "seconds": solved - started,
+                "estimate_seconds": time.perf_counter() - solved,
                 "unknowns": last.nodal.size,
                 "load_steps": len(points) - 1,
                 "halved_steps": path.halved,
@@ -100,7 +105,17 @@ class FemNonlinearSolver:
                 "reaction_y": reactions[:, 1],
                 **_contact_history(path, regions),
             },
+            error=error,
         )
+
+
+def _error(path: LoadPath, problem: Problem, space: LagrangeSpace) -> ErrorEstimate | None:
+    """The discretisation error at the full load; None where it was not reached or has no limit."""
+    last = path.points[-1]
+    if last.fraction < 1 or problem.load.kind == "point":
+        return None
+    path.equilibrium.factorise(last.nodal, Stage(last.fraction, last.contact))
+    return ErrorEstimator(problem, space).estimate(last.nodal, path.equilibrium.response)
 
 
 def _status(path: LoadPath, regions: Sequence[ContactRegion | None], advice: str) -> Status:
