@@ -61,6 +61,12 @@ class ErrorEstimate:
         """Largest error of u or v at a marker, mm."""
         return float(np.abs(self.markers).max())
 
+    @property
+    def phrase(self) -> str:
+        """Its size in words."""
+        size = f"{self.at_markers:.2g} mm at the markers and {self.energy_norm:.2%} in the energy norm"
+        return f"an estimated {size}"
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Solution:

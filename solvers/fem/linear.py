@@ -149,7 +149,4 @@ def _uncertainty(problem: Problem, error: ErrorEstimate | None) -> str:
         return "a point load has no limit under refinement, so there is no error to estimate"
     if error is None:
         return "the discretisation is the only error, and was not estimated"
-    return (
-        f"the discretisation is the only error, an estimated {error.at_markers:.2g} mm at the markers "
-        f"and {error.energy_norm:.2%} in the energy norm"
-    )
+    return f"the discretisation is the only error, {error.phrase}"

@@ -81,13 +81,17 @@ class FemNonlinearSolver:
         solved = time.perf_counter()
         error = _error(path, problem, space)
         path.close()
+        remarks = [
+            error and f"error of the discretisation {error.phrase}",
+            locking_advice(self.degree, problem.material),
+        ]
         return Solution(
             solver=self.name,
             problem=problem,
             field=LagrangeField(space, last.nodal),
             energy=energies[-1],
             reaction=reactions[-1],
-            status=_status(path, regions, locking_advice(self.degree, problem.material)),
+            status=_status(path, regions, "; ".join(filter(None, remarks))),
             stats={
                 "seconds": solved - started,
                 "estimate_seconds": time.perf_counter() - solved,
@@ -118,8 +122,8 @@ def _error(path: LoadPath, problem: Problem, space: LagrangeSpace) -> ErrorEstim
     return ErrorEstimator(problem, space).estimate(last.nodal, path.equilibrium.response)
 
 
-def _status(path: LoadPath, regions: Sequence[ContactRegion | None], advice: str) -> Status:
-    """Whether the path led to the full load, and what to try where it did not; else other advice."""
+def _status(path: LoadPath, regions: Sequence[ContactRegion | None], remarks: str) -> Status:
+    """Whether the path led to the full load, and what to try where it did not; else remarks."""
     contact = path.equilibrium.contact
     fraction = path.points[-1].fraction
     if fraction < 1:
@@ -141,7 +145,7 @@ def _status(path: LoadPath, regions: Sequence[ContactRegion | None], advice: str
     if (region := regions[-1]) is not None:
         parts = f" in {region.parts} parts" if region.parts > 1 else ""
         taken += f"; contact from x = {region.start:.4g} to {region.end:.4g} mm{parts}"
-    return Status(True, "; ".join(filter(None, [taken, advice])))
+    return Status(True, "; ".join(filter(None, [taken, remarks])))
 
 
 def _contact_history(path: LoadPath, regions: Sequence[ContactRegion | None]) -> dict[str, FloatArray]:

@@ -12,6 +12,7 @@ from solvers.fem.error_estimate import ErrorEstimator
 from solvers.fem.lagrange import LagrangeField, LagrangeSpace
 from solvers.fem.least_energy import LeastEnergy, LinearSystem
 from solvers.fem.linear import FemSolver
+from solvers.fem.nonlinear import FemNonlinearSolver
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, State
 from tests.solvers.conftest import bar_mesh
@@ -137,3 +138,39 @@ def test_the_estimate_can_be_left_out(coarse_mesh):
     solution = FemSolver(estimate=False).solve(Problem(coarse_mesh, Material(plane="stress")))
     assert solution.error is None
     assert "was not estimated" in solution.status.message
+
+
+def test_at_a_small_stroke_the_finite_strain_estimate_is_the_linear_one(coarse_mesh):
+    """Up to the ratio of stroke and size; the von Mises error is of first order in the error there."""
+    load = Load(displacement=(0.0, -1e-3))
+    linear = FemSolver().solve(Problem(coarse_mesh, load=load)).error
+    finite = FemNonlinearSolver().solve(Problem(coarse_mesh, Material(law="neo-hookean"), load)).error
+    assert finite.energy_norm == pytest.approx(linear.energy_norm, rel=1e-3)
+    assert finite.displacement == pytest.approx(linear.displacement, rel=1e-3)
+    assert finite.von_mises == pytest.approx(linear.von_mises, rel=0.15)
+    np.testing.assert_allclose(finite.markers, linear.markers, rtol=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "load", [Load(), Load(kind="patch", displacement=(None, -10.0))], ids=["mean", "slide"]
+)
+def test_estimates_at_finite_strain_are_within_a_factor_of_two(coarse_mesh, graded, load):
+    """Seen: 1.04 in energy, 1.06 to 1.18 for displacements, 1.5 to 1.6 for the von Mises stress."""
+    material, solver = Material(law="neo-hookean"), FemNonlinearSolver()
+    finer = solver.solve(Problem(graded, material, load))
+    solution = solver.solve(Problem(coarse_mesh, material, load))
+    found = effectivity(solution, finer)
+    assert 0.8 < found.energy_norm < 1.25
+    assert 0.5 < min(found) < max(found) < 2
+    assert solution.error.phrase in solution.status.message
+
+
+def test_a_finite_strain_solution_that_stops_early_or_has_no_limit_has_no_estimate(coarse_mesh):
+    material = Material(law="neo-hookean")
+    point = Problem(coarse_mesh, material, Load(kind="point", displacement=(0.0, -0.1)))
+    assert FemNonlinearSolver().solve(point).error is None
+    torn = Problem(coarse_mesh, material, Load(displacement=(0.0, -80.0)))
+    stopped = FemNonlinearSolver(min_step=0.05).solve(torn)
+    assert not stopped.status.converged
+    assert stopped.error is None
