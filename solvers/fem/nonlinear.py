@@ -82,7 +82,7 @@ class FemNonlinearSolver:
         error = _error(path, problem, space)
         path.close()
         remarks = [
-            error and f"error of the discretisation {error.phrase}",
+            f"error of the discretisation {error.phrase}" if error else "",
             locking_advice(self.degree, problem.material),
         ]
         return Solution(
