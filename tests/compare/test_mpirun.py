@@ -34,7 +34,7 @@ def test_one_and_two_ranks_give_the_same_tables(start_ranks, tmp_path):
         output, errors = process.communicate()
         assert (process.returncode, output, errors) == (0, "", "")
     one, two = (numbers(tmp_path / str(ranks) / "markers.csv") for ranks in (1, 2))
-    assert one.shape[0] == 18
+    assert len(one) == 9
     np.testing.assert_allclose(two, one, rtol=0, atol=1e-8)
     energies = [
         [entry["energy"] for entry in json.loads(path.read_text(encoding="utf-8"))["solvers"].values()]
