@@ -116,3 +116,12 @@ def test_newton_does_not_start_from_an_element_turned_inside_out():
     (torn,) = fields(problem, 0, size=2.0)
     balance = newton(problem).solve(torn, np.zeros(2), Stage(1.0, np.zeros(0)))
     assert (balance.converged, balance.reason) == (False, "diverged_function_domain")
+
+
+def test_newton_meets_constraints_that_its_start_misses():
+    problem = equilibrium("neo-hookean", Load(kind="mean", displacement=(0.02, -0.05)))
+    expected = started(newton(problem), problem)
+    found = newton(problem).solve(0 * expected.nodal, np.zeros(2), Stage(1.0, np.zeros(0)))
+    assert found.converged
+    np.testing.assert_allclose(found.nodal, expected.nodal, atol=1e-8)
+    np.testing.assert_allclose(found.forces, expected.forces, rtol=1e-6)
