@@ -59,7 +59,7 @@ class LoadPath:
         points: What was found, from rest.
         halved: How many steps failed.
         iterations: Newton iterations of all steps.
-        reason: How the last step that failed did, in PETSc's words.
+        reason: How the last step that failed did, where it was Newton's method in PETSc's word.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class LoadPath:
             self.iterations += balance.iterations
             hardest = max(hardest, balance.iterations)
             if not balance.converged:
-                self.reason = balance.reason
+                self.reason = f"SNES: {balance.reason}"
                 return None, hardest
             nodal, forces = balance.nodal, balance.forces
             contact = self.equilibrium.contact
@@ -129,7 +129,7 @@ class LoadPath:
             gap, _ = contact.gaps(nodal, fraction)
             if max(np.abs(gap[pressed > 0]).max(initial=0.0), -gap.min()) <= PENETRATION:
                 return PathPoint(fraction, nodal, forces, pressed), hardest
-        self.reason = "contact_not_settled"
+        self.reason = "the contact does not settle"
         return None, hardest
 
     def _guess(self, fraction: float) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -130,7 +130,7 @@ def _status(path: LoadPath, regions: Sequence[ContactRegion | None], remarks: st
         wider = "a wider contact" if contact is None else "another radius"
         return Status(
             False,
-            f"stopped at {fraction:.1%} of the load: Newton's method fails beyond (SNES: {path.reason}); "
+            f"stopped at {fraction:.1%} of the load: Newton's method fails beyond ({path.reason}); "
             f"take a finer mesh, {wider} or a smaller stroke",
         )
     taken = f"all of the load applied in {len(path.points) - 1} steps, {path.iterations} Newton iterations"
