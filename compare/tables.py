@@ -102,13 +102,18 @@ def _own_error(reference: Evaluation) -> str:
 def _with_own_error(distance: float, reference: Evaluation) -> str:
     """The relative difference in %, and that of the reference from the exact solution."""
     own = reference.uncertainty
-    return f"{100 * distance:.3g}" + (f" ±{100 * own.displacement.rel_l2:.1g}" if own else "")
+    if own is None:
+        return f"{100 * distance:.3g}"
+    percent = f"{100 * distance:.0f}" if distance >= 1 else f"{100 * distance:.2g}"
+    return f"{percent}±{100 * own.displacement.rel_l2:.1g}"
 
 
 def seconds(evaluation: Evaluation) -> str:
     """How long the solver took, s, or a dash if it does not say."""
     value = evaluation.stats.get("seconds")
-    return f"{value:.2f}" if isinstance(value, int | float) else "–"
+    if not isinstance(value, int | float):
+        return "–"
+    return f"{value:.{2 if value < 10 else 1 if value < 100 else 0}f}"
 
 
 def above_fem(evaluation: Evaluation) -> str:

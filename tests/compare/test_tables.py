@@ -1,5 +1,6 @@
 import csv
 from collections.abc import Callable
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
@@ -98,9 +99,11 @@ def test_the_terminal_table_names_numbers_reference_failure_and_source(
 
 
 def test_the_terminal_table_fits_eighty_columns(
-    fem: Evaluation, failed: Evaluation, observations: Observations
+    estimated: Evaluation, failed: Evaluation, observations: Observations
 ) -> None:
-    text = printed(mae_table([fem, failed], observations, fem), width=80)
+    slow = replace(failed, stats={"seconds": 1234.2})
+    text = printed(mae_table([estimated, slow], observations, estimated), width=80)
+    assert "1234 " in text
     assert "fem-nonlinear" in text
     assert "…" not in text
     assert max(map(len, text.splitlines())) <= 80
@@ -110,7 +113,7 @@ def test_the_own_error_of_the_reference_stands_beside_the_difference(
     estimated: Evaluation, pinn: Evaluation, observations: Observations, tmp_path: Path
 ) -> None:
     text = printed(mae_table([estimated, pinn], observations, estimated), width=80)
-    assert "10 ±1" in text
+    assert "10±1" in text
     assert "±: error of fem itself" in text
     write_summary(
         tmp_path / "s.csv", evaluations=[estimated, pinn], observations=observations, reference=estimated
