@@ -114,9 +114,10 @@ class FemNonlinearSolver:
 
 
 def _error(path: LoadPath, problem: Problem, space: LagrangeSpace) -> ErrorEstimate | None:
-    """The discretisation error at the full load; None where it was not reached or has no limit."""
+    """The discretisation error at the full load; None where it was not reached, has no limit or no force."""
     last = path.points[-1]
-    if last.fraction < 1 or problem.load.kind == "point":
+    untouched = path.equilibrium.contact is not None and not last.contact.any()
+    if last.fraction < 1 or problem.load.kind == "point" or untouched:
         return None
     path.equilibrium.factorise(last.nodal, Stage(last.fraction, last.contact))
     return ErrorEstimator(problem, space).estimate(last.nodal, path.equilibrium.response)
