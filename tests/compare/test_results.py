@@ -58,7 +58,7 @@ SCHEMA = {
     "schema": int,
     "design": dict,
     "material": {"young": Real, "poisson": Real, "plane": str, "law": str},
-    "load": {"kind": str, "displacement": tuple},
+    "load": {"kind": str, "displacement": tuple, "position": type(None), "radius": (Real, type(None))},
     "measurements": {"source": str, "description": str, "markers": int},
     "reference": str,
     "solvers": {"fem": SOLVER, "pinn-std": {**SOLVER, "uncertainty": type(None)}},
