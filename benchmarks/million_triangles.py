@@ -72,7 +72,7 @@ def _on_ranks(ranks: int, path: Path, degree: int, linear_solver: str) -> dict:
     launcher = shutil.which("mpirun") or "mpirun"
     arguments = [sys.executable, "-m", "benchmarks.million_triangles", str(path), str(degree), linear_solver]
     done = subprocess.run(
-        [launcher, "--quiet", "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), *arguments],
+        [launcher, "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), *arguments],
         stdout=subprocess.PIPE,
         text=True,
         check=True,

@@ -50,7 +50,7 @@ def start_ranks() -> Callable[..., subprocess.Popen[str]]:
         # the launcher.
         return subprocess.Popen(
             [
-                *(launcher, "--quiet", "--allow-run-as-root", "--oversubscribe", "-n", str(count)),
+                *(launcher, "--allow-run-as-root", "--oversubscribe", "-n", str(count)),
                 *(sys.executable, *arguments),
             ],
             stdout=subprocess.PIPE,

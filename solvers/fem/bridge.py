@@ -51,7 +51,9 @@ def _nodes_of_dofs(space: LagrangeSpace, domain: Any, dolfinx_space: Any) -> Int
     A cell of DOLFINx has its degrees of freedom at its corners and, for degree 2, at the middles of the edges
     opposite to them, in the order of the corners.
     """
-    nodes = np.asarray(domain.geometry.input_global_indices)[_rows(domain.geometry.dofmap, 3)]
+    geometry = domain.geometry
+    table = geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap  # until 0.10
+    nodes = np.asarray(geometry.input_global_indices)[_rows(table, 3)]
     if space.degree == 2:
         nodes = np.concatenate([nodes, space.edge_nodes(nodes[:, OPPOSITE])], axis=1)
     positions = dolfinx_space.tabulate_dof_coordinates()[:, :2]

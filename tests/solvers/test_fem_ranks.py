@@ -77,7 +77,5 @@ def test_an_interruption_ends_all(start):
     process = start("waiting")
     assert process.stdout.readline() == "waiting\n"
     process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=100)
+    process.communicate(timeout=100)
     assert process.returncode != 0  # the launcher's own: Open MPI 4 says 1, whatever the ranks say
-    # It kills what has not ended after a second, which on a busy machine may come before the line.
-    assert errors.splitlines() in (["interrupted"], [])
