@@ -16,7 +16,7 @@ from compare.provenance import package_versions, sources_digest
 from geometry.cache import cache_folder
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.problem import Problem
+from solvers.problem import Load, Problem
 from solvers.registry import make_solver
 from solvers.solver import Progress, Solver, silent
 from vision.measurements import read_measurements, write_measurements
@@ -42,6 +42,11 @@ def virtual_experiment(problem: Problem, progress: Progress = silent) -> Observa
         raise UserError(
             "the virtual experiment presses on the finger: prescribe v, or give --measurements FILE.csv"
         )
+    if problem.load.position is not None:
+        raise UserError(
+            "the virtual experiment presses where the mesh has its contact: mesh the finger with its "
+            "contact_position there, or give --measurements FILE.csv"
+        )
     try:
         solver = make_solver("fem-nonlinear")
     except ImportError as error:
@@ -49,9 +54,7 @@ def virtual_experiment(problem: Problem, progress: Progress = silent) -> Observa
     richer = Problem(
         mesh=problem.mesh,
         material=problem.material.model_copy(update={"law": "neo-hookean", "plane": "strain"}),
-        load=problem.load.model_copy(
-            update={"kind": "patch", "displacement": (None, normal), "radius": None}
-        ),
+        load=Load(kind="patch", displacement=(None, normal)),
     )
     entry = cache_folder() / f"experiment-{_key(solver, richer)}.csv"
     if entry.exists():

@@ -149,6 +149,12 @@ def test_without_a_prescribed_v_there_is_no_experiment(problem, solutions):
     assert not solutions
 
 
+def test_a_load_that_is_not_on_the_meshs_contact_is_refused(problem, solutions):
+    with pytest.raises(UserError, match="presses where the mesh has its contact"):
+        virtual_experiment(replace(problem, load=Load(position=50.0)))
+    assert solutions == []
+
+
 def test_without_the_finite_element_library_measurements_are_asked_for(problem, cache, monkeypatch):
     def missing(name: str) -> None:
         raise ModuleNotFoundError("No module named 'dolfinx'")
