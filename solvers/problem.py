@@ -53,9 +53,9 @@ class Load(BaseModel):
     """What the indenter does to the boundary `contact`; a component that is None is free of force.
 
     Attributes:
-        kind: `mean`: the weighted mean displacement over the contact is prescribed (`contact_functional`); well
-            posed, the default. `point`: the displacement of the contact's middle node is prescribed, as in
-            the paper; its limit under mesh refinement does not exist. `patch`: every point of the contact has
+        kind: `mean`: the weighted mean displacement over the contact is prescribed (`contact_functional`);
+            well posed, the default. `point`: the displacement of the contact's middle node is prescribed, as
+            in the paper; its limit under mesh refinement does not exist. `patch`: every point of the contact has
             the displacement. `cylinder`: a rigid cylinder without friction, which touches the front face at
             the contact's middle from outside, moves by the displacement; which part of the face it presses
             on is found.
