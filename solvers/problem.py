@@ -55,10 +55,10 @@ class Load(BaseModel):
     Attributes:
         kind: `mean`: the weighted mean displacement over the contact is prescribed (`contact_functional`);
             well posed, the default. `point`: the displacement of the contact's middle node is prescribed, as
-            in the paper; its limit under mesh refinement does not exist. `patch`: every point of the contact has
-            the displacement. `cylinder`: a rigid cylinder without friction, which touches the front face at
-            the contact's middle from outside, moves by the displacement; which part of the face it presses
-            on is found.
+            in the paper; its limit under mesh refinement does not exist. `patch`: every point of the contact
+            has the displacement. `cylinder`: a rigid cylinder without friction, which touches the front face
+            at the contact's middle from outside, moves by the displacement; which part of the face it
+            presses on is found.
         displacement: Prescribed (u, v), mm.
         position: Abscissa of the contact's middle on the front face, mm; None means where the mesh has its
             boundary `contact`, whose width the contact has in any case. A `patch` cannot be elsewhere.
