@@ -1,6 +1,6 @@
 """The shared mesh, refined first if that is asked for."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from compare.stages import Stages
@@ -25,6 +25,7 @@ def shared_mesh(
     material: Material = Material(),
     load: Load = Load(),
     solvers: Sequence[Solver] = (),
+    check: Callable[[TriangleMesh], None] | None = None,
 ) -> tuple[TriangleMesh, Adaptation | None]:
     """The mesh of a finger, refined until `fem` knows the markers to a tolerance if one is given.
 
@@ -36,6 +37,7 @@ def shared_mesh(
         material: Its elastic constants; the law is the linear one.
         load: What moves the finger.
         solvers: If `fem` is one of them, the degree of its elements is taken.
+        check: Raises a `UserError` if the first mesh will not do.
 
     Raises:
         UserError: If the mesh cannot be made or adapted.
@@ -44,6 +46,8 @@ def shared_mesh(
         check_adaptable(tolerance, load)
     with stages.stage("mesh"):
         mesh = finger_mesh(design, settings=settings)
+        if check is not None:
+            check(mesh)
     if tolerance is None:
         return mesh, None
     try:

@@ -143,6 +143,8 @@ def mesh(
 
     chosen, settings = finger.read()
     material, load = physics.read()
+    if out.is_file():
+        raise UserError(f"--out {out}: this is a file; name a folder")
     with Stages(Console(stderr=True)) as stages:
         triangles, adaptation = shared_mesh(
             chosen, settings, stages, tolerance=adapt, material=material, load=load

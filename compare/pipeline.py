@@ -4,6 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -102,9 +103,8 @@ def run(job: Job, stages: Stages) -> Outcome:
             material=job.material,
             load=job.load,
             solvers=job.solvers,
+            check=partial(_check_inside, given) if given else None,
         )
-        if given:
-            _check_inside(given, mesh)
         if adaptation is not None:
             write_rounds(folder / "adapt.csv", adaptation)
         problem = Problem(mesh, job.material, job.load)

@@ -182,7 +182,7 @@ BAD = [
     ("gridsearch --out foreign", "foreign holds files that are not of a grid search"),
     ("gridsearch --out file", "file is a file; name a folder with --out"),
     ("design --formats step,dwg", "unknown CAD format 'dwg'; there are step, stl, dxf, svg"),
-    ("mesh --mesh-size 1 --out file", "file: File exists"),
+    ("mesh --mesh-size 1 --out file", "--out file: this is a file; name a folder"),
 ]
 
 
