@@ -282,11 +282,11 @@ def gridsearch(
 @pinnray.command
 def solvers() -> int:
     """List the solvers, with the material laws and loads that each has, its presets and their settings."""
-    from rich.table import Table
+    from rich.table import Column, Table
 
     from solvers.registry import PRESETS, make_solver, usable_solvers
 
-    table = Table("solver", "laws", "loads", "settings")
+    table = Table("solver", "laws", "loads", Column("settings", overflow="fold"))
     for name, usual in usable_solvers().items():
         _, *others = PRESETS.get(name, [""])
         for solver in [usual, *(make_solver(name, preset=preset) for preset in others)]:

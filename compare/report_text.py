@@ -65,7 +65,7 @@ def load_sentence(load: Load, design: Parameters) -> str:
     ]
     moved = ", ".join(parts).replace(" ", "\N{NO-BREAK SPACE}").replace(",\N{NO-BREAK SPACE}", ", ")
     middle = design.contact_abscissa if load.position is None else load.position
-    about = f"about x = {middle:g} mm on the front face"
+    about = f"{'from' if load.kind == 'cylinder' else 'about'} x = {middle:g} mm on the front face"
     return f"{where}: {moved}, {about} (load “{load.kind}”)."
 
 

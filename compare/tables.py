@@ -11,7 +11,7 @@ from compare.atomic import atomic_path
 from compare.certificate import Certificate
 from compare.differences import ReferenceDifferences
 from compare.evaluation import Evaluation
-from compare.figures.labels import solver_label
+from compare.figures.labels import significant, solver_label
 from compare.metrics import marker_errors, reference_differences
 from geometry.observations import Observations
 
@@ -103,7 +103,7 @@ def _with_own_error(distance: float, reference: Evaluation) -> str:
     """The relative difference in %, and that of the reference from the exact solution."""
     own = reference.uncertainty
     if own is None:
-        return f"{100 * distance:.3g}"
+        return significant(100 * distance, 3)
     percent = f"{100 * distance:.0f}" if distance >= 1 else f"{100 * distance:.2g}"
     return f"{percent}±{100 * own.displacement.rel_l2:.1g}"
 

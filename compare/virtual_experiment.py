@@ -22,10 +22,10 @@ from solvers.solver import Progress, Solver, silent
 from vision.measurements import read_measurements, write_measurements
 
 SOURCE = (
-    "simulated by fem-nonlinear (neo-Hookean, finite strain, plane strain, sliding contact patch); "
-    "no camera was involved"
+    "simulated by fem-nonlinear (neo-Hookean, finite strain, plane strain, contact patch that is "
+    "pressed in by {:.4g} mm and slides along x); no camera was involved"
 )
-"""What is said of the numbers wherever they appear."""
+"""What is said of the numbers wherever they appear; the number is -v of the indenter."""
 
 SOURCES = ("geometry", "solvers.elasticity", "solvers.fem", "solvers.problem", "solvers.solution")
 """Modules whose change makes a new simulation."""
@@ -71,7 +71,7 @@ def virtual_experiment(problem: Problem, progress: Progress = silent) -> Observa
         displacements=solution.displacement(markers),
         standard_deviations=np.zeros_like(markers),
         visible=np.ones(len(markers), dtype=bool),
-        source=SOURCE,
+        source=SOURCE.format(-normal),
         simulated=True,
     )
     with atomic_path(entry) as partial:
@@ -81,5 +81,5 @@ def virtual_experiment(problem: Problem, progress: Progress = silent) -> Observa
 
 def _key(solver: Solver, problem: Problem) -> str:
     """SHA-256 over all that the simulation depends on."""
-    parts = [problem.digest, solver.settings(), package_versions(), sources_digest(SOURCES)]
+    parts = [problem.digest, solver.settings(), package_versions(), sources_digest(SOURCES), SOURCE]
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()

@@ -22,7 +22,7 @@ from geometry.arrays import FloatArray
 
 LOG_RATIO = 20.0
 """An axis is logarithmic where the largest value exceeds the smallest by this factor."""
-HEAD, HEIGHT, FOOT, LEFT, GAP = 0.3, 1.6, 0.45, 0.65, 0.75
+HEAD, HEIGHT, FOOT, LEFT, GAP = 0.3, 1.6, 0.45, 0.75, 0.85
 """Heights, the left margin and the gap between charts, inches."""
 ENERGY = "energy"
 

@@ -12,7 +12,7 @@ from compare.evaluation import Evaluation
 from compare.figures import body
 from compare.figures.canvas import Canvas
 from compare.figures.colours import PERCENT, Scale
-from compare.figures.labels import solver_label
+from compare.figures.labels import significant, solver_label
 from compare.figures.style import MUTED, WIDTH, axes_at, figure, heading
 from geometry.arrays import FloatArray
 from geometry.mesh import TriangleMesh
@@ -67,7 +67,7 @@ def draw_excess(path: Path, *, canvas: Canvas, mesh: TriangleMesh, evaluations: 
             body.show(axes, canvas.picture(colours), canvas.extent)
             body.outline(axes, edges, mesh.points, width=0.35)
             axes.set_title(label, size=8.5, pad=2, weight="bold")
-            note = f"in all {100 * certificate.rel_excess:.2g} % of the energy"
+            note = f"in all {significant(100 * certificate.rel_excess, 2)} % of the energy"
             axes.text(0.99, 0.27, note, ha="right", size=7, color=MUTED, transform=axes.transAxes)
         body.scale_bar(axes, canvas.extent)
         bar = axes_at(drawn, (0.2 * WIDTH, total - FOOT + 0.1, 0.6 * WIDTH, 0.09))

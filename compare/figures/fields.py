@@ -13,7 +13,7 @@ from compare.evaluation import Evaluation
 from compare.figures import body
 from compare.figures.canvas import Canvas, Extent
 from compare.figures.colours import PERCENT, Scale, sequential, symmetric
-from compare.figures.labels import solver_label
+from compare.figures.labels import significant, solver_label
 from compare.figures.style import MUTED, WIDTH, axes_at, figure, heading
 from compare.metrics import COMPONENTS
 from geometry.arrays import FloatArray
@@ -128,12 +128,13 @@ def draw_field(
             values = quantity.values(evaluation)
             axes = panel(row, 0, scale, values, evaluation)
             axes.set_title(solver_label(evaluation), size=8.5, pad=2, weight="bold")
-            _remark(axes, f"largest mean of a triangle: {size} = {np.abs(values).max():.3g} {quantity.unit}")
+            largest = np.abs(evaluation.per_triangle(values)).max()
+            _remark(axes, f"largest {size} = {significant(largest, 3)} {quantity.unit}")
             if evaluation is not reference:
                 axes = panel(row, 1, differences, values - base, evaluation)
                 norm = field_difference(values, base, reference.weights).rel_l2
                 axes.set_title(f"minus {solver_label(reference)}", size=8.5, pad=2)
-                _remark(axes, f"rel. $L^2$ {100 * norm:.3g} %")
+                _remark(axes, f"rel. $L^2$ {significant(100 * norm, 3)} %")
             elif columns == 2:
                 _explain(drawn, (2 * MARGIN + width, HEAD + PANEL_TITLE, width, height), reference)
         body.scale_bar(axes, canvas.extent)
@@ -156,7 +157,7 @@ def _explain(drawn: MplFigure, box: tuple[float, float, float, float], reference
     text = (
         f"Reference: {solver_label(reference)}\n"
         f"Scales end at the {PERCENT:g} % point of the\narea (left: of the reference; right:\n"
-        "of the differences). Values beyond\ntake the end colours."
+        "of the differences). Values beyond\ntake the end colours. Largest: of the\nmeans over a triangle."
     )
     axes.text(0.02, 0.95, text, va="top", size=7, color=MUTED, linespacing=1.35, transform=axes.transAxes)
 

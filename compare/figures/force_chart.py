@@ -18,7 +18,7 @@ from compare.figures.style import (
 )
 from compare.force_displacement import ForceCurve, follows_load
 
-HEAD, HEIGHT, FOOT, LEFT, RIGHT = 0.3, 2.4, 0.45, 0.65, 0.65
+HEAD, HEIGHT, FOOT, LEFT, RIGHT = 0.3, 2.4, 0.45, 0.75, 0.65
 """Heights and the margins, inches."""
 
 

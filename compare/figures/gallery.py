@@ -58,13 +58,20 @@ class Gallery:
     def overlay(self) -> Figure:
         """The deformed finger of every solver."""
         path = self.folder / "overlay.png"
-        draw_overlay(path, mesh=self.mesh, evaluations=self.evaluations, observations=self.observations)
+        draw_overlay(
+            path,
+            mesh=self.mesh,
+            load=self.load,
+            evaluations=self.evaluations,
+            observations=self.observations,
+        )
+        cylinder = "" if self.load.radius is None else " Grey circle: the cylinder where it ends."
         return Figure(
             path,
             "Deformed finger",
             f"The deformed body of each solver, coloured by displacement magnitude on one scale; the "
             f"displacement is not exaggerated. Circles: {self.observations.label} marker positions. Crosses: "
-            f"the solver’s. Grey: the undeformed body. {self._simulated()}",
+            f"the solver’s. Grey: the undeformed body.{cylinder} {self._simulated()}",
         )
 
     def marker_errors(self) -> Figure:

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as MplFigure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Circle
 
 from compare.evaluation import Evaluation
 from compare.figures import body
@@ -19,6 +20,7 @@ from compare.metrics import marker_errors
 from geometry.arrays import FloatArray, IntArray
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
+from solvers.problem import Load
 
 MARGIN = 0.12
 HEAD, PANEL_TITLE, FOOT = 0.55, 0.27, 0.48
@@ -26,7 +28,12 @@ HEAD, PANEL_TITLE, FOOT = 0.55, 0.27, 0.48
 
 
 def draw_overlay(
-    path: Path, *, mesh: TriangleMesh, evaluations: Sequence[Evaluation], observations: Observations
+    path: Path,
+    *,
+    mesh: TriangleMesh,
+    load: Load,
+    evaluations: Sequence[Evaluation],
+    observations: Observations,
 ) -> None:
     """Draw every solver's deformed finger, one panel each, at true scale."""
     extent = overlay_extent(mesh, evaluations, observations)
@@ -45,13 +52,17 @@ def draw_overlay(
             top = HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
             axes = axes_at(drawn, (left, top, width, height))
             _panel(axes, canvas, scale, edges, mesh, evaluation, observations)
+            if load.radius is None:
+                _contact_path(axes, mesh, evaluation)
+            else:
+                _cylinder(axes, mesh, load, load.radius)
             body.scale_bar(axes, extent)
         body.colour_bar(
             axes_at(drawn, (0.25 * WIDTH, total - FOOT + 0.06, 0.5 * WIDTH, 0.09)),
             scale,
             "displacement magnitude, mm",
         )
-        _legend(drawn, observations)
+        _legend(drawn, observations, "contact’s motion" if load.radius is None else "cylinder’s motion")
 
 
 def displacement_scale(mesh: TriangleMesh, evaluations: Sequence[Evaluation]) -> Scale:
@@ -95,7 +106,6 @@ def _panel(
     body.show(axes, canvas.picture(scale.paint(_magnitude(mesh, evaluation)), deformed), extent)
     body.outline(axes, edges, deformed, width=0.4)
     body.clamp(axes, mesh.points[mesh.boundary("base").ravel()])
-    _contact_path(axes, mesh, evaluation)
     seen = observations.visible
     observed = observations.points[seen] + observations.displacements[seen]
     computed = observations.points + evaluation.marker_displacement
@@ -112,7 +122,21 @@ def _panel(
 def _contact_path(axes: Axes, mesh: TriangleMesh, evaluation: Evaluation) -> None:
     nodes = np.unique(mesh.boundary("contact"))
     start = mesh.points[nodes].mean(axis=0)
-    end = start + evaluation.node_displacement[nodes].mean(axis=0)
+    _arrow(axes, start, start + evaluation.node_displacement[nodes].mean(axis=0))
+
+
+def _cylinder(axes: Axes, mesh: TriangleMesh, load: Load, radius: float) -> None:
+    """The cylinder where it ends, and the way of the point that touched first; it can leave the picture."""
+    nodes = np.unique(mesh.boundary("contact"))
+    middle = np.ptp(mesh.points[nodes, 0]) / 2 + mesh.points[nodes, 0].min()
+    start = np.array([middle if load.position is None else load.position, 0.0])
+    end = start + load.values
+    circle = Circle((end[0], end[1] + radius), radius, fill=False, color=MUTED, lw=0.8, zorder=3)
+    axes.add_patch(circle)
+    _arrow(axes, start, end)
+
+
+def _arrow(axes: Axes, start: FloatArray, end: FloatArray) -> None:
     arrow = {
         "arrowstyle": "-|>,head_width=0.18,head_length=0.35",
         "color": INK,
@@ -123,7 +147,7 @@ def _contact_path(axes: Axes, mesh: TriangleMesh, evaluation: Evaluation) -> Non
     axes.annotate("", xy=tuple(end), xytext=tuple(start), arrowprops=arrow, zorder=6)
 
 
-def _legend(drawn: MplFigure, observations: Observations) -> None:
+def _legend(drawn: MplFigure, observations: Observations, motion: str) -> None:
     handles = [
         Line2D(
             [],
@@ -138,7 +162,7 @@ def _legend(drawn: MplFigure, observations: Observations) -> None:
         ),
         Line2D([], [], ls="", marker="x", ms=4, color=INK, mew=0.9, label="solver’s markers"),
         Line2D([], [], color="#9a9a9a", lw=0.9, label="undeformed"),
-        Line2D([], [], color=INK, lw=1, marker=">", ms=3.5, markevery=[1], label="contact’s motion"),
+        Line2D([], [], color=INK, lw=1, marker=">", ms=3.5, markevery=[1], label=motion),
     ]
     drawn.legend(
         handles=handles,

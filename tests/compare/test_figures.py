@@ -13,9 +13,12 @@ from PIL import Image
 from compare.evaluation import Evaluation
 from compare.figures import Figure, draw_all
 from compare.figures.canvas import Canvas
+from compare.figures.energy_chart import draw_energy
 from compare.figures.fields import QUANTITIES, draw_field, field_extent
+from compare.figures.force_chart import draw_force_displacement
 from compare.figures.overlay import overlay_extent
 from compare.figures.style import DPI, WIDTH
+from compare.force_displacement import force_curves
 from compare.verdict import certified
 from geometry.design import Design
 from geometry.mesh import TriangleMesh
@@ -177,3 +180,49 @@ def test_the_reference_energy_is_a_line(figures: dict[str, Figure], pages: dict[
     energies, distances, *_ = pages[figures["energy"].path].figure.axes
     assert [2.0, 2.0] in [list(line.get_ydata()) for line in energies.get_lines()]
     np.testing.assert_allclose(distances.get_lines()[0].get_ydata(), [44.0, 1.0, 0.21])
+
+
+def test_no_remark_on_a_field_lies_on_a_slender_finger(
+    fem: Evaluation, pinn: Evaluation, mesh: TriangleMesh, pages: dict[Path, Page], tmp_path: Path
+) -> None:
+    x, y = mesh.points.T
+    length, width = float(np.ptp(x)), float(np.ptp(y))
+    points = np.column_stack([x, y * (1.01 - x / length) * 28 / 120 * length / width])
+    finger = replace(mesh, points=points)
+    for quantity in QUANTITIES:
+        path = tmp_path / f"{quantity.name}.png"
+        with Canvas(finger, field_extent(finger), width=300) as canvas:
+            draw_field(path, quantity, canvas=canvas, mesh=finger, evaluations=[fem, pinn], reference=fem)
+        for axes in pages[path].figure.axes:
+            corners = axes.transData.transform(points)
+            for text in axes.texts:
+                if text.get_text().startswith(("largest", "rel.")):
+                    box = text.get_window_extent()
+                    covered = [corner for corner in corners if box.contains(*corner)]
+                    assert (quantity.name, text.get_text(), covered) == (quantity.name, text.get_text(), [])
+
+
+def test_the_number_beside_a_field_is_its_largest_mean_of_a_triangle(
+    fem: Evaluation, mesh: TriangleMesh, pages: dict[Path, Page], tmp_path: Path
+) -> None:
+    peak = replace(fem, von_mises=np.zeros(len(fem.weights)))
+    peak.von_mises[0] = 3.0  # at one of a triangle's three points, which have equal weights
+    path = tmp_path / "field.png"
+    with Canvas(mesh, field_extent(mesh), width=300) as canvas:
+        draw_field(path, QUANTITIES[0], canvas=canvas, mesh=mesh, evaluations=[peak], reference=peak)
+    assert "= 1 MPa" in pages[path].text
+
+
+def test_ticks_of_six_characters_leave_room_for_the_labels(
+    fem: Evaluation, pinn: Evaluation, pages: dict[Path, Page], tmp_path: Path
+) -> None:
+    history = {"units": np.array([3200.0, 8000.0]), "energy": np.array([1.1015, 1.0881])}
+    followed = {"load_fraction": np.array([0.0, 1.0]), "reaction_x": np.zeros(2), "reaction_y": [0, -0.0021]}
+    near = replace(fem, energy=1.0924)
+    path = tmp_path / "energy.png"
+    draw_energy(path, evaluations=[near, replace(pinn, history=history)], reference=near)
+    assert pages[path].cut_off() == []
+    path = tmp_path / "force.png"
+    follower = replace(pinn, history=followed, reaction=np.array([0.0, -0.0021]))
+    draw_force_displacement(path, curves=force_curves([follower], Load()), depth=20.0)
+    assert pages[path].cut_off() == []

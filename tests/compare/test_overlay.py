@@ -5,13 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import BendingField
+from drawn_pages import Page
 from matplotlib.axes import Axes
+from matplotlib.patches import Circle
 
 from compare.evaluation import Evaluation
 from compare.figures.overlay import draw_overlay
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
-from solvers.problem import Problem
+from solvers.problem import Load, Problem
 from solvers.solution import Solution, Status
 
 
@@ -46,9 +48,25 @@ def test_crosses_are_at_the_observed_points_even_if_they_are_not_the_meshs_marke
 
     monkeypatch.setattr(Axes, "plot", watched)
     evaluation = Evaluation.of(solution, mesh, points)
-    draw_overlay(tmp_path / "a.png", mesh=mesh, evaluations=[evaluation], observations=observations)
+    draw_overlay(
+        tmp_path / "a.png", mesh=mesh, load=Load(), evaluations=[evaluation], observations=observations
+    )
     x, y = points.T
     expected = points + np.stack([0.01 * y**2, -0.02 * x**2], axis=1)
     assert len(crosses) > 0
     for drawn in crosses:
         np.testing.assert_allclose(drawn, expected, rtol=1e-12)
+
+
+def test_a_cylinder_is_drawn_where_it_ends(
+    mesh: TriangleMesh, fem: Evaluation, observations: Observations, pages: dict[Path, Page], tmp_path: Path
+) -> None:
+    load = Load(kind="cylinder", displacement=(1.0, -3.0), radius=2.0)
+    path = tmp_path / "a.png"
+    draw_overlay(path, mesh=mesh, load=load, evaluations=[fem], observations=observations)
+    (circle,) = [patch for patch in pages[path].figure.axes[0].patches if isinstance(patch, Circle)]
+    contact = mesh.points[mesh.boundary("contact").ravel(), 0]
+    middle = (contact.min() + contact.max()) / 2
+    np.testing.assert_allclose(circle.center, (middle + 1.0, -1.0), atol=1e-12)
+    assert circle.radius == 2.0
+    assert "cylinder’s motion" in pages[path].text

@@ -64,6 +64,7 @@ def test_the_markers_of_the_mesh_are_observed_and_said_to_be_simulated(problem, 
     assert observations.simulated
     assert observations.source.startswith("simulated by fem-nonlinear")
     assert "no camera" in observations.source
+    assert f"pressed in by {-problem.load.displacement[1]:.4g} mm" in observations.source
 
 
 def test_the_second_time_it_is_read_from_the_cache(problem, solutions):
