@@ -64,6 +64,8 @@ def shared_mesh(
             section=finger_section(design),
             progress=progress,
         )
+        if not adaptation.reached:
+            progress(1.0, adaptation.message)
     return adaptation.mesh, adaptation
 
 

@@ -62,7 +62,10 @@ def check_problem(solver: Solver, problem: Problem) -> None:
 def check_load(solver: Solver, load: Load) -> None:
     """Raise a `UserError` if the kind of load is not one that the solver takes."""
     if load.kind not in solver.loads:
-        raise UserError(f"{solver.name} takes the loads {', '.join(solver.loads)}, not {load.kind!r}")
+        raise UserError(
+            f"{solver.name} takes the loads {', '.join(solver.loads)}, not {load.kind!r}; "
+            "`pinnray solvers` lists the loads of each"
+        )
 
 
 def with_law(material: Material, solver: Solver) -> Material:
