@@ -67,8 +67,8 @@ def draw_excess(path: Path, *, canvas: Canvas, mesh: TriangleMesh, evaluations: 
             body.show(axes, canvas.picture(colours), canvas.extent)
             body.outline(axes, edges, mesh.points, width=0.35)
             axes.set_title(label, size=8.5, pad=2, weight="bold")
-            note = f"in all {significant(100 * certificate.rel_excess, 2)} % of the energy"
-            axes.text(0.99, 0.27, note, ha="right", size=7, color=MUTED, transform=axes.transAxes)
+            note = f"{significant(100 * certificate.rel_excess, 2)} % of the energy"
+            axes.text(0.99, 0.33, note, ha="right", size=7, color=MUTED, transform=axes.transAxes)
         body.scale_bar(axes, canvas.extent)
         bar = axes_at(drawn, (0.2 * WIDTH, total - FOOT + 0.1, 0.6 * WIDTH, 0.09))
         body.colour_bar(bar, scale, "density of the excess energy, MPa", extend="both")

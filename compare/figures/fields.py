@@ -147,8 +147,8 @@ def field_extent(mesh: TriangleMesh) -> Extent:
 
 
 def _remark(axes: Axes, text: str) -> None:
-    """A number in the corner below the tip, which no finger fills."""
-    axes.text(0.99, 0.27, text, ha="right", size=7, color=MUTED, transform=axes.transAxes)
+    """A number in the corner below the tip, which no finger fills, above the scale bar."""
+    axes.text(0.99, 0.33, text, ha="right", size=7, color=MUTED, transform=axes.transAxes)
 
 
 def _explain(drawn: MplFigure, box: tuple[float, float, float, float], reference: Evaluation) -> None:
@@ -156,8 +156,8 @@ def _explain(drawn: MplFigure, box: tuple[float, float, float, float], reference
     axes.set_axis_off()
     text = (
         f"Reference: {solver_label(reference)}\n"
-        f"Scales end at the {PERCENT:g} % point of the\narea (left: of the reference; right:\n"
-        "of the differences). Values beyond\ntake the end colours. Largest: of the\nmeans over a triangle."
+        f"Scales end at the {PERCENT:g} % point of the area\n(left: of the reference; right: of the\n"
+        "differences). Values beyond take the end\ncolours. Largest: of the means over a triangle."
     )
     axes.text(0.02, 0.95, text, va="top", size=7, color=MUTED, linespacing=1.35, transform=axes.transAxes)
 

@@ -200,6 +200,7 @@ def test_no_remark_on_a_field_lies_on_a_slender_finger(
                     box = text.get_window_extent()
                     covered = [corner for corner in corners if box.contains(*corner)]
                     assert (quantity.name, text.get_text(), covered) == (quantity.name, text.get_text(), [])
+        assert (quantity.name, pages[path].cut_off(), pages[path].overlaps()) == (quantity.name, [], [])
 
 
 def test_the_number_beside_a_field_is_its_largest_mean_of_a_triangle(
