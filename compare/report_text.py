@@ -122,8 +122,11 @@ def sentence(text: str) -> str:
 
 
 def number(value: float, digits: int = 4) -> str:
-    """A number with so many significant digits, with a typographic minus."""
-    return f"{value:#.{digits}g}".rstrip(".").replace("-", "−")
+    """A number with so many significant digits, with a typographic minus; no exponent from 1 to a million."""
+    text = f"{value:#.{digits}g}"
+    if 1 <= abs(value) < 1e6:
+        text = f"{float(text):.0f}" if "e" in text else text
+    return text.rstrip(".").replace("-", "−")
 
 
 def without_rounding(force: FloatArray) -> tuple[float, float]:

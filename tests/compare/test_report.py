@@ -245,3 +245,17 @@ def test_small_words() -> None:
     assert percent(-0.0123) == "−1.23 %"
     assert [distance(value) for value in (math.nan, 3e-15, 9.44e-7, 0.21)] == ["–", "0", "9.4e−07", "0.21"]
     assert sentence("solved directly; no more.") == "Solved directly; no more."
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        (29471.4, "29500"),  # no exponent where a reader does not need one
+        (999.6, "1000"),  # rounded up to a digit more
+        (-0.02099, "−0.0210"),  # a zero that is significant, a typographic minus
+        (114.2, "114"),  # no point at the end
+        (2.5e7, "2.50e+07"),
+    ],
+)
+def test_numbers_have_three_digits(value: float, expected: str) -> None:
+    assert number(value, 3) == expected
