@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import TypeAdapter
 
-from compare.atomic import atomic_path
 from compare.certificate import Certificate
 from compare.differences import ReferenceDifferences
 from geometry.arrays import FloatArray
+from geometry.atomic import atomic_path
 from geometry.mesh import TriangleMesh
 from geometry.quadrature import body_quadrature
 from solvers.fem.lagrange import LagrangeSpace

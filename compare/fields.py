@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pyvista
 
-from compare.atomic import atomic_path
 from compare.evaluation import Evaluation
 from geometry.arrays import FloatArray
+from geometry.atomic import atomic_path
 from geometry.mesh import TriangleMesh
 
 SYMMETRIC = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")

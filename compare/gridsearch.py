@@ -9,13 +9,13 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from compare.atomic import write_json
 from compare.gridsearch_run import FAILED, RESULT_FILE, Point, Reference, Run, Task, train
 from compare.gridsearch_tables import best_of, ranked, run_note, write_runs
 from compare.output_folder import locked
 from compare.processes import ProcessFailed, in_processes
 from compare.provenance import machine, package_versions, sources_digest
 from compare.stages import Stages
+from geometry.atomic import write_json
 from geometry.cache import finger_mesh
 from geometry.design import Design
 from geometry.errors import UserError

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from compare.atomic import write_json
 from compare.differences import field_difference
 from geometry.arrays import FloatArray
+from geometry.atomic import write_json
 from geometry.errors import UserError
 from geometry.mesh import TriangleMesh
 from geometry.quadrature import body_quadrature, edge_quadrature

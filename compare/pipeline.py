@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from compare.adaptation import shared_mesh, write_rounds
-from compare.atomic import write_json
 from compare.evaluation import Evaluation
 from compare.fields import write_vtu
 from compare.figures import draw_all
@@ -25,6 +24,7 @@ from compare.tables import write_markers, write_summary
 from compare.uncertainty import evaluated
 from compare.verdict import certified
 from compare.virtual_experiment import virtual_experiment
+from geometry.atomic import write_json
 from geometry.design import Design
 from geometry.errors import OutsideBodyError, UserError
 from geometry.mesh import TriangleMesh

@@ -7,7 +7,6 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from compare import report_text as text
-from compare.atomic import atomic_path
 from compare.certificate import Certificate
 from compare.certificate_text import certificate_sentences
 from compare.differences import ReferenceDifferences
@@ -18,6 +17,7 @@ from compare.metrics import MarkerErrors, marker_errors, reference_differences
 from compare.regions import NEAR
 from compare.tables import seconds
 from compare.uncertainty import indistinct
+from geometry.atomic import atomic_path
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
 from geometry.parameters import Parameters

@@ -7,12 +7,12 @@ from pathlib import Path
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from compare.atomic import atomic_path
 from compare.certificate import Certificate
 from compare.differences import ReferenceDifferences
 from compare.evaluation import Evaluation
 from compare.figures.labels import significant, solver_label
 from compare.metrics import marker_errors, reference_differences
+from geometry.atomic import atomic_path
 from geometry.observations import Observations
 
 Cell = str | int | float | bool

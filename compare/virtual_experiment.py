@@ -11,8 +11,8 @@ from contextlib import suppress
 
 import numpy as np
 
-from compare.atomic import atomic_path
 from compare.provenance import package_versions, sources_digest
+from geometry.atomic import atomic_path
 from geometry.cache import cache_folder
 from geometry.errors import UserError
 from geometry.observations import Observations

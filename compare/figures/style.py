@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as MplFigure
 
-from compare.atomic import atomic_path
+from geometry.atomic import atomic_path
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType

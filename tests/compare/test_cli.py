@@ -71,7 +71,7 @@ BAD = [
     ("compare --frobnicate", "Unknown option: --frobnicate"),
     (
         "frobnicate",
-        "Unknown command .* commands: compare, design, mesh, solve, gridsearch, solvers",
+        "Unknown command .* commands: compare, design, mesh, solve, gridsearch, solvers, calibrate",
     ),
     ("compare slender", "'slender' belongs to no option"),  # forgot --design
     ("compare --seed", "--seed requires an argument"),

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.atomic import atomic_path
+from geometry.atomic import atomic_path
 
 
 def test_the_new_file_takes_the_place_of_the_old_one(tmp_path: Path) -> None:

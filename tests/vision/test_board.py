@@ -1,0 +1,62 @@
+"""The board's corners against an analytic picture of it."""
+
+import numpy as np
+import pytest
+from chessboards import drawn
+
+from geometry.errors import UserError
+from vision.board import Board, read_board, read_grey
+
+SMALL = Board(5, 4, 10.0)
+TO_PIXELS = np.array([[4.2, 0.7, 90.0], [-0.5, 3.9, 75.0], [1e-3, -6e-4, 1.0]])
+"""From the board's plane, mm."""
+
+
+def test_corners_are_found_where_they_are():
+    image = drawn(SMALL, np.linalg.inv(TO_PIXELS), (360, 260))
+    found = SMALL.find(image)
+    exact = np.column_stack([SMALL.corners[:, :2], np.ones(20)]) @ TO_PIXELS.T
+    exact = exact[:, :2] / exact[:, 2:]
+    error = min(np.abs(order - exact).max() for order in (found, found[::-1]))  # a board has no up
+    assert error < 0.05
+
+
+def test_an_empty_picture_shows_no_board():
+    assert SMALL.find(np.full((200, 300), 128, dtype=np.uint8)) is None
+
+
+def test_corners_lie_a_square_apart():
+    assert SMALL.corners[[0, 1, 5]].tolist() == [[0, 0, 0], [10, 0, 0], [0, 10, 0]]
+
+
+def test_a_board_is_read_from_text():
+    assert read_board(" 9X6", 25) == Board(9, 6, 25)
+
+
+@pytest.mark.parametrize(
+    ("size", "square", "message"),
+    [
+        ("9", 25, "cannot read the board '9'"),
+        ("9x-6", 25, "cannot read the board"),
+        ("9x2", 25, "a board of 9x2 inner corners"),
+        ("9x600", 25, "a board of 9x600 inner corners"),
+        ("9x6", 0, "a square of 0 mm"),
+        ("9x6", float("nan"), "a square of nan mm"),
+    ],
+)
+def test_an_impossible_board_is_refused(size, square, message):
+    with pytest.raises(UserError, match=message):
+        read_board(size, square)
+
+
+@pytest.mark.parametrize("content", [b"", b"no picture", b"\x89PNG\r\n\x1a\n"])
+def test_what_is_no_picture_is_one_line(content, tmp_path):
+    path = tmp_path / "photo.png"
+    path.write_bytes(content)
+    with pytest.raises(UserError, match=r"cannot read the picture .*photo\.png: it is not one"):
+        read_grey(path)
+
+
+def test_an_absent_picture_is_one_line(tmp_path):
+    with pytest.raises(UserError, match="No such file"):
+        read_grey(tmp_path / "absent.png")
