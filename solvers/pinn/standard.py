@@ -27,7 +27,7 @@ class PinnStdSolver(FiniteBasisSolver):
     growth: float = 0.55
     gate_width: float = 1.0
     slope: float = 0.5
-    cell: float = 0.7
+    cell: float = 0.5
     name: ClassVar[str] = "pinn-std"
 
     def settings(self) -> dict[str, object]:
