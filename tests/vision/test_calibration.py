@@ -145,7 +145,7 @@ def test_bad_input_is_one_line(arguments, message, folder, tmp_path, monkeypatch
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.skipif(not PHOTOGRAPHS, reason="Debian package opencv-doc is not installed")
+@pytest.mark.skipif(not PHOTOGRAPHS, reason="no photographs in /usr/share/doc/opencv-doc (Debian)")
 def test_the_photographs_of_opencv_give_their_known_camera():
     found = calibrate({path.name: read_grey(path) for path in PHOTOGRAPHS}, BOARD)
     assert found.boardless == ()
