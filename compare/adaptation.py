@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from compare.exits import say
 from compare.stages import Stages
 from compare.tables import write_csv
 from geometry.cache import finger_mesh
@@ -84,3 +85,11 @@ def write_rounds(path: Path, adaptation: Adaptation) -> None:
             for number, step in enumerate(adaptation.rounds)
         ],
     )
+
+
+def adapted_enough(adaptation: Adaptation | None) -> bool:
+    """Whether the tolerance of --adapt was reached, if there is one; a line on standard error if not."""
+    if adaptation is None or adaptation.reached:
+        return True
+    say(f"error: --adapt {adaptation.tolerance:g}: {adaptation.message}")
+    return False

@@ -26,6 +26,7 @@ RADIUS = 5.0
 FINGER = Group("Finger", sort_key=1)
 PHYSICS = Group("Physics", sort_key=2)
 TRAINING = Group("Solvers' settings", sort_key=3)
+OUTPUT = Group("Output", sort_key=4, default_parameter=Parameter(negative="", show_default=False))
 
 
 Adapt = Annotated[

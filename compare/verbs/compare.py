@@ -1,0 +1,90 @@
+"""The one-shot main job: solve one finger with several solvers and compare them."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+from rich.console import Console
+
+from compare.exits import NOT_CONVERGED, say
+from compare.options import OUTPUT, Adapt, FingerOptions, PhysicsOptions, SolverOptions, existing
+
+
+def compare(
+    finger: FingerOptions = FingerOptions(),
+    physics: PhysicsOptions = PhysicsOptions(),
+    options: SolverOptions = SolverOptions(),
+    *,
+    adapt: Adapt = None,
+    solvers: Annotated[
+        str, Parameter(help="Names with commas between; `pinnray solvers` lists them.")
+    ] = "fem,pinn-std",
+    measurements: Annotated[
+        Path | None,
+        Parameter(
+            help="CSV file of marker displacements (x_mm, y_mm, u_mm, v_mm). Without it they are simulated "
+            "by a finite-strain run, and everything that shows them says so."
+        ),
+    ] = None,
+    reference: Annotated[
+        str | None, Parameter(help="Solver that the others are compared with; fem, else the first.")
+    ] = None,
+    out: Annotated[
+        Path | None, Parameter(group=OUTPUT, help="Output folder; out/DESIGN if not given.")
+    ] = None,
+    resume: Annotated[
+        bool, Parameter(group=OUTPUT, help="Take over solutions that an earlier run finished.")
+    ] = False,
+    quiet: Annotated[bool, Parameter(group=OUTPUT, help="No progress, no table.")] = False,
+    json_: Annotated[
+        bool, Parameter(name="--json", group=OUTPUT, help="Print metrics.json and nothing else.")
+    ] = False,
+) -> int:
+    """Solve one finger with several solvers and compare them at the markers and on the shared mesh.
+
+    Draws the finger, meshes it once, solves it with every solver, and writes a report with tables, pictures
+    and fields. Examples:
+
+    - compare --design default
+    - compare --design slender --solvers fem
+    - compare --set rib_count=6 --set height=110 --measurements markers.csv
+    - compare --preset paper --device cuda
+    """
+    from compare.adaptation import adapted_enough
+    from compare.pipeline import Job, run
+    from compare.stages import Stages
+    from compare.tables import mae_table
+
+    design, mesh = finger.read(options.preset)
+    material, load = physics.read(options.preset)
+    made = options.read(solvers)
+    physics.check_law(made)
+    job = Job(
+        design=design,
+        solvers=made,
+        mesh=mesh,
+        adapt=adapt,
+        material=material,
+        load=load,
+        measurements=existing(measurements),
+        reference=reference,
+        out=out or Path("out") / design.name,
+        resume=resume,
+    )
+    try:
+        with Stages(Console(stderr=True), quiet=quiet or json_) as stages:
+            outcome = run(job, stages)
+    except KeyboardInterrupt:
+        kept = job.out.with_name(f"{job.out.name}.partial").exists()
+        note = "what was finished is kept; --resume goes on from it" if kept else "nothing was finished yet"
+        raise KeyboardInterrupt(note) from None
+    if json_:
+        print((job.out / "metrics.json").read_text(encoding="utf-8"), end="")
+    elif not quiet:
+        console = Console()
+        console.print(mae_table(outcome.evaluations, outcome.observations, outcome.reference))
+        console.print(f"report: {job.out / 'report.html'}", soft_wrap=True, highlight=False)
+    unconverged = [evaluation for evaluation in outcome.evaluations if not evaluation.converged]
+    for evaluation in unconverged:
+        say(f"error: {evaluation.solver} did not converge: {evaluation.message}")
+    return NOT_CONVERGED if unconverged or not adapted_enough(outcome.adaptation) else 0

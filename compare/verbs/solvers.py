@@ -1,0 +1,19 @@
+"""List the solvers."""
+
+from rich.console import Console
+
+
+def solvers() -> int:
+    """List the solvers, with the material laws and loads that each has, its presets and their settings."""
+    from rich.table import Table
+
+    from solvers.registry import PRESETS, make_solver, usable_solvers
+
+    table = Table("solver", "laws", "loads", "settings")
+    for name, usual in usable_solvers().items():
+        _, *others = PRESETS.get(name, [""])
+        for solver in [usual, *(make_solver(name, preset=preset) for preset in others)]:
+            settings = [f"{key}={value}" for key, value in solver.settings().items()]
+            table.add_row(name, *map("\n".join, (solver.laws, solver.loads, settings)))
+    Console().print(table)
+    return 0
