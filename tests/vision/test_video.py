@@ -1,0 +1,192 @@
+"""Videos: what is written is read back, and what is damaged is told in one line."""
+
+import warnings
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from geometry.errors import ShapeError, UserError
+from vision.video import VideoWriter, open_frames
+
+VIDEOS = Path(__file__).parent / "videos"
+SIZE = (64, 48)
+
+
+def smooth(count: int, size: tuple[int, int] = SIZE) -> list[np.ndarray]:
+    """Frames in colour without sharp edges, none like another; uint8."""
+    x, y = np.meshgrid(*map(np.arange, size))
+    waves = [(x + 5 * n, y - 3 * n, x + y + 4 * n) for n in range(count)]
+    return [np.rint(128 + 90 * np.sin(np.stack(wave, axis=2) / 9)).astype(np.uint8) for wave in waves]
+
+
+def written(path: Path, frames: list[np.ndarray], rate: float = 25.0, codec: str | None = None) -> Path:
+    with VideoWriter(path, frames[0].shape[1::-1], rate, codec) as video:
+        for frame in frames:
+            video.write(frame)
+    return path
+
+
+def read(path: Path) -> list[np.ndarray]:
+    with open_frames(path) as frames:
+        return [frame.image for frame in frames]
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "psnr"),
+    [
+        ("a.mkv", None, np.inf),  # lossless
+        ("a.avi", "ffv1", np.inf),
+        ("a.avi", None, 35),  # dB; 8 bits of these waves in MJPG
+        ("A.MP4", "MP4V", 30),
+    ],
+)
+def test_every_frame_comes_back(name, codec, psnr, tmp_path):
+    frames = smooth(7)
+    path = written(tmp_path / name, frames, codec=codec)
+    back = read(path)
+    assert len(back) == 7
+    assert min(map(cv2.PSNR, frames, back)) >= min(psnr, 360)  # OpenCV's infinity is about 361
+    assert [file.name for file in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("rate", [1, 23.976, 59.94, 240])
+@pytest.mark.parametrize("suffix", [".mkv", ".avi", ".mp4"])
+def test_times_and_rate_come_back(rate, suffix, tmp_path):
+    path = written(tmp_path / f"a{suffix}", smooth(5), rate)
+    with open_frames(path) as frames:
+        assert (frames.size, frames.count) == (SIZE, 5)
+        assert frames.rate == pytest.approx(rate, rel=1e-3)
+        times = [frame.time for frame in frames]
+    assert times == pytest.approx(np.arange(5) / rate, abs=1.1e-3)  # Matroska has milliseconds
+
+
+def test_grey_frames_and_odd_sides_keep_their_pixels(tmp_path):
+    grey = [frame[:, :, 0] for frame in smooth(3, (65, 49))]
+    back = read(written(tmp_path / "a.mkv", grey))
+    assert back[0].shape == (50, 66, 3)
+    for one, other in zip(grey, back, strict=True):
+        np.testing.assert_array_equal(other[:49, :65], np.dstack([one] * 3))
+        np.testing.assert_array_equal(other[49], other[48])
+
+
+def test_the_times_and_the_pixels_of_a_telephone_are_as_stored():
+    """H.264, to be shown turned by 90 degrees, variable rate; luma is 40 + 8 n, n = 0, 1, 5, 10, 15."""
+    with open_frames(VIDEOS / "h264_turned_variable_rate.mp4") as frames:
+        assert frames.size == (48, 32)
+        found = list(frames)
+    n = np.array([0, 1, 5, 10, 15])
+    assert [frame.time for frame in found] == pytest.approx(n / 25, abs=1e-3)
+    levels = (24 + 8 * n) * 255 / 219  # of limited range, ITU-R BT.601
+    assert [frame.image.mean() for frame in found] == pytest.approx(levels, abs=1.5)
+
+
+def test_hevc_of_10_bits_is_read():
+    """Luma is 160 + 240 n of 1023."""
+    levels = (np.array([160, 400, 640]) / 4 - 16) * 255 / 219
+    assert [image.mean() for image in read(VIDEOS / "hevc_10_bits.mp4")] == pytest.approx(levels, abs=1.5)
+
+
+@pytest.mark.parametrize("suffix", [".mkv", ".avi"])
+def test_a_truncated_video_says_how_much_was_read(suffix, tmp_path):
+    path = written(tmp_path / f"a{suffix}", smooth(40))
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.warns(UserWarning, match=r"says that it has 40 frames, but only the first \d+ can be read"):
+        back = read(path)
+    assert 10 < len(back) < 30
+
+
+def test_whole_videos_do_not_warn(tmp_path):
+    with warnings.catch_warnings(action="error"):
+        read(written(tmp_path / "a.mkv", smooth(3), rate=59.94))
+        read(VIDEOS / "h264_turned_variable_rate.mp4")
+
+
+def without_index(path: Path) -> None:
+    whole = written(path, smooth(5)).read_bytes()
+    path.write_bytes(whole[: whole.rindex(b"moov")])
+
+
+def without_data(path: Path) -> None:
+    """The table of contents whole, every frame overwritten."""
+    whole = written(path, smooth(5)).read_bytes()
+    start, end = whole.index(b"mdat") + 4, whole.rindex(b"moov") - 4
+    path.write_bytes(whole[:start] + bytes(end - start) + whole[end:])
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda path: path.write_bytes(b""), r"a\.mp4: the file is empty"),
+        (lambda path: path.write_text("no video at all\n"), r"a\.mp4: it is no video, its end is missing"),
+        (lambda path: path.write_bytes(np.random.default_rng(0).bytes(9999)), r"a\.mp4: it is no video"),
+        (without_index, r"a\.mp4: it is no video, its end is missing"),
+        (without_data, r"no frame of the video .*a\.mp4 can be read"),
+    ],
+)
+def test_what_is_no_video_is_one_line(damage, message, tmp_path, capfd):
+    path = tmp_path / "a.mp4"
+    damage(path)
+    with pytest.raises(UserError, match=message):
+        open_frames(path)
+    assert capfd.readouterr().err == ""  # FFmpeg holds its tongue
+
+
+def test_an_absent_source_is_one_line(tmp_path):
+    with pytest.raises(UserError, match=r"absent\.mkv: there is no such video"):
+        open_frames(tmp_path / "absent.mkv")
+    with pytest.raises(UserError, match="camera 97 cannot be opened"):
+        open_frames("97")
+    with pytest.raises(UserError, match="a rate of 0 frames a second"):
+        open_frames(tmp_path, rate=0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("a.mov", SIZE, 25), r"a\.mov; it can be \.mkv \(ffv1"),
+        (("a.mkv", SIZE, 25, "h264"), r"a\.mkv as h264; it can be"),
+        (("a.mkv", SIZE, 0), "0 frames a second"),
+        (("a.mkv", (0, 48), 25), "0x48 pixels"),
+    ],
+)
+def test_an_impossible_video_is_refused(arguments, message):
+    with pytest.raises(UserError, match=message):
+        VideoWriter(*arguments)
+
+
+def test_a_frame_of_another_size_is_refused_and_the_old_video_stays(tmp_path):
+    path = tmp_path / "a.mkv"
+    path.write_text("old")
+    with pytest.raises(ShapeError, match=r"uint8 of shape \(48, 65, 3\)"):
+        written(path, smooth(1) + smooth(1, (65, 48)))
+    assert path.read_text() == "old"
+    assert [file.name for file in tmp_path.iterdir()] == ["a.mkv"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [(("a.mp4", SIZE, 25, "ffv1"), "with FFV1 in such a file"), (("a.mkv", SIZE, 25), "no frame was given")],
+)
+def test_a_video_that_cannot_be_written_leaves_nothing(arguments, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UserError, match=message), VideoWriter(*arguments):
+        pass
+    assert not list(tmp_path.iterdir())
+
+
+def lose_one(path: Path) -> None:
+    """OpenCV passes over a frame of a wrong size without a word, as over one for which the disk is full."""
+    with VideoWriter(path, SIZE, 25) as video:
+        for frame in smooth(2):
+            video.write(frame)
+        video._right = 2
+        video.write(smooth(1)[0])
+
+
+def test_a_frame_that_did_not_reach_the_file_is_noticed(tmp_path):
+    with pytest.raises(UserError, match="only 2 of 3 frames"):
+        lose_one(tmp_path / "a.mkv")
+    assert not list(tmp_path.iterdir())
