@@ -1,0 +1,124 @@
+"""The misfit to the markers: its units, its derivative, and what each weighting means."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.errors import UserError
+from geometry.observations import Observations
+from solvers.assimilation import SMALLEST_DEVIATION, assimilates, check_weighting, misfit_of
+from solvers.fem.linear import FemSolver
+from solvers.problem import Problem
+
+
+@pytest.fixture
+def problem(coarse_mesh):
+    """Nine markers, of which the third was not seen."""
+    points = coarse_mesh.markers
+    random = np.random.default_rng(3)
+    visible = np.ones(len(points), dtype=bool)
+    visible[2] = False
+    displacements = random.normal(size=points.shape)
+    displacements[2] = 1e6
+    deviations = random.uniform(0.01, 0.1, points.shape)
+    deviations[0] = 0.0
+    return Problem(
+        coarse_mesh,
+        observations=Observations(points, displacements, deviations, visible, "by a test", True),
+    )
+
+
+def test_no_observations_no_misfit(coarse_mesh):
+    assert misfit_of(Problem(coarse_mesh)) is None
+
+
+def test_paper_weights_are_its_loss_times_the_area(problem):
+    """λ_ASM (1/N) Σ |u - d|² as the paper prints it, summed in a loop, over the markers seen."""
+    observations = problem.observations
+    seen = [marker for marker in range(9) if observations.visible[marker]]
+    moved = np.random.default_rng(1).normal(size=(len(seen), 2))
+    loss = sum(
+        (u - observations.displacements[marker, 0]) ** 2 + (v - observations.displacements[marker, 1]) ** 2
+        for marker, (u, v) in zip(seen, moved, strict=True)
+    ) / len(seen)
+    area = problem.mesh.areas.sum()
+    assert misfit_of(problem, asm_weight=7.0).value(moved) == pytest.approx(area * 7.0 * loss, rel=1e-12)
+
+
+def test_precision_weights_are_the_log_likelihood_times_the_scale(problem):
+    """The density of the errors by SciPy, whose logarithm falls by the misfit over the scale."""
+    from scipy.stats import norm
+
+    misfit = misfit_of(problem, weights="precision", scale=0.3)
+    seen = problem.observations.visible
+    deviations = problem.observations.standard_deviations[seen]
+    deviations = np.where(deviations < SMALLEST_DEVIATION, SMALLEST_DEVIATION, deviations)
+    assert deviations.min() == SMALLEST_DEVIATION
+    moved = misfit.observed + 0.02
+    fall = (
+        norm.logpdf(0, scale=deviations).sum() - norm.logpdf(moved - misfit.observed, scale=deviations).sum()
+    )
+    assert misfit.value(moved) == pytest.approx(0.3 * fall, rel=1e-9)
+
+
+@pytest.mark.parametrize("weights", ["paper", "precision"])
+def test_forces_are_minus_the_derivative(problem, weights):
+    """Taylor's remainder of a quadratic is the misfit of the step itself, for any step."""
+    misfit = misfit_of(problem, weights=weights)
+    random = np.random.default_rng(5)
+    moved, step = random.normal(size=(2, *misfit.observed.shape))
+    for size in (1.0, 1e-3):
+        rise = (
+            misfit.value(moved + size * step)
+            - misfit.value(moved)
+            + size * (misfit.forces(moved) * step).sum()
+        )
+        assert rise == pytest.approx(size**2 * misfit.value(misfit.observed + step), rel=1e-6)
+
+
+def test_what_was_not_seen_does_not_count(problem):
+    misfit = misfit_of(problem)
+    seen = problem.observations.visible
+    assert misfit.points.tolist() == problem.observations.points[seen].tolist()
+    assert np.abs(misfit.observed).max() < 10
+
+
+def test_without_a_marker_the_others_weigh_the_same(problem):
+    misfit = misfit_of(problem)
+    rest = misfit.without(4)
+    moved = np.random.default_rng(2).normal(size=misfit.observed.shape)
+    moved[4] = misfit.observed[4]
+    assert rest.value(np.delete(moved, 4, axis=0)) == pytest.approx(misfit.value(moved), rel=1e-14)
+    assert rest.points.tolist() == np.delete(misfit.points, 4, axis=0).tolist()
+
+
+def test_a_factor_weighs_all_markers(problem):
+    misfit = misfit_of(problem)
+    moved = misfit.observed + 1.0
+    assert misfit.scaled(3.0).value(moved) == pytest.approx(3 * misfit.value(moved), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        (("papers", 1.0, 1.0), "weights must be paper or precision, got 'papers'"),
+        (("paper", -1.0, 1.0), "asm_weight must be zero or more, got -1"),
+        (("precision", 1.0, float("nan")), "scale must be zero or more, got nan"),
+    ],
+)
+def test_settings_that_make_no_misfit_are_refused(settings, said):
+    with pytest.raises(UserError, match=f"fem-asm: {said}"):
+        check_weighting("fem-asm", *settings)
+
+
+def test_only_a_solver_that_says_so_assimilates():
+    class Assimilating(FemSolver):
+        assimilates = True
+
+    assert not assimilates(FemSolver())
+    assert assimilates(Assimilating())
+
+
+def test_observations_make_another_problem(problem):
+    assert problem.digest != replace(problem, observations=None).digest
