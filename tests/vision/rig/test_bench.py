@@ -1,0 +1,84 @@
+"""The finger on the bench: what is drawn is what the truth says."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from geometry.design import Design
+from geometry.errors import ShapeError
+from vision.rig.bench import Bench
+from vision.rig.render import light_of
+from vision.rig.shapes import Scene
+from vision.rig.view import default_camera, view
+from vision.workspace import default_workspace
+
+WORKSPACE = default_workspace(Design())
+CAMERA = default_camera()
+
+
+@pytest.fixture(scope="module")
+def bench(coarse_mesh):
+    return Bench(coarse_mesh, Design(), WORKSPACE.model_copy(update={"marker_plane": 4.0}))
+
+
+def bent(mesh):
+    """A displacement that turns the finger more the nearer the tip is, mm."""
+    x = mesh.points[:, 0] / 90
+    return 12 * np.column_stack([-0.2 * x**2, -(x**2)])
+
+
+def test_every_marker_is_drawn_where_the_truth_says_it_is(bench):
+    displacement = bent(bench.mesh)
+    pose = view(CAMERA, WORKSPACE)
+    scene = bench.scene(displacement)
+    drawn = Scene((1.0, 1.0, 1.0), scene.shapes[-9:])
+    dark = 1 - light_of(drawn, CAMERA, pose, 0.8)[:, :, 0].astype(np.float64)
+    y, x = np.mgrid[:720, :1280]
+    truth = CAMERA.project(bench.markers(displacement), pose)
+    for centre in truth:
+        column, row = np.rint(centre).astype(int)
+        window = np.s_[row - 15 : row + 16, column - 15 : column + 16]
+        mass = dark[window].sum()
+        found = np.array([(x * dark)[window].sum(), (y * dark)[window].sum()]) / mass
+        # Of the picture of a disc that bends, the middle is near that of the disc only.
+        np.testing.assert_allclose(found, centre, rtol=0, atol=0.02)
+
+
+def test_the_truth_is_the_displaced_nodes_in_the_markers_plane(bench):
+    displacement = bent(bench.mesh)
+    moved = bench.markers(displacement) - bench.markers(np.zeros_like(displacement))
+    np.testing.assert_allclose(moved[:, :2], displacement[bench.mesh.marker_nodes], atol=1e-13)
+    np.testing.assert_array_equal(bench.markers(displacement)[:, 2], 4.0)
+
+
+def test_the_indenter_stands_on_the_contact(bench):
+    displacement = np.zeros_like(bench.mesh.points)
+    contact = np.unique(bench.mesh.boundary("contact"))
+    displacement[contact] = (0.5, -2.0)
+    indenter = next(shape for shape in bench.scene(displacement).shapes if shape.edges[:, :, 1].max() > 50)
+    foot = indenter.edges[indenter.edges[:, 0, 1] <= -2.0, 0]
+    left, right = np.add(Design().contact_ends, 0.5)
+    np.testing.assert_allclose([foot[:, 0].min(), foot[:, 0].max()], [left, right], atol=1e-9)
+
+
+def test_displacements_of_another_mesh_are_refused(bench):
+    with pytest.raises(ShapeError, match="displacement must have shape"):
+        bench.scene(np.zeros((7, 2)))
+
+
+@pytest.mark.parametrize("tilt", [0.0, 3.0, 10.0])
+def test_the_view_shows_all_fiducials_upright_at_the_tilt(tilt):
+    pose = view(CAMERA, WORKSPACE, tilt=tilt)
+    seen = CAMERA.project(np.column_stack([WORKSPACE.points, np.zeros(7)]), pose)
+    assert ((seen > 30) & (seen < (1250, 690))).all()
+    origin, right, up, near = CAMERA.project([[45, -15, 0], [46, -15, 0], [45, -14, 0], [45, -15, 1]], pose)
+    assert right[0] - origin[0] == pytest.approx(9.5, abs=0.2)
+    assert origin[1] - up[1] == pytest.approx(9.5, abs=0.2)
+    axis = np.subtract(*_in_camera(pose))
+    assert np.degrees(np.arccos(-axis[2])) == pytest.approx(tilt, abs=1e-5)
+    np.testing.assert_allclose(origin, near, atol=0.1 + 0.2 * tilt)
+
+
+def _in_camera(pose):
+    """Where the camera has the points (0, 0, 1) and (0, 0, 0)."""
+    return Rotation.from_rotvec(pose.rotation).apply(np.eye(3)[2]) + pose.translation, pose.translation

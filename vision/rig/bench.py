@@ -1,0 +1,101 @@
+"""A finger on the bench: fiducials, clamp and indenter around it, markers on it, as a scene."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from geometry.across import boundary_edges
+from geometry.arrays import FloatArray, IntArray
+from geometry.errors import ShapeError
+from geometry.locate import Location
+from geometry.mesh import TriangleMesh
+from geometry.parameters import Parameters
+from vision.rig.shapes import Colour, Scene, Shape, circle, closed, rectangle
+from vision.workspace import Workspace
+
+PAINTS: dict[str, Colour] = {
+    "dark": (0.07, 0.065, 0.06),
+    "red": (0.10, 0.12, 0.62),
+    "green": (0.16, 0.48, 0.12),
+    "blue": (0.60, 0.25, 0.08),
+}
+"""What markers can be painted with."""
+
+BENCH: Colour = (0.60, 0.62, 0.61)
+FINGER: Colour = (0.80, 0.86, 0.88)
+CLAMP: Colour = (0.40, 0.37, 0.35)
+INDENTER: Colour = (0.20, 0.42, 0.72)
+
+CLAMP_SIZE = (7.0, 3.0)
+"""Of the clamp: how far it reaches behind the base, and beyond its ends, mm."""
+BLADE = ((0.0, 0.0), (3.0, 9.0), (3.0, 60.0))
+"""Half of the indenter above its foot: beyond the end of the contact, and height above the finger, mm."""
+OVERLAP = 0.3
+"""How far the indenter's foot goes on below the finger that hides it, so that no gap is seen, mm."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """What the camera looks at; the finger moves with the displacements that it is given.
+
+    Attributes:
+        mesh: Of the finger, whose nodes are moved.
+        parameters: Of the finger.
+        workspace: Around it.
+        paint: Of the markers, one of `PAINTS`.
+    """
+
+    mesh: TriangleMesh
+    parameters: Parameters
+    workspace: Workspace
+    paint: str = "dark"
+
+    def markers(self, displacement: FloatArray) -> FloatArray:
+        """Where the markers' centres are, shape (m, 3), mm, with the nodes displaced by shape (n, 2), mm."""
+        points = self.mesh.markers + _checked(displacement, self.mesh)[self.mesh.marker_nodes]
+        return np.column_stack([points, np.full(len(points), self.workspace.marker_plane)])
+
+    def scene(self, displacement: FloatArray) -> Scene:
+        """The scene with the nodes displaced by shape (n, 2), mm; markers are deformed with the finger."""
+        moved = self.mesh.points + _checked(displacement, self.mesh)
+        plane = self.workspace.marker_plane
+        fiducials = [circle(point, self.workspace.fiducial_diameter / 2) for point in self.workspace.points]
+        where = self._marker_borders
+        shifts = np.einsum("nc,ncx->nx", where.barycentric, displacement[self.mesh.triangles[where.cells]])
+        borders = np.split(where.points + shifts, len(self.mesh.marker_nodes))
+        depth, beyond = CLAMP_SIZE
+        clamp = rectangle((-depth, -self.parameters.base_width - beyond), (0.0, beyond))
+        return Scene(
+            BENCH,
+            [
+                *(Shape(closed(border), PAINTS["dark"]) for border in fiducials),
+                Shape(clamp, CLAMP, plane),
+                Shape(self._indenter(moved), INDENTER, plane),
+                Shape(moved[self._border], FINGER, plane),
+                *(Shape(closed(border), PAINTS[self.paint], plane) for border in borders),
+            ],
+        )
+
+    def _indenter(self, moved: FloatArray) -> FloatArray:
+        """A blade that stands on the contact, shape (n, 2, 2)."""
+        foot = moved[np.unique(self.mesh.boundary("contact"))]
+        middle, width = foot.mean(axis=0), np.ptp(foot[:, 0])
+        right = np.array([(0.0, -OVERLAP), *BLADE]) + middle + (width / 2, 0.0)
+        left = 2 * middle[0] - right[::-1, 0]
+        return closed(np.concatenate([right, np.column_stack([left, right[::-1, 1]])]))
+
+    @cached_property
+    def _border(self) -> IntArray:
+        return boundary_edges(self.mesh.triangles)
+
+    @cached_property
+    def _marker_borders(self) -> Location:
+        radius = self.parameters.marker_diameter / 2
+        return self.mesh.locate(np.concatenate([circle(centre, radius) for centre in self.mesh.markers]))
+
+
+def _checked(displacement: FloatArray, mesh: TriangleMesh) -> FloatArray:
+    if displacement.shape != mesh.points.shape:
+        raise ShapeError(f"displacement must have shape {mesh.points.shape}, got {displacement.shape}")
+    return displacement

@@ -1,0 +1,91 @@
+"""What light, lens and sensor make of a scene.
+
+Noise of the sensor: the electrons that a pixel counts have a variance equal to their number (EMVA Standard
+1288, release 4.0, section 2), here as normal numbers, which above some ten electrons they are; the read noise
+has the same variance everywhere. Units: pixels, grey levels of 0 to 255.
+"""
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from geometry.errors import UserError
+from geometry.messages import one_line
+from geometry.parameters import bounded
+
+LUMA = (0.114, 0.587, 0.299)
+"""Weights of blue, green and red (ITU-R BT.601)."""
+
+Light = NDArray[np.float32]
+"""Shares of the light that reach the pixels, shape (height, width, 3)."""
+Image = NDArray[np.uint8]
+
+
+class Exposure(BaseModel):
+    """How a picture is taken.
+
+    Raises:
+        UserError: One line with the setting, the value and what would be right.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    white: float = bounded(235.0, 10, 1000, "grey levels", "", "Of a white surface in the image's middle")
+    gradient: float = bounded(
+        0.1, 0, 0.9, "", "", "Growth of the light from the middle of the image to its side, relative"
+    )
+    gradient_direction: float = bounded(
+        30.0, -360, 360, "deg", "", "Where the light grows to, from right to down"
+    )
+    blur: float = bounded(0.8, 0, 20, "px", "", "Standard deviation of the lens's blur")
+    noise: float = bounded(
+        1.0, 0, 100, "grey levels", "", "Standard deviation of the noise that is there without light"
+    )
+    full_well: float | None = bounded(
+        None, 100, 1e9, "electrons", "", "That make grey level 255, for photon noise; none: no such noise"
+    )
+    monochrome: bool = False
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            raise UserError(one_line(error, Exposure)) from None
+
+    def develop(self, light: Light, rng: np.random.Generator) -> Image:
+        """The picture that light makes, shape (height, width, 3), or (height, width) if monochrome."""
+        grey = self.white * self._lamp(light.shape[1::-1])[:, :, None] * light
+        if self.monochrome:
+            grey = grey @ np.array(LUMA, dtype=np.float32)
+        if self.noise or self.full_well:
+            variance = self.noise**2 + (grey * (255 / self.full_well) if self.full_well else 0.0)
+            grey += np.sqrt(variance, dtype=np.float32) * rng.standard_normal(grey.shape, dtype=np.float32)
+        return np.asarray(np.clip(np.rint(grey), 0, 255), dtype=np.uint8)
+
+    def _lamp(self, size: tuple[int, ...]) -> Light:
+        """The light on a picture of this width and height, relative to its middle, shape (height, width)."""
+        width, height = size
+        angle = np.deg2rad(self.gradient_direction)
+        x = (np.arange(width) - (width - 1) / 2) * np.cos(angle)
+        y = (np.arange(height) - (height - 1) / 2) * np.sin(angle)
+        return np.asarray(np.maximum(1 + self.gradient * (x + y[:, None]) / (width / 2), 0), np.float32)
+
+
+def fineness(blur: float) -> int:
+    """How many cells a pixel is divided into along either side, so that they resolve the blur."""
+    return int(np.clip(np.ceil(2 / blur), 2, 4)) if blur else 1
+
+
+def blurred(canvas: Light, blur: float) -> Light:
+    """The light on pixels from that on cells, of which `fineness(blur)` squared make a pixel."""
+    if not blur:
+        return canvas
+    cells = fineness(blur)
+    sigma = blur * cells
+    reach = 2 * int(np.ceil(5 * sigma)) + 1
+    soft = cv2.GaussianBlur(canvas, (reach, reach), sigma, borderType=cv2.BORDER_REPLICATE)
+    size = (canvas.shape[1] // cells, canvas.shape[0] // cells)
+    return np.asarray(cv2.resize(soft, size, interpolation=cv2.INTER_AREA), dtype=np.float32)

@@ -1,0 +1,45 @@
+"""A scene as a camera sees it."""
+
+import numpy as np
+
+from vision.camera import Camera, Pose
+from vision.rig.coverage import coverage
+from vision.rig.exposure import Exposure, Image, Light, blurred, fineness
+from vision.rig.shapes import Scene, seen_edges
+
+
+def render(
+    scene: Scene, camera: Camera, pose: Pose, exposure: Exposure, *, seed: int = 0, frame: int = 0
+) -> Image:
+    """A picture of a scene; the same arguments give the same picture to the bit.
+
+    Args:
+        scene: What is seen.
+        camera: What sees it.
+        pose: Of the scene's frame in the camera's.
+        exposure: Light, lens and sensor.
+        seed: Of the noise of a recording.
+        frame: Number in it; the noise of a frame does not depend on other frames.
+
+    Returns:
+        Shape (height, width, 3), BGR, or (height, width) if the exposure is monochrome.
+    """
+    light = light_of(scene, camera, pose, exposure.blur)
+    return exposure.develop(light, noise_of(seed, frame))
+
+
+def noise_of(seed: int, frame: int) -> np.random.Generator:
+    """The random numbers of one frame of a recording."""
+    return np.random.default_rng([seed, frame])
+
+
+def light_of(scene: Scene, camera: Camera, pose: Pose, blur: float) -> Light:
+    """The light of a scene on the pixels: its integral over each, through a lens with this blur, pixels."""
+    cells = fineness(blur)
+    size = (camera.width * cells, camera.height * cells)
+    canvas = np.full((*size[::-1], 3), scene.background, dtype=np.float32)
+    for shape in scene.shapes:
+        rows, columns, share = coverage((seen_edges(shape, camera, pose) + 0.5) * cells, size)
+        below = canvas[rows, columns]
+        below += share[:, :, None].astype(np.float32) * (np.array(shape.colour, dtype=np.float32) - below)
+    return blurred(canvas, blur)

@@ -1,0 +1,77 @@
+"""Painted shapes in planes of constant z: what scenes are made of."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from geometry.arrays import FloatArray
+from vision.camera import Camera, Pose
+
+CORNERS = 512
+"""Of the polygon that stands for a circle: 0.0004 pixels from it at a radius of 20 pixels."""
+CHORD = 1e-3
+"""How far the picture of a straight edge may be from the curve that the lens makes of it, pixels."""
+
+Colour = tuple[float, float, float]
+"""Shares of blue, green and red light that a surface sends back."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A part of a plane.
+
+    Attributes:
+        edges: Of its border, shape (n, 2, 2), mm, in any order, the shape on the same side of all.
+        colour: All over it.
+        z: Of its plane, mm.
+    """
+
+    edges: FloatArray
+    colour: Colour
+    z: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Shapes before a background; the later ones hide the earlier ones."""
+
+    background: Colour
+    shapes: Sequence[Shape]
+
+
+def closed(corners: ArrayLike) -> FloatArray:
+    """The edges of a polygon, shape (n, 2, 2), from its corners in order, shape (n, 2)."""
+    points = np.asarray(corners, dtype=np.float64)
+    return np.stack([points, np.roll(points, -1, axis=0)], axis=1)
+
+
+def rectangle(low: Sequence[float], high: Sequence[float]) -> FloatArray:
+    """The edges of a rectangle from its lower left and upper right corner, shape (4, 2, 2)."""
+    return closed([low, (high[0], low[1]), high, (low[0], high[1])])
+
+
+def circle(centre: ArrayLike, radius: float) -> FloatArray:
+    """Corners of a polygon that has the circle's area, shape (n, 2), mm."""
+    angle = 2 * np.pi * np.arange(CORNERS) / CORNERS
+    reach = radius * np.sqrt(angle[1] / np.sin(angle[1]))
+    return np.asarray(centre + reach * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+
+
+def seen_edges(shape: Shape, camera: Camera, pose: Pose) -> FloatArray:
+    """The edges of the shape's picture, shape (m, 2, 2), pixels; those that the lens bends are cut."""
+    start, end = shape.edges[:, 0], shape.edges[:, 1]
+
+    def seen(points: FloatArray) -> FloatArray:
+        return camera.project(np.column_stack([points, np.full(len(points), shape.z)]), pose)
+
+    bent = np.linalg.norm(seen((start + end) / 2) - (seen(start) + seen(end)) / 2, axis=1)
+    pieces = np.maximum(np.ceil(np.sqrt(bent / CHORD)), 1).astype(np.int64)
+    edge = np.repeat(np.arange(len(pieces)), pieces)
+    nth = np.arange(len(edge)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+
+    def along(fraction: FloatArray) -> FloatArray:
+        return seen(start[edge] + fraction[:, None] * (end - start)[edge])
+
+    return np.stack([along(nth / pieces[edge]), along((nth + 1) / pieces[edge])], axis=1)

@@ -1,0 +1,56 @@
+"""Where the virtual camera stands."""
+
+import cv2
+import numpy as np
+
+from geometry.arrays import FloatArray
+from vision.camera import Camera, Pose
+from vision.workspace import Workspace
+
+RIM = 0.06
+"""Free share of the image on either side of the fiducials."""
+
+
+def default_camera(width: int = 1280, height: int = 720) -> Camera:
+    """A camera with a usual lens, whose picture is a little narrower at its rim; without deviations."""
+    focus = 1.02 * width
+    return Camera(
+        width=width,
+        height=height,
+        fx=focus,
+        fy=focus,
+        cx=0.507 * width,
+        cy=0.491 * height,
+        distortion=(-0.1, 0.02, 5e-4, -3e-4, 0.0),
+    )
+
+
+def view(
+    camera: Camera, workspace: Workspace, *, tilt: float = 0.0, direction: float = 60.0, turn: float = 0.0
+) -> Pose:
+    """Where the workspace is in the frame of a camera that looks at its middle and sees all fiducials.
+
+    Args:
+        camera: What looks.
+        workspace: What is looked at, with its z axis towards the camera.
+        tilt: Angle between the optical axis and the workspace's z axis, degrees.
+        direction: Of the axis about which it is tilted, in the image, degrees from right to down.
+        turn: About the optical axis, degrees.
+    """
+    low, high = workspace.points.min(axis=0), workspace.points.max(axis=0)
+    span = (high - low + workspace.fiducial_diameter) / (1 - 2 * RIM)
+    distance = max(camera.fx * span[0] / camera.width, camera.fy * span[1] / camera.height)
+    axis = np.deg2rad(direction)
+    rotation = (
+        _rotation([0, 0, np.deg2rad(turn)])
+        @ _rotation(np.deg2rad(tilt) * np.array([np.cos(axis), np.sin(axis), 0]))
+        @ np.diag([1.0, -1.0, -1.0])
+    )
+    middle = np.append((low + high) / 2, 0.0)
+    # The middle of the workspace is seen in the middle of the image, which the principal point is only near.
+    aim = np.linalg.solve(camera.matrix, [(camera.width - 1) / 2, (camera.height - 1) / 2, 1.0])
+    return Pose(cv2.Rodrigues(rotation)[0].ravel(), distance * aim - rotation @ middle)
+
+
+def _rotation(vector: FloatArray | list[float]) -> FloatArray:
+    return np.asarray(cv2.Rodrigues(np.array(vector, dtype=np.float64))[0], dtype=np.float64)
