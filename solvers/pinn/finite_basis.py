@@ -10,6 +10,7 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.quadrature import body_quadrature
+from solvers.assimilation import Misfit
 from solvers.pinn.base_factor import BaseFactor
 from solvers.pinn.grading import (
     Spacing,
@@ -122,7 +123,7 @@ class FiniteBasisSolver(ABC):
             if path.fraction < 1 or error <= self.tolerance:
                 break
         reaction = np.zeros(2)
-        reaction[problem.load.prescribed] = path.forces[:, 0]
+        reaction[problem.load.prescribed] = level.reaction(path.forces)
         return Solution(
             solver=self.name,
             problem=problem,
@@ -166,7 +167,13 @@ class FiniteBasisSolver(ABC):
             factor=BaseFactor.of(mesh, self.base_length),
             rng=rng,
         )
-        return Level.of(units, problem, *graded_quadrature(triangles, spacing, self.cell))
+        return Level.of(
+            units, problem, *graded_quadrature(triangles, spacing, self.cell), self.observed(problem)
+        )
+
+    def observed(self, problem: Problem) -> Misfit | None:
+        """What is assimilated of a problem's observations: nothing, unless a solver says otherwise."""
+        return None
 
     def _status(self, path: Path, finer: float, change: float, error: float) -> Status:
         if path.fraction < 1:

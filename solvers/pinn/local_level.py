@@ -7,6 +7,7 @@ import numpy as np
 import torch
 
 from geometry.arrays import FloatArray
+from solvers.assimilation import Misfit
 from solvers.pinn.conditions import load_conditions
 from solvers.pinn.local_energy import LocalEnergy
 from solvers.pinn.local_units import LocalField, LocalUnits
@@ -21,7 +22,7 @@ class Equilibrium(NamedTuple):
 
     Attributes:
         output: Output layer, shape (c, 2, m + 1), mm.
-        forces: Multipliers of the load's functionals, shape (a, k), N/mm.
+        forces: Of the level's springs, shape (n,), N/mm.
         change: Twice the energy of the step over the work of the load: small where Newton has converged.
     """
 
@@ -32,32 +33,56 @@ class Equilibrium(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """The energy of a network under a load.
+    """The energy of a network that springs pull on.
+
+    A spring pulls a functional of the displacement to a value. Those of the load are rigid; those of what is
+    observed yield by 1 / weight per force, which makes their energy the misfit.
 
     Attributes:
         energy: The energy.
-        functionals: The load's functionals on the output layer, shape (a k, U).
-        values: What they are to be, shape (a k,), mm.
-        axes: How many components are prescribed, a.
+        functionals: Of the output layer, shape (n, U): the load's, then those that are observed.
+        values: What they are pulled to, shape (n,), mm.
+        compliance: How far they yield, shape (n,), mm per N/mm.
+        load: Shape (a, k) of the load's functionals: k for each of a components.
     """
 
     energy: LocalEnergy
     functionals: FloatArray
     values: FloatArray
-    axes: int
+    compliance: FloatArray
+    load: tuple[int, ...]
 
     @classmethod
-    def of(cls, units: LocalUnits, problem: Problem, points: FloatArray, weights: FloatArray) -> "Level":
-        """The level of some units with a quadrature: points (q, 2), mm, and weights (q,), mm^2."""
+    def of(
+        cls,
+        units: LocalUnits,
+        problem: Problem,
+        points: FloatArray,
+        weights: FloatArray,
+        observed: Misfit | None = None,
+    ) -> "Level":
+        """The level of some units with a quadrature: points (q, 2), mm, and weights (q,), mm^2.
+
+        Args:
+            units: The hidden units.
+            problem: What is solved.
+            points: Of the quadrature.
+            weights: Of the quadrature.
+            observed: What is assimilated.
+        """
         conditions = load_conditions(problem)
-        functionals = np.zeros((*conditions.values.shape, units.windows.count, 2, units.per_window))
-        for row, axis in enumerate(problem.load.prescribed):
-            functionals[row, :, :, axis] = units.functionals(conditions.points, conditions.weights)
+        rigid = _functionals(units, conditions.points, conditions.weights, problem.load.prescribed)
+        functionals, values, compliance = [rigid], [conditions.values.ravel()], [np.zeros(len(rigid))]
+        if observed is not None:
+            functionals.append(_functionals(units, observed.points, observed.shares, [0, 1]))
+            values.append(observed.values.T.ravel())
+            compliance.append(1 / observed.weights.T.ravel())
         return cls(
             LocalEnergy.of(units, problem.material, points, weights),
-            functionals.reshape(conditions.values.size, -1),
-            conditions.values.ravel(),
-            len(conditions.values),
+            np.concatenate(functionals),
+            np.concatenate(values),
+            np.concatenate(compliance),
+            conditions.values.shape,
         )
 
     @property
@@ -65,6 +90,15 @@ class Level:
         """The output layer without displacement."""
         units = self.energy.units
         return torch.zeros(units.windows.count, 2, units.per_window, dtype=torch.float64)
+
+    def reaction(self, forces: FloatArray) -> FloatArray:
+        """The indenter's force for each prescribed component, shape (a,), N/mm, among the springs' (n,)."""
+        of_load: FloatArray = forces[: np.prod(self.load)].reshape(self.load)
+        return of_load[:, 0]
+
+    def misfit(self, forces: FloatArray) -> float:
+        """The energy of the springs, N mm/mm: what the observations add to what is minimised."""
+        return 0.5 * float(self.compliance @ forces**2)
 
     def field(self, output: torch.Tensor) -> LocalField:
         """The displacement that an output layer gives."""
@@ -74,7 +108,8 @@ class Level:
         """One Newton step to equilibrium under a fraction of the load; for a linear law it is the solution.
 
         With K the second derivative of the energy and r its first, y = K^-1 (-r) and x_k = K^-1 b_k for the
-        functionals b_k; the step is y + f_k x_k with the forces f that make it meet the conditions.
+        functionals b_k; the step is y + f_k x_k with the forces f by which every spring with compliance s_k
+        is short of its value by s_k f_k.
 
         Returns:
             None if a point of the quadrature is inside out.
@@ -89,12 +124,13 @@ class Level:
             definite=self.energy.material.law == "linear",
         )
         gap = fraction * self.values - self.functionals @ (output.numpy().ravel() + free)
-        forces = np.linalg.solve(self.functionals @ np.transpose(responses), gap)
+        compliance = self.functionals @ np.transpose(responses) + np.diag(self.compliance)
+        forces = np.linalg.solve(compliance, gap)
         change = free + forces @ np.array(responses)
         decrement = (forces @ self.functionals - residual) @ change
         return Equilibrium(
             output + torch.from_numpy(change).view_as(output),
-            forces.reshape(self.axes, -1),
+            forces,
             float(abs(decrement / (fraction * self.values @ forces))),
         )
 
@@ -103,3 +139,11 @@ class Level:
         material = self.energy.material.model_copy(update={"law": "linear"})
         found = replace(self, energy=replace(self.energy, material=material, origin=field)).step(self.rest)
         return self.rest if found is None else found.output
+
+
+def _functionals(units: LocalUnits, points: FloatArray, weights: FloatArray, axes: list[int]) -> FloatArray:
+    """Sums of weights (k, q) times components of the displacement at points (q, 2): (a k, U)."""
+    found = np.zeros((len(axes), len(weights), units.windows.count, 2, units.per_window))
+    for row, axis in enumerate(axes):
+        found[row, :, :, axis] = units.functionals(points, weights)
+    return found.reshape(len(axes) * len(weights), -1)

@@ -22,7 +22,7 @@ class Path(NamedTuple):
     Attributes:
         fraction: Of the load.
         output: Output layer there, shape (c, 2, m + 1), mm.
-        forces: Multipliers of the load's functionals, shape (a, k), N/mm.
+        forces: Of the level's springs, shape (n,), N/mm.
         iterations: Newton iterations so far.
     """
 
@@ -34,7 +34,7 @@ class Path(NamedTuple):
     @classmethod
     def start(cls, level: Level) -> "Path":
         """No load yet."""
-        return cls(0.0, level.rest, np.zeros((level.axes, len(level.values) // level.axes)), 0)
+        return cls(0.0, level.rest, np.zeros(len(level.values)), 0)
 
     def to(self, fraction: float, state: Equilibrium | None, iterations: int) -> "Path":
         """With more iterations, which led to a state at a fraction of the load or, if None, nowhere."""
