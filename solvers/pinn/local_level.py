@@ -73,9 +73,9 @@ class Level:
         conditions = load_conditions(problem)
         rigid = _functionals(units, conditions.points, conditions.weights, problem.load.prescribed)
         functionals, values, compliance = [rigid], [conditions.values.ravel()], [np.zeros(len(rigid))]
-        if observed is not None:
-            functionals.append(_functionals(units, observed.points, observed.shares, [0, 1]))
-            values.append(observed.values.T.ravel())
+        if observed is not None and observed.weights.any():
+            functionals.append(_functionals(units, *observed.sampling(), [0, 1]))
+            values.append(observed.observed.T.ravel())
             compliance.append(1 / observed.weights.T.ravel())
         return cls(
             LocalEnergy.of(units, problem.material, points, weights),

@@ -99,12 +99,34 @@ def test_a_factor_weighs_all_markers(problem):
     assert misfit.scaled(3.0).value(moved) == pytest.approx(3 * misfit.value(moved), rel=1e-14)
 
 
+def test_a_marker_moves_by_the_mean_over_its_disc(problem):
+    """That of x^2 y over a disc around (a, b) is a^2 b + b r^2 / 4, of a square distance more by r^2 / 2."""
+    misfit = misfit_of(problem, marker_radius=0.5)
+    (x, y), shares = misfit.sampling()[0].T, misfit.sampling()[1]
+    a, b = misfit.points.T
+    np.testing.assert_allclose(shares @ (x**2 * y), a**2 * b + b * 0.5**2 / 4, rtol=1e-12)
+    np.testing.assert_allclose(shares @ ((x - 1) ** 2 + y**2), (a - 1) ** 2 + b**2 + 0.5**2 / 2, rtol=1e-12)
+
+
+def test_without_a_radius_it_is_the_centre_that_moves(problem):
+    points, shares = misfit_of(problem, marker_radius=0.0).sampling()
+    np.testing.assert_array_equal(shares @ points, misfit_of(problem).points)
+
+
+def test_a_disc_does_not_reach_beyond_the_body(problem):
+    """The markers are in the middle of a wall of 2 mm."""
+    assert misfit_of(problem).radius == 0.8
+    assert misfit_of(problem, marker_radius=3.0).radius == pytest.approx(1.0, rel=1e-9)
+    assert misfit_of(problem).without(0).radius == 0.8
+
+
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
         (("papers", 1.0, 1.0), "weights must be paper or precision, got 'papers'"),
         (("paper", -1.0, 1.0), "asm_weight must be zero or more, got -1"),
         (("precision", 1.0, float("nan")), "scale must be zero or more, got nan"),
+        (("paper", 1.0, 1.0, -0.8), "marker_radius must be zero or more, got -0.8"),
     ],
 )
 def test_settings_that_make_no_misfit_are_refused(settings, said):
