@@ -13,6 +13,8 @@ def certificate_sentences(evaluation: Evaluation) -> str:
     label, certificate = solver_label(evaluation), evaluation.certificate
     if evaluation.law != CERTIFIED_LAW:
         return f"{label} has no certificate: there is one for the {CERTIFIED_LAW} law only."
+    if evaluation.in_sample:
+        return f"{label} has no certificate: it pays energy for the markers that it was given."
     if certificate is None:
         reason = "DOLFINx, which makes it, is not installed" if evaluation.finite else "it is not finite"
         return f"{label} has no certificate: {reason}."

@@ -53,6 +53,7 @@ class Evaluation:
         energy_density: Shape (q,), MPa.
         uncertainty: The solver's estimate of its own error, as differences of the exact solution from it.
         marker_uncertainty: The same at the markers, absolute, shape (m, 2), mm.
+        in_sample: Whether the solver was given the observations: its errors at them are training errors.
         certificate: What the result is worth by the energy of finite elements; not part of the archive.
     """
 
@@ -76,6 +77,7 @@ class Evaluation:
     energy_density: FloatArray
     uncertainty: ReferenceDifferences | None = None
     marker_uncertainty: FloatArray | None = None
+    in_sample: bool = False
     certificate: Certificate | None = None
 
     @classmethod
@@ -111,6 +113,7 @@ class Evaluation:
             stress_zz=state.stress_zz,
             von_mises=state.von_mises,
             energy_density=state.energy_density,
+            in_sample=solution.problem.observations is not None,
         )
 
     @property

@@ -31,6 +31,7 @@ from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
 from geometry.settings import MeshSettings
 from solvers.adaptation import Adaptation, check_adaptable
+from solvers.assimilation import assimilates
 from solvers.problem import Load, Material, Problem
 from solvers.solver import Solver, check_load, with_law
 from solvers.training import TrainedSolver, TrainingContext
@@ -241,7 +242,8 @@ def _evaluate(
     job: Job, solver: Solver, problem: Problem, observations: Observations, folder: Path, stages: Stages
 ) -> Evaluation:
     """Solve and sample, or take over what an earlier run finished."""
-    own = Problem(problem.mesh, with_law(job.material, solver), job.load)
+    given = observations if assimilates(solver) else None
+    own = Problem(problem.mesh, with_law(job.material, solver), job.load, given)
     key = _key(solver, own, observations)
     kept = folder / SOLUTIONS / f"{solver.name}.npz"
     with stages.stage(solver.name) as progress:

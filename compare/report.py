@@ -1,7 +1,7 @@
 """The report: one HTML file that holds its pictures and needs nothing else."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -39,7 +39,6 @@ class ReportContent:
         reference: One of the evaluations.
         figures: Pictures in the order in which they appear.
         provenance: What to state of the run (seed, versions, hashes, times); a mapping becomes a group.
-        assimilating: Names of the solvers that used the markers: their errors there are training errors.
         adaptation: How the mesh was refined, if that was asked for.
     """
 
@@ -52,7 +51,6 @@ class ReportContent:
     reference: Evaluation
     figures: Sequence[Figure]
     provenance: Mapping[str, object]
-    assimilating: frozenset[str] = field(default_factory=frozenset)
     adaptation: Adaptation | None = None
 
 
@@ -61,7 +59,6 @@ class SolverEntry:
     """One solver's line in the tables."""
 
     label: str
-    assimilates: bool
     is_reference: bool
     evaluation: Evaluation
     errors: MarkerErrors
@@ -123,7 +120,6 @@ def _entry(evaluation: Evaluation, content: ReportContent) -> SolverEntry:
     differences = reference_differences(evaluation, content.reference)
     return SolverEntry(
         label=solver_label(evaluation),
-        assimilates=evaluation.solver in content.assimilating,
         is_reference=evaluation is content.reference,
         evaluation=evaluation,
         errors=marker_errors(evaluation, content.observations),

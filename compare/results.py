@@ -23,13 +23,12 @@ def metrics(
     observations: Observations,
     evaluations: Sequence[Evaluation],
     reference: Evaluation,
-    assimilating: frozenset[str] = frozenset(),
 ) -> dict[str, Any]:
     """Everything that `metrics.json` holds.
 
     `markers` compares with every marker that was seen. `held_out` compares with markers that the solver was
-    not given: those same markers for a solver that was given none, null for the solvers named in
-    `assimilating`. Markers that were not seen are NaN.
+    not given: those same markers for a solver that was given none, null for one that assimilated them.
+    Markers that were not seen are NaN.
     """
     return {
         "schema": SCHEMA,
@@ -43,17 +42,12 @@ def metrics(
         },
         "reference": reference.solver,
         "solvers": {
-            evaluation.solver: _solver(
-                evaluation, observations, reference, assimilates=evaluation.solver in assimilating
-            )
-            for evaluation in evaluations
+            evaluation.solver: _solver(evaluation, observations, reference) for evaluation in evaluations
         },
     }
 
 
-def _solver(
-    evaluation: Evaluation, observations: Observations, reference: Evaluation, *, assimilates: bool
-) -> dict[str, Any]:
+def _solver(evaluation: Evaluation, observations: Observations, reference: Evaluation) -> dict[str, Any]:
     errors = marker_errors(evaluation, observations)
     differences = reference_differences(evaluation, reference)
     means = {name: getattr(errors, name) for name in ("mae_u", "mae_v", "mae_sum", "mae_rss")}
@@ -67,11 +61,12 @@ def _solver(
         "stats": dict(evaluation.stats),
         "certificate": evaluation.certificate and evaluation.certificate.numbers(),
         "markers": {
+            "in_sample": evaluation.in_sample,
             "ae_u": errors.ae_u.tolist(),
             "ae_v": errors.ae_v.tolist(),
             **means,
         },
-        "held_out": None if assimilates else means,
+        "held_out": None if evaluation.in_sample else means,
         "uncertainty": _own_uncertainty(evaluation),
         "to_reference": _differences(differences)
         | {"reference_uncertainty": reference.uncertainty and _differences(reference.uncertainty)},

@@ -10,7 +10,7 @@ from rich.table import Table
 from compare.certificate import Certificate
 from compare.differences import ReferenceDifferences
 from compare.evaluation import Evaluation
-from compare.figures.labels import significant, solver_label
+from compare.figures.labels import IN_SAMPLE, significant, solver_at_markers, solver_label
 from compare.metrics import marker_errors, reference_differences
 from geometry.atomic import atomic_path
 from geometry.observations import Observations
@@ -34,7 +34,10 @@ def write_markers(path: Path, *, evaluations: Sequence[Evaluation], observations
         for evaluation, error in zip(evaluations, errors, strict=True):
             name = evaluation.solver
             own_u, own_v = (float(value) for value in evaluation.marker_displacement[marker])
-            row |= {f"{name}_converged": int(evaluation.converged)}
+            row |= {
+                f"{name}_converged": int(evaluation.converged),
+                f"{name}_in_sample": int(evaluation.in_sample),
+            }
             row |= {f"{name}_u_mm": own_u, f"{name}_v_mm": own_v}
             row[f"{name}_ae_u_mm"] = float(error.ae_u[marker]) if seen else ""
             row[f"{name}_ae_v_mm"] = float(error.ae_v[marker]) if seen else ""
@@ -68,6 +71,7 @@ def mae_table(evaluations: Sequence[Evaluation], observations: Observations, ref
             f"L²: relative difference of the displacement from the reference, {solver_label(reference)}.\n"
             f"{_own_error(reference) if len(evaluations) > 1 else ''}"
             "above fem: energy of the displacement on fem's elements above the least there."
+            f"{_in_sample(evaluations)}"
         ),
         box=SIMPLE_HEAD,
         collapse_padding=True,
@@ -81,7 +85,7 @@ def mae_table(evaluations: Sequence[Evaluation], observations: Observations, ref
         errors = marker_errors(evaluation, observations)
         distance = reference_differences(evaluation, reference).displacement.rel_l2
         table.add_row(
-            solver_label(evaluation).replace(" (", "\n("),
+            solver_at_markers(evaluation).replace(" (", "\n("),
             *(f"{value:.3f}" for value in (errors.mae_u, errors.mae_v, errors.mae_sum, errors.mae_rss)),
             "–" if evaluation is reference else _with_own_error(distance, reference),
             f"{evaluation.energy:.4g}",
@@ -90,6 +94,11 @@ def mae_table(evaluations: Sequence[Evaluation], observations: Observations, ref
             style=None if evaluation.converged else "yellow",
         )
     return table
+
+
+def _in_sample(evaluations: Sequence[Evaluation]) -> str:
+    """What the mark beside a solver's name means, if there is one."""
+    return f"\n{IN_SAMPLE}." if any(evaluation.in_sample for evaluation in evaluations) else ""
 
 
 def _own_error(reference: Evaluation) -> str:
@@ -128,6 +137,7 @@ def above_fem(evaluation: Evaluation) -> str:
 def _summary(evaluation: Evaluation, observations: Observations, reference: Evaluation) -> dict[str, Cell]:
     errors, to = marker_errors(evaluation, observations), reference_differences(evaluation, reference)
     row: dict[str, Cell] = {"solver": evaluation.solver, "converged": int(evaluation.converged)}
+    row |= {"in_sample": int(evaluation.in_sample)}
     row |= {"observations": observations.label, "reference": reference.solver}
     row |= {"mae_u_mm": errors.mae_u, "mae_v_mm": errors.mae_v}
     row |= {"mae_sum_mm": errors.mae_sum, "mae_rss_mm": errors.mae_rss}

@@ -15,13 +15,14 @@ CERTIFIED_LAW = "linear"
 def certified(evaluations: Sequence[Evaluation], problem: Problem) -> list[Evaluation]:
     """The evaluations, those of the linear law with a certificate and the verdict that follows from it.
 
+    A solver that was given observations pays energy for them, so that least energy does not judge it.
     Without DOLFINx there are no certificates, and a warning says so.
 
     Args:
         evaluations: Sampled on the problem's mesh.
         problem: What was solved; each evaluation knows its own law.
     """
-    if all(evaluation.law != CERTIFIED_LAW for evaluation in evaluations):
+    if not any(map(_certifiable, evaluations)):
         return list(evaluations)
     try:
         from compare.certifier import Certifier
@@ -32,10 +33,14 @@ def certified(evaluations: Sequence[Evaluation], problem: Problem) -> list[Evalu
     certifier = Certifier(replace(problem, material=material))
     return [
         judged(evaluation, certifier.certificate(evaluation) if evaluation.finite else None)
-        if evaluation.law == CERTIFIED_LAW
+        if _certifiable(evaluation)
         else evaluation
         for evaluation in evaluations
     ]
+
+
+def _certifiable(evaluation: Evaluation) -> bool:
+    return evaluation.law == CERTIFIED_LAW and not evaluation.in_sample
 
 
 def judged(evaluation: Evaluation, certificate: Certificate | None) -> Evaluation:

@@ -14,7 +14,7 @@ from compare.figures.energy_chart import draw_energy
 from compare.figures.excess import DECADES, draw_excess
 from compare.figures.fields import QUANTITIES, Quantity, draw_field, field_extent
 from compare.figures.force_chart import draw_force_displacement
-from compare.figures.labels import solver_label
+from compare.figures.labels import IN_SAMPLE, solver_label
 from compare.figures.marker_chart import draw_marker_errors
 from compare.figures.mesh_drawing import draw_mesh, mesh_numbers
 from compare.figures.overlay import draw_overlay
@@ -71,7 +71,7 @@ class Gallery:
             "Deformed finger",
             f"The deformed body of each solver, coloured by displacement magnitude on one scale; the "
             f"displacement is not exaggerated. Circles: {self.observations.label} marker positions. Crosses: "
-            f"the solver’s. Grey: the undeformed body.{cylinder} {self._simulated()}",
+            f"the solver’s. Grey: the undeformed body.{cylinder} {self._given()}{self._simulated()}",
         )
 
     def marker_errors(self) -> Figure:
@@ -88,7 +88,8 @@ class Gallery:
             path,
             "Errors at the markers",
             f"Absolute difference between each solver’s displacement and the {self.observations.label} one, "
-            f"for both components; markers are numbered from base to tip.{unseen} {self._simulated()}",
+            f"for both components; markers are numbered from base to tip.{unseen} {self._given()}"
+            f"{self._simulated()}",
         )
 
     def field(self, quantity: Quantity) -> Figure:
@@ -192,6 +193,10 @@ class Gallery:
             f"inscribed to the circumscribed radius (1 for an equilateral triangle): worst "
             f"{numbers.worst:.2f}, mean {numbers.mean:.2f}. Orange: the contact. Dots: the markers.",
         )
+
+    def _given(self) -> str:
+        """What the mark beside a solver's name means, if there is one."""
+        return f"{IN_SAMPLE}. " if any(evaluation.in_sample for evaluation in self.evaluations) else ""
 
     def _simulated(self) -> str:
         if not self.observations.simulated:

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from compare.evaluation import Evaluation
-from compare.figures.labels import solver_label
+from compare.figures.labels import solver_at_markers
 from compare.figures.style import (
     MUTED,
     WIDTH,
@@ -29,7 +29,7 @@ HEAD, HEIGHT, FOOT, LEFT = 0.32, 1.45, 0.42, 0.72
 def draw_marker_errors(path: Path, *, evaluations: Sequence[Evaluation], observations: Observations) -> None:
     """Bars of |du| and |dv| at every marker, grouped by marker, one colour a solver (Fig. 6 of the paper)."""
     errors = [marker_errors(evaluation, observations) for evaluation in evaluations]
-    names = [solver_label(evaluation) for evaluation in evaluations]
+    names = [solver_at_markers(evaluation) for evaluation in evaluations]
     charts = {
         "u": ([error.ae_u for error in errors], [error.mae_u for error in errors]),
         "v": ([error.ae_v for error in errors], [error.mae_v for error in errors]),

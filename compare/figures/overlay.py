@@ -14,7 +14,7 @@ from compare.evaluation import Evaluation
 from compare.figures import body
 from compare.figures.canvas import Canvas, Extent
 from compare.figures.colours import Scale
-from compare.figures.labels import markers_label, solver_label
+from compare.figures.labels import markers_label, solver_at_markers
 from compare.figures.style import INK, MEASURED, MUTED, WIDTH, axes_at, figure, heading
 from compare.metrics import marker_errors
 from geometry.arrays import FloatArray, IntArray
@@ -114,7 +114,7 @@ def _panel(
     axes.plot(*computed.T, "x", ms=4, color="white", mew=2.0, zorder=4)
     axes.plot(*computed.T, "x", ms=4, color=INK, mew=0.9, zorder=5)
     errors = marker_errors(evaluation, observations)
-    axes.set_title(solver_label(evaluation), size=9, pad=3, weight="bold")
+    axes.set_title(solver_at_markers(evaluation), size=9, pad=3, weight="bold")
     note = f"MAE  u {errors.mae_u:.3g} mm,  v {errors.mae_v:.3g} mm"
     axes.text(0.01, 0.01, note, size=7.5, color=MUTED, transform=axes.transAxes)
 

@@ -191,6 +191,13 @@ def test_a_minimiser_whose_quadrature_is_too_coarse_is_found_out(finger: Triangl
     assert len(certificate.faults) == 2
 
 
+def test_least_energy_does_not_judge_a_solver_that_was_given_the_markers(
+    fem: Evaluation, finger: TriangleMesh
+) -> None:
+    given = replace(fem, in_sample=True)
+    assert certified([given], Problem(finger)) == [given]
+
+
 def test_only_the_linear_law_is_certified(finger: TriangleMesh) -> None:
     problem = Problem(finger)
     evaluation = Evaluation.of(FemSolver().solve(problem), finger)

@@ -16,6 +16,7 @@ from compare.figures.canvas import Canvas
 from compare.figures.energy_chart import draw_energy
 from compare.figures.fields import QUANTITIES, draw_field, field_extent
 from compare.figures.force_chart import draw_force_displacement
+from compare.figures.gallery import Gallery
 from compare.figures.overlay import overlay_extent
 from compare.figures.style import DPI, WIDTH
 from compare.force_displacement import force_curves
@@ -122,6 +123,23 @@ def test_a_solver_that_failed_is_marked(
     name: str, figures: dict[str, Figure], pages: dict[Path, Page]
 ) -> None:
     assert "fem-nonlinear (not converged)" in pages[figures[name].path].text
+
+
+@pytest.mark.parametrize("name", ["overlay", "marker_errors"])
+def test_a_solver_that_was_given_the_markers_is_marked_at_them(
+    name: str,
+    pages: dict[Path, Page],
+    tmp_path: Path,
+    mesh: TriangleMesh,
+    fem: Evaluation,
+    pinn: Evaluation,
+    observations: Observations,
+) -> None:
+    given = (fem, replace(pinn, in_sample=True))
+    gallery = Gallery(tmp_path, Design(), mesh, Load(), given, observations, fem)
+    figure = getattr(gallery, name)()
+    assert "pinn-std †" in pages[figure.path].text
+    assert "† was given these markers" in figure.caption
 
 
 @pytest.mark.parametrize("name", ["overlay", "marker_errors"])

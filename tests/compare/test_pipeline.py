@@ -22,6 +22,7 @@ from compare.stages import Stages
 from geometry.cache import finger_mesh
 from geometry.design import Design
 from geometry.errors import UserError
+from geometry.observations import Observations
 from geometry.settings import MeshSettings
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
@@ -233,6 +234,43 @@ def test_a_marker_that_was_not_seen(tmp_path):
     assert [hidden[name] for name in ("observed_u_mm", "fem_ae_u_mm", "fem_ae_v_mm")] == [""] * 3
     assert "2 of 3 markers seen" in (out / "report.html").read_text(encoding="utf-8")
     assert read_measurements(out / "observations.csv").visible.tolist() == [True, False, True]
+
+
+@dataclass
+class Assimilating(Scripted):
+    """Remembers what it was given."""
+
+    assimilates: ClassVar[bool] = True
+    given: Observations | None = None
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        self.given = problem.observations
+        return super().solve(problem, progress)
+
+
+def test_only_a_solver_that_assimilates_is_given_the_markers_and_it_is_marked(job):
+    """The other would remember them too; what it says at them is a prediction."""
+    blind = Assimilating("blind")
+    blind.assimilates = False
+    seeing = Assimilating("seeing")
+    outcome = compare(wanted := job(blind, seeing))
+    assert blind.given is None
+    assert seeing.given.displacements.tolist() == [[-0.5, -5], [-2, -0.5]]
+    solvers = strictly(wanted.out / "metrics.json")["solvers"]
+    assert [solvers[name]["markers"]["in_sample"] for name in ("blind", "seeing")] == [False, True]
+    assert [solvers[name]["held_out"] is None for name in ("blind", "seeing")] == [False, True]
+    assert [evaluation.certificate is None for evaluation in outcome.evaluations] == [False, True]
+    assert "seeing †" in (wanted.out / "report.html").read_text(encoding="utf-8")
+
+
+def test_other_measurements_are_assimilated_again(job, tmp_path):
+    """One that does not assimilate is taken over: its displacement is the same at the same markers."""
+    other = tmp_path / "other.csv"
+    other.write_text("x_mm,y_mm,u_mm,v_mm\n20,-1,-0.6,-5\n85,-1,-2,-0.5\n")
+    compare(job(Scripted("blind"), Assimilating("seeing")))
+    again = job(Scripted("blind"), Assimilating("seeing"), measurements=other, resume=True)
+    compare(again)
+    assert [solver.calls for solver in again.solvers] == [0, 1]
 
 
 # Stopped halfway

@@ -141,13 +141,13 @@ def test_a_point_load_is_said_to_have_no_limit(content: ReportContent, kind: str
     assert ("point-load" in page.values("id")) is warned
 
 
-@pytest.mark.parametrize(("names", "warned"), [({"pinn-std"}, True), (set(), False)])
-def test_errors_on_assimilated_markers_are_training_errors(
-    content: ReportContent, names: set[str], warned: bool
-) -> None:
-    page = Page(render(replace(content, assimilating=frozenset(names))))
-    assert ("in-sample" in page.values("id")) is warned
-    assert ("pinn-std †" in page.text) is warned
+@pytest.mark.parametrize("given", [True, False])
+def test_errors_on_assimilated_markers_are_training_errors(content: ReportContent, given: bool) -> None:
+    fem, pinn = content.evaluations
+    page = Page(render(replace(content, evaluations=[fem, replace(pinn, in_sample=given)])))
+    assert ("in-sample" in page.values("id")) is given
+    assert ("pinn-std †" in page.text) is given
+    assert ("pinn-std has no certificate: it pays energy for the markers" in page.text) is given
 
 
 def test_a_solver_that_failed_is_marked_everywhere(content: ReportContent, failed: Evaluation) -> None:

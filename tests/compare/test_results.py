@@ -49,7 +49,7 @@ SOLVER = {
     "reaction": list,
     "stats": dict,
     "certificate": CERTIFICATE,
-    "markers": {"ae_u": list, "ae_v": list, **ERRORS},
+    "markers": {"in_sample": bool, "ae_u": list, "ae_v": list, **ERRORS},
     "held_out": ERRORS,
     "uncertainty": UNCERTAINTY,
     "to_reference": {**DIFFERENCES, "reference_uncertainty": DIFFERENCES},
@@ -154,8 +154,9 @@ def test_a_marker_that_was_not_seen_is_nan_and_counts_nowhere(numbers, observe, 
     assert (markers["mae_u"], markers["mae_v"]) == (pytest.approx(0.3), pytest.approx(0.4))
 
 
-def test_held_out_errors_are_those_of_markers_that_the_solver_was_not_given(numbers):
-    told = numbers(assimilating=frozenset({"pinn-std"}))["solvers"]
+def test_held_out_errors_are_those_of_markers_that_the_solver_was_not_given(numbers, fem, pinn):
+    told = numbers(evaluations=[fem, replace(pinn, in_sample=True)])["solvers"]
+    assert [told[name]["markers"]["in_sample"] for name in ("fem", "pinn-std")] == [False, True]
     assert told["pinn-std"]["held_out"] is None
     assert told["fem"]["held_out"] == {name: told["fem"]["markers"][name] for name in ERRORS}
 

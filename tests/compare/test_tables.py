@@ -18,7 +18,8 @@ from geometry.observations import Observations
 Rows = list[dict[str, str]]
 UNITS = ("_mm", "_MPa", "_1", "_N_mm_per_mm", "_N_per_mm", "_s", "_rel_l2", "_rel")
 WITHOUT_UNIT = {"marker", "observations", "visible", "solver", "converged", "reference", "status"}
-WITHOUT_UNIT |= {"misses_energy", "fem_converged", "pinn-std_converged"}
+WITHOUT_UNIT |= {"misses_energy", "in_sample"}
+WITHOUT_UNIT |= {f"{name}_{flag}" for name in ("fem", "pinn-std") for flag in ("converged", "in_sample")}
 
 
 def read(path: Path) -> Rows:
@@ -107,6 +108,23 @@ def test_the_terminal_table_fits_eighty_columns(
     assert "fem-nonlinear" in text
     assert "…" not in text
     assert max(map(len, text.splitlines())) <= 80
+
+
+def test_a_solver_that_was_given_the_markers_is_marked_in_every_table(
+    fem: Evaluation, pinn: Evaluation, observations: Observations, tmp_path: Path
+) -> None:
+    given = [fem, replace(pinn, in_sample=True)]
+    text = printed(mae_table(given, observations, fem), width=80)
+    assert "pinn-std †" in text
+    assert "fem †" not in text
+    assert "† was given these markers: its errors there are training errors." in text
+    assert "†" not in printed(mae_table([fem, pinn], observations, fem), width=80)
+    write_summary(tmp_path / "s.csv", evaluations=given, observations=observations, reference=fem)
+    write_markers(tmp_path / "m.csv", evaluations=given, observations=observations)
+    assert [row["in_sample"] for row in read(tmp_path / "s.csv")] == ["0", "1"]
+    assert {(row["fem_in_sample"], row["pinn-std_in_sample"]) for row in read(tmp_path / "m.csv")} == {
+        ("0", "1")
+    }
 
 
 def test_the_own_error_of_the_reference_stands_beside_the_difference(
