@@ -1,5 +1,6 @@
 """A finger on the bench: fiducials, clamp and indenter around it, markers on it, as a scene."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,8 +30,8 @@ INDENTER: Colour = (0.20, 0.42, 0.72)
 
 CLAMP_SIZE = (7.0, 3.0)
 """Of the clamp: how far it reaches behind the base, and beyond its ends, mm."""
-BLADE = ((0.0, 0.0), (3.0, 9.0), (3.0, 60.0))
-"""Half of the indenter above its foot: beyond the end of the contact, and height above the finger, mm."""
+BLADE = ((0.0, 0.0), (0.033, 0.1), (0.033, 0.67))
+"""Half of the indenter: from the contact's end, and above it, as shares of the finger's height."""
 OVERLAP = 0.3
 """How far the indenter's foot goes on below the finger that hides it, so that no gap is seen, mm."""
 
@@ -56,14 +57,19 @@ class Bench:
         points = self.mesh.markers + _checked(displacement, self.mesh)[self.mesh.marker_nodes]
         return np.column_stack([points, np.full(len(points), self.workspace.marker_plane)])
 
-    def scene(self, displacement: FloatArray) -> Scene:
-        """The scene with the nodes displaced by shape (n, 2), mm; markers are deformed with the finger."""
+    def discs(self, displacement: FloatArray) -> list[Shape]:
+        """The markers with the nodes displaced by shape (n, 2), mm; they are deformed with the finger."""
+        where = self._marker_borders
+        corners = _checked(displacement, self.mesh)[self.mesh.triangles[where.cells]]
+        moved = where.points + np.einsum("nc,ncx->nx", where.barycentric, corners)
+        borders = np.split(moved, len(self.mesh.marker_nodes))
+        return [Shape(closed(border), PAINTS[self.paint], self.workspace.marker_plane) for border in borders]
+
+    def scene(self, displacement: FloatArray, occluders: Sequence[Shape] = ()) -> Scene:
+        """The scene with the nodes displaced by shape (n, 2), mm, and what else is before the camera."""
         moved = self.mesh.points + _checked(displacement, self.mesh)
         plane = self.workspace.marker_plane
         fiducials = [circle(point, self.workspace.fiducial_diameter / 2) for point in self.workspace.points]
-        where = self._marker_borders
-        shifts = np.einsum("nc,ncx->nx", where.barycentric, displacement[self.mesh.triangles[where.cells]])
-        borders = np.split(where.points + shifts, len(self.mesh.marker_nodes))
         depth, beyond = CLAMP_SIZE
         clamp = rectangle((-depth, -self.parameters.base_width - beyond), (0.0, beyond))
         return Scene(
@@ -73,7 +79,8 @@ class Bench:
                 Shape(clamp, CLAMP, plane),
                 Shape(self._indenter(moved), INDENTER, plane),
                 Shape(moved[self._border], FINGER, plane),
-                *(Shape(closed(border), PAINTS[self.paint], plane) for border in borders),
+                *self.discs(displacement),
+                *occluders,
             ],
         )
 
@@ -81,7 +88,8 @@ class Bench:
         """A blade that stands on the contact, shape (n, 2, 2)."""
         foot = moved[np.unique(self.mesh.boundary("contact"))]
         middle, width = foot.mean(axis=0), np.ptp(foot[:, 0])
-        right = np.array([(0.0, -OVERLAP), *BLADE]) + middle + (width / 2, 0.0)
+        blade = np.array(BLADE) * self.parameters.height
+        right = np.concatenate([[(0.0, -OVERLAP)], blade]) + middle + (width / 2, 0.0)
         left = 2 * middle[0] - right[::-1, 0]
         return closed(np.concatenate([right, np.column_stack([left, right[::-1, 1]])]))
 

@@ -1,0 +1,41 @@
+"""When the load grows, and what an open shutter sees of it."""
+
+import numpy as np
+import pytest
+
+from geometry.errors import UserError
+from vision.rig.motion import Motion
+
+
+@pytest.mark.parametrize("shutter", [0.0, 0.3, 0.9])
+@pytest.mark.parametrize("moving", [0, 1, 7])
+def test_frames_at_rest_and_held_see_no_motion(moving, shutter):
+    motion = Motion(rest=3, moving=moving, held=4, shutter=shutter)
+    loads = [motion.exposed(frame, 5) for frame in range(len(motion))]
+    assert [load.tolist() for load in loads[:3]] == [[0.0]] * 3
+    assert [load.tolist() for load in loads[-4:]] == [[1.0]] * 4
+    assert len(motion) == 7 + moving
+
+
+def test_the_load_grows_at_constant_speed_between():
+    motion = Motion(rest=3, moving=7, held=4, shutter=0.5)
+    means = [motion.exposed(frame, 5).mean() for frame in range(3, 10)]
+    np.testing.assert_allclose(np.diff(means), 1 / 7.5)
+    assert motion.travel(5) == pytest.approx(0.5 / 7.5)
+    assert motion.travel(1) == 0
+    assert 0 < means[0] < means[-1] < 1
+
+
+def test_an_exposure_is_seen_in_equal_parts():
+    motion = Motion(rest=3, moving=7, held=4, shutter=0.5)
+    np.testing.assert_allclose(
+        motion.exposed(5, 4), motion.load(5 + 0.5 * np.array([0.125, 0.375, 0.625, 0.875]))
+    )
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"), [({"rest": 0}, "rest = 0 frames is outside"), ({"shutter": 1}, "shutter = 1")]
+)
+def test_a_motion_that_cannot_be_filmed_is_refused(settings, said):
+    with pytest.raises(UserError, match=said):
+        Motion(**settings)

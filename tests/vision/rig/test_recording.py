@@ -1,0 +1,134 @@
+"""Recordings: frames, their truth, and the files that hold both."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from geometry.design import Design
+from geometry.errors import UserError
+from vision.camera import load_camera
+from vision.measurements import read_measurements
+from vision.rig.bench import Bench
+from vision.rig.exposure import Exposure
+from vision.rig.motion import Motion
+from vision.rig.occluders import cable, share_seen
+from vision.rig.recorder import FILES, record
+from vision.rig.recording import Recording
+from vision.rig.view import default_camera, view
+from vision.video import open_frames
+from vision.workspace import Workspace, default_workspace
+
+WORKSPACE = default_workspace(Design())
+CAMERA = default_camera(320, 180)
+POSE = view(CAMERA, WORKSPACE, tilt=3)
+
+
+@pytest.fixture(scope="module")
+def bench(coarse_mesh):
+    return Bench(coarse_mesh, Design(), WORKSPACE)
+
+
+def film(bench, **changes):
+    x = bench.mesh.points[:, 0] / 90
+    settings = {
+        "bench": bench,
+        "displacement": -10 * np.column_stack([0.2 * x**2, x**2]),
+        "camera": CAMERA,
+        "pose": POSE,
+        "exposure": Exposure(noise=2),
+        "motion": Motion(rest=2, moving=2, held=2),
+    }
+    return Recording(**{**settings, **changes})
+
+
+def test_a_frame_is_the_same_alone_and_among_all(bench):
+    recording = film(bench)
+    frames = list(recording.frames())
+    assert len(frames) == 6
+    for number in (5, 2, 0):
+        image, truth = recording.frame(number)
+        np.testing.assert_array_equal(image, frames[number][0])
+        np.testing.assert_array_equal(truth.pixels, frames[number][1].pixels)
+    assert (frames[0][0] != frames[1][0]).any()  # noise of its own
+
+
+def test_the_truth_goes_from_rest_to_the_whole_displacement(bench):
+    recording = film(bench)
+    truths = [truth for _, truth in recording.frames()]
+    start, end = truths[0].world, truths[-1].world
+    np.testing.assert_array_equal(start[:, :2], bench.mesh.markers)
+    moved = recording.observations("a test").displacements
+    np.testing.assert_allclose((end - start)[:, :2], moved, atol=1e-12)
+    np.testing.assert_allclose(truths[2].world, start + truths[2].load * (end - start), atol=1e-12)
+    np.testing.assert_array_equal(truths[-1].pixels, CAMERA.project(end, POSE))
+
+
+def test_motion_blur_is_the_mean_of_what_is_seen_while_the_shutter_is_open(bench):
+    sharp = Exposure(noise=0, gradient=0, blur=0.7)
+    slow = film(bench, exposure=sharp, motion=Motion(rest=1, moving=1, held=1, shutter=0.8))
+    ends = film(bench, exposure=sharp, motion=Motion(rest=1, moving=4, held=1, shutter=0.0))
+    image, truth = slow.frame(1)
+    dark = 255 - image[:, :, 1].astype(float)
+    column, row = np.rint(truth.pixels[-1]).astype(int)
+    window = np.s_[row - 15 : row + 16, column - 15 : column + 16]
+    assert np.ptp(slow.motion.load(1 + np.array([0, 0.8]))) > 0.6
+    crisp = 255 - ends.frame(0)[0][:, :, 1].astype(float)
+    assert dark[window].max() < 0.8 * crisp.max()
+
+
+def test_a_cable_hides_the_share_of_a_marker_that_it_is_told_to(bench):
+    still = np.zeros_like(bench.mesh.points)
+    disc = bench.discs(still)[4]
+    camera, pose = default_camera(), view(default_camera(), WORKSPACE)
+
+    def seen(share):
+        cover = cable(bench.mesh.markers[4], Design().marker_diameter / 2, share, z=0)
+        return share_seen(disc, [cover], camera, pose)
+
+    assert seen(0) == pytest.approx(1, abs=0.005)
+    assert seen(0.5) == pytest.approx(0.5, abs=0.01)
+    # The segment of a circle that is a quarter of the diameter high, in closed form.
+    assert seen(0.25) == pytest.approx(1 - (np.arccos(0.5) - 0.5 * np.sqrt(0.75)) / np.pi, abs=0.01)
+    assert seen(1) == pytest.approx(0, abs=0.005)
+
+
+def test_what_hides_a_marker_is_in_the_picture_and_in_the_truth(bench):
+    cover = cable(bench.mesh.markers[2], 0.8, 1.0)
+    recording = film(bench, occluders=lambda frame: [cover] if frame == 1 else [])
+    (clear, free), (covered, hidden) = recording.frame(0), recording.frame(1)
+    assert free.seen == pytest.approx(np.ones(9), abs=1e-9)
+    assert hidden.seen[2] == pytest.approx(0, abs=0.01)
+    assert np.abs(covered.astype(int) - clear).max() > 60
+
+
+@pytest.mark.parametrize("codec", list(FILES))
+def test_a_recording_is_read_back(codec, bench, tmp_path):
+    recording = film(bench)
+    record(recording, tmp_path, source="a test", codec=codec)
+    with open_frames(tmp_path / FILES[codec]) as frames:
+        images = [frame.image for frame in frames]
+    expected = [image for image, _ in recording.frames()]
+    assert len(images) == 6
+    for image, exact in zip(images, expected, strict=True):
+        if codec in ("ffv1", "png"):
+            np.testing.assert_array_equal(image, exact)
+        else:
+            assert np.abs(image.astype(int) - exact).mean() < 5
+    assert load_camera(tmp_path / "camera.json") == CAMERA
+    workspace = Workspace(**json.loads((tmp_path / "workspace.json").read_text(encoding="utf-8")))
+    assert workspace == WORKSPACE
+    truth = read_measurements(tmp_path / "observations_true.csv")
+    np.testing.assert_array_equal(truth.displacements, recording.observations("").displacements)
+    with (tmp_path / "truth.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 6 * 9
+    assert float(rows[-1]["x_px"]) == recording.frame(5)[1].pixels[-1, 0]
+    assert json.loads((tmp_path / "truth.json").read_text(encoding="utf-8"))["exposure"]["noise"] == 2
+
+
+def test_an_unknown_codec_is_refused_before_anything_is_rendered(bench, tmp_path):
+    with pytest.raises(UserError, match="there are ffv1, mjpg, mp4v, png"):
+        record(film(bench), tmp_path, source="a test", codec="h264")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,55 @@
+"""How the finger is moved while it is filmed: it rests, it is pressed, it is held."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.messages import one_line
+from geometry.parameters import bounded
+
+
+class Motion(BaseModel):
+    """The frames of a recording, and how much of the load acts while the shutter is open.
+
+    Between two frames the shutter opens with the frame; the load grows at constant speed from when it has
+    closed after the last frame at rest until it opens for the first frame that is held.
+
+    Raises:
+        UserError: One line with the setting, the value and what would be right.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    rest: int = bounded(30, 1, 100_000, "frames", "", "Before the finger is pressed")
+    moving: int = bounded(30, 0, 100_000, "frames", "", "While it is; 0 is a jump between two frames")
+    held: int = bounded(30, 1, 100_000, "frames", "", "After that")
+    rate: float = bounded(30.0, 0.1, 1000, "1/s", "", "Frames a second")
+    shutter: float = bounded(0.3, 0, 0.9, "", "", "Share of the time for which the shutter is open")
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            raise UserError(one_line(error, Motion)) from None
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return self.rest + self.moving + self.held
+
+    def load(self, time: ArrayLike) -> FloatArray:
+        """Share of the load that acts at times, both of shape (n,); the frames start at 0, 1, 2, ..."""
+        start = self.rest - 1 + self.shutter
+        return np.asarray(np.clip((np.asarray(time) - start) / (self.rest + self.moving - start), 0.0, 1.0))
+
+    def exposed(self, frame: int, steps: int) -> FloatArray:
+        """Shares of the load in the middles of so many parts of a frame's exposure; one if they are equal."""
+        parts = (np.arange(steps) + 0.5) / steps
+        return np.unique(self.load(frame + self.shutter * parts))
+
+    def travel(self, frame: int) -> float:
+        """By how much the share of the load grows during a frame's exposure."""
+        return float(np.ptp(self.load(frame + np.array([0.0, self.shutter]))))

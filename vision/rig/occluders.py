@@ -1,0 +1,56 @@
+"""Things that come between the camera and the finger."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from geometry.arrays import FloatArray
+from vision.camera import Camera, Pose
+from vision.rig.coverage import coverage
+from vision.rig.shapes import Shape, closed, seen_edges
+
+CABLE = (0.10, 0.10, 0.11)
+REACH = 75.0
+"""Half of the length of a cable, mm."""
+
+
+def cable(
+    point: ArrayLike, radius: float, share: float, *, angle: float = 70.0, width: float = 4.0, z: float = 1.0
+) -> Shape:
+    """A straight cable that hides a share of the diameter of a disc.
+
+    Args:
+        point: Centre of the disc, shape (2,), mm.
+        radius: Of the disc, mm.
+        share: 0 if the cable touches it, 1 if it hides it all; the wider part of the cable lies beyond.
+        angle: Of the cable with the x axis, degrees.
+        width: Of the cable, mm.
+        z: Of the cable's plane, mm.
+    """
+    along = np.array([np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))])
+    across = np.array([along[1], -along[0]])
+    near = np.asarray(point) + radius * (1 - 2 * share) * across
+    far = near + width * across
+    ends = [near - REACH * along, far - REACH * along, far + REACH * along, near + REACH * along]
+    return Shape(closed(ends), CABLE, z)
+
+
+def share_seen(shape: Shape, occluders: Sequence[Shape], camera: Camera, pose: Pose) -> float:
+    """Share of a shape's picture that lies in the image and that the occluders leave, to a hundredth."""
+    size = (camera.width, camera.height)
+    edges = seen_edges(shape, camera, pose) + 0.5
+    whole = abs(_area(edges))
+    rows, columns, left = coverage(edges, size)
+    for occluder in occluders:
+        hidden = np.zeros(size[::-1])
+        where = coverage(seen_edges(occluder, camera, pose) + 0.5, size)
+        hidden[where.rows, where.columns] = where.share
+        left = left * (1 - hidden[rows, columns])
+    return float(left.sum() / whole)
+
+
+def _area(edges: FloatArray) -> float:
+    """Signed area within closed edges, square pixels."""
+    (x0, y0), (x1, y1) = edges[:, 0].T, edges[:, 1].T
+    return float((x0 * y1 - x1 * y0).sum() / 2)

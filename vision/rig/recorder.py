@@ -1,0 +1,100 @@
+"""A recording as files: the video, and everything that is needed to score who tracks it."""
+
+import csv
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import cv2
+
+from geometry.atomic import write_json
+from geometry.errors import UserError
+from vision.camera import save_camera
+from vision.measurements import write_measurements
+from vision.rig.exposure import Image
+from vision.rig.recording import Recording, Truth
+from vision.video import CODECS, VideoWriter
+
+PICTURES = "png"
+FILES = {codec.lower(): f"video{suffix}" for suffix, codec in CODECS.items()} | {PICTURES: "frames"}
+"""Where the frames are by the codec: a video, or a folder of pictures."""
+TRUTH_COLUMNS = ("frame", "time_s", "load", "marker", "x_mm", "y_mm", "z_mm", "x_px", "y_px", "seen")
+
+
+def record(
+    recording: Recording,
+    folder: Path,
+    *,
+    source: str,
+    codec: str = "ffv1",
+    progress: Callable[[float, str], None] = lambda fraction, text: None,
+) -> None:
+    """Write a recording into a folder that exists.
+
+    The frames (`FILES` by the codec), `truth.csv` with every marker in every frame, `observations_true.csv`
+    with the displacements, `camera.json`, `workspace.json` and `truth.json` with the rest of the settings.
+
+    Args:
+        recording: What is filmed, and how.
+        folder: Where the files go.
+        source: One sentence on where the displacements come from.
+        codec: ffv1 and png lose nothing; mjpg and mp4v do.
+        progress: Told the share that is done.
+
+    Raises:
+        UserError: If the codec is unknown or a file cannot be written.
+    """
+    if codec not in FILES:
+        raise UserError(f"there is no codec {codec!r}; there are {', '.join(FILES)}")
+    count, rate = len(recording.motion), recording.motion.rate
+    with ExitStack() as stack:
+        write = _writer(recording, folder / FILES[codec], stack)
+        file = stack.enter_context((folder / "truth.csv").open("w", newline="", encoding="utf-8"))
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(TRUTH_COLUMNS)
+        for number, (image, truth) in enumerate(recording.frames()):
+            write(image)
+            table.writerows(_rows(number, number / rate, truth))
+            progress((number + 1) / count, f"{number + 1} of {count} frames")
+    write_measurements(folder / "observations_true.csv", recording.observations(source))
+    save_camera(folder / "camera.json", recording.camera)
+    write_json(folder / "workspace.json", recording.bench.workspace.model_dump(mode="json"))
+    write_json(folder / "truth.json", _settings(recording))
+
+
+def _writer(recording: Recording, place: Path, stack: ExitStack) -> Callable[[Image], None]:
+    """What appends a frame to the video or to the folder of pictures."""
+    if place.suffix:
+        size = (recording.camera.width, recording.camera.height)
+        return stack.enter_context(VideoWriter(place, size, recording.motion.rate)).write
+    place.mkdir()
+    names = (place / f"{number:06d}.png" for number in range(len(recording.motion)))
+    return lambda image: write_picture(next(names), image)
+
+
+def write_picture(path: Path, image: Image) -> None:
+    """Write a picture as PNG; OpenCV says only by False that it could not."""
+    if not cv2.imwrite(str(path), image):
+        raise UserError(f"cannot write the picture {path}; is the disk full?")
+
+
+def _rows(number: int, time: float, truth: Truth) -> Iterator[tuple[float, ...]]:
+    columns = zip(truth.world.tolist(), truth.pixels.tolist(), truth.seen.tolist(), strict=True)
+    for marker, (world, pixels, seen) in enumerate(columns, start=1):
+        yield (number, time, truth.load, marker, *world, *pixels, seen)
+
+
+def _settings(recording: Recording) -> dict[str, object]:
+    """All that the frames depend on and that is in no other file."""
+    return {
+        "design": recording.bench.parameters.model_dump(),
+        "mesh_sha256": recording.bench.mesh.digest,
+        "paint": recording.bench.paint,
+        "pose": {
+            "rotation": recording.pose.rotation.tolist(),
+            "translation_mm": recording.pose.translation.tolist(),
+        },
+        "exposure": recording.exposure.model_dump(),
+        "motion": recording.motion.model_dump(),
+        "seed": recording.seed,
+    }

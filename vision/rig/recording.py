@@ -1,0 +1,125 @@
+"""A recording of the finger: its frames, one after another, each with the truth about it."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import groupby
+from typing import NamedTuple
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.observations import Observations
+from vision.camera import Camera, Pose
+from vision.rig.bench import Bench
+from vision.rig.exposure import Exposure, Image, Light
+from vision.rig.motion import Motion
+from vision.rig.occluders import share_seen
+from vision.rig.render import light_of, noise_of
+from vision.rig.shapes import Shape
+
+STEP = 0.5
+"""How far the finger moves at most between two pictures whose mean is a picture with motion blur, pixels."""
+MOST_STEPS = 32
+
+
+class Truth(NamedTuple):
+    """What is known of a frame.
+
+    Attributes:
+        load: Share of the load, the mean while the shutter is open.
+        world: The markers' centres, the mean while the shutter is open, shape (m, 3), mm.
+        pixels: Their pictures, shape (m, 2).
+        seen: Share of every marker's picture that nothing hides, shape (m,).
+    """
+
+    load: float
+    world: FloatArray
+    pixels: FloatArray
+    seen: FloatArray
+
+
+def nothing(frame: int) -> Sequence[Shape]:
+    """No occluders in any frame."""
+    return ()
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """How a finger is filmed; `frames` gives the film.
+
+    Attributes:
+        bench: The finger and what is around it.
+        displacement: Of the mesh's nodes under the whole load, shape (n, 2), mm.
+        camera, pose, exposure, motion: How it is filmed, and how the load grows; displacements grow with it.
+        occluders: What is before the finger in a frame.
+        seed: Of the noise.
+    """
+
+    bench: Bench
+    displacement: FloatArray
+    camera: Camera
+    pose: Pose
+    exposure: Exposure = Exposure()
+    motion: Motion = Motion()
+    occluders: Callable[[int], Sequence[Shape]] = nothing
+    seed: int = 0
+
+    def frames(self) -> Iterator[tuple[Image, Truth]]:
+        """The frames in order, each with its truth."""
+        for state, numbers in groupby(range(len(self.motion)), key=self._state):
+            light, truth = self._seen(*state)
+            for number in numbers:
+                yield self.exposure.develop(light, noise_of(self.seed, number)), truth
+
+    def frame(self, number: int) -> tuple[Image, Truth]:
+        """One frame, the same as among all."""
+        light, truth = self._seen(*self._state(number))
+        return self.exposure.develop(light, noise_of(self.seed, number)), truth
+
+    def observations(self, source: str) -> Observations:
+        """The true displacements of the markers between rest and whole load."""
+        moved = self.displacement[self.bench.mesh.marker_nodes]
+        return Observations(
+            points=self.bench.mesh.markers,
+            displacements=moved,
+            standard_deviations=np.zeros_like(moved),
+            visible=np.ones(len(moved), dtype=bool),
+            source=source,
+            simulated=True,
+        )
+
+    def _state(self, number: int) -> tuple[tuple[float, ...], tuple[Shape, ...]]:
+        """The shares of the load in a frame's exposure, and what is before the finger."""
+        pictures = np.ceil(self.motion.travel(number) * self._path / STEP)
+        loads = self.motion.exposed(number, int(np.clip(pictures, 1, MOST_STEPS)))
+        return tuple(loads.tolist()), tuple(self.occluders(number))
+
+    @cached_property
+    def _path(self) -> float:
+        """The longest way of a marker in the picture, pixels."""
+        start, end = (
+            self.camera.project(self.bench.markers(load * self.displacement), self.pose) for load in (0, 1)
+        )
+        return float(np.linalg.norm(end - start, axis=1).max())
+
+    def _seen(self, loads: Sequence[float], occluders: Sequence[Shape]) -> tuple[Light, Truth]:
+        """The mean light of the states with these shares of the load, and their truth."""
+        states = [load * self.displacement for load in loads]
+        light = np.zeros((self.camera.height, self.camera.width, 3), dtype=np.float32)
+        for state in states:
+            scene = self.bench.scene(state, occluders)
+            light += light_of(scene, self.camera, self.pose, self.exposure.blur) / len(states)
+        worlds = [self.bench.markers(state) for state in states]
+        truth = Truth(
+            load=float(np.mean(loads)),
+            world=np.mean(worlds, axis=0),
+            pixels=np.mean([self.camera.project(world, self.pose) for world in worlds], axis=0),
+            seen=np.array(
+                [
+                    share_seen(disc, occluders, self.camera, self.pose)
+                    for disc in self.bench.discs(states[len(states) // 2])
+                ]
+            ),
+        )
+        return light, truth
