@@ -1,0 +1,154 @@
+"""Centres of discs against pictures that are drawn exactly."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from disc_images import DiscImage, Edge
+from scipy.stats import chi2
+
+from geometry.errors import ShapeError, UserError
+from vision.disc_edge import Discs, fit_discs
+
+COUNT = 60
+BORDER = 12
+"""Light ground between the tiles of a sheet and the picture's border, pixels."""
+
+
+def sheet(images: list[DiscImage], *, noise: float = 2.0) -> tuple[np.ndarray, np.ndarray]:
+    """One noisy picture of all, side by side, and where its discs are."""
+    rng = np.random.default_rng(7)
+    shifts = np.cumsum([0, *(image.size[0] for image in images[:-1])])
+    centres = np.array(
+        [(x + image.centre[0], image.centre[1]) for x, image in zip(shifts, images, strict=True)]
+    )
+    return np.hstack([image.noisy(noise, rng) for image in images]), centres
+
+
+def scattered(image: DiscImage, count: int = COUNT) -> list[DiscImage]:
+    """The same at many places within a pixel."""
+    offsets = np.random.default_rng(3).uniform(-0.5, 0.5, (count, 2))
+    return [replace(image, centre=tuple(offset + image.centre)) for offset in offsets]
+
+
+def guessed(centres: np.ndarray, radius: float, *, off: float = 0.6) -> np.ndarray:
+    """Guesses that are off by that many pixels in any direction, and in the radius by up to a tenth."""
+    rng = np.random.default_rng(5)
+    angle = rng.uniform(0, 2 * np.pi, len(centres))
+    shift = off * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return np.column_stack([centres + shift, radius * rng.uniform(0.9, 1.1, len(centres))])
+
+
+def measured(
+    image: DiscImage, *, noise: float = 2.0, off: float = 0.6, **options
+) -> tuple[Discs, np.ndarray]:
+    """What was found of `COUNT` such discs, and the errors."""
+    picture, centres = sheet(scattered(image), noise=noise)
+    discs = fit_discs(picture, guessed(centres, image.radius, off=off), **options)
+    return discs, discs.centres - centres
+
+
+def assert_covered(discs: Discs, errors: np.ndarray) -> None:
+    """The errors are what the covariances say, as far as their number can tell (99.8 % of cases)."""
+    assert discs.found.all()
+    scores = np.einsum("ni,nij,nj->", errors, np.linalg.inv(discs.covariances), errors)
+    low, high = chi2.ppf([1e-3, 1 - 1e-3], errors.size)
+    assert low < scores < high
+
+
+@pytest.mark.parametrize(
+    ("image", "noise"),
+    [
+        (DiscImage(), 2.0),
+        (DiscImage(blur=1.5), 6.0),  # adverse
+        (DiscImage(radius=3.5), 2.0),
+        (DiscImage(radius=30.0, centre=(45, 45), size=(91, 91)), 2.0),
+        (DiscImage(stretch=1.16, turn=0.7), 2.0),  # a strain of 10 %
+        (DiscImage(gradient=(0.015, -0.01)), 2.0),  # light that changes by 30 % over the disc
+        (DiscImage(light=40, dark=200), 2.0),
+        (DiscImage(light=290), 2.0),  # saturated around the disc
+    ],
+)
+def test_errors_are_what_the_covariances_say(image, noise):
+    assert_covered(*measured(image, noise=noise))
+
+
+def test_clean_pictures_give_a_hundredth_of_a_pixel():
+    _, errors = measured(DiscImage())
+    assert (
+        np.sqrt((errors**2).mean()) < 0.0105
+    )  # bound 0.0080, by chi-square with 120 degrees below 1.3 times
+    assert np.abs(errors.mean(axis=0)).max() < 3.5 * 0.0080 / np.sqrt(COUNT)
+
+
+@pytest.mark.parametrize("off", [2.0, 4.0, 6.0])
+def test_a_guess_may_be_off_by_several_pixels(off):
+    discs, errors = measured(DiscImage(), off=off)
+    assert discs.found.all()
+    assert np.abs(errors).max() < 0.04
+
+
+def test_shape_radius_contrast_and_blur_are_recovered():
+    picture, centres = sheet([DiscImage(stretch=1.1, turn=0.0, blur=0.9)], noise=0.0)
+    discs = fit_discs(picture, guessed(centres, 8))
+    assert discs.radii == pytest.approx([8], abs=0.01)
+    assert discs.shapes == pytest.approx(np.array([[np.sinh(np.log(1.1)), 0]]), abs=4e-3)
+    assert discs.contrast == pytest.approx([120], abs=0.5)
+    assert discs.blur == pytest.approx([np.hypot(0.9, 12**-0.5)], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        DiscImage(dark=180.0),  # nothing
+        DiscImage(dark=180.0, gradient=(0.01, 0.01)),
+        DiscImage(dark=180.0, edges=(Edge(0.3, 25.0, 60.0),)),  # an edge, no disc
+        DiscImage(radius=16.0),  # too large
+        DiscImage(centre=(20.0, -5.0)),  # nearly outside
+        DiscImage(centre=(38.0, 20.0)),  # beyond reach
+    ],
+)
+def test_what_is_not_there_is_not_found(image):
+    picture, _ = sheet([image])
+    discs = fit_discs(picture, [(20.0, 20.0, 8.0)])
+    assert not discs.found.any()
+    assert np.isnan(discs.centres).all()
+
+
+def test_a_disc_beyond_the_border_needs_its_radius():
+    discs, errors = measured(DiscImage(centre=(20, 1)), radii=8.0)
+    assert_covered(discs, errors)
+    assert discs.seen.max() < 0.65
+    assert not measured(DiscImage(centre=(20, 1)))[0].found.any()
+
+
+def test_discs_of_many_sizes_keep_their_order():
+    images = [replace(DiscImage(), radius=radius) for radius in (8.0, 4.0, 14.0, 5.0)]
+    picture, centres = sheet(images)
+    discs = fit_discs(
+        picture, [(*centre, image.radius) for centre, image in zip(centres, images, strict=True)]
+    )
+    assert discs.radii == pytest.approx([8, 4, 14, 5], abs=0.1)
+    assert np.abs(discs.centres - centres).max() < 0.05
+
+
+def test_no_guess_no_disc():
+    assert fit_discs(np.zeros((9, 9), dtype=np.uint8), np.empty((0, 3))).centres.shape == (0, 2)
+
+
+GREY = np.zeros((20, 20), dtype=np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("image", "guesses", "radii", "error", "said"),
+    [
+        (GREY[..., None], [(9, 9, 3)], None, UserError, "grey images of eight bits"),
+        (GREY / 1.0, [(9, 9, 3)], None, UserError, "grey images of eight bits"),
+        (GREY, [(9, 9, 0)], None, UserError, "radius of a disc must be above zero"),
+        (GREY, [(9, 9, 3)], -1, UserError, "radius of a disc must be above zero"),
+        (GREY, [(9, 9)], None, ShapeError, r"guesses must have shape \('n', 3\)"),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused(image, guesses, radii, error, said):
+    with pytest.raises(error, match=said):
+        fit_discs(image, guesses, radii=radii)
