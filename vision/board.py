@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.arrays import FloatArray
+from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
 
 GreyImage = NDArray[np.uint8]
@@ -45,6 +45,12 @@ class Board:
         rows, columns = np.mgrid[: self.rows, : self.columns]
         corners = np.stack([columns.ravel(), rows.ravel(), np.zeros(rows.size)], axis=1)
         return np.asarray(self.square * corners, dtype=np.float64)
+
+    @property
+    def halves(self) -> tuple[BoolArray, BoolArray]:
+        """The corners in two halves that interlock like the squares of a board, shape (n,) each."""
+        first = np.indices((self.rows, self.columns)).sum(axis=0).ravel() % 2 == 0
+        return first, ~first
 
     def find(self, image: GreyImage) -> FloatArray | None:
         """Where `corners` are in an image, shape (n, 2), pixels; None if it does not show the whole board.
