@@ -4,16 +4,14 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from vision.calibration import Calibration
-from vision.camera import INTRINSICS
 
 
 def calibration_table(calibration: Calibration) -> Table:
     """The camera with standard deviations, and how well it predicts where corners are seen."""
     camera = calibration.camera
     table = Table("camera", "value", "±", "unit", box=SIMPLE_HEAD)
-    values = (camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion)
-    deviations = camera.standard_deviations or (0.0,) * len(values)
-    for name, value, deviation in zip(INTRINSICS, values, deviations, strict=True):
+    deviations = camera.standard_deviations or (0.0,) * len(camera.names)
+    for name, value, deviation in zip(camera.names, camera.intrinsics, deviations, strict=True):
         digits, unit = (5, "") if name[0] in "kp" else (2, "px")
         table.add_row(name, f"{value:.{digits}f}", f"{deviation:.{digits}f}" if deviation else "fixed", unit)
     seen = len(calibration.view_errors)

@@ -1,8 +1,8 @@
 """Bundle adjustment: a camera and the poses of a board, fitted together to where corners were seen.
 
-Least squares by the Levenberg-Marquardt method. Poses are eliminated by the Schur complement, which leaves the
-normal matrix of the intrinsics: its inverse is their covariance (B. Triggs et al., "Bundle adjustment - a modern
-synthesis", 1999, sections 6.1 and 9). Units: mm, pixels.
+Least squares by the Levenberg-Marquardt method. Poses are eliminated by the Schur complement, which leaves
+the normal matrix of the intrinsics: its inverse is their covariance (B. Triggs et al., "Bundle adjustment - a
+modern synthesis", Vision Algorithms, 1999, sections 6.1 and 9). Units: mm, pixels.
 """
 
 from dataclasses import dataclass, replace

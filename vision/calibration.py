@@ -1,9 +1,9 @@
 """A camera from photographs of a board, with what is known about its errors.
 
-Z. Zhang, "A flexible new technique for camera calibration", IEEE TPAMI 22, 2000: a plane seen in several poses
-determines the camera. All intrinsics and poses are fitted by least squares. The fit's own residuals flatter it,
-so `held_out` repeats it without some of the photographs and asks how well it predicts corners there. Units:
-pixels, mm.
+Z. Zhang, "A flexible new technique for camera calibration", IEEE TPAMI 22, 2000: a plane seen in several
+poses determines the camera. All intrinsics and poses are fitted by least squares. The fit's own residuals
+flatter it, so `held_out` repeats it without some of the photographs and asks how well it predicts corners
+there. Units: pixels, mm.
 """
 
 import warnings
@@ -20,7 +20,6 @@ from vision.adjustment import Adjusted, Sightings, adjust
 from vision.board import Board, GreyImage
 from vision.camera import Camera
 from vision.first_guess import board_poses, first_camera
-from vision.lens import LENSES
 
 FEWEST_VIEWS = 4
 FOLDS = 5
@@ -30,6 +29,10 @@ OUTLIER = 3.0
 """Error of a view in medians of all from which it deserves a look."""
 CORNER_ERROR, LARGEST_DOUBT = 0.1, 0.05
 """Pixels; a camera whose focal length such errors change by more than this share is not determined."""
+UNDETERMINED = (
+    "the photographs do not determine the camera; take some with the board tilted by 20 to 45 degrees in "
+    "different directions"
+)
 
 
 class LensChoice(NamedTuple):
@@ -57,7 +60,8 @@ class Calibration:
     Attributes:
         camera: With covariance.
         board: What was photographed.
-        views: Where its corners were seen, by the name of the photograph, shape (n, 2), pixels; NaN if not seen.
+        views: Where its corners were seen, by the name of the photograph, shape (n, 2), pixels;
+            NaN where one was not seen.
         residuals: Seen minus predicted by the fit, likewise.
         held_out: Root mean square distance in photographs that the camera was not fitted to, pixels.
         coverage: Share of the image area that was inside a board at least once.
@@ -155,7 +159,9 @@ def calibrate_views(
     return calibration
 
 
-def better_lens(calibration: Calibration, lens: LensChoice, *, ratio: float = 0.8) -> tuple[LensChoice, float] | None:
+def better_lens(
+    calibration: Calibration, lens: LensChoice, *, ratio: float = 0.8
+) -> tuple[LensChoice, float] | None:
     """A lens that would bring the error held out below `ratio` of what it is, and that error, pixels."""
     camera, corners = calibration.camera, list(calibration.views.values())
     errors = {}
@@ -173,7 +179,8 @@ def better_lens(calibration: Calibration, lens: LensChoice, *, ratio: float = 0.
 def held_out(views: Sequence[FloatArray], board: Board, camera: Camera, lens: LensChoice) -> float:
     """Root mean square error of prediction, pixels, by k-fold cross-validation over the views.
 
-    In a view that was left out, half of the corners gives the pose and the rest are predicted, and conversely.
+    In a view that was left out, half of the corners gives the pose and the rest are predicted; then the
+    other way round.
     """
     folds, none = min(FOLDS, len(views)), np.zeros(len(camera.names), dtype=bool)
     distances = []
@@ -192,12 +199,10 @@ def _fit(views: Sequence[FloatArray], board: Board, size: tuple[int, int], lens:
     """Camera and poses from nothing but the views."""
     sightings = _sightings(views, board)
     try:
-        return _adjusted(first_camera(sightings, size, lens.model), sightings, lens)
+        first = first_camera(sightings, size, lens.model)
     except UserError:
-        raise UserError(
-            "the photographs do not determine the camera; take some with the board tilted by 20 to 45 "
-            "degrees in different directions"
-        ) from None
+        raise UserError(UNDETERMINED) from None
+    return _adjusted(first, sightings, lens)
 
 
 def _adjusted(camera: Camera, sightings: Sightings, lens: LensChoice) -> Adjusted:
@@ -205,11 +210,12 @@ def _adjusted(camera: Camera, sightings: Sightings, lens: LensChoice) -> Adjuste
     free = np.array([lens.fit_k3 or lens.model != "brown" or name != "k3" for name in camera.names])
     try:
         adjusted = adjust(camera, board_poses(camera, sightings), sightings, free=free)
-    except np.linalg.LinAlgError:
-        raise UserError("the views do not determine the camera") from None
-    doubt = np.array(adjusted.camera.standard_deviations)[:2] / (adjusted.camera.fx, adjusted.camera.fy)
-    if not (doubt * max(1, CORNER_ERROR / _rms([adjusted.residuals])) < LARGEST_DOUBT).all():
-        raise UserError("the views do not determine the focal lengths")
+    except (UserError, np.linalg.LinAlgError):
+        raise UserError(UNDETERMINED) from None
+    doubt = np.array(adjusted.camera.standard_deviations)[:2] / adjusted.camera.intrinsics[:2]
+    rms = max(_rms([adjusted.residuals]), 1e-9)
+    if not (doubt * max(1, CORNER_ERROR / rms) < LARGEST_DOUBT).all():
+        raise UserError(UNDETERMINED)
     return adjusted
 
 

@@ -1,7 +1,7 @@
 """A camera: how points in space become pixels, and how the distortion of its lens is undone.
 
-A pinhole behind one of the lenses of `vision.lens`, in the convention of OpenCV: x to the right, y down, z away
-from the camera; the centre of the first pixel is (0, 0). Units: mm in space, pixels in the image.
+A pinhole behind one of the lenses of `vision.lens`, in the convention of OpenCV: x to the right, y down, z
+away from the camera; the centre of the first pixel is (0, 0). Units: mm in space, pixels in the image.
 """
 
 from collections.abc import Sequence
@@ -37,8 +37,8 @@ class Seen(NamedTuple):
 
     Attributes:
         pixels: Shape (n, 2).
-        by_place: Derivative by what was seen: points in the camera's frame, shape (n, 2, 3), pixels per mm; or
-            pixels, (n, 2, 2).
+        by_place: Derivative by what was seen: points in the camera's frame, shape (n, 2, 3), pixels per mm;
+            or pixels, (n, 2, 2).
         by_intrinsics: Derivative by the camera's `intrinsics`, shape (n, 2, intrinsics).
     """
 

@@ -60,7 +60,7 @@ def board_poses(camera: Camera, sightings: Sightings) -> Poses:
     for points, pixels in views:
         try:
             found, rotation, shift = cv2.solvePnP(
-                points, pixels, camera.matrix, None, flags=cv2.SOLVEPNP_IPPE
+                points, pixels, camera.matrix, np.zeros(4), flags=cv2.SOLVEPNP_IPPE
             )
         except cv2.error:
             found = False

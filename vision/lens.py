@@ -1,10 +1,10 @@
 """Lenses: where a ray from the scene meets the plane at depth 1 after the lens has bent it.
 
-`BrownLens` is radial and tangential distortion (D. C. Brown, "Close-range camera calibration", Photogrammetric
-Engineering 37, 1971). `FisheyeLens` is for angles of view beyond about 100 degrees: a polynomial in the angle
-to the axis (J. Kannala, S. S. Brandt, "A generic camera model and calibration method for conventional,
-wide-angle, and fish-eye lenses", IEEE TPAMI 28, 2006, eq. 6). Both have OpenCV's coefficients. No units: a
-point of the plane is (x / z, y / z).
+`BrownLens` is radial and tangential distortion (D. C. Brown, "Close-range camera calibration",
+Photogrammetric Engineering 37, 1971). `FisheyeLens` is for angles of view beyond about 100 degrees: a
+polynomial in the angle to the axis (J. Kannala, S. S. Brandt, "A generic camera model and calibration method
+for conventional, wide-angle, and fish-eye lenses", IEEE TPAMI 28, 2006, eq. 6). Both have OpenCV's
+coefficients. No units: a point of the plane is (x / z, y / z).
 """
 
 from dataclasses import dataclass
@@ -61,7 +61,7 @@ class BrownLens:
         mixed = 2 * x * y * steepness + 2 * (self.p1 * x + self.p2 * y)
         along_x = radial + 2 * x**2 * steepness + 2 * self.p1 * y + 6 * self.p2 * x
         along_y = radial + 2 * y**2 * steepness + 6 * self.p1 * y + 2 * self.p2 * x
-        return np.stack([along_x, mixed, mixed, along_y], axis=1).reshape(-1, 2, 2)
+        return np.asarray(np.stack([along_x, mixed, mixed, along_y], axis=1).reshape(-1, 2, 2))
 
     def by_coefficients(self, plane: FloatArray) -> FloatArray:
         """Derivative of `distort` by k1, k2, p1, p2, k3, shape (n, 2, 5)."""
@@ -83,7 +83,7 @@ class FisheyeLens:
 
     def distort(self, plane: FloatArray) -> FloatArray:
         """Where the lens puts points; shapes (n, 2)."""
-        return plane * self._scale(_radius(plane))[:, None]
+        return np.asarray(plane * self._scale(_radius(plane))[:, None])
 
     def slope(self, plane: FloatArray) -> FloatArray:
         """Derivative of `distort` by the points, shape (n, 2, 2)."""
@@ -112,5 +112,5 @@ LENSES: dict[str, type[BrownLens] | type[FisheyeLens]] = {"brown": BrownLens, "f
 
 
 def _radius(plane: FloatArray) -> FloatArray:
-    """Distance from the axis, shape (n,); a tiny one instead of zero, where all formulas have their limits."""
+    """Distance from the axis, shape (n,); a tiny one instead of zero, where the formulas are limits."""
     return np.maximum(np.hypot(plane[:, 0], plane[:, 1]), 1e-8)

@@ -8,6 +8,7 @@ from rich.console import Console
 
 from compare.exits import say
 from compare.options import OUTPUT
+from compare.provenance import package_versions
 from geometry.errors import UserError
 
 
@@ -23,15 +24,18 @@ def calibrate(
     """Calibrate a camera from photographs of a chessboard, and say how well it is known."""
     from compare.calibration_table import calibration_table
     from vision.board import read_board, read_grey
+    from vision.calibration import LensChoice
     from vision.calibration import calibrate as calibrated
-    from vision.camera import check_format, save_camera
+    from vision.camera_file import check_format, save_calibration
 
     check_format(out)
     if not images:
         raise UserError("no photograph was given; name at least 4 that show the board")
     chessboard = read_board(board, square)
-    calibration = calibrated({str(path): read_grey(path) for path in images}, chessboard, fit_k3=k3)
-    save_camera(out, calibration.camera)
+    calibration = calibrated(
+        {str(path): read_grey(path) for path in images}, chessboard, lens=LensChoice(fit_k3=k3)
+    )
+    save_calibration(out, calibration, package_versions())
     for name in calibration.boardless:
         say(f"warning: no board of {chessboard} inner corners was found in {name}")
     Console().print(calibration_table(calibration))

@@ -11,8 +11,8 @@ from chessboards import BOARD, CAMERA, drawn, views
 from compare.cli import main
 from geometry.errors import UserError
 from vision.board import Board, read_grey
-from vision.calibration import calibrate, calibrate_views
-from vision.camera import load_camera
+from vision.calibration import LensChoice, calibrate, calibrate_views
+from vision.camera_file import load_camera
 
 SIZE = (CAMERA.width, CAMERA.height)
 NOISE = 0.05
@@ -58,7 +58,7 @@ def test_held_out_errors_show_what_the_fit_hides():
 
 
 def test_the_third_coefficient_is_fitted_on_request():
-    camera = calibrate_views(views(8, noise=NOISE), BOARD, SIZE, fit_k3=True).camera
+    camera = calibrate_views(views(8, noise=NOISE), BOARD, SIZE, lens=LensChoice(fit_k3=True)).camera
     assert 0 < abs(camera.distortion[4]) < 3 * camera.standard_deviations[8]
 
 

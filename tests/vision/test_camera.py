@@ -10,11 +10,12 @@ import pytest
 from chessboards import BOARD, CAMERA, poses, projected
 
 from geometry.errors import UserError
-from vision.camera import INTRINSICS, Camera, load_camera, save_camera
+from vision.camera import Camera
+from vision.camera_file import load_camera, save_camera
 
 GRID = np.stack(np.meshgrid(np.linspace(0, 1279, 17), np.linspace(0, 719, 11)), axis=-1).reshape(-1, 2)
 BARREL = replace(CAMERA, distortion=(-0.35, 0.15, 2e-3, -1e-3, -0.03))
-KNOWN = replace(CAMERA, standard_deviations=tuple(np.pi / 10.0 ** np.arange(9)))
+KNOWN = replace(CAMERA, covariance=tuple(map(tuple, np.diag(np.pi / 10.0 ** np.arange(9)).tolist())))
 
 
 @pytest.mark.parametrize("camera", [CAMERA, BARREL])
@@ -92,8 +93,16 @@ def matrix(*data: float) -> dict:
             {"distortion_coefficients": matrix(*[0.0] * 8)},
             "distortion_coefficients is not a matrix of 4 or 5",
         ),
-        ({"intrinsics_standard_deviations": matrix(*[-1.0] * 9)}, "must be 9 numbers from 0: fx, fy"),
-        ({"fisheye_model": 1}, "fisheye_model 1; only the model with k1"),
+        (
+            {"intrinsics_covariance": matrix(*[1.0] * 9)},
+            "intrinsics_covariance is not a matrix of 81 numbers",
+        ),
+        ({"intrinsics_covariance": matrix(*[-1.0] * 81)}, "its diagonal from 0: fx, fy"),
+        (
+            {"intrinsics_covariance": None, "intrinsics_standard_deviations": matrix(*[-1.0] * 9)},
+            "a standard deviation is below zero",
+        ),
+        ({"fisheye_model": 1}, "distortion_coefficients is not a matrix of 4 numbers"),
     ],
 )
 def test_what_is_wrong_in_a_file_is_one_line(change, message, tmp_path):
@@ -134,4 +143,36 @@ def test_an_impossible_camera_is_refused(change):
 
 
 def test_every_intrinsic_has_a_name():
-    assert len(INTRINSICS) == len(KNOWN.standard_deviations)
+    assert len(KNOWN.names) == len(KNOWN.standard_deviations)
+
+
+FISHEYE = Camera(1280, 720, 520.0, 518.0, 652.0, 349.0, (0.03, -0.01, 2e-3, -5e-4), "fisheye")
+
+
+def test_a_fisheye_is_undistorted_to_the_corners():
+    straight = FISHEYE.undistort(GRID)
+    assert np.abs(straight - GRID).max() > 500
+    np.testing.assert_allclose(FISHEYE.distort(straight), GRID, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("camera", [BARREL, FISHEYE])
+def test_derivatives_are_those_of_differences(camera):
+    points = np.random.default_rng(2).uniform((-80, -50, 150), (80, 50, 250), (20, 3))
+    steps = np.diag([1e-3] * 4 + [1e-6] * (len(camera.names) - 4))
+
+    def changed(function, step):
+        up, down = (camera.with_intrinsics(camera.intrinsics + sign * step) for sign in (1, -1))
+        return (function(up) - function(down)) / (2 * step.max())
+
+    seen, straight = camera.see(points), camera.undistorting(GRID)
+    for number, step in enumerate(steps):
+        by_number = changed(lambda camera: camera.project(points), step)
+        np.testing.assert_allclose(seen.by_intrinsics[:, :, number], by_number, rtol=1e-6, atol=1e-6)
+        by_number = changed(lambda camera: camera.undistort(GRID), step)
+        np.testing.assert_allclose(straight.by_intrinsics[:, :, number], by_number, rtol=1e-5, atol=1e-5)
+    for axis, shift in enumerate(1e-3 * np.eye(3)):
+        difference = (camera.project(points + shift) - camera.project(points - shift)) / 2e-3
+        np.testing.assert_allclose(seen.by_place[:, :, axis], difference, rtol=1e-6, atol=1e-6)
+    for axis, shift in enumerate(1e-3 * np.eye(2)):
+        difference = (camera.undistort(GRID + shift) - camera.undistort(GRID - shift)) / 2e-3
+        np.testing.assert_allclose(straight.by_place[:, :, axis], difference, rtol=1e-6, atol=1e-6)

@@ -1,0 +1,67 @@
+"""The adjustment against the dense least-squares problem, solved by SciPy, and against OpenCV."""
+
+import cv2
+import numpy as np
+import pytest
+from chessboards import BOARD, CAMERA, poses, views
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from vision.adjustment import Poses, Sightings, adjust
+
+VIEWS = list(views(6, noise=0.3).values())
+FREE = np.arange(9) < 8
+START = CAMERA.with_intrinsics([1000, 1000, 640, 360, 0, 0, 0, 0, 0])
+
+
+def sightings(*, seen: np.ndarray) -> Sightings:
+    view, corner = np.nonzero(seen)
+    return Sightings(BOARD.corners[corner], np.array(VIEWS)[seen], view)
+
+
+def placed() -> Poses:
+    rotations, translations = zip(*poses(6), strict=True)
+    return Poses(Rotation.from_rotvec(rotations), np.array(translations))
+
+
+ALL = sightings(seen=np.ones((6, 54), dtype=bool))
+SOME = sightings(seen=np.random.default_rng(5).random((6, 54)) < 0.4)
+
+
+@pytest.mark.parametrize("seen", [ALL, SOME])
+def test_fit_and_covariance_are_those_of_the_dense_problem(seen):
+    found = adjust(START, placed(), seen, free=FREE)
+
+    def missed(unknowns):
+        camera = CAMERA.with_intrinsics([*unknowns[:8], 0])
+        six = unknowns[8:].reshape(6, 6)
+        board = Poses(Rotation.from_rotvec(six[:, :3]), six[:, 3:])
+        return (camera.project(board.place(seen.points, seen.view)) - seen.pixels).ravel()
+
+    begin = [*CAMERA.intrinsics[:8], *np.column_stack([placed().rotations.as_rotvec(), placed()[1]]).ravel()]
+    dense = least_squares(missed, begin, x_scale="jac", xtol=1e-12, ftol=1e-12, jac="3-point")
+    upper = np.linalg.qr(dense.jac, mode="r")
+    covariance = np.linalg.inv(upper.T @ upper) * 2 * dense.cost / (dense.jac.shape[0] - 44)
+    deviations = np.sqrt(np.diag(covariance))[:8]
+    assert (np.abs(found.camera.intrinsics[:8] - dense.x[:8]) < 1e-3 * deviations).all()
+    scale = np.outer(deviations, deviations)
+    known = np.array(found.camera.covariance)
+    np.testing.assert_allclose(known[:8, :8] / scale, covariance[:8, :8] / scale, rtol=0, atol=1e-4)
+    assert not known[8].any()  # what is fixed has no error
+
+
+def test_standard_deviations_are_those_of_opencv():
+    found = adjust(START, placed(), ALL, free=FREE).camera
+    points, pixels = [BOARD.corners.astype(np.float32)] * 6, [view.astype(np.float32) for view in VIEWS]
+    size, flags = (CAMERA.width, CAMERA.height), cv2.CALIB_FIX_K3
+    expected = cv2.calibrateCameraExtended(points, pixels, size, np.eye(3), np.zeros(5), flags=flags)[5]
+    np.testing.assert_allclose(found.standard_deviations, expected.ravel()[:9], rtol=2e-3)
+
+
+def test_a_known_camera_leaves_only_the_poses():
+    found = adjust(CAMERA, placed(), SOME, free=np.zeros(9, dtype=bool))
+    assert found.camera.intrinsics.tolist() == CAMERA.intrinsics.tolist()
+    assert np.abs(found.residuals).mean() < 0.3
+    off = found.poses.moved(np.full((6, 6), 1e-4))  # it is a minimum
+    missed = CAMERA.project(off.place(SOME.points, SOME.view)) - SOME.pixels
+    assert np.sum(missed**2) > np.sum(found.residuals**2)
