@@ -1,5 +1,6 @@
 """A calibration as a table for the terminal."""
 
+import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
@@ -19,4 +20,16 @@ def calibration_table(calibration: Calibration) -> Table:
     table.add_row("rms error held out", f"{calibration.held_out:.3f}", "", "px")
     table.add_row("coverage of the image", f"{100 * calibration.coverage:.0f}", "", "%")
     table.add_row("photographs with the board", f"{seen} of {seen + len(calibration.boardless)}", "", "")
+    return table
+
+
+def view_table(calibration: Calibration, *, most: int = 15) -> Table:
+    """The errors of the photographs, the worst first."""
+    table = Table("photograph", "corners", "rms error, px", box=SIMPLE_HEAD)
+    errors = sorted(calibration.view_errors.items(), key=lambda entry: -entry[1])
+    for name, error in errors[:most]:
+        seen = np.isfinite(calibration.views[name][:, 0]).sum()
+        table.add_row(name, f"{seen}", f"{error:.3f}")
+    if len(errors) > most:
+        table.add_row(f"and {len(errors) - most} with smaller errors", "", "")
     return table

@@ -1,8 +1,6 @@
 """A chessboard to calibrate with, and its corners in a photograph."""
 
-import re
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -32,12 +30,14 @@ class Board:
 
     def __post_init__(self) -> None:
         if min(self.columns, self.rows) < 3 or max(self.columns, self.rows) > 100:
-            raise UserError(f"a board of {self} inner corners; it must have 3 to 100 along either side")
+            raise UserError(
+                f"a board of {self.columns}x{self.rows} inner corners; it must have 3 to 100 along either side"
+            )
         if not 0 < self.square < np.inf:
             raise UserError(f"a square of {self.square:g} mm; its side must be above zero")
 
     def __str__(self) -> str:
-        return f"{self.columns}x{self.rows}"
+        return f"{self.columns}x{self.rows} inner corners"
 
     @property
     def corners(self) -> FloatArray:
@@ -63,28 +63,7 @@ class Board:
         )
         return np.asarray(corners, dtype=np.float64).reshape(-1, 2) if found else None
 
-
-def read_board(size: str, square: float) -> Board:
-    """The board of a text such as "9x6" and the side of a square, mm."""
-    if not (found := re.fullmatch(r"(\d{1,3})x(\d{1,3})", size.strip(), re.IGNORECASE)):
-        raise UserError(f"cannot read the board {size!r}; give its inner corners, such as 9x6")
-    return Board(int(found[1]), int(found[2]), square)
-
-
-def read_grey(path: Path) -> GreyImage:
-    """A picture in grey, not turned even if its file says how, shape (height, width).
-
-    Raises:
-        UserError: If there is no such file or it is no picture.
-    """
-    try:
-        content = np.frombuffer(path.read_bytes(), dtype=np.uint8)
-    except OSError as error:
-        raise UserError(f"cannot read the picture {path}: {error.strerror}") from None
-    flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
-    image = cv2.imdecode(content, flags) if len(content) else None
-    if image is None:
-        raise UserError(
-            f"cannot read the picture {path}: it is not one that OpenCV knows, such as PNG or JPEG"
-        )
-    return np.asarray(image, dtype=np.uint8)
+    def seems(self, image: GreyImage) -> str | None:
+        """Another size that the board in an image seems to have; None if there is none."""
+        found, _, cells = cv2.findChessboardCornersSBWithMeta(image, (3, 3), cv2.CALIB_CB_LARGER)
+        return f"{max(cells.shape)}x{min(cells.shape)}" if found else None

@@ -7,7 +7,8 @@ there. Units: pixels, mm.
 """
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -25,6 +26,8 @@ FEWEST_VIEWS = 4
 FOLDS = 5
 LEAST_COVERAGE = 0.6
 """Share of the image below which the distortion near its edges is a guess."""
+GUESSES = 8
+"""Photographs that are asked what board they show if it is not the expected one."""
 OUTLIER = 3.0
 """Error of a view in medians of all from which it deserves a look."""
 CORNER_ERROR, LARGEST_DOUBT = 0.1, 0.05
@@ -88,12 +91,12 @@ class Calibration:
 
 
 def calibrate(
-    images: Mapping[str, GreyImage], board: Board, *, lens: LensChoice = LENS_CHOICES[0]
+    images: Iterable[tuple[str, GreyImage]], board: Board, *, lens: LensChoice = LENS_CHOICES[0]
 ) -> Calibration:
     """Calibrate a camera from photographs of a board.
 
     Args:
-        images: Grey photographs by name, all of one size.
+        images: Names and grey photographs, all of one size; only one is held at a time.
         board: What they show.
         lens: What is fitted.
 
@@ -101,22 +104,29 @@ def calibrate(
         UserError: If the sizes differ, fewer than 4 photographs show the board, or they do not determine the
             camera.
     """
-    sizes = {image.shape[1::-1]: name for name, image in images.items()}
-    if len(sizes) > 1:
-        (first, one), (second, other), *_ = sizes.items()
-        raise UserError(
-            f"{one} has {first[0]}x{first[1]} pixels and {other} {second[0]}x{second[1]}; "
-            "photographs for one calibration must have one size"
-        )
-    found = {name: board.find(image) for name, image in images.items()}
-    views = {name: corners for name, corners in found.items() if corners is not None}
-    boardless = tuple(name for name, corners in found.items() if corners is None)
+    views, boardless, guesses, first = {}, [], Counter[str](), ("", (0, 0))
+    for name, image in images:
+        size = (image.shape[1], image.shape[0])
+        first = first if first[0] else (name, size)
+        if size != first[1]:
+            raise UserError(
+                f"{first[0]} has {first[1][0]}x{first[1][1]} pixels and {name} {size[0]}x{size[1]}; "
+                "photographs for one calibration must have one size"
+            )
+        corners = board.find(image)
+        if corners is not None:
+            views[name] = corners
+        else:
+            boardless.append(name)
+            if not views and len(boardless) <= GUESSES and (guess := board.seems(image)):
+                guesses[guess] += 1
     if not views:
+        ((guess, votes),) = guesses.most_common(1) or [("", 0)]
         raise UserError(
-            f"none of {len(images)} photographs shows a board of {board} inner corners as a whole; count them"
+            f"none of {len(boardless)} photographs shows a board of {board}"
+            + (f"; {votes} seem to show {guess}" if votes > 1 else "; count them")
         )
-    ((width, height),) = sizes
-    return calibrate_views(views, board, (width, height), lens=lens, boardless=boardless)
+    return calibrate_views(views, board, first[1], lens=lens, boardless=tuple(boardless))
 
 
 def calibrate_views(
@@ -141,7 +151,7 @@ def calibrate_views(
     """
     if len(views) < FEWEST_VIEWS:
         raise UserError(
-            f"{len(views)} of {len(views) + len(boardless)} photographs show the board of {board} corners; "
+            f"{len(views)} of {len(views) + len(boardless)} photographs show the board of {board}; "
             f"at least {FEWEST_VIEWS} must, better 15, tilted in different directions"
         )
     corners = list(views.values())

@@ -2,7 +2,7 @@
 
 Images are uint8, shape (height, width) in grey or (height, width, 3) in blue, green, red. They are as the
 sensor read them: a file's note that it should be shown turned is not followed, in photographs neither
-(`board.read_grey`), so that one calibration fits both.
+(`vision.photographs`), so that one calibration fits both.
 """
 
 from collections.abc import Generator, Iterator

@@ -1,7 +1,7 @@
 """Calibrate a camera."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 from rich.console import Console
@@ -13,31 +13,50 @@ from geometry.errors import UserError
 
 
 def calibrate(
-    *images: Annotated[Path, Parameter(help="Photographs of the board, all of one size.")],
-    board: Annotated[str, Parameter(help="Inner corners along either side, such as 9x6.")],
+    *images: Annotated[
+        Path, Parameter(help="Photographs of the board, all of one size: pictures, folders, or a video.")
+    ],
+    board: Annotated[
+        str,
+        Parameter(
+            help="Inner corners of a chessboard along either side, such as 9x6, or squares of a ChArUco "
+            "board, such as charuco:8x6."
+        ),
+    ],
     square: Annotated[float, Parameter(help="Side of a square, mm.")],
-    k3: Annotated[
-        bool, Parameter(negative="", help="Fit the third radial coefficient too, for a wide lens.")
-    ] = False,
+    marker: Annotated[float | None, Parameter(help="Side of a marker of a ChArUco board, mm.")] = None,
+    dictionary: Annotated[str, Parameter(help="Of the markers of a ChArUco board.")] = "5X5_100",
+    model: Annotated[
+        Literal["brown", "fisheye"],
+        Parameter(help="The lens: brown up to about 100 degrees of view, fisheye beyond."),
+    ] = "brown",
+    k3: Annotated[bool, Parameter(negative="", help="Fit the third radial coefficient too.")] = False,
+    without: Annotated[
+        tuple[str, ...],
+        Parameter(negative="", show_default=False, help="A photograph to leave out; may be repeated."),
+    ] = (),
     out: Annotated[Path, Parameter(group=OUTPUT, help="The camera, JSON or YAML.")] = Path("out/camera.json"),
 ) -> int:
-    """Calibrate a camera from photographs of a chessboard, and say how well it is known."""
-    from compare.calibration_table import calibration_table
-    from vision.board import read_board, read_grey
-    from vision.calibration import LensChoice
+    """Calibrate a camera from photographs of a chessboard or ChArUco board, and say how well it is known."""
+    from compare.calibration_table import calibration_table, view_table
+    from vision.boards import read_board
+    from vision.calibration import LensChoice, better_lens
     from vision.calibration import calibrate as calibrated
     from vision.camera_file import check_format, save_calibration
+    from vision.photographs import photographs
 
     check_format(out)
     if not images:
         raise UserError("no photograph was given; name at least 4 that show the board")
-    chessboard = read_board(board, square)
-    calibration = calibrated(
-        {str(path): read_grey(path) for path in images}, chessboard, lens=LensChoice(fit_k3=k3)
-    )
+    chosen, lens = read_board(board, square, marker=marker, dictionary=dictionary), LensChoice(model, k3)
+    calibration = calibrated(photographs(images, without=without), chosen, lens=lens)
     save_calibration(out, calibration, package_versions())
-    for name in calibration.boardless:
-        say(f"warning: no board of {chessboard} inner corners was found in {name}")
-    Console().print(calibration_table(calibration))
+    if calibration.boardless:
+        say(f"warning: no board of {chosen} was found in {', '.join(calibration.boardless)}")
+    if better := better_lens(calibration, lens):
+        say(f"warning: with {better[0]} the error held out would be {better[1]:.3f} px")
+    console = Console()
+    console.print(calibration_table(calibration))
+    console.print(view_table(calibration))
     print(out)
     return 0

@@ -5,7 +5,9 @@ import pytest
 from chessboards import drawn
 
 from geometry.errors import UserError
-from vision.board import Board, read_board, read_grey
+from vision.board import Board
+from vision.boards import read_board
+from vision.photographs import photographs
 
 SMALL = Board(5, 4, 10.0)
 TO_PIXELS = np.array([[4.2, 0.7, 90.0], [-0.5, 3.9, 75.0], [1e-3, -6e-4, 1.0]])
@@ -53,10 +55,10 @@ def test_an_impossible_board_is_refused(size, square, message):
 def test_what_is_no_picture_is_one_line(content, tmp_path):
     path = tmp_path / "photo.png"
     path.write_bytes(content)
-    with pytest.raises(UserError, match=r"cannot read the picture .*photo\.png: it is not one"):
-        read_grey(path)
+    with pytest.raises(UserError, match=r"cannot read the picture .*photo\.png: it"):
+        list(photographs([path]))
 
 
 def test_an_absent_picture_is_one_line(tmp_path):
     with pytest.raises(UserError, match="No such file"):
-        read_grey(tmp_path / "absent.png")
+        list(photographs([tmp_path / "absent.png"]))

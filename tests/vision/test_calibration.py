@@ -10,9 +10,10 @@ from chessboards import BOARD, CAMERA, drawn, views
 
 from compare.cli import main
 from geometry.errors import UserError
-from vision.board import Board, read_grey
+from vision.board import Board
 from vision.calibration import LensChoice, calibrate, calibrate_views
 from vision.camera_file import load_camera
+from vision.photographs import photographs
 
 SIZE = (CAMERA.width, CAMERA.height)
 NOISE = 0.05
@@ -78,7 +79,9 @@ def test_coverage_is_the_area_between_the_corners(known):
 
 
 def test_too_few_views_are_refused():
-    with pytest.raises(UserError, match=r"3 of 5 photographs show the board of 9x6 corners; at least 4"):
+    with pytest.raises(
+        UserError, match=r"3 of 5 photographs show the board of 9x6 inner corners; at least 4"
+    ):
         calibrate_views(views(3, noise=NOISE), BOARD, SIZE, boardless=("a", "b"))
 
 
@@ -91,12 +94,12 @@ def test_boards_that_are_never_tilted_do_not_determine_the_camera():
 def test_photographs_of_different_sizes_are_refused():
     images = {"a.png": np.zeros((40, 60), np.uint8), "b.png": np.zeros((60, 40), np.uint8)}
     with pytest.raises(UserError, match=r"a\.png has 60x40 pixels and b\.png 40x60"):
-        calibrate(images, BOARD)
+        calibrate(images.items(), BOARD)
 
 
 def test_photographs_without_a_board_are_refused():
     with pytest.raises(UserError, match="none of 2 photographs shows a board of 9x6"):
-        calibrate(dict.fromkeys("ab", np.zeros((100, 150), np.uint8)), BOARD)
+        calibrate(dict.fromkeys("ab", np.zeros((100, 150), np.uint8)).items(), BOARD)
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +150,7 @@ def test_bad_input_is_one_line(arguments, message, folder, tmp_path, monkeypatch
 
 @pytest.mark.skipif(not PHOTOGRAPHS, reason="no photographs in /usr/share/doc/opencv-doc (Debian)")
 def test_the_photographs_of_opencv_give_their_known_camera():
-    found = calibrate({path.name: read_grey(path) for path in PHOTOGRAPHS}, BOARD)
+    found = calibrate(photographs(PHOTOGRAPHS), BOARD)
     assert found.boardless == ()
     assert 530 < found.camera.fx < 540
     assert abs(found.camera.fy - found.camera.fx) < 3
