@@ -31,7 +31,7 @@ class Board:
     def __post_init__(self) -> None:
         if min(self.columns, self.rows) < 3 or max(self.columns, self.rows) > 100:
             raise UserError(
-                f"a board of {self.columns}x{self.rows} inner corners; it must have 3 to 100 along either side"
+                f"a board of {self.columns}x{self.rows} inner corners; either side must have 3 to 100"
             )
         if not 0 < self.square < np.inf:
             raise UserError(f"a square of {self.square:g} mm; its side must be above zero")

@@ -17,8 +17,8 @@ def read_board(
     """
     if not (found := re.fullmatch(r"(charuco:)?(\d{1,3})x(\d{1,3})", text.strip(), re.IGNORECASE)):
         raise UserError(
-            f"cannot read the board {text!r}; give its inner corners, such as 9x6, or the squares of a ChArUco "
-            "board, such as charuco:8x6"
+            f"cannot read the board {text!r}; give its inner corners, such as 9x6, or the squares of a "
+            "ChArUco board, such as charuco:8x6"
         )
     columns, rows = int(found[2]), int(found[3])
     if not found[1]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from geometry.arrays import FloatArray
+from geometry.arrays import BoolArray, FloatArray, IntArray
 from geometry.errors import UserError
 from vision.board import Board, GreyImage
 
@@ -31,8 +31,8 @@ class CharucoBoard(Board):
         dictionary: Of its markers, a name in `DICTIONARIES`.
 
     Raises:
-        UserError: Besides what a chessboard refuses, if a marker has no room in a square, the dictionary is not
-            known or too small.
+        UserError: Besides what a chessboard refuses, if a marker has no room in a square, the dictionary is
+            not known or too small.
     """
 
     marker: float
@@ -42,12 +42,13 @@ class CharucoBoard(Board):
         super().__post_init__()
         if not 0 < self.marker < self.square:
             raise UserError(
-                f"a marker of {self.marker:g} mm in a square of {self.square:g} mm; it must be above zero and "
-                "smaller than the square"
+                f"a marker of {self.marker:g} mm in a square of {self.square:g} mm; it must be above zero "
+                "and smaller than the square"
             )
         if self.dictionary not in DICTIONARIES:
             raise UserError(
-                f"no dictionary of markers is called {self.dictionary!r}; there are: {', '.join(DICTIONARIES)}"
+                f"no dictionary of markers is called {self.dictionary!r}; there are: "
+                f"{', '.join(DICTIONARIES)}"
             )
         markers = (self.columns + 1) * (self.rows + 1) // 2
         size = len(cv2.aruco.getPredefinedDictionary(DICTIONARIES[self.dictionary]).bytesList)
@@ -58,10 +59,10 @@ class CharucoBoard(Board):
         return f"{self.columns + 1}x{self.rows + 1} squares with markers {self.dictionary}"
 
     def find(self, image: GreyImage) -> FloatArray | None:
-        """Where `corners` are in an image, shape (n, 2), pixels, NaN where one is not seen; None if too few are.
+        """Where `corners` are in an image, shape (n, 2), pixels, NaN where one is not seen; None if few are.
 
-        OpenCV before 4.14 gives them half a pixel off; they are located anew as saddle points, in windows that
-        end where the markers begin. Boards of the layout before OpenCV 4.6 are found too.
+        OpenCV before 4.14 gives them half a pixel off; they are located anew as saddle points, in windows
+        that end where the markers begin. Boards of the layout before OpenCV 4.6 are found too.
 
         Source: S. Garrido-Jurado et al., "Automatic generation and detection of highly reliable fiducial
         markers under occlusion", Pattern Recognition 47, 2014; W. Förstner, E. Gülch, "A fast operator for
@@ -98,7 +99,7 @@ class CharucoBoard(Board):
         board.setLegacyPattern(legacy)
         return board
 
-    def _window(self, numbers: FloatArray, pixels: FloatArray) -> int:
+    def _window(self, numbers: IntArray, pixels: FloatArray) -> int:
         """Half the side of a window that does not reach the markers, pixels."""
         apart = np.linalg.norm(pixels[:, None] - pixels, axis=2)
         neighbours = np.linalg.norm(self.corners[numbers][:, None] - self.corners[numbers], axis=2)
@@ -106,7 +107,7 @@ class CharucoBoard(Board):
         gap = 0.5 * side * (1 - self.marker / self.square)
         return int(np.clip(gap, SMALLEST_WINDOW, LARGEST_WINDOW))
 
-    def _determined(self, seen: FloatArray) -> bool:
+    def _determined(self, seen: BoolArray) -> bool:
         """Whether either half of the seen corners determines a pose."""
         for half in self.halves:
             points = self.corners[half & seen, :2]

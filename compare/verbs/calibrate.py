@@ -11,6 +11,8 @@ from compare.options import OUTPUT
 from compare.provenance import package_versions
 from geometry.errors import UserError
 
+VERSIONS = ("python", "pinn-ray", "numpy", "scipy", "opencv-python-headless")
+
 
 def calibrate(
     *images: Annotated[
@@ -50,7 +52,8 @@ def calibrate(
         raise UserError("no photograph was given; name at least 4 that show the board")
     chosen, lens = read_board(board, square, marker=marker, dictionary=dictionary), LensChoice(model, k3)
     calibration = calibrated(photographs(images, without=without), chosen, lens=lens)
-    save_calibration(out, calibration, package_versions())
+    versions = package_versions()
+    save_calibration(out, calibration, {name: versions[name] for name in VERSIONS})
     if calibration.boardless:
         say(f"warning: no board of {chosen} was found in {', '.join(calibration.boardless)}")
     if better := better_lens(calibration, lens):

@@ -40,7 +40,7 @@ def test_a_board_is_read_from_text():
     [
         ("9", 25, "cannot read the board '9'"),
         ("9x-6", 25, "cannot read the board"),
-        ("9x2", 25, "a board of 9x2 inner corners"),
+        ("9x2", 25, "a board of 9x2 inner corners; either side"),
         ("9x600", 25, "a board of 9x600 inner corners"),
         ("9x6", 0, "a square of 0 mm"),
         ("9x6", float("nan"), "a square of nan mm"),

@@ -9,7 +9,7 @@ import cv2
 
 from geometry.atomic import write_json
 from geometry.errors import UserError
-from vision.camera import save_camera
+from vision.camera_file import save_camera
 from vision.measurements import write_measurements
 from vision.rig.exposure import Image
 from vision.rig.recording import Recording, Truth

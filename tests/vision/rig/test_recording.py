@@ -8,7 +8,7 @@ import pytest
 
 from geometry.design import Design
 from geometry.errors import UserError
-from vision.camera import load_camera
+from vision.camera_file import load_camera
 from vision.measurements import read_measurements
 from vision.rig.bench import Bench
 from vision.rig.exposure import Exposure
