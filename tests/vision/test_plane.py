@@ -1,0 +1,127 @@
+"""Planes against the cameras that saw them, and their covariances against repeated measurements."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from chessboards import projected
+from fingers import MARKERS, PRESSED
+from test_fiducials import pose_of
+
+from geometry.parameters import Parameters
+from vision.camera import Camera
+from vision.plane import camera_plane, homography_plane, similarity_plane
+from vision.workspace import default_workspace
+
+CAMERA = Camera(1280, 720, 1200.0, 1195.0, 652.0, 349.0, distortion=(-0.12, 0.05, 1e-3, -5e-4, 0.0))
+FIDUCIALS = default_workspace(Parameters()).points
+BEFORE = MARKERS["front"]
+AFTER = BEFORE + np.array(PRESSED["front"])[0]
+POSE = pose_of(10, (4, -3), 145)
+NOISE = 0.05
+"""Pixels."""
+
+
+def seen(points, camera=CAMERA, *, height=0.0):
+    return projected(camera, np.column_stack([points, np.full(len(points), height)]), POSE)
+
+
+def noise(count):
+    return np.repeat(NOISE**2 * np.eye(2)[None], count, axis=0)
+
+
+PINHOLE = replace(CAMERA, distortion=(0.0,) * 5)
+FLAT = pose_of(10, (0, 0), 145)
+
+
+@pytest.mark.parametrize("height", [0.0, 7.5])
+def test_a_calibrated_camera_sees_points_where_they_are(height):
+    plane = camera_plane(CAMERA, FIDUCIALS, seen(FIDUCIALS), noise(7), height=height)
+    np.testing.assert_allclose(plane.points(seen(AFTER, height=height)), AFTER, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(plane.pixels(AFTER), seen(AFTER, height=height), rtol=0, atol=1e-5)
+    assert plane.residual < 1e-6
+
+
+def test_forgetting_the_height_of_the_markers_costs_what_the_scale_says():
+    plane = camera_plane(CAMERA, FIDUCIALS, seen(FIDUCIALS), noise(7))
+    moved = np.diff(plane.points(seen(np.array([[0.0, 0.0], [80.0, 0.0]]), height=7.5)), axis=0)
+    assert np.linalg.norm(moved) == pytest.approx(80 * (1 + 7.5 / 145), rel=0.01)
+
+
+def test_a_homography_is_exact_without_a_lens():
+    plane = homography_plane(FIDUCIALS, seen(FIDUCIALS, PINHOLE), noise(7))
+    np.testing.assert_allclose(plane.points(seen(AFTER, PINHOLE)), AFTER, rtol=0, atol=1e-8)
+    assert plane.residual < 1e-8
+
+
+def test_a_homography_tells_by_its_residual_that_there_is_a_lens():
+    assert homography_plane(FIDUCIALS, seen(FIDUCIALS), noise(7)).residual > 0.05
+
+
+def test_a_similarity_is_exact_for_a_camera_that_looks_straight_down():
+    pixels = projected(PINHOLE, np.column_stack([BEFORE, np.zeros(9)]), FLAT)
+    square = replace(PINHOLE, fy=PINHOLE.fx)
+    pixels, after = (
+        projected(square, np.column_stack([points, np.zeros(9)]), FLAT) for points in (BEFORE, AFTER)
+    )
+    plane = similarity_plane(BEFORE, pixels, noise(9))
+    np.testing.assert_allclose(plane.points(after), AFTER, rtol=0, atol=1e-8)
+
+
+def views():
+    """A plane of every kind, and the camera that it is exact for."""
+    yield "camera", CAMERA, lambda pixels: camera_plane(CAMERA, FIDUCIALS, pixels, noise(7), height=3.0)
+    yield "homography", PINHOLE, lambda pixels: homography_plane(FIDUCIALS, pixels, noise(7))
+    yield "similarity", PINHOLE, lambda pixels: similarity_plane(FIDUCIALS, pixels, noise(7))
+
+
+@pytest.mark.parametrize(("name", "camera", "fit"), views())
+def test_slopes_are_those_of_differences(name, camera, fit):
+    plane = fit(seen(FIDUCIALS, camera))
+    slopes = plane.view.slopes(AFTER, plane.parameters)
+    for axis in range(2):
+        step = 1e-4 * np.eye(2)[axis]
+        difference = (plane.pixels(AFTER + step) - plane.pixels(AFTER - step)) / 2e-4
+        np.testing.assert_allclose(slopes.point[:, :, axis], difference, rtol=0, atol=1e-5)
+    for number in range(6 if name == "camera" else len(plane.parameters)):  # the intrinsics: see test_camera
+        step = 1e-6 * np.eye(len(plane.parameters))[number] * max(1, abs(plane.parameters[number]))
+        up, down = (plane.view.pixels(AFTER, plane.parameters + sign * step) for sign in (1, -1))
+        difference = (up - down) / (2 * step[number])
+        np.testing.assert_allclose(slopes.parameters[:, :, number], difference, rtol=1e-4, atol=1e-3)
+
+
+@pytest.mark.parametrize(("name", "camera", "fit"), views())
+def test_the_covariance_of_displacements_is_that_of_repeated_measurements(name, camera, fit):
+    """200 repetitions know a standard deviation to 5 percent, and the mean of 18 much better."""
+    generator = np.random.default_rng(0)
+    height = 3.0 if name == "camera" else 0.0
+    exact = [
+        seen(points, camera, height=level)
+        for points, level in ((FIDUCIALS, 0), (BEFORE, height), (AFTER, height))
+    ]
+    plane = fit(exact[0])
+    if name == "similarity":  # of a tilted plane: what is exact is the image of the map itself
+        exact = [plane.pixels(points) for points in (FIDUCIALS, BEFORE, AFTER)]
+        plane = fit(exact[0])
+    found = []
+    for _ in range(200):
+        fiducials, before, after = (pixels + generator.normal(0, NOISE, pixels.shape) for pixels in exact)
+        again = fit(fiducials)
+        found.append((again.points(after) - again.points(before)).ravel())
+    covariance = plane.displacement_covariance(BEFORE, AFTER, noise(9), noise(9))
+    ratio = np.std(found, axis=0) / np.sqrt(np.diag(covariance))
+    assert np.sqrt(np.mean(ratio**2)) == pytest.approx(1, abs=0.06)
+    assert ratio.min() > 0.8
+    assert ratio.max() < 1.25
+    correlation = np.corrcoef(np.transpose(found))
+    deviation = np.sqrt(np.diag(covariance))
+    np.testing.assert_allclose(correlation, covariance / np.outer(deviation, deviation), rtol=0, atol=0.3)
+
+
+def test_errors_of_the_fiducials_mostly_cancel_in_displacements():
+    plane = camera_plane(CAMERA, FIDUCIALS, seen(FIDUCIALS), noise(7))
+    none = np.zeros((9, 2, 2))
+    shift = plane.displacement_covariance(BEFORE, BEFORE, none, none)
+    np.testing.assert_allclose(shift, 0, rtol=0, atol=1e-12)
+    small = np.sqrt(np.diag(plane.displacement_covariance(BEFORE, AFTER, none, none)).max())
+    assert 0 < small < 0.3 * NOISE * 145 / 1200

@@ -1,0 +1,100 @@
+"""Which detection is which marker, by the joint explanation that a smooth deformation makes likeliest.
+
+The displacement from where the markers are expected is a Gaussian field that the base ties down. Markers are
+taken from base to tip; each is one of the detections or missing, and what is known of it narrows the field at
+the others. The likeliest joint explanations are kept (D. B. Reid, "An algorithm for tracking multiple
+targets", IEEE TAC 24, 1979), and a marker is named only if almost all of their weight agrees. Units: mm.
+"""
+
+import numpy as np
+
+from geometry.arrays import FloatArray, IntArray
+
+EXPLANATIONS = 256
+"""How many joint explanations are kept."""
+SURE = 0.999
+"""Posterior probability from which a marker is named; below it counts as missing."""
+SEEN = 0.9
+"""Prior probability that a marker is among the detections."""
+FALSE_DENSITY = 1e-3
+"""Of detections that are no marker, 1/mm²."""
+GATE = 5.0
+"""Standard deviations beyond which a detection is not a marker."""
+NOISE = 0.15
+"""Standard deviation of what the field leaves out: detection, and a wall that bulges between two ribs."""
+JUMPS = (1 / 16, 1.0)
+"""Steps between frames that are thought possible, as multiples of the finger's usual whole stroke."""
+
+
+def identify(found: FloatArray, expected: FloatArray, fields: FloatArray) -> IntArray:
+    """Name the markers among detections.
+
+    Args:
+        found: Detections in the finger's frame, shape (n, 2).
+        expected: Where the markers are expected, shape (m, 2).
+        fields: Covariances of the displacement from there along x and y, one for each size of step that is
+            thought possible, shape (k, 2, m, m), mm²; see `moved` and `placed`.
+
+    Returns:
+        The number of its detection for every marker, shape (m,); -1 where it is missing or not certain.
+    """
+    kinds, count = len(fields), len(expected)
+    mean = np.repeat(expected.T[None], kinds, axis=0)
+    covariance = fields.copy()
+    weight = np.zeros(kinds)
+    names = np.full((kinds, count), -1)
+    free = np.ones((kinds, len(found)), dtype=bool)
+    for marker in np.argsort(expected[:, 0], kind="stable"):
+        spread = covariance[:, :, marker, marker] + NOISE**2
+        missed = found.T - mean[:, :, marker, None]
+        square = (missed**2 / spread[:, :, None]).sum(axis=1)
+        density = -0.5 * (square + np.log(2 * np.pi * spread).sum(axis=1)[:, None])
+        allowed = free & (square < GATE**2)
+        density = np.where(allowed, density + np.log(SEEN / FALSE_DENSITY), -np.inf)
+        choices = weight[:, None] + np.column_stack([density, np.full(len(weight), np.log(1 - SEEN))])
+        best = np.argsort(-choices, axis=None)[:EXPLANATIONS]
+        best = best[np.isfinite(choices.ravel()[best])]
+        parent, chosen = np.unravel_index(best, choices.shape)
+        weight, seen = choices[parent, chosen], chosen < len(found)
+        mean, covariance, names, free = mean[parent], covariance[parent], names[parent], free[parent]
+        names[seen, marker] = chosen[seen]
+        free[seen, chosen[seen]] = False
+        row = covariance[seen, :, marker]
+        gain = row / spread[parent[seen], :, None]
+        mean[seen] += gain * missed[parent[seen], :, chosen[seen]][:, :, None]
+        covariance[seen] -= gain[..., None] * row[..., None, :]
+    share = np.exp(weight - weight.max())
+    agreed = (share[:, None] * (names == names[0])).sum(axis=0) / share.sum()
+    return np.where(agreed >= SURE, names[0], -1)
+
+
+def moved(points: FloatArray, jumps: tuple[float, ...] = JUMPS) -> FloatArray:
+    """Covariances of a deformation between two frames, shape (len(jumps), 2, m, m), mm².
+
+    The slope of v along the finger is a random walk that starts at a hinge in the base. So is that of u, but
+    much smaller, and u follows the turning of the section. The sizes are those of fingers that are pressed
+    in by an eighth of their length, by `fem-nonlinear`, with room to spare.
+    """
+    length = points[:, 0].max()
+    x, y = points[:, :1] / length, (points[:, 1:] - points[:, 1].mean()) / length
+    near = np.minimum(x, x.T)
+    bend = near**2 * (3 * np.maximum(x, x.T) - near) / 6  # of a slope that is a random walk from zero
+    v = (0.25**2 * x * x.T + 0.6**2 * bend) * np.exp(-0.5 * ((y - y.T) / 0.4) ** 2)
+    u = 0.05**2 * x * x.T + 0.15**2 * bend + 0.2**2 * near * y * y.T
+    return np.stack([jump**2 * length**2 * np.stack([u, v]) for jump in jumps])
+
+
+def placed(points: FloatArray) -> FloatArray:
+    """Covariances at rest, shape (1, 2, m, m), mm²: the finger may be 1 mm and 1 degree off its place."""
+    arms = (points[:, 1:], points[:, :1])
+    return np.array([[1 + np.radians(1) ** 2 * arm @ arm.T for arm in arms]])
+
+
+def filled(points: FloatArray, displacements: FloatArray) -> FloatArray:
+    """Displacements with the likeliest values in place of those that are nan, shape (m, 2), mm."""
+    known = np.isfinite(displacements).all(axis=1)
+    whole = displacements.copy()
+    for axis, field in enumerate(moved(points, (1.0,))[0]):
+        own = field[np.ix_(known, known)] + NOISE**2 * np.eye(known.sum())
+        whole[~known, axis] = field[np.ix_(~known, known)] @ np.linalg.solve(own, displacements[known, axis])
+    return whole

@@ -1,0 +1,86 @@
+"""When the finger rests: the frames before it is pressed and those after it has come to rest again."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+
+STILL = 0.02
+"""Root mean square distance from the first frames that is no motion yet, mm, ..."""
+NOISE_FACTOR = 3.5
+"""... or so many standard deviations of the noise, whichever is more."""
+FEWEST = 3
+"""Frames that are a rest; fewer if there are only a few pictures."""
+
+
+class Rest(NamedTuple):
+    """The frames at rest, as ranges: before and after the motion."""
+
+    initial: range
+    final: range
+
+
+def find_rest(positions: FloatArray) -> Rest:
+    """Find when the finger rests.
+
+    Args:
+        positions: Of markers in every frame, shape (f, m, 2), mm; nan where one was not seen.
+
+    Raises:
+        UserError: If there is only one frame, or the finger does not rest at either end, or does not move.
+    """
+    count = len(positions)
+    if count < 2:
+        raise UserError(f"{count} frame; show the finger at rest before and after it is pressed")
+    limit = max(STILL, NOISE_FACTOR * _noise(positions))
+    fewest = max(1, min(FEWEST, count // 2))
+    first = _resting(positions, fewest, limit)
+    last = _resting(positions[::-1], fewest, limit)
+    for length, end in ((first, "start"), (last, "end")):
+        if length < fewest:
+            raise UserError(
+                f"the finger does not rest at the {end}: it moves by more than {limit:.2g} mm within "
+                f"{fewest} frames; film it at rest before it is pressed and while it is held"
+            )
+    rest = Rest(range(first), range(count - last, count))
+    moved = _distance(_centre(positions[: rest.initial.stop]), _centre(positions[rest.final.start :]))
+    if not moved > limit:
+        raise UserError(
+            f"the finger is in the end where it was at the start, within {limit:.2g} mm; "
+            "the film must end while it is pressed"
+        )
+    return rest
+
+
+def _resting(positions: FloatArray, fewest: int, limit: float) -> int:
+    """Number of frames from the first that stay near where the first few are; a single stray one may not."""
+    reference = _centre(positions[:fewest])
+    away = np.array([not _distance(frame, reference) <= limit for frame in positions])
+    left = away[:-1] & away[1:]
+    if left.any():
+        return int(left.argmax())
+    return len(away) - int(away[-1])
+
+
+def _noise(positions: FloatArray) -> float:
+    """Standard deviation of a coordinate, mm, from second differences, which are free of steady motion."""
+    bends = positions[2:] - 2 * positions[1:-1] + positions[:-2]
+    known = np.abs(bends[np.isfinite(bends)])
+    return float(np.median(known) * 1.4826 / np.sqrt(6)) if len(known) else 0.0
+
+
+def _centre(positions: FloatArray) -> FloatArray:
+    """The median of the frames in which a marker was seen, shape (m, 2), mm; nan if it never was."""
+    seen = np.isfinite(positions).any(axis=0)
+    centre = np.full(positions.shape[1:], np.nan)
+    centre[seen] = np.nanmedian(positions[:, seen], axis=0)
+    return centre
+
+
+def _distance(positions: FloatArray, reference: FloatArray) -> float:
+    """Root mean square over the coordinates of what is known in both, mm; nan if nothing is."""
+    missed = positions - reference
+    known = missed[np.isfinite(missed)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
