@@ -47,9 +47,10 @@ def closed(corners: ArrayLike) -> FloatArray:
     return np.stack([points, np.roll(points, -1, axis=0)], axis=1)
 
 
-def rectangle(low: Sequence[float], high: Sequence[float]) -> FloatArray:
+def rectangle(low: ArrayLike, high: ArrayLike) -> FloatArray:
     """The edges of a rectangle from its lower left and upper right corner, shape (4, 2, 2)."""
-    return closed([low, (high[0], low[1]), high, (low[0], high[1])])
+    (left, bottom), (right, top) = np.asarray(low), np.asarray(high)
+    return closed([(left, bottom), (right, bottom), (right, top), (left, top)])
 
 
 def circle(centre: ArrayLike, radius: float) -> FloatArray:

@@ -1,0 +1,111 @@
+"""Photographs of a calibration board in many poses."""
+
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from geometry.arrays import BoolArray, FloatArray
+from geometry.errors import UserError
+from vision.board import Board
+from vision.camera import Camera, Pose
+from vision.charuco import DICTIONARIES, CharucoBoard
+from vision.rig.shapes import Scene, Shape, rectangle
+
+PAPER, INK, WALL = (0.90, 0.91, 0.90), (0.06, 0.06, 0.06), (0.35, 0.38, 0.40)
+MARGIN = 0.7
+"""White rim of the board, sides of a square."""
+TILT = (12.0, 38.0)
+"""Between the board and the image, degrees."""
+SIZE = (0.35, 0.65)
+"""Of the board's longer side, as a share of the image's."""
+RIM = 4.0
+"""Between the board and the border of the image, pixels."""
+TRIES = 400
+
+
+def board_scene(board: Board) -> Scene:
+    """A board on a wall, in the frame of its corners."""
+    low = -(1 + MARGIN) * np.full(2, board.square)
+    high = (np.array([board.columns, board.rows]) + MARGIN) * board.square
+    places = np.indices((board.columns + 1, board.rows + 1)).reshape(2, -1).T - 1
+    black = places[places.sum(axis=1) % 2 == 0]
+    squares = [rectangle(place * board.square, (place + 1) * board.square) for place in black]
+    cells = _cells(board) if isinstance(board, CharucoBoard) else []
+    # All in one shape, in which cells that touch leave no seam.
+    ink = Shape(np.concatenate([*squares, *cells]), INK)
+    return Scene(WALL, [Shape(rectangle(low, high), PAPER), ink])
+
+
+def board_poses(board: Board, camera: Camera, count: int, *, seed: int = 0) -> list[Pose]:
+    """Poses in which all of a board is seen, tilted in all directions; together they cover the image.
+
+    Each is the one of some drawn at random that shows most of what no pose before it has shown.
+
+    Raises:
+        UserError: If the board never fits into the image.
+    """
+    rng = np.random.default_rng(seed)
+    grid = np.stack(np.meshgrid(np.arange(0, camera.width, 16), np.arange(0, camera.height, 16)), axis=-1)
+    pixels = grid.reshape(-1, 2).astype(np.float64)
+    fresh = np.ones(len(pixels), dtype=np.bool_)
+    poses: list[Pose] = []
+    for _ in range(count):
+        drawn = [pose for pose in (_drawn(board, camera, rng) for _ in range(TRIES)) if pose is not None]
+        if not drawn:
+            raise UserError(f"a board of {board} does not fit into the image in any pose tried")
+        shown = [_inside(camera.project(_rim(board, 0.0), pose), pixels) for pose in drawn]
+        best = int(np.argmax([(fresh & inside).sum() for inside in shown]))
+        poses.append(drawn[best])
+        fresh &= ~shown[best]
+        if not (fresh.sum() > 0.05 * len(fresh)):
+            fresh[:] = True
+    return poses
+
+
+def _drawn(board: Board, camera: Camera, rng: np.random.Generator) -> Pose | None:
+    """A pose at random; None if part of the board would not be seen."""
+    axis, tilt, turn = rng.uniform(0, 2 * np.pi), np.deg2rad(rng.uniform(*TILT)), rng.uniform(-0.3, 0.3)
+    rotation = Rotation.from_rotvec([tilt * np.cos(axis), tilt * np.sin(axis), 0.0]) * Rotation.from_rotvec(
+        [0.0, 0.0, turn]
+    )
+    rim = _rim(board, MARGIN)
+    longer = np.ptp(rim, axis=0).max()
+    distance = camera.fx * longer / (rng.uniform(*SIZE) * camera.width)
+    aim = rng.uniform((0, 0), (camera.width, camera.height))
+    ray = np.append((aim - (camera.cx, camera.cy)) / (camera.fx, camera.fy), 1.0)
+    pose = Pose(rotation.as_rotvec(), distance * ray - rotation.apply(rim.mean(axis=0)))
+    seen = camera.project(rim, pose)
+    size = np.array([camera.width, camera.height])
+    return pose if ((seen > RIM) & (seen < size - 1 - RIM)).all() else None
+
+
+def _rim(board: Board, margin: float) -> FloatArray:
+    """The corners of the squares' rectangle, or of one that is larger by some squares, shape (4, 3), mm."""
+    low, high = -(1 + margin), np.array([board.columns, board.rows]) + margin
+    x, y = np.array([low, high[0], high[0], low]), np.array([low, low, high[1], high[1]])
+    return np.asarray(board.square * np.stack([x, y, np.zeros(4)], axis=1))
+
+
+def _inside(corners: FloatArray, points: FloatArray) -> BoolArray:
+    """Which points, shape (n, 2), lie in a convex polygon."""
+    side = np.roll(corners, -1, axis=0) - corners
+    to = points[:, None] - corners
+    turn = side[:, 0] * to[:, :, 1] - side[:, 1] * to[:, :, 0]
+    return np.asarray((turn > 0).all(axis=1) | (turn < 0).all(axis=1))
+
+
+def _cells(board: CharucoBoard) -> Iterator[FloatArray]:
+    """The edges of the black cells of the board's markers, as OpenCV lays them out."""
+    dictionary = cv2.aruco.getPredefinedDictionary(DICTIONARIES[board.dictionary])
+    layout = cv2.aruco.CharucoBoard(
+        (board.columns + 1, board.rows + 1), board.square, board.marker, dictionary
+    )
+    side = dictionary.markerSize + 2
+    cell = board.marker / side
+    for number, corners in zip(np.ravel(layout.getIds()), layout.getObjPoints(), strict=True):
+        rows, columns = np.nonzero(dictionary.generateImageMarker(int(number), side) == 0)
+        for place in np.stack([columns, rows], axis=1):
+            low = np.asarray(corners)[0, :2] - board.square + cell * place
+            yield rectangle(low, low + cell)
