@@ -11,6 +11,7 @@ from compare.verbs.compare import compare
 from compare.verbs.design import design
 from compare.verbs.gridsearch import gridsearch
 from compare.verbs.mesh import mesh
+from compare.verbs.pick import pick
 from compare.verbs.solve import solve
 from compare.verbs.solvers import solvers
 
@@ -21,7 +22,7 @@ pinnray = App(
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
-for verb in (compare, design, mesh, solve, gridsearch, solvers, calibrate):
+for verb in (compare, design, mesh, solve, gridsearch, solvers, calibrate, pick):
     pinnray.command(verb, help_epilogue=EXIT_CODES)
 
 

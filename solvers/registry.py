@@ -20,6 +20,10 @@ PRESETS = {
         "fast": "solvers.pinn.standard:PinnStdSolver",
         "paper": "solvers.pinn.paper:PaperPinnSolver",
     },
+    "pinn-asm": {
+        "fast": "solvers.pinn.assimilating:PinnAsmSolver",
+        "paper": "solvers.pinn.assimilating:PaperPinnAsmSolver",
+    },
 }
 """Presets of our solvers, the usual one first. Each is a class with settings of its own."""
 
@@ -28,6 +32,8 @@ BUILT_IN = {
     "fem-nonlinear": "solvers.fem.nonlinear:FemNonlinearSolver",
     "pinn-std": PRESETS["pinn-std"]["fast"],
     "pinn-local": "solvers.pinn.local:PinnLocalSolver",
+    "pinn-asm": PRESETS["pinn-asm"]["fast"],
+    "pinn-local-asm": "solvers.pinn.assimilating:PinnLocalAsmSolver",
 }
 
 

@@ -258,19 +258,43 @@ def settings_of(solvers: Iterable[Solver]) -> dict[str, str]:
     }
 
 
+GIVEN_MARKERS = {"pinn-asm": "pinn-std", "pinn-local-asm": "pinn-local"}
+"""Solvers that have all settings of another one, and those of assimilation."""
+
+
 def test_the_guide_has_every_solver_setting_as_it_is():
     from solvers.registry import BUILT_IN, make_solver
 
     rows = table(GUIDE, "setting", after="## Solvers")
     assert {name: row[1] for name, row in zip(names(rows), rows, strict=True)} == settings_of(
-        make_solver(name) for name in BUILT_IN
+        make_solver(name) for name in BUILT_IN if name not in GIVEN_MARKERS
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "radius"),
+    [
+        ("pinn-asm", {}, "0.8"),
+        ("pinn-local-asm", {}, "0.8"),
+        ("pinn-asm", {"preset": "paper"}, "0.0"),  # which the row says too
+    ],
+)
+def test_the_guide_has_the_settings_of_assimilation_as_they_are(name, settings, radius):
+    from solvers.registry import make_solver
+
+    rows = table(GUIDE, "setting of `pinn-asm`, `pinn-local-asm`")
+    documented = {key: row[1] for key, row in zip(names(rows), rows, strict=True)}
+    own, shared = (make_solver(which, **settings).settings() for which in (name, GIVEN_MARKERS[name]))
+    assert own.items() >= shared.items()
+    assert {key: str(own[key]) for key in own if key not in shared} == {**documented, "marker_radius": radius}
 
 
 def test_the_guide_has_every_setting_of_the_other_presets_as_it_is():
     from solvers.registry import PRESETS, make_solver
 
     for name, (_, *others) in PRESETS.items():
+        if name in GIVEN_MARKERS:
+            continue
         for preset in others:
             rows = table(GUIDE, f"setting of `{preset}`")
             documented = {name: row[1] for name, row in zip(names(rows), rows, strict=True)}

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from geometry.atomic import atomic_path
 from geometry.errors import UserError
 from vision.frames import Image, Shot
 
@@ -91,6 +92,15 @@ class Decoder:
             brightest = int(image.max()).bit_length()
             self._white = 2 ** next(bits for bits in DEPTHS if bits >= brightest) - 1
         return np.asarray(cv2.convertScaleAbs(image, alpha=255 / self._white), dtype=np.uint8)
+
+
+def write_picture(path: Path, image: Image) -> None:
+    """Write a picture atomically, in the format of its suffix."""
+    done, content = cv2.imencode(path.suffix.lower(), image)
+    if not done:
+        raise UserError(f"cannot write the picture {path}")
+    with atomic_path(path) as partial:
+        partial.write_bytes(content.tobytes())
 
 
 def split(read: Callable[[int], bytes], name: str) -> Iterator[bytes]:

@@ -78,6 +78,29 @@ def propose(
     return found[order][_first_of_overlapping(found[order])] + (x0, y0, 0)
 
 
+def highlighted(
+    image: Image, colour: Colour, circles: FloatArray | None = None, *, radius: float = 25.0
+) -> tuple[Image, float]:
+    """A picture to check a colour by eye, and the share of the image that has it.
+
+    Args:
+        image: Shape (h, w) or (h, w, 3).
+        colour: What has it is magenta; the rest is pale.
+        circles: x, y and radius, shape (n, 3), pixels, drawn in green.
+        radius: Largest radius that is looked for, pixels.
+
+    Returns:
+        The picture, shape (h, w, 3), and a number from 0 to 1.
+    """
+    mask = colour.mask(np.asarray(cv2.medianBlur(image, 3), dtype=np.uint8), radius)
+    coloured = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image
+    picture = cv2.addWeighted(coloured, 0.5, np.full_like(coloured, 255), 0.5, 0)
+    picture[mask > 0] = (200, 0, 200)
+    for x, y, r in np.empty((0, 3)) if circles is None else circles:
+        cv2.circle(picture, (round(x), round(y)), round(r) + 2, (0, 140, 0), 1, cv2.LINE_AA)
+    return np.asarray(picture, dtype=np.uint8), float(mask.mean()) / 255
+
+
 def _fill(mask: Image, circles: FloatArray) -> FloatArray:
     """How much more colour there is within each circle than around it, shape (n,), -1 to 1."""
     shares = []

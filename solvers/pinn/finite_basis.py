@@ -10,7 +10,6 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.quadrature import body_quadrature
-from solvers.assimilation import Misfit
 from solvers.pinn.base_factor import BaseFactor
 from solvers.pinn.grading import (
     Spacing,
@@ -21,6 +20,7 @@ from solvers.pinn.grading import (
 from solvers.pinn.local_level import Level
 from solvers.pinn.local_newton import Path, equilibrium, follow_load
 from solvers.pinn.local_units import LocalField, LocalUnits
+from solvers.pinn.observing import WEIGHING, Observing
 from solvers.pinn.pieces import pool
 from solvers.pinn.windows import Windows
 from solvers.problem import Problem
@@ -35,7 +35,7 @@ FINEST = 0.75
 
 
 @dataclass(frozen=True, kw_only=True)
-class FiniteBasisSolver(ABC):
+class FiniteBasisSolver(Observing, ABC):
     """Windows spread over the body, denser at its re-entrant corners, each with a few random tanh ridges.
 
     The energy of the linear law is quadratic in the output layer, which is found by one sparse factorisation;
@@ -69,13 +69,12 @@ class FiniteBasisSolver(ABC):
     cell: float
     base_length: float = 5.0
     seed: int = 0
-    name: ClassVar[str]
     laws: ClassVar[tuple[str, ...]] = ("linear", "neo-hookean")
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
 
     def __post_init__(self) -> None:
         for setting, value in asdict(self).items():
-            if setting not in ("seed", "growth") and not value > 0:
+            if setting not in ("seed", "growth", *WEIGHING) and not value > 0:
                 raise UserError(f"{self.name}: {setting} must be positive, got {value}")
         if self.seed < 0 or self.ridges < 2 or self.coarser <= 1 or self.growth < 0:
             raise UserError(f"{self.name} needs seed >= 0, ridges >= 2, coarser > 1 and growth >= 0")
@@ -138,6 +137,7 @@ class FiniteBasisSolver(ABC):
                 "windows": field.units.windows.count,
                 "quadrature_points": level.energy.points,
                 "newton_iterations": path.iterations,
+                **({"misfit": level.misfit(path.forces)} if level.compliance.any() else {}),
                 "seed": self.seed,
                 "device": "cpu",
             },
@@ -168,12 +168,8 @@ class FiniteBasisSolver(ABC):
             rng=rng,
         )
         return Level.of(
-            units, problem, *graded_quadrature(triangles, spacing, self.cell), self.observed(problem)
+            units, problem, *graded_quadrature(triangles, spacing, self.cell), self.misfit(problem)
         )
-
-    def observed(self, problem: Problem) -> Misfit | None:
-        """What is assimilated of a problem's observations: nothing, unless a solver says otherwise."""
-        return None
 
     def _status(self, path: Path, finer: float, change: float, error: float) -> Status:
         if path.fraction < 1:

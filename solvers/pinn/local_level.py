@@ -59,7 +59,7 @@ class Level:
         problem: Problem,
         points: FloatArray,
         weights: FloatArray,
-        observed: Misfit | None = None,
+        misfit: Misfit | None = None,
     ) -> "Level":
         """The level of some units with a quadrature: points (q, 2), mm, and weights (q,), mm^2.
 
@@ -68,15 +68,15 @@ class Level:
             problem: What is solved.
             points: Of the quadrature.
             weights: Of the quadrature.
-            observed: What is assimilated.
+            misfit: What is minimised with the energy.
         """
         conditions = load_conditions(problem)
         rigid = _functionals(units, conditions.points, conditions.weights, problem.load.prescribed)
         functionals, values, compliance = [rigid], [conditions.values.ravel()], [np.zeros(len(rigid))]
-        if observed is not None and observed.weights.any():
-            functionals.append(_functionals(units, *observed.sampling(), [0, 1]))
-            values.append(observed.observed.T.ravel())
-            compliance.append(1 / observed.weights.T.ravel())
+        if misfit is not None and misfit.weights.any():
+            functionals.append(_functionals(units, *misfit.sampling(), [0, 1]))
+            values.append(misfit.observed.T.ravel())
+            compliance.append(1 / misfit.weights.T.ravel())
         return cls(
             LocalEnergy.of(units, problem.material, points, weights),
             np.concatenate(functionals),

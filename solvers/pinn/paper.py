@@ -16,6 +16,7 @@ from solvers.pinn.loss_gradient import Loss
 from solvers.pinn.losses import DisplacementTerm, EnergyTerm, LossTerm, stiffness_matrix
 from solvers.pinn.mlp_field import MlpField
 from solvers.pinn.modified_mlp import ModifiedMlp
+from solvers.pinn.observing import Observing
 from solvers.pinn.pieces import pool, torch_threads
 from solvers.pinn.processes import ONE_PROCESS, Processes
 from solvers.pinn.training import OPTIMISERS, Recipe, Store, Training
@@ -33,7 +34,7 @@ FREE = ("epochs", "patience", "min_change", "checkpoint_every", "threads", "devi
 
 
 @dataclass(frozen=True)
-class PaperPinnSolver:
+class PaperPinnSolver(Observing):
     """Two modified MLPs, one for u and one for v, trained by gradients on energy plus soft conditions.
 
     Attributes:
@@ -81,16 +82,18 @@ class PaperPinnSolver:
     def __post_init__(self) -> None:
         for setting in ("epochs", "learning_rate", "bc_weight", "width", "layers"):
             if not getattr(self, setting) > 0:
-                raise UserError(f"pinn-std: {setting} must be positive, got {getattr(self, setting)}")
+                raise UserError(f"{self.name}: {setting} must be positive, got {getattr(self, setting)}")
         if self.base_points < 2:
-            raise UserError(f"pinn-std: base_points must be at least 2, got {self.base_points}")
+            raise UserError(f"{self.name}: base_points must be at least 2, got {self.base_points}")
         for setting in ("patience", "checkpoint_every", "threads", "seed"):
             if getattr(self, setting) < 0:
-                raise UserError(f"pinn-std: {setting} must be zero or more, got {getattr(self, setting)}")
+                raise UserError(f"{self.name}: {setting} must be zero or more, got {getattr(self, setting)}")
         if self.optimiser not in OPTIMISERS:
-            raise UserError(f"pinn-std: optimiser must be {' or '.join(OPTIMISERS)}, got {self.optimiser!r}")
+            raise UserError(
+                f"{self.name}: optimiser must be {' or '.join(OPTIMISERS)}, got {self.optimiser!r}"
+            )
         if self.device == "cuda" and not torch.cuda.is_available():
-            raise UserError("pinn-std: device cuda needs a GPU and torch's CUDA build; take device=cpu")
+            raise UserError(f"{self.name}: device cuda needs a GPU and torch's CUDA build; take device=cpu")
 
     def settings(self) -> dict[str, object]:
         """Network, loss, optimiser and seed."""
@@ -167,7 +170,10 @@ class PaperPinnSolver:
         return Store(self._context.folder, digest, self._context.resume, writes=processes.rank == 0)
 
     def loss(self, problem: Problem, processes: Processes = ONE_PROCESS) -> Loss:
-        """The paper's loss: L_PDE + bc_weight L_BC."""
+        """The paper's loss: L_PDE + bc_weight L_BC and, of a solver that assimilates, its factor times L_ASM.
+
+        L_ASM is the mean square of the misfits' lengths, mm²; with unequal weights, the weighted mean.
+        """
 
         def tensor(array: FloatArray) -> torch.Tensor:
             return torch.tensor(np.asarray(array), dtype=PRECISIONS[self.precision], device=self.device)
@@ -191,4 +197,19 @@ class PaperPinnSolver:
                 "BC", tensor(contact), tensor(targets), tensor(wanted), functional=tensor(functional[None])
             ),
         ]
-        return Loss(self.network, terms, {"PDE": 1.0, "BC": self.bc_weight}, processes)
+        factors = {"PDE": 1.0, "BC": self.bc_weight}
+        misfit = self.misfit(problem)
+        if misfit is not None and misfit.weights.any():
+            points, shares = misfit.sampling()
+            total = float(misfit.weights.sum())
+            factors["ASM"] = total / (4 * float(problem.mesh.areas.sum()))
+            terms.append(
+                DisplacementTerm(
+                    "ASM",
+                    tensor(points),
+                    targets=tensor(misfit.observed.T),
+                    weights=tensor(2 * misfit.weights.T / total),
+                    functional=tensor(shares),
+                )
+            )
+        return Loss(self.network, terms, factors, processes)

@@ -45,7 +45,8 @@ class PlainPinn:
             solver: A `PaperPinnSolver` for its settings; collocation at the nodes only.
             dtype: Precision.
         """
-        self.problem, self.bc_weight = problem, solver.bc_weight
+        self.problem = problem
+        self.factors = {"PDE": 1.0, "BC": solver.bc_weight}
         parameters = solver.network.initial(solver.seed, dtype)
         first, gates, biases, output, output_bias = solver.network.weights(parameters)
         self.networks = []
@@ -71,6 +72,10 @@ class PlainPinn:
         y = np.linspace(base[:, 1].min(), base[:, 1].max(), solver.base_points)
         self.base = tensor(np.column_stack([np.full_like(y, base[0, 0]), y]))
         self.contact, self.contact_weights = map(tensor, contact_functional(problem))
+        if problem.observations is not None:
+            self.factors["ASM"] = solver.asm_weight
+            self.markers = tensor(problem.observations.points)
+            self.measured = tensor(problem.observations.displacements)
 
     def loss(self) -> dict[str, torch.Tensor]:
         """The terms, with a graph for differentiating once more."""
@@ -92,13 +97,17 @@ class PlainPinn:
         for network, wanted in zip(self.networks, self.problem.load.displacement, strict=True):
             if wanted is not None:
                 boundary = boundary + ((network(self.contact) * self.contact_weights).sum() - wanted) ** 2
-        return {"PDE": density.mean(), "BC": boundary}
+        terms = {"PDE": density.mean(), "BC": boundary}
+        if "ASM" in self.factors:
+            moved = torch.stack([network(self.markers) for network in self.networks], dim=1)
+            terms["ASM"] = ((moved - self.measured) ** 2).sum(dim=1).mean()
+        return terms
 
-    def step(self) -> tuple[float, float, float]:
-        """One epoch: PDE, BC and the total before the step."""
+    def step(self) -> tuple[float, ...]:
+        """One epoch: PDE, BC, with observations ASM, and the total before the step."""
         self.adam.zero_grad()
         terms = self.loss()
-        total = terms["PDE"] + self.bc_weight * terms["BC"]
+        total = sum(self.factors[name] * term for name, term in terms.items())
         total.backward()
         self.adam.step()
-        return terms["PDE"].item(), terms["BC"].item(), total.item()
+        return *(term.item() for term in terms.values()), total.item()

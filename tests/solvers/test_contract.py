@@ -17,13 +17,17 @@ from tests.solvers.conftest import bar_mesh
 QUICK = {
     "pinn-std": {"wall_spacing": 1.0, "corner_spacing": 0.2, "ridges": 4},
     "pinn-local": {"wall_spacing": 0.8, "corner_spacing": 0.2, "ridges": 4},
+    "pinn-asm": {"wall_spacing": 1.0, "corner_spacing": 0.2, "ridges": 4},
+    "pinn-local-asm": {"wall_spacing": 0.8, "corner_spacing": 0.2, "ridges": 4},
 }
 """Settings that make a solver quick enough for the tests."""
 
 NAMES = list(dict.fromkeys([*solver_names(), "skfem-p1"]))
 """Ours, those of the packages that are installed, and the package that lives in the tests."""
 
-ACCURACY = {"fem": 1e-8, "fem-nonlinear": 1e-6, "skfem-p1": 1e-8, "pinn-std": 0.02, "pinn-local": 0.02}
+ACCURACY = {"fem": 1e-8, "fem-nonlinear": 1e-6, "skfem-p1": 1e-8} | dict.fromkeys(
+    ("pinn-std", "pinn-local", "pinn-asm", "pinn-local-asm"), 0.02
+)
 """Relative difference that two solutions of one problem may have: rounding, Newton's tolerance, training.
 
 A solver that is not listed gets 0.01."""

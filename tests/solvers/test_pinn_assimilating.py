@@ -1,0 +1,216 @@
+"""`pinn-asm` and `pinn-local-asm`: the least of energy plus misfit, and what it is without markers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from geometry.errors import UserError
+from geometry.observations import Observations
+from solvers.assimilation import assimilates
+from solvers.pinn.assimilating import PaperPinnAsmSolver, PinnAsmSolver, PinnLocalAsmSolver
+from solvers.pinn.local_newton import equilibrium
+from solvers.pinn.mlp_field import MlpField
+from solvers.pinn.standard import PinnStdSolver
+from solvers.problem import Load, Material, Problem
+from solvers.registry import make_solver
+from solvers.training import TrainedSolver
+from tests.solvers.autograd_reference import PlainPinn
+from tests.solvers.conftest import bar_mesh
+
+QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "ridges": 3, "tolerance": 0.05}
+PINN_ASM = PinnAsmSolver(**QUICK)
+
+
+def observed(problem: Problem, markers: np.ndarray, displacements: np.ndarray) -> Problem:
+    """The problem with displacements that were measured at markers, both (m, 2), mm."""
+    visible = np.ones(len(markers), dtype=bool)
+    deviations = np.linspace(0.01, 0.05, 2 * len(markers)).reshape(-1, 2)
+    return replace(
+        problem, observations=Observations(markers, displacements, deviations, visible, "by a test", True)
+    )
+
+
+@pytest.fixture(scope="module")
+def plain(coarse_mesh):
+    return PinnStdSolver(**QUICK).solve(Problem(coarse_mesh))
+
+
+@pytest.fixture(scope="module")
+def problem(coarse_mesh, plain) -> Problem:
+    """Markers that went farther than the model goes, by half a millimetre at the tip."""
+    markers = coarse_mesh.markers
+    return observed(
+        plain.problem, markers, plain.displacement(markers) + [0.2, -0.5] * (markers[:, :1] / 90) ** 2
+    )
+
+
+@pytest.fixture(scope="module")
+def solution(problem):
+    return PINN_ASM.solve(problem)
+
+
+@pytest.fixture(scope="module")
+def bent() -> Problem:
+    """A neo-Hookean cantilever that is bent by a quarter of its length, its markers farther than that."""
+    mesh = bar_mesh(40.0, 4.0, 40, 4, contact=(38.0, 40.0))
+    problem = Problem(mesh, Material(law="neo-hookean"), Load(displacement=(None, -10.0)))
+    return observed(problem, np.array([[12.0, -2.0], [24.0, -1.5]]), np.array([[0.3, -2.5], [0.0, -5.5]]))
+
+
+@pytest.mark.parametrize("weights", ["paper", "precision"])
+def test_it_has_the_least_energy_plus_misfit(problem, weights):
+    """By Taylor's formula: in any direction that keeps the load J rises by its quadratic part, exactly."""
+    solver = PinnAsmSolver(**QUICK, weights=weights)
+    level, misfit = solver.level(problem, 1.0), solver.misfit(problem)
+    points, shares = misfit.sampling()
+    where = problem.mesh.locate(points)
+
+    def seen(output: torch.Tensor) -> np.ndarray:
+        return shares @ level.field(output).displacement(where)
+
+    def total(output: torch.Tensor) -> float:
+        return level.energy.total(output) + misfit.value(seen(output))
+
+    least = level.step(level.rest)
+    drawn = np.random.default_rng(0).normal(size=level.functionals.shape[1])
+    load = level.functionals[: np.prod(level.load)]
+    drawn -= load.T @ np.linalg.solve(load @ load.T, load @ drawn)
+    direction = torch.from_numpy(drawn).view_as(least.output)
+    quadratic = level.energy.total(direction) + misfit.value(misfit.observed + seen(direction))
+    for size in (1.0, 1e-3):
+        rise = total(least.output + size * direction) - total(least.output)
+        assert rise == pytest.approx(size**2 * quadratic, rel=1e-5)
+    assert misfit.value(seen(least.output)) == pytest.approx(level.misfit(least.forces), rel=1e-6)
+    assert least.forces @ level.values == pytest.approx(2 * total(least.output), rel=1e-6), "Clapeyron"
+
+
+def test_finite_strain_has_the_least_energy_plus_misfit_nearby(bent):
+    solver = PinnLocalAsmSolver(wall_spacing=0.8, corner_spacing=0.2, ridges=3, asm_weight=0.1)
+    solution = solver.solve(bent)
+    assert solution.status.converged, solution.status.message
+    level, misfit = solver.level(bent, 1.0), solver.misfit(bent)
+    points, shares = misfit.sampling()
+    where = bent.mesh.locate(points)
+
+    def total(output: torch.Tensor) -> float:
+        field = level.field(output)
+        return level.energy.total(output) + misfit.value(shares @ field.displacement(where))
+
+    least, _ = equilibrium(level, solution.field.output, 1.0)
+    drawn = np.random.default_rng(0).normal(size=level.functionals.shape[1])
+    load = level.functionals[: np.prod(level.load)]
+    drawn -= load.T @ np.linalg.solve(load @ load.T, load @ drawn)
+    direction = 1e-4 * torch.from_numpy(drawn).view_as(least.output)
+    ahead, here, behind = (total(least.output + size * direction) for size in (1, 0, -1))
+    curvature = ahead - 2 * here + behind
+    assert curvature > 0
+    assert abs(ahead - behind) < 0.01 * curvature
+    assert solution.stats["misfit"] == pytest.approx(level.misfit(least.forces), rel=1e-6)
+
+
+def test_markers_are_met_and_energy_pays_for_it(solution, plain, problem):
+    missed = solution.displacement(problem.mesh.markers) - problem.observations.displacements
+    assert np.abs(missed).mean() < 0.01
+    before = plain.displacement(problem.mesh.markers) - problem.observations.displacements
+    assert np.abs(before).mean() > 0.05
+    assert solution.energy > plain.energy
+    assert solution.status.converged, solution.status.message
+
+
+@pytest.mark.parametrize("settings", [{"asm_weight": 0.0}, {"weights": "precision", "scale": 0.0}])
+def test_without_weight_it_is_the_network_without_markers(problem, plain, settings):
+    markers = problem.mesh.markers
+    found = PinnAsmSolver(**QUICK, **settings).solve(problem).displacement(markers)
+    np.testing.assert_allclose(found, plain.displacement(markers), rtol=1e-9)
+
+
+def test_as_the_weight_goes_to_zero_so_do_the_markers(problem, plain):
+    markers = problem.mesh.markers
+    far, near = (
+        np.abs(
+            PinnAsmSolver(**QUICK, asm_weight=weight).solve(problem).displacement(markers) - expected
+        ).max()
+        for expected in [plain.displacement(markers)]
+        for weight in (1e-6, 1e-7)
+    )
+    assert 0 < near < far < 0.01
+    assert far / near == pytest.approx(10, rel=0.05)
+
+
+def test_without_observations_it_is_the_network_without_markers(coarse_mesh, plain):
+    found = PINN_ASM.solve(Problem(coarse_mesh)).displacement(coarse_mesh.markers)
+    np.testing.assert_allclose(found, plain.displacement(coarse_mesh.markers), rtol=1e-9)
+
+
+def test_neither_order_nor_unseen_markers_matter(problem, solution):
+    observations = problem.observations
+    order = [3, 0, 8, 1, 2, 4, 7, 6, 5, 4]
+    visible = np.ones(10, dtype=bool)
+    visible[-1] = False
+    displacements = observations.displacements[order]
+    displacements[-1] = 1e3
+    other = Observations(
+        observations.points[order],
+        displacements,
+        observations.standard_deviations[order],
+        visible,
+        "by a test",
+        True,
+    )
+    found = PINN_ASM.solve(replace(problem, observations=other))
+    points = problem.mesh.points
+    np.testing.assert_allclose(found.displacement(points), solution.displacement(points), atol=1e-7)
+
+
+def test_the_first_epochs_of_the_paper_are_those_of_the_plain_implementation(problem):
+    tiny = {"width": 8, "layers": 2, "base_points": 20, "precision": "double"}
+    solver = PaperPinnAsmSolver(**tiny, epochs=5, asm_weight=100.0)
+    history = solver.solve(problem).history
+    plain = PlainPinn(problem, solver)
+    for epoch in range(5):
+        ours = [history[name][epoch] for name in ("PDE", "BC", "ASM", "total")]
+        np.testing.assert_allclose(ours, plain.step(), rtol=1e-10)
+
+
+@pytest.mark.parametrize("settings", [{}, {"marker_radius": 0.8}, {"weights": "precision"}])
+def test_the_papers_loss_is_energy_plus_misfit_over_the_area(problem, settings):
+    """Without the conditions' penalty; and its gradient is its derivative, by differences of second order."""
+    solver = PaperPinnAsmSolver(width=8, layers=2, precision="double", bc_weight=1e-300, **settings)
+    loss, parameters = solver.loss(problem), solver.network.initial(0, torch.float64)
+    evaluation = loss(parameters)
+    misfit = solver.misfit(problem)
+    points, shares = misfit.sampling()
+    moved = shares @ MlpField(solver.network, parameters).displacement(problem.mesh.locate(points))
+    value = misfit.value(moved) / problem.mesh.areas.sum()
+    assert evaluation.total == pytest.approx(evaluation.terms["PDE"] + value, rel=1e-10)
+    direction = torch.from_numpy(np.random.default_rng(1).normal(size=parameters.shape))
+    rest = [
+        abs(
+            loss(parameters + size * direction).total
+            - evaluation.total
+            - size * float((evaluation.gradient * direction).sum())
+        )
+        for size in (2e-3, 1e-3)
+    ]
+    assert rest[0] / rest[1] == pytest.approx(4, rel=0.05)
+
+
+def test_they_say_that_they_assimilate():
+    names = ("pinn-asm", "pinn-local-asm", "pinn-std", "pinn-local")
+    assert [assimilates(make_solver(name)) for name in names] == [True, True, False, False]
+
+
+def test_the_papers_preset_is_trained_and_takes_the_centres():
+    solver = make_solver("pinn-asm", preset="paper")
+    assert isinstance(solver, TrainedSolver)
+    assert assimilates(solver)
+    assert solver.settings()["marker_radius"] == 0
+    assert make_solver("pinn-asm").settings()["marker_radius"] == 0.8
+
+
+@pytest.mark.parametrize("settings", [{"asm_weight": -1.0}, {"preset": "paper", "asm_weight": -1.0}])
+def test_bad_weights_are_refused(settings):
+    with pytest.raises(UserError, match="pinn-asm: asm_weight must be zero or more, got -1"):
+        make_solver("pinn-asm", **settings)
