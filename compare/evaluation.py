@@ -54,6 +54,8 @@ class Evaluation:
         uncertainty: The solver's estimate of its own error, as differences of the exact solution from it.
         marker_uncertainty: The same at the markers, absolute, shape (m, 2), mm.
         in_sample: Whether the solver was given the observations: its errors at them are training errors.
+        left_out: What the solver says of each marker if it is not given that one, shape (m, 2), mm; None
+            where it does not tell.
         certificate: What the result is worth by the energy of finite elements; not part of the archive.
     """
 
@@ -78,6 +80,7 @@ class Evaluation:
     uncertainty: ReferenceDifferences | None = None
     marker_uncertainty: FloatArray | None = None
     in_sample: bool = False
+    left_out: FloatArray | None = None
     certificate: Certificate | None = None
 
     @classmethod
@@ -114,6 +117,7 @@ class Evaluation:
             von_mises=state.von_mises,
             energy_density=state.energy_density,
             in_sample=solution.problem.observations is not None,
+            left_out=solution.left_out,
         )
 
     @property

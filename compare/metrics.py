@@ -35,7 +35,21 @@ class MarkerErrors(NamedTuple):
 
 def marker_errors(evaluation: Evaluation, observations: Observations) -> MarkerErrors:
     """Absolute and mean absolute errors at the markers, in-sample for a solver that assimilated them."""
-    error = np.abs(evaluation.marker_displacement - observations.displacements)
+    return _errors(evaluation.marker_displacement, observations)
+
+
+def held_out_errors(evaluation: Evaluation, observations: Observations) -> MarkerErrors | None:
+    """The same at markers that the solver was not given: all, or each left out in its turn.
+
+    None for a solver that was given the markers and does not tell what it would say without.
+    """
+    if not evaluation.in_sample:
+        return marker_errors(evaluation, observations)
+    return None if evaluation.left_out is None else _errors(evaluation.left_out, observations)
+
+
+def _errors(displacement: FloatArray, observations: Observations) -> MarkerErrors:
+    error = np.abs(displacement - observations.displacements)
     error[~observations.visible] = np.nan
     mae_u, mae_v = (float(value) for value in np.nanmean(error, axis=0))
     return MarkerErrors(

@@ -13,7 +13,7 @@ from compare.differences import ReferenceDifferences
 from compare.evaluation import Evaluation
 from compare.figures import Figure
 from compare.figures.labels import solver_label
-from compare.metrics import MarkerErrors, marker_errors, reference_differences
+from compare.metrics import MarkerErrors, held_out_errors, marker_errors, reference_differences
 from compare.regions import NEAR
 from compare.tables import seconds
 from compare.uncertainty import indistinct
@@ -62,6 +62,7 @@ class SolverEntry:
     is_reference: bool
     evaluation: Evaluation
     errors: MarkerErrors
+    left_out: MarkerErrors | None
     differences: ReferenceDifferences
     indistinct: str
     reaction: tuple[float, float]
@@ -123,6 +124,7 @@ def _entry(evaluation: Evaluation, content: ReportContent) -> SolverEntry:
         is_reference=evaluation is content.reference,
         evaluation=evaluation,
         errors=marker_errors(evaluation, content.observations),
+        left_out=held_out_errors(evaluation, content.observations) if evaluation.in_sample else None,
         differences=differences,
         indistinct=text.indistinct_sentence(
             solver_label(evaluation),

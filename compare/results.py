@@ -6,7 +6,7 @@ from typing import Any
 
 from compare.differences import FieldDifference, ReferenceDifferences
 from compare.evaluation import Evaluation
-from compare.metrics import marker_errors, reference_differences
+from compare.metrics import MarkerErrors, held_out_errors, marker_errors, reference_differences
 from geometry.design import Design
 from geometry.observations import Observations
 from solvers.problem import Load, Material
@@ -27,8 +27,8 @@ def metrics(
     """Everything that `metrics.json` holds.
 
     `markers` compares with every marker that was seen. `held_out` compares with markers that the solver was
-    not given: those same markers for a solver that was given none, null for one that assimilated them.
-    Markers that were not seen are NaN.
+    not given: those same markers for a solver that was given none; each marker left out in its turn for one
+    that assimilated them, null if it does not tell. Markers that were not seen are NaN.
     """
     return {
         "schema": SCHEMA,
@@ -48,9 +48,8 @@ def metrics(
 
 
 def _solver(evaluation: Evaluation, observations: Observations, reference: Evaluation) -> dict[str, Any]:
-    errors = marker_errors(evaluation, observations)
+    errors, held_out = marker_errors(evaluation, observations), held_out_errors(evaluation, observations)
     differences = reference_differences(evaluation, reference)
-    means = {name: getattr(errors, name) for name in ("mae_u", "mae_v", "mae_sum", "mae_rss")}
     return {
         "law": evaluation.law,
         "status": "converged" if evaluation.converged else "not converged",
@@ -64,13 +63,17 @@ def _solver(evaluation: Evaluation, observations: Observations, reference: Evalu
             "in_sample": evaluation.in_sample,
             "ae_u": errors.ae_u.tolist(),
             "ae_v": errors.ae_v.tolist(),
-            **means,
+            **_means(errors),
         },
-        "held_out": None if evaluation.in_sample else means,
+        "held_out": held_out and _means(held_out),
         "uncertainty": _own_uncertainty(evaluation),
         "to_reference": _differences(differences)
         | {"reference_uncertainty": reference.uncertainty and _differences(reference.uncertainty)},
     }
+
+
+def _means(errors: MarkerErrors) -> dict[str, float]:
+    return {name: getattr(errors, name) for name in ("mae_u", "mae_v", "mae_sum", "mae_rss")}
 
 
 def _own_uncertainty(evaluation: Evaluation) -> dict[str, Any] | None:

@@ -11,9 +11,12 @@ from compare.certificate import Certificate
 from compare.differences import ReferenceDifferences
 from compare.evaluation import Evaluation
 from compare.figures.labels import IN_SAMPLE, significant, solver_at_markers, solver_label
-from compare.metrics import marker_errors, reference_differences
+from compare.metrics import MarkerErrors, held_out_errors, marker_errors, reference_differences
 from geometry.atomic import atomic_path
 from geometry.observations import Observations
+
+LEFT_OUT = "  each left out"
+"""Says of a row that each marker was left out in its turn."""
 
 Cell = str | int | float | bool
 
@@ -86,14 +89,21 @@ def mae_table(evaluations: Sequence[Evaluation], observations: Observations, ref
         distance = reference_differences(evaluation, reference).displacement.rel_l2
         table.add_row(
             solver_at_markers(evaluation).replace(" (", "\n("),
-            *(f"{value:.3f}" for value in (errors.mae_u, errors.mae_v, errors.mae_sum, errors.mae_rss)),
+            *_three_digits(errors),
             "–" if evaluation is reference else _with_own_error(distance, reference),
             f"{evaluation.energy:.4g}",
             above_fem(evaluation),
             seconds(evaluation),
             style=None if evaluation.converged else "yellow",
         )
+        if evaluation.left_out is not None:
+            left_out = held_out_errors(evaluation, observations)
+            table.add_row(LEFT_OUT, *(_three_digits(left_out) if left_out else ()))
     return table
+
+
+def _three_digits(errors: MarkerErrors) -> list[str]:
+    return [f"{value:.3f}" for value in (errors.mae_u, errors.mae_v, errors.mae_sum, errors.mae_rss)]
 
 
 def _in_sample(evaluations: Sequence[Evaluation]) -> str:
@@ -141,6 +151,9 @@ def _summary(evaluation: Evaluation, observations: Observations, reference: Eval
     row |= {"observations": observations.label, "reference": reference.solver}
     row |= {"mae_u_mm": errors.mae_u, "mae_v_mm": errors.mae_v}
     row |= {"mae_sum_mm": errors.mae_sum, "mae_rss_mm": errors.mae_rss}
+    held_out = held_out_errors(evaluation, observations)
+    for name in ("mae_u", "mae_v", "mae_sum", "mae_rss"):
+        row[f"held_out_{name}_mm"] = getattr(held_out, name) if held_out else ""
     row |= _differences("to_reference", to)
     empty = dict.fromkeys(_differences("reference_uncertainty", to), "")
     own = reference.uncertainty

@@ -132,6 +132,20 @@ def standard_deviations(observations: Observations) -> FloatArray:
     return np.maximum(observations.standard_deviations[observations.visible], SMALLEST_DEVIATION)
 
 
+def without_each(problem: Problem, missed: FloatArray) -> FloatArray:
+    """What a solver that was not given marker i says of it, from what it misses it by, (m, 2), mm.
+
+    Returns:
+        The displacement of every marker of the observations; NaN where it was not seen.
+    """
+    observations = problem.observations
+    if observations is None:
+        raise UserError("there are no markers to leave out")
+    predicted = np.full(observations.displacements.shape, np.nan)
+    predicted[observations.visible] = observations.displacements[observations.visible] - missed
+    return predicted
+
+
 def _room(mesh: TriangleMesh, points: FloatArray) -> float:
     """The least distance of points (m, 2), mm, from the boundary of the body, mm."""
     start, end = mesh.points[boundary_edges(mesh.triangles)].transpose(1, 0, 2)

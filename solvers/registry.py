@@ -30,6 +30,7 @@ PRESETS = {
 BUILT_IN = {
     "fem": "solvers.fem.linear:FemSolver",
     "fem-nonlinear": "solvers.fem.nonlinear:FemNonlinearSolver",
+    "fem-asm": "solvers.fem.assimilating:FemAsmSolver",
     "pinn-std": PRESETS["pinn-std"]["fast"],
     "pinn-local": "solvers.pinn.local:PinnLocalSolver",
     "pinn-asm": PRESETS["pinn-asm"]["fast"],

@@ -82,6 +82,8 @@ class Solution:
         stats: Numbers that describe the solve: `seconds`, `unknowns`, ...
         history: Columns of the training or load-stepping record, all of one length; empty for a direct solve.
         error: The discretisation error, where the solver estimates it.
+        left_out: Of a solver that assimilates: the displacement of each observed marker as it would be
+            without that one, shape (m, 2), mm; NaN where it was not seen.
     """
 
     solver: str
@@ -93,6 +95,7 @@ class Solution:
     stats: Mapping[str, float | int | str]
     history: Mapping[str, FloatArray] = dataclasses.field(default_factory=dict)
     error: ErrorEstimate | None = None
+    left_out: FloatArray | None = None
 
     def displacement(self, points: ArrayLike | Location) -> FloatArray:
         """Displacement at points of shape (n, 2), mm: shape (n, 2), mm.

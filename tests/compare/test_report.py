@@ -147,6 +147,9 @@ def test_errors_on_assimilated_markers_are_training_errors(content: ReportConten
     page = Page(render(replace(content, evaluations=[fem, replace(pinn, in_sample=given)])))
     assert ("in-sample" in page.values("id")) is given
     assert ("pinn-std †" in page.text) is given
+    told = replace(pinn, in_sample=given, left_out=pinn.marker_displacement if given else None)
+    page = Page(render(replace(content, evaluations=[fem, told])))
+    assert ("pinn-std, each marker left out" in page.text) is given
     assert ("pinn-std has no certificate: it pays energy for the markers" in page.text) is given
 
 

@@ -158,6 +158,10 @@ def test_held_out_errors_are_those_of_markers_that_the_solver_was_not_given(numb
     told = numbers(evaluations=[fem, replace(pinn, in_sample=True)])["solvers"]
     assert [told[name]["markers"]["in_sample"] for name in ("fem", "pinn-std")] == [False, True]
     assert told["pinn-std"]["held_out"] is None
+    left_out = replace(pinn, in_sample=True, left_out=fem.marker_displacement + np.array([0.0, 0.1]))
+    told = numbers(evaluations=[fem, left_out])["solvers"]
+    assert told["pinn-std"]["held_out"]["mae_u"] == pytest.approx(0.3)
+    assert told["pinn-std"]["held_out"]["mae_v"] == pytest.approx(0.5)
     assert told["fem"]["held_out"] == {name: told["fem"]["markers"][name] for name in ERRORS}
 
 

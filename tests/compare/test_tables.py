@@ -118,6 +118,13 @@ def test_a_solver_that_was_given_the_markers_is_marked_in_every_table(
     assert "pinn-std †" in text
     assert "fem †" not in text
     assert "† was given these markers: its errors there are training errors." in text
+    told = replace(given[1], left_out=observations.displacements + 0.125)
+    text = printed(mae_table([fem, told], observations, fem), width=80)
+    (line,) = [line for line in text.splitlines() if "each left out" in line]
+    assert line.split() == ["each", "left", "out", "0.125", "0.125", "0.250", "0.177"]
+    write_summary(tmp_path / "t.csv", evaluations=[fem, told], observations=observations, reference=fem)
+    row = read(tmp_path / "t.csv")[1]
+    assert (float(row["held_out_mae_sum_mm"]), row["in_sample"]) == (0.25, "1")
     assert "†" not in printed(mae_table([fem, pinn], observations, fem), width=80)
     write_summary(tmp_path / "s.csv", evaluations=given, observations=observations, reference=fem)
     write_markers(tmp_path / "m.csv", evaluations=given, observations=observations)

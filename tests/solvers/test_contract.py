@@ -25,7 +25,7 @@ QUICK = {
 NAMES = list(dict.fromkeys([*solver_names(), "skfem-p1"]))
 """Ours, those of the packages that are installed, and the package that lives in the tests."""
 
-ACCURACY = {"fem": 1e-8, "fem-nonlinear": 1e-6, "skfem-p1": 1e-8} | dict.fromkeys(
+ACCURACY = {"fem": 1e-8, "fem-nonlinear": 1e-6, "fem-asm": 1e-8, "skfem-p1": 1e-8} | dict.fromkeys(
     ("pinn-std", "pinn-local", "pinn-asm", "pinn-local-asm"), 0.02
 )
 """Relative difference that two solutions of one problem may have: rounding, Newton's tolerance, training.

@@ -1,0 +1,54 @@
+"""How the finger gives way to forces at markers, while its conditions at base and contact hold."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from solvers.assimilation import Misfit
+from solvers.fem.lagrange import LagrangeSpace
+from solvers.fem.least_energy import LeastEnergy, LinearSystem
+from solvers.marker_forces import MarkerForces
+from solvers.problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerCompliance:
+    """Finite-element displacements without and under forces at m markers.
+
+    Attributes:
+        least: The factorised problem; its factors are to be destroyed after use.
+        undisturbed: Nodal displacements without forces at the markers, shape (N, 2), mm.
+        sampling: The mean over a marker, by which nodal values give its displacement, shape (m, N).
+        responses: Nodal displacements under a unit force at each component of each marker, while base and
+            load hold at zero, shape (2 m, N, 2), mm per N/mm.
+    """
+
+    least: LeastEnergy
+    undisturbed: FloatArray
+    sampling: FloatArray
+    responses: FloatArray
+
+    @classmethod
+    def of(cls, problem: Problem, degree: int, misfit: Misfit | None) -> "MarkerCompliance":
+        """Factorise once; solve once for the problem and once for every component of a marker."""
+        space = LagrangeSpace(problem.mesh, degree)
+        least = LeastEnergy.of(LinearSystem.of(problem, space))
+        sampling = np.zeros((0, len(space.nodes)))
+        if misfit is not None:
+            points, weights = misfit.sampling()
+            sampling = weights @ space.shape_functions(problem.mesh.locate(points)).toarray()
+        forces = np.kron(sampling, np.eye(2)).reshape(-1, *least.held.shape)
+        responses = np.array([least.unbalanced(force)[1] for force in forces]).reshape(forces.shape)
+        return cls(least, least.solution(), sampling, responses)
+
+    def forces(self, misfit: Misfit) -> MarkerForces:
+        """The minimisers of energy plus misfit, in terms of the forces at the markers."""
+        moved = np.einsum("mn,knx->kmx", self.sampling, self.responses)
+        compliance = moved.reshape(len(moved), len(moved))
+        missed = misfit.observed - self.sampling @ self.undisturbed
+        return MarkerForces(0.5 * (compliance + compliance.T), misfit.weights, missed)
+
+    def under(self, forces: FloatArray) -> FloatArray:
+        """Nodal displacements under forces at the markers, shape (m, 2), N/mm: shape (N, 2), mm."""
+        return np.asarray(self.undisturbed + np.einsum("k,knx->nx", forces.ravel(), self.responses))

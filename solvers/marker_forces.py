@@ -1,0 +1,93 @@
+"""Least energy plus misfit in the few unknowns that matter: the forces by which the markers are pulled.
+
+Let G_j be the displacement under a unit force at component j of the markers while all conditions hold at
+zero, and C = B G their compliance. The minimiser of E(u) + 1/2 (B u - d)^T W (B u - d) is u = u_0 + G p:
+without the markers' forces p it is u_0, and
+
+    (W^-1 + C) p = d - B u_0        E(u) = E(u_0) + 1/2 p^T C p
+
+(Sherman, Morrison, Woodbury). One eigen-decomposition of W^1/2 C W^1/2 gives it for all factors of W; with
+M = (W^-1 + C)^-1, what marker i would be missed by without it is M_ii^-1 p_i, a block of 2 by 2.
+
+Sources: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006, section
+5.4.2, for leaving one out, and equation 2.30 for the evidence: with the prior exp(-E / T) the compliance
+times T is the prior covariance of B u. P. C. Hansen, SIAM Review 34 (1992) 561-580, for the L-curve.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+
+
+class Fit(NamedTuple):
+    """The minimiser for one factor of the weights.
+
+    Attributes:
+        forces: p, shape (m, 2), N/mm.
+        residual: What the markers are missed by, d - B u, shape (m, 2), mm.
+        left_out: What each marker would be missed by without it, the other weights as they are, (m, 2), mm.
+        energy: E(u) - E(u_0), N mm / mm.
+    """
+
+    forces: FloatArray
+    residual: FloatArray
+    left_out: FloatArray
+    energy: float
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerForces:
+    """The minimisers for all factors of the weights.
+
+    Attributes:
+        compliance: C, shape (2 m, 2 m), mm per N/mm, the two components of a marker one after the other.
+        weights: The diagonal of W, positive, shape (m, 2), MPa.
+        missed: d - B u_0, shape (m, 2), mm.
+    """
+
+    compliance: FloatArray
+    weights: FloatArray
+    missed: FloatArray
+
+    @cached_property
+    def _modes(self) -> tuple[FloatArray, FloatArray]:
+        root = np.sqrt(self.weights.ravel())
+        values, vectors = np.linalg.eigh(root[:, None] * self.compliance * root)
+        return np.maximum(values, 0.0), vectors
+
+    @cached_property
+    def _in_modes(self) -> FloatArray:
+        """W^1/2 (d - B u_0) in the eigenvectors, shape (2 m,)."""
+        return np.asarray(self._modes[1].T @ (np.sqrt(self.weights) * self.missed).ravel())
+
+    def fit(self, factor: float = 1.0) -> Fit:
+        """The minimiser for weights times a factor, which is positive."""
+        values, vectors = self._modes
+        root, count = np.sqrt(self.weights), len(self.weights)
+        damped = vectors / (1 + factor * values)
+        scaled = (damped @ self._in_modes).reshape(-1, 2)
+        blocks = (damped @ vectors.T).reshape(count, 2, count, 2)[np.arange(count), :, np.arange(count)]
+        forces = factor * root * scaled
+        return Fit(
+            forces=forces,
+            residual=scaled / root,
+            left_out=np.linalg.solve(blocks, scaled[..., None])[..., 0] / root,
+            energy=0.5 * float(forces.ravel() @ self.compliance @ forces.ravel()),
+        )
+
+    def log_evidence(self, scale: float, factor: float = 1.0) -> float:
+        """Logarithm of the density of d, but for a constant, where W = scale / σ².
+
+        The errors' standard deviations σ are what they are; the prior is exp(-E / (factor scale)).
+
+        Args:
+            scale: Of the weights, N mm / mm.
+            factor: Of the scale.
+        """
+        values, _ = self._modes
+        spread = 1 + factor * values
+        return -0.5 * float((self._in_modes**2 / spread).sum() / scale + np.log(spread).sum())

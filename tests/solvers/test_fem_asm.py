@@ -1,0 +1,216 @@
+"""`fem-asm` against a dense minimisation, refits, limits and its own derivative."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.errors import UserError
+from geometry.observations import Observations
+from solvers.assimilation import misfit_of
+from solvers.fem.assimilating import FACTORS, FemAsmSolver
+from solvers.fem.lagrange import LagrangeSpace
+from solvers.fem.least_energy import LinearSystem
+from solvers.fem.linear import FemSolver
+from solvers.problem import Load, Problem, contact_functional
+
+LOADS = ("mean", "point", "patch")
+
+
+def pulled(mesh, load, *, hidden=()):
+    """Markers that are 1 mm or so from where `fem` has them, with deviations of every size."""
+    random = np.random.default_rng(4)
+    problem = Problem(mesh, load=load)
+    points = mesh.markers
+    visible = np.ones(len(points), dtype=bool)
+    visible[list(hidden)] = False
+    moved = FemSolver(estimate=False).solve(problem).displacement(points) + random.normal(size=points.shape)
+    deviations = random.uniform(0.02, 0.5, points.shape)
+    return replace(problem, observations=Observations(points, moved, deviations, visible, "by a test", True))
+
+
+@pytest.fixture(scope="module", params=LOADS)
+def problem(request, coarse_mesh):
+    return pulled(coarse_mesh, Load(kind=request.param), hidden=(3,))
+
+
+SOFT = FemAsmSolver(weights="precision", scale=0.05)
+"""Neither the finger nor the markers have it their own way."""
+
+
+def dense(problem, solver):
+    """The minimiser by Lagrange multipliers on the whole stiffness, without the solver's algebra."""
+    space = LagrangeSpace(problem.mesh, solver.degree)
+    system = LinearSystem.of(problem, space)
+    free = np.zeros((len(space.nodes), 2), dtype=bool)
+    matrix = system.assemble(free)
+    matrix.convert("dense")
+    size = free.size
+    node_of_dof = np.repeat(system.distributed._node_of_dof, 2) * 2 + np.tile([0, 1], len(space.nodes))
+    stiffness = np.zeros((size, size))
+    stiffness[np.ix_(node_of_dof, node_of_dof)] = matrix.getDenseArray()
+    misfit = misfit_of(problem, weights=solver.weights, scale=solver.scale)
+    points, weights = misfit.sampling()
+    at = np.kron(weights @ space.shape_functions(problem.mesh.locate(points)).toarray(), np.eye(2))
+    conditions, values = [], []
+
+    def hold(rows, axis, to):
+        for row in rows:
+            conditions.append(np.kron(row, np.eye(2)[axis]))
+            values.append(to)
+
+    for axis in (0, 1):
+        hold(np.eye(len(space.nodes))[space.boundary_nodes("base")], axis, 0.0)
+        to = problem.load.displacement[axis]
+        if problem.load.kind == "patch":
+            hold(np.eye(len(space.nodes))[space.boundary_nodes("contact")], axis, to)
+        else:
+            contact, functional = contact_functional(problem)
+            row = functional @ space.shape_functions(problem.mesh.locate(contact)).toarray()
+            hold([row], axis, to)
+    bordered = np.array(conditions)
+    diagonal = misfit.weights.ravel()
+    matrix = np.block(
+        [
+            [stiffness + at.T * diagonal @ at, bordered.T],
+            [bordered, np.zeros((len(bordered), len(bordered)))],
+        ]
+    )
+    right = np.concatenate([at.T @ (diagonal * misfit.observed.ravel()), values])
+    nodal = np.linalg.solve(matrix, right)[:size]
+    reaction = (stiffness @ nodal - at.T @ (diagonal * (misfit.observed.ravel() - at @ nodal))).reshape(-1, 2)
+    moved = np.setdiff1d(np.arange(len(space.nodes)), space.boundary_nodes("base"))
+    return nodal.reshape(-1, 2), 0.5 * nodal @ stiffness @ nodal, reaction[moved].sum(axis=0)
+
+
+def test_it_is_the_minimiser_by_dense_algebra(problem):
+    solver = replace(SOFT, degree=1)
+    solution = solver.solve(problem)
+    nodal, energy, reaction = dense(problem, solver)
+    assert np.abs(solution.field.values - nodal).max() < 1e-8 * np.abs(nodal).max()
+    assert solution.energy == pytest.approx(energy, rel=1e-8)
+    np.testing.assert_allclose(solution.reaction, reaction, atol=1e-8 * np.abs(reaction).max())
+
+
+def test_leaving_a_marker_out_in_closed_form_is_solving_again_without_it(problem):
+    """The weights of the others stay: the precision of an observation is its own."""
+    solution = SOFT.solve(problem)
+    observations = problem.observations
+    for marker in range(9):
+        if not observations.visible[marker]:
+            assert np.isnan(solution.left_out[marker]).all()
+            continue
+        visible = observations.visible.copy()
+        visible[marker] = False
+        again = SOFT.solve(replace(problem, observations=replace(observations, visible=visible)))
+        only = np.arange(9) == marker
+        disc = misfit_of(replace(problem, observations=replace(observations, visible=only)))
+        points, weights = replace(disc, radius=misfit_of(problem).radius).sampling()
+        expected = weights @ again.displacement(points)
+        np.testing.assert_allclose(solution.left_out[[marker]], expected, atol=1e-8)
+
+
+def test_weak_weights_give_fem(problem):
+    plain = FemSolver(estimate=False).solve(replace(problem, observations=None))
+    solution = FemAsmSolver(asm_weight=1e-13).solve(problem)
+    assert np.abs(solution.field.values - plain.field.values).max() < 1e-8
+    assert solution.energy == pytest.approx(plain.energy, rel=1e-8)
+    np.testing.assert_allclose(solution.reaction, plain.reaction, rtol=1e-7, atol=1e-9)
+
+
+def test_strong_weights_go_through_the_markers(problem):
+    observations = problem.observations
+    solution = FemAsmSolver(asm_weight=1e9, marker_radius=0.0).solve(problem)
+    missed = solution.displacement(observations.points) - observations.displacements
+    assert np.abs(missed[observations.visible]).max() < 1e-8
+    assert np.abs(missed[~observations.visible]).max() > 0.1
+
+
+@pytest.mark.parametrize("problem", ["mean"], indirect=True)
+def test_energy_plus_misfit_is_least(problem):
+    """Taylor: no slope at the minimiser in any direction that keeps the conditions, and a curvature."""
+    solution = SOFT.solve(problem)
+    misfit = misfit_of(problem, weights="precision", scale=SOFT.scale)
+    points, weights = misfit.sampling()
+    space = solution.field.space
+    system = LinearSystem.of(problem, space)
+    at = weights @ space.shape_functions(problem.mesh.locate(points)).toarray()
+
+    def total(nodal):
+        return 0.5 * (nodal * system.residual(nodal)).sum() + misfit.value(at @ nodal)
+
+    least = total(solution.field.values)
+    plain = FemSolver(estimate=False).solve(replace(problem, observations=None))
+    other = FemSolver(estimate=False).solve(
+        replace(problem, observations=None, load=Load(kind="patch", displacement=(0.0, -10.0)))
+    )
+    for direction in (plain.field.values - solution.field.values, other.field.values - plain.field.values):
+        rises = [total(solution.field.values + step * direction) - least for step in (1e-2, 1e-3, -1e-3)]
+        assert rises[0] > 0
+        assert rises[0] == pytest.approx(100 * rises[1], rel=1e-4)
+        assert rises[2] == pytest.approx(rises[1], rel=1e-4)
+
+
+@pytest.mark.parametrize("problem", ["mean"], indirect=True)
+def test_the_curve_is_what_other_weights_give(problem):
+    curve = SOFT.solve(problem).history
+    plain = FemSolver(estimate=False).solve(replace(problem, observations=None))
+    for number in (20, 36, 40):
+        other = replace(SOFT, scale=SOFT.scale * FACTORS[number]).solve(problem)
+        assert other.energy - plain.energy == pytest.approx(curve["curve_energy"][number], rel=1e-6)
+        seen = problem.observations.visible
+        missed = (other.left_out - problem.observations.displacements)[seen]
+        assert np.sqrt((missed**2).mean()) == pytest.approx(curve["curve_left_out_mm"][number], rel=1e-8)
+    # Assimilation costs energy, and the more the markers weigh, the more.
+    assert (np.diff(curve["curve_energy"]) > 0).all()
+    assert (np.diff(curve["curve_in_sample_mm"]) < 0).all()
+
+
+@pytest.mark.parametrize("problem", ["mean"], indirect=True)
+@pytest.mark.parametrize("choose", ["left-out", "evidence"])
+def test_the_chosen_weights_are_the_best_on_the_curve(problem, choose):
+    solution = replace(SOFT, choose=choose).solve(problem)
+    curve = solution.history
+    score = -curve["curve_left_out_mm"] if choose == "left-out" else curve["curve_log_evidence"]
+    assert solution.stats["weight_factor"] == FACTORS[score.argmax()]
+    assert 0 < score.argmax() < len(FACTORS) - 1
+
+
+@pytest.mark.parametrize("problem", ["mean"], indirect=True)
+def test_the_evidence_is_the_normal_density_of_the_markers(problem):
+    """By SciPy, with the covariance of the prior from the compliance."""
+    from scipy.stats import multivariate_normal
+
+    finger, misfit = SOFT.prepare(problem)
+    forces = finger.forces(misfit)
+    variances = problem.observations.standard_deviations[problem.observations.visible].ravel() ** 2
+    expected = [
+        multivariate_normal.logpdf(
+            forces.missed.ravel(), cov=factor * SOFT.scale * forces.compliance + np.diag(variances)
+        )
+        for factor in (0.01, 1.0)
+    ]
+    rise = forces.log_evidence(SOFT.scale, 0.01) - forces.log_evidence(SOFT.scale)
+    assert rise == pytest.approx(expected[0] - expected[1], rel=1e-9)
+
+
+def test_without_markers_it_is_fem(coarse_mesh):
+    problem = Problem(coarse_mesh)
+    solution = FemAsmSolver().solve(problem)
+    assert solution.field.values.tolist() == FemSolver().solve(problem).field.values.tolist()
+    assert solution.solver == "fem-asm"
+    assert solution.left_out is None
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"degree": 3}, "degree 1 and 2, not 3"),
+        ({"weights": "equal"}, "weights must be paper or precision"),
+        ({"choose": "best"}, "choose must be given, left-out, evidence"),
+        ({"choose": "evidence"}, "needs weights=precision"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(settings, said):
+    with pytest.raises(UserError, match=said):
+        FemAsmSolver(**settings)
