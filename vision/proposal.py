@@ -19,8 +19,8 @@ from vision.frames import Image
 Window = tuple[int, int, int, int]
 """x0, y0, x1, y1, pixels; x1 and y1 are outside."""
 
-VOTES = 8
-"""Gradients that must point at a centre: of the about 23 edge pixels of the smallest disc, a third."""
+VOTES = (5.0, 8.0)
+"""Gradients that must point at a centre: twice the least radius, a third of the edge, within these limits."""
 EDGE = 100.0
 """Canny's higher threshold; the blurred mask's edges have 160 or more whatever the light."""
 LEAST_FILL = 0.5
@@ -65,7 +65,7 @@ def propose(
         dp=1,
         minDist=max(least, 3.0),
         param1=EDGE,
-        param2=VOTES,
+        param2=float(np.clip(2 * least, *VOTES)),
         minRadius=int(least),
         maxRadius=ceil(largest),
     )
@@ -97,7 +97,8 @@ def highlighted(
     picture = cv2.addWeighted(coloured, 0.5, np.full_like(coloured, 255), 0.5, 0)
     picture[mask > 0] = (200, 0, 200)
     for x, y, r in np.empty((0, 3)) if circles is None else circles:
-        cv2.circle(picture, (round(x), round(y)), round(r) + 2, (0, 140, 0), 1, cv2.LINE_AA)
+        centre = (round(16 * x), round(16 * y))  # with 4 bits behind the point
+        cv2.circle(picture, centre, round(16 * (r + 2)), (0, 140, 0), 1, cv2.LINE_AA, shift=4)
     return np.asarray(picture, dtype=np.uint8), float(mask.mean()) / 255
 
 

@@ -5,9 +5,15 @@ import pytest
 from dots import Dots, dots, draw_disc
 
 from geometry.arrays import FloatArray
+from geometry.design import Design
 from geometry.errors import UserError
 from vision.colour import DARK, ColourRange
-from vision.proposal import propose
+from vision.proposal import highlighted, propose
+from vision.rig.bench import Bench
+from vision.rig.exposure import Exposure
+from vision.rig.render import render
+from vision.rig.view import default_camera, view
+from vision.workspace import default_workspace
 
 
 def missed(scene: Dots, found: FloatArray) -> int:
@@ -57,6 +63,25 @@ def test_coloured_discs_are_proposed_alone():
     assert len(found) == 9
 
 
+@pytest.mark.parametrize("paint", ["dark", "blue"])
+@pytest.mark.parametrize("monochrome", [False, True])
+def test_all_markers_and_fiducials_of_the_rig_are_proposed(paint, monochrome, coarse_mesh):
+    """A pressed finger seen under 5 degrees, in bad light: nearly nothing else is proposed."""
+    workspace, camera = default_workspace(Design()), default_camera()
+    bench = Bench(coarse_mesh, Design(), workspace, paint=paint)
+    x = coarse_mesh.points[:, 0] / 90
+    pressed = -10 * np.column_stack([0.2 * x**2, x**2])
+    pose = view(camera, workspace, tilt=5.0)
+    exposure = Exposure(noise=6, blur=1.5, gradient=0.3, monochrome=monochrome)
+    image = render(bench.scene(pressed), camera, pose, exposure)
+    fiducials = np.column_stack([workspace.points, np.zeros(7)])
+    for points, radius in ((bench.markers(pressed), 7.6), (fiducials, 19.0)):  # pixels
+        found = propose(image, radii=(0.7 * radius, 1.3 * radius))
+        apart = np.linalg.norm(found[:, None, :2] - camera.project(points, pose), axis=2)
+        assert apart.min(axis=0).max() < 3
+        assert len(found) <= len(points) + 3
+
+
 def test_a_window_gives_what_the_whole_image_gives_there():
     scene = dots(7.6)
     x, y, _ = scene.discs[4]
@@ -93,3 +118,15 @@ def test_discs_that_touch_are_told_apart_and_none_is_proposed_twice():
 def test_impossible_radii_are_refused(radii):
     with pytest.raises(UserError, match="they must go from above 0 upwards"):
         propose(np.zeros((20, 20), np.uint8), radii=radii)
+
+
+def test_the_picture_to_check_by_eye_shows_what_has_the_colour_and_the_circles():
+    scene = dots(7.6, noise=0.0, blur=0.5, shading=0.0, size=(640, 360))
+    picture, share = highlighted(scene.image, ColourRange((0, -128, -128), (40, 127, 127)), scene.discs[:1])
+    magenta = (picture == (200, 0, 200)).all(axis=2)
+    assert magenta.mean() == pytest.approx(share)
+    assert share == pytest.approx(np.pi * (scene.discs[:, 2] ** 2).sum() / (640 * 360), rel=0.05)
+    x, y, _ = scene.discs[0]
+    green = (picture == (0, 140, 0)).all(axis=2)
+    rows, columns = np.nonzero(green)
+    assert np.hypot(columns - x, rows - y) == pytest.approx(7.6 + 2, abs=1)
