@@ -12,6 +12,7 @@ from compare.verbs.design import design
 from compare.verbs.gridsearch import gridsearch
 from compare.verbs.mesh import mesh
 from compare.verbs.pick import pick
+from compare.verbs.rig import rig
 from compare.verbs.solve import solve
 from compare.verbs.solvers import solvers
 
@@ -22,7 +23,7 @@ pinnray = App(
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
-for verb in (compare, design, mesh, solve, gridsearch, solvers, calibrate, pick):
+for verb in (compare, design, mesh, solve, gridsearch, solvers, calibrate, pick, rig):
     pinnray.command(verb, help_epilogue=EXIT_CODES)
 
 

@@ -5,7 +5,8 @@ import warnings
 from collections.abc import Callable
 from typing import Any, TextIO
 
-from cyclopts import CycloptsError, UnusedCliTokensError
+import pydantic
+from cyclopts import CycloptsError, UnusedCliTokensError, ValidationError
 
 from geometry.errors import UserError
 
@@ -24,6 +25,11 @@ def guarded(command: Callable[[], Any]) -> int:
             return int(command() or 0)
         except UnusedCliTokensError as error:
             say(f"error: {' '.join(error.unused_tokens or ())!r} belongs to no option; see --help")
+        except ValidationError as error:  # of settings that are given as options
+            cause = error.__cause__
+            problems = cause.errors() if isinstance(cause, pydantic.ValidationError) else []
+            said = [problem["msg"].removeprefix("Value error, ") for problem in problems] or [str(error)]
+            say(f"error: {'; '.join(said)}")
         except (UserError, CycloptsError) as error:
             say(f"error: {error}")
         except OSError as error:

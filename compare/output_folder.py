@@ -9,10 +9,13 @@ import fcntl
 import json
 import os
 import shutil
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
+from compare.provenance import file_digest
+from geometry.atomic import write_json
 from geometry.errors import UserError
 
 RUN_FILE = "run.json"
@@ -33,7 +36,7 @@ def check_output(out: Path) -> None:
     files = (path.relative_to(out) for path in out.rglob("[!.]*") if path.is_file())
     if foreign := next((path for path in files if path.as_posix() not in ours), None):
         raise UserError(
-            f"{out} holds {foreign}, which is not of a comparison and would be lost; "
+            f"{out} holds {foreign}, which no run has written and which would be lost; "
             "move it, or name another folder with --out"
         )
 
@@ -69,6 +72,16 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
                         folder.rmdir()
             raise
         _take_place(partial, out)
+
+
+def write_run(folder: Path, provenance: Mapping[str, Any]) -> None:
+    """Write `run.json`: what the results depend on, and the SHA-256 of every file beside it."""
+    files = {
+        path.relative_to(folder).as_posix(): file_digest(path)
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name != RUN_FILE
+    }
+    write_json(folder / RUN_FILE, {"schema": 1, **provenance, "files_sha256": files})
 
 
 def take_training(name: str, source: Path, target: Path) -> None:

@@ -15,7 +15,7 @@ from compare.fields import write_vtu
 from compare.figures import draw_all
 from compare.force_displacement import force_curves, write_force_displacement
 from compare.metrics import pick_reference
-from compare.output_folder import RUN_FILE, SOLUTIONS, TRAINING, check_output, replaced_folder, take_training
+from compare.output_folder import SOLUTIONS, TRAINING, check_output, replaced_folder, take_training, write_run
 from compare.provenance import file_digest, machine, package_versions, sources_digest
 from compare.report import ReportContent, write_report
 from compare.results import metrics
@@ -191,12 +191,7 @@ def run(job: Job, stages: Stages) -> Outcome:
                     adaptation=adaptation,
                 ),
             )
-            files = {
-                path.relative_to(folder).as_posix(): file_digest(path)
-                for path in sorted(folder.rglob("*"))
-                if path.is_file() and path.name != RUN_FILE
-            }
-            write_json(folder / RUN_FILE, {"schema": 1, **provenance, "files_sha256": files})
+            write_run(folder, provenance)
     return Outcome(numbers, evaluations, observations, reference, adaptation)
 
 

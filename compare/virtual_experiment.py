@@ -18,6 +18,7 @@ from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.problem import Load, Problem
 from solvers.registry import make_solver
+from solvers.solution import Solution
 from solvers.solver import Progress, Solver, silent
 from vision.measurements import read_measurements, write_measurements
 
@@ -37,46 +38,72 @@ def virtual_experiment(problem: Problem, progress: Progress = silent) -> Observa
     Raises:
         UserError: If the simulation cannot be run or does not reach the full load.
     """
-    normal = problem.load.displacement[1]
-    if normal is None:
-        raise UserError(
-            "the virtual experiment presses on the finger: prescribe v, or give --measurements FILE.csv"
-        )
-    if problem.load.position is not None:
-        raise UserError(
-            "the virtual experiment presses where the mesh has its contact: mesh the finger with its "
-            "contact_position there, or give --measurements FILE.csv"
-        )
     try:
-        solver = make_solver("fem-nonlinear")
-    except ImportError as error:
-        raise UserError(f"the virtual experiment: {error}; or give --measurements FILE.csv") from None
-    richer = Problem(
-        mesh=problem.mesh,
-        material=problem.material.model_copy(update={"law": "neo-hookean", "plane": "strain"}),
-        load=Load(kind="patch", displacement=(None, normal)),
-    )
-    entry = cache_folder() / f"experiment-{_key(solver, richer)}.csv"
-    if entry.exists():
-        with suppress(UserError):  # a damaged file is made again
-            observations = read_measurements(entry)
-            progress(1.0, "from the cache")
-            return observations
-    solution = solver.solve(richer, progress)
-    if not solution.status.converged:
-        raise UserError(f"the virtual experiment {solution.status.message}; or give --measurements FILE.csv")
+        solver, richer = _richer(problem)
+        entry = cache_folder() / f"experiment-{_key(solver, richer)}.csv"
+        if entry.exists():
+            with suppress(UserError):  # a damaged file is made again
+                observations = read_measurements(entry)
+                progress(1.0, "from the cache")
+                return observations
+        solution = _solved(solver, richer, progress)
+    except UserError as error:
+        raise UserError(f"{error}; or give --measurements FILE.csv") from None
     markers = problem.mesh.markers
     observations = Observations(
         points=markers,
         displacements=solution.displacement(markers),
         standard_deviations=np.zeros_like(markers),
         visible=np.ones(len(markers), dtype=bool),
-        source=SOURCE.format(-normal),
+        source=said_of(problem),
         simulated=True,
     )
     with atomic_path(entry) as partial:
         write_measurements(partial, observations)
     return observations
+
+
+def simulation(problem: Problem, progress: Progress = silent) -> Solution:
+    """The solution whose displacements `virtual_experiment` gives at the markers; it is not kept.
+
+    Raises:
+        UserError: If it cannot be run or does not reach the full load.
+    """
+    return _solved(*_richer(problem), progress)
+
+
+def said_of(problem: Problem) -> str:
+    """One sentence on where the numbers of the simulation come from."""
+    return SOURCE.format(-(problem.load.displacement[1] or 0.0))
+
+
+def _solved(solver: Solver, richer: Problem, progress: Progress) -> Solution:
+    solution = solver.solve(richer, progress)
+    if not solution.status.converged:
+        raise UserError(f"the virtual experiment {solution.status.message}")
+    return solution
+
+
+def _richer(problem: Problem) -> tuple[Solver, Problem]:
+    """What simulates, and the problem that it solves."""
+    normal = problem.load.displacement[1]
+    if normal is None:
+        raise UserError("the virtual experiment presses on the finger: prescribe v")
+    if problem.load.position is not None:
+        raise UserError(
+            "the virtual experiment presses where the mesh has its contact: mesh the finger with its "
+            "contact_position there"
+        )
+    try:
+        solver = make_solver("fem-nonlinear")
+    except ImportError as error:
+        raise UserError(f"the virtual experiment: {error}") from None
+    richer = Problem(
+        mesh=problem.mesh,
+        material=problem.material.model_copy(update={"law": "neo-hookean", "plane": "strain"}),
+        load=Load(kind="patch", displacement=(None, normal)),
+    )
+    return solver, richer
 
 
 def _key(solver: Solver, problem: Problem) -> str:

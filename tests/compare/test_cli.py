@@ -158,7 +158,7 @@ BAD = [
     ("compare --measurements binary.csv", "binary.csv: it is not a CSV file in UTF-8"),
     ("compare --mesh-size 1 --measurements outside.csv", "not of this finger: .* outside the body"),
     # where to write
-    ("compare --out foreign", "foreign holds thesis.txt, which is not of a comparison"),
+    ("compare --out foreign", "foreign holds thesis.txt, which no run has written"),
     ("compare --out file", "file is a file; name a folder with --out"),
     ("compare --out file/below", "cannot write to .*: Not a directory"),
     ("compare --out /proc/absent/run", "cannot write to /proc/absent/run.partial"),  # whoever runs this

@@ -159,7 +159,7 @@ def test_our_own_result_an_empty_folder_and_none_may_be_replaced(out, tmp_path):
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (lambda out: (out / "notes.txt").write_text("mine"), "holds notes.txt, which is not of a comparison"),
+        (lambda out: (out / "notes.txt").write_text("mine"), "holds notes.txt, which no run has written"),
         (lambda out: (out / "solutions" / "mine.npz").write_text(""), "holds solutions/mine.npz"),
         (lambda out: (out / "run.json").write_text("{}"), "holds "),  # another program's run.json
         (lambda out: (out / "run.json").write_text("[1]"), "holds "),

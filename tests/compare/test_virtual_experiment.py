@@ -145,7 +145,7 @@ def test_an_experiment_that_stops_halfway_is_refused_and_not_kept(problem, cache
 
 
 def test_without_a_prescribed_v_there_is_no_experiment(problem, solutions):
-    with pytest.raises(UserError, match="prescribe v, or give --measurements"):
+    with pytest.raises(UserError, match="prescribe v; or give --measurements"):
         virtual_experiment(replace(problem, load=Load(displacement=(1.0, None))))
     assert not solutions
 

@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from geometry.errors import UserError
 from geometry.messages import one_line
@@ -33,6 +33,13 @@ class Exposure(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
+    blur: float = bounded(0.8, 0, 20, "px", "", "Standard deviation of the blur of the lens")
+    noise: float = bounded(
+        1.0, 0, 100, "grey levels", "", "Standard deviation of the noise that is there without light too"
+    )
+    full_well: float | None = bounded(
+        None, 100, 1e9, "electrons", "", "That make grey level 255, for photon noise; none: no such noise"
+    )
     white: float = bounded(235.0, 10, 1000, "grey levels", "", "Of a white surface in the image's middle")
     gradient: float = bounded(
         0.1, 0, 0.9, "", "", "Growth of the light from the middle of the image to its side, relative"
@@ -40,14 +47,7 @@ class Exposure(BaseModel):
     gradient_direction: float = bounded(
         30.0, -360, 360, "deg", "", "Where the light grows to, from right to down"
     )
-    blur: float = bounded(0.8, 0, 20, "px", "", "Standard deviation of the lens's blur")
-    noise: float = bounded(
-        1.0, 0, 100, "grey levels", "", "Standard deviation of the noise that is there without light"
-    )
-    full_well: float | None = bounded(
-        None, 100, 1e9, "electrons", "", "That make grey level 255, for photon noise; none: no such noise"
-    )
-    monochrome: bool = False
+    monochrome: bool = Field(default=False, description="A camera without colours")
 
     def __init__(self, **values: Any) -> None:
         try:

@@ -25,8 +25,8 @@ class Motion(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     rest: int = bounded(30, 1, 100_000, "frames", "", "Before the finger is pressed")
-    moving: int = bounded(30, 0, 100_000, "frames", "", "While it is; 0 is a jump between two frames")
-    held: int = bounded(30, 1, 100_000, "frames", "", "After that")
+    moving: int = bounded(30, 0, 100_000, "frames", "", "While it is pressed; 0 is a jump between two frames")
+    held: int = bounded(30, 1, 100_000, "frames", "", "While it is held")
     rate: float = bounded(30.0, 0.1, 1000, "1/s", "", "Frames a second")
     shutter: float = bounded(0.3, 0, 0.9, "", "", "Share of the time for which the shutter is open")
 
@@ -39,6 +39,17 @@ class Motion(BaseModel):
     def __len__(self) -> int:
         """Number of frames."""
         return self.rest + self.moving + self.held
+
+    @property
+    def parts(self) -> dict[str, range]:
+        """The frames of every part of the recording."""
+        pressed, end = self.rest + self.moving, len(self)
+        return {
+            "all": range(end),
+            "rest": range(self.rest),
+            "moving": range(self.rest, pressed),
+            "held": range(pressed, end),
+        }
 
     def load(self, time: ArrayLike) -> FloatArray:
         """Share of the load that acts at times, both of shape (n,); the frames start at 0, 1, 2, ..."""

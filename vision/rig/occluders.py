@@ -1,13 +1,17 @@
 """Things that come between the camera and the finger."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.arrays import FloatArray
+from geometry.errors import UserError
 from vision.camera import Camera, Pose
+from vision.rig.bench import Bench
 from vision.rig.coverage import coverage
+from vision.rig.motion import Motion
 from vision.rig.shapes import Shape, closed, seen_edges
 
 CABLE = (0.10, 0.10, 0.11)
@@ -34,6 +38,46 @@ def cable(
     far = near + width * across
     ends = [near - REACH * along, far - REACH * along, far + REACH * along, near + REACH * along]
     return Shape(closed(ends), CABLE, z)
+
+
+def cables(
+    bench: Bench, displacement: FloatArray, motion: Motion, shares: Mapping[int, float], during: str = "all"
+) -> Callable[[int], Sequence[Shape]]:
+    """Cables that hide the same shares of some markers' diameters in every frame of a part of a recording.
+
+    Args:
+        bench: With the markers, from 1 on.
+        displacement: Of the mesh's nodes under the whole load, shape (n, 2), mm.
+        motion: Whose frames they are.
+        shares: By the number of the marker.
+        during: One of `motion.parts`.
+
+    Returns:
+        What is before the finger in a frame.
+
+    Raises:
+        UserError: If there is no such marker, or a share is not between 0 and 1.
+    """
+    count = len(bench.mesh.marker_nodes)
+    for number, share in shares.items():
+        if not 1 <= number <= count:
+            raise UserError(f"there is no marker {number} to cover; there are 1 to {count}")
+        if not 0 <= share <= 1:
+            raise UserError(f"marker {number} cannot be covered by {share:g} of its diameter; give 0 to 1")
+
+    @cache
+    def at(load: float) -> tuple[Shape, ...]:
+        centres = bench.markers(load * displacement)
+        radius = bench.parameters.marker_diameter / 2
+        return tuple(
+            cable(centres[number - 1, :2], radius, share, z=bench.workspace.marker_plane)
+            for number, share in shares.items()
+        )
+
+    def occluders(frame: int) -> tuple[Shape, ...]:
+        return at(float(motion.load(frame + motion.shutter / 2))) if frame in motion.parts[during] else ()
+
+    return occluders
 
 
 def share_seen(shape: Shape, occluders: Sequence[Shape], camera: Camera, pose: Pose) -> float:

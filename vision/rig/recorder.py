@@ -1,7 +1,7 @@
 """A recording as files: the video, and everything that is needed to score who tracks it."""
 
 import csv
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -9,10 +9,13 @@ import cv2
 
 from geometry.atomic import write_json
 from geometry.errors import UserError
+from vision.camera import Pose
 from vision.camera_file import save_camera
 from vision.measurements import write_measurements
 from vision.rig.exposure import Image
 from vision.rig.recording import Recording, Truth
+from vision.rig.render import render
+from vision.rig.shapes import Scene
 from vision.video import CODECS, VideoWriter
 
 PICTURES = "png"
@@ -44,8 +47,7 @@ def record(
     Raises:
         UserError: If the codec is unknown or a file cannot be written.
     """
-    if codec not in FILES:
-        raise UserError(f"there is no codec {codec!r}; there are {', '.join(FILES)}")
+    check_codec(codec)
     count, rate = len(recording.motion), recording.motion.rate
     with ExitStack() as stack:
         write = _writer(recording, folder / FILES[codec], stack)
@@ -60,6 +62,38 @@ def record(
     save_camera(folder / "camera.json", recording.camera)
     write_json(folder / "workspace.json", recording.bench.workspace.model_dump(mode="json"))
     write_json(folder / "truth.json", _settings(recording))
+
+
+def check_codec(codec: str) -> None:
+    """Raise `UserError` unless there is such a codec."""
+    if codec not in FILES:
+        raise UserError(f"there is no codec {codec!r}; there are {', '.join(FILES)}")
+
+
+def photograph(
+    scene: Scene,
+    poses: Sequence[Pose],
+    recording: Recording,
+    folder: Path,
+    *,
+    progress: Callable[[float, str], None] = lambda fraction, text: None,
+) -> None:
+    """Photograph a scene in some poses with the camera of a recording, as PNG pictures in a new folder.
+
+    The noise is that of frames which the recording does not have.
+    """
+    folder.mkdir()
+    for number, pose in enumerate(poses):
+        image = render(
+            scene,
+            recording.camera,
+            pose,
+            recording.exposure,
+            seed=recording.seed,
+            frame=len(recording.motion) + number,
+        )
+        write_picture(folder / f"{number:03d}.png", image)
+        progress((number + 1) / len(poses), f"{number + 1} of {len(poses)} photographs")
 
 
 def _writer(recording: Recording, place: Path, stack: ExitStack) -> Callable[[Image], None]:
