@@ -3,14 +3,16 @@
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Group, Parameter
 
 from geometry.errors import UserError
-from vision.board import Board
-from vision.camera import Camera, Pose
 from vision.workspace import Workspace
+
+if TYPE_CHECKING:  # OpenCV comes with them, and `--help` has to be quick
+    from vision.board import Board
+    from vision.camera import Camera, Pose
 
 CAMERA = Group("Camera", sort_key=4)
 EXPOSURE = Group("Exposure", sort_key=5)
@@ -37,7 +39,7 @@ class CameraOptions:
     ] = 60.0
     turn: Annotated[float, Parameter(help="Of the camera about the optical axis, degrees.")] = 0.0
 
-    def read(self, workspace: Workspace) -> tuple[Camera, Pose]:
+    def read(self, workspace: Workspace) -> "tuple[Camera, Pose]":
         """The camera, and where it has the workspace."""
         from vision.camera_file import load_camera
         from vision.rig.view import default_camera, view
@@ -94,7 +96,7 @@ class BoardOptions:
         float | None, Parameter(show_default=False, help="Side of a marker of a ChArUco board, mm.")
     ] = None
 
-    def read(self) -> Board:
+    def read(self) -> "Board":
         """The board."""
         from vision.boards import read_board
 

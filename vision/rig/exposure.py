@@ -7,7 +7,6 @@ has the same variance everywhere. Units: pixels, grey levels of 0 to 255.
 
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -72,20 +71,3 @@ class Exposure(BaseModel):
         x = (np.arange(width) - (width - 1) / 2) * np.cos(angle)
         y = (np.arange(height) - (height - 1) / 2) * np.sin(angle)
         return np.asarray(np.maximum(1 + self.gradient * (x + y[:, None]) / (width / 2), 0), np.float32)
-
-
-def fineness(blur: float) -> int:
-    """How many cells a pixel is divided into along either side, so that they resolve the blur."""
-    return int(np.clip(np.ceil(2 / blur), 2, 4)) if blur else 1
-
-
-def blurred(canvas: Light, blur: float) -> Light:
-    """The light on pixels from that on cells, of which `fineness(blur)` squared make a pixel."""
-    if not blur:
-        return canvas
-    cells = fineness(blur)
-    sigma = blur * cells
-    reach = 2 * int(np.ceil(5 * sigma)) + 1
-    soft = cv2.GaussianBlur(canvas, (reach, reach), sigma, borderType=cv2.BORDER_REPLICATE)
-    size = (canvas.shape[1] // cells, canvas.shape[0] // cells)
-    return np.asarray(cv2.resize(soft, size, interpolation=cv2.INTER_AREA), dtype=np.float32)

@@ -1,10 +1,11 @@
 """A scene as a camera sees it."""
 
+import cv2
 import numpy as np
 
 from vision.camera import Camera, Pose
 from vision.rig.coverage import coverage
-from vision.rig.exposure import Exposure, Image, Light, blurred, fineness
+from vision.rig.exposure import Exposure, Image, Light
 from vision.rig.shapes import Scene, seen_edges
 
 
@@ -43,3 +44,20 @@ def light_of(scene: Scene, camera: Camera, pose: Pose, blur: float) -> Light:
         below = canvas[rows, columns]
         below += share[:, :, None].astype(np.float32) * (np.array(shape.colour, dtype=np.float32) - below)
     return blurred(canvas, blur)
+
+
+def fineness(blur: float) -> int:
+    """How many cells a pixel is divided into along either side, so that they resolve the blur."""
+    return int(np.clip(np.ceil(2 / blur), 2, 4)) if blur else 1
+
+
+def blurred(canvas: Light, blur: float) -> Light:
+    """The light on pixels from that on cells, of which `fineness(blur)` squared make a pixel."""
+    if not blur:
+        return canvas
+    cells = fineness(blur)
+    sigma = blur * cells
+    reach = 2 * int(np.ceil(5 * sigma)) + 1
+    soft = cv2.GaussianBlur(canvas, (reach, reach), sigma, borderType=cv2.BORDER_REPLICATE)
+    size = (canvas.shape[1] // cells, canvas.shape[0] // cells)
+    return np.asarray(cv2.resize(soft, size, interpolation=cv2.INTER_AREA), dtype=np.float32)
