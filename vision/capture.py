@@ -8,6 +8,7 @@ from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -62,7 +63,7 @@ def _shots_of_video(
     read, first, last = 0, math.nan, -math.inf
     try:
         while (image := _next(capture)) is not None:
-            said = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000
+            said = _time(capture, rate)
             last = said if said > last else last + 1 / rate
             first = first if read else last
             yield Shot(image, last, f"frame {read}")
@@ -115,6 +116,12 @@ def _next(capture: cv2.VideoCapture) -> Image | None:
     return np.asarray(image, dtype=np.uint8) if done else None
 
 
+def _time(capture: cv2.VideoCapture, rate: float) -> float:
+    """Of the last image, s; by its number at `rate` if the stream does not say when it starts (OpenCV 4)."""
+    said = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000
+    return said if said >= 0 else capture.get(cv2.CAP_PROP_PTS) / rate
+
+
 def _rate(capture: cv2.VideoCapture, told: float | None) -> float:
     said = capture.get(cv2.CAP_PROP_FPS)
     return said if 0 < said <= FASTEST else told or USUAL_RATE
@@ -124,8 +131,10 @@ def _rate(capture: cv2.VideoCapture, told: float | None) -> float:
 def silent() -> Iterator[None]:
     """Keeps remarks of OpenCV and FFmpeg off standard error: what they mean to a user, we say."""
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-    level = cv2.setLogLevel(0)
+    opencv: Any = cv2
+    logging = opencv if hasattr(opencv, "setLogLevel") else opencv.utils.logging  # OpenCV 4 and 5
+    level = logging.setLogLevel(0)
     try:
         yield
     finally:
-        cv2.setLogLevel(level)
+        logging.setLogLevel(level)

@@ -108,7 +108,10 @@ class VideoWriter:
                     str(self._partial), cv2.CAP_FFMPEG, code, self.rate, self._whole_size
                 )
             if not self._writer.isOpened():
-                raise UserError(f"cannot write the video {self.path} with {self._codec} in such a file")
+                width, height = self.size
+                raise UserError(
+                    f"OpenCV cannot write {width}x{height} pixels as {self._codec} into {self.path}"
+                )
             stack.push(self._finish)
             self._stack = stack.pop_all()
         return self

@@ -72,6 +72,28 @@ def test_an_impossible_place_is_one_line(place, message):
         pick_colour(dots(5.0, size=(640, 360)).image, place)
 
 
+def lightness(grey: int) -> float:
+    return 116 * (((grey / 255 + 0.055) / 1.055) ** 2.4) ** (1 / 3) - 16
+
+
+def test_the_range_ends_half_way_to_what_is_around():
+    """Grey 120 on 180: L* 50 and 73."""
+    scene = dots(
+        12.0, colour=(120,) * 3, wall=180.0, background=180.0, noise=1.0, shading=0.0, size=(640, 360)
+    )
+    colour = pick_colour(scene.image, scene.discs[4, :2])
+    assert colour.high[0] == pytest.approx((lightness(120) + lightness(180)) / 2, abs=1.5)
+    assert colour.low[0] == pytest.approx(lightness(120) - 25, abs=1.5)
+
+
+def test_what_is_not_connected_to_the_click_does_not_count():
+    scene = dots(12.0, colour=(120,) * 3, size=(640, 360))
+    x, y, _ = scene.discs[4]
+    alone = pick_colour(scene.image, (x, y))
+    scene.image[250:, 450:] = 135
+    assert pick_colour(scene.image, (x, y)) == alone
+
+
 def test_a_click_onto_a_speck_is_refused():
     speck = np.zeros((40, 50, 3), np.uint8)
     speck[20:23, 30:33] = 255  # of which the median leaves a cross
