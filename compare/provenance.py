@@ -12,6 +12,7 @@ PACKAGES = (
     "pinn-ray",
     "numpy",
     "scipy",
+    "scikit-learn",
     "torch",
     "fenics-dolfinx",
     "fenics-ufl",

@@ -31,6 +31,8 @@ BUILT_IN = {
     "fem": "solvers.fem.linear:FemSolver",
     "fem-nonlinear": "solvers.fem.nonlinear:FemNonlinearSolver",
     "fem-asm": "solvers.fem.assimilating:FemAsmSolver",
+    "gp": "solvers.gaussian_process:GaussianProcessSolver",
+    "statfem": "solvers.statistical_fem:StatFemSolver",
     "pinn-std": PRESETS["pinn-std"]["fast"],
     "pinn-local": "solvers.pinn.local:PinnLocalSolver",
     "pinn-asm": PRESETS["pinn-asm"]["fast"],

@@ -6,9 +6,10 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.quadrature import body_quadrature
-from solvers.elasticity import linear_energy_density, linear_stress
+from solvers.elasticity import linear_energy_density
 from solvers.pinn.training import Training
-from solvers.problem import Problem, contact_ends, contact_functional
+from solvers.problem import Problem, contact_functional
+from solvers.section_force import section_force
 from solvers.solution import DisplacementField, Status
 
 ENERGY_CHANGE = 0.01
@@ -31,7 +32,7 @@ def judge(problem: Problem, field: DisplacementField, training: Training) -> Ver
     rule = body_quadrature(problem.mesh)
     gradient = field.gradient(rule.location)
     energy = float((rule.weights * linear_energy_density(gradient, problem.material.lame)).sum())
-    reaction = _section_force(problem, rule.location.points, rule.weights, gradient)
+    reaction = section_force(problem, rule, gradient)
     change = _late_change(training.history[:, training.columns.index("energy")])
     base, contact = _violations(problem, field)
     converged = change <= ENERGY_CHANGE and max(base, contact) <= VIOLATION
@@ -46,24 +47,6 @@ def judge(problem: Problem, field: DisplacementField, training: Training) -> Ver
         else "so the training has not settled: take more epochs"
     )
     return Verdict(energy, reaction, Status(converged, message))
-
-
-def _section_force(
-    problem: Problem, points: FloatArray, weights: FloatArray, gradient: FloatArray
-) -> FloatArray:
-    """Force on the sections between base and contact, on average, for the prescribed components.
-
-    In equilibrium each of these sections transmits the indenter's force. This is the work of the stress on a
-    displacement that grows linearly from the base to the contact, where it is a unit translation.
-    """
-    start = float(problem.mesh.points[problem.mesh.boundary("base").ravel(), 0].max())
-    end, _ = contact_ends(problem)
-    between = (points[:, 0] > start) & (points[:, 0] < end)
-    stress = linear_stress(gradient[between], problem.material.lame)
-    force = np.zeros(2)
-    for axis in problem.load.prescribed:
-        force[axis] = (weights[between] * (stress.xx, stress.xy)[axis]).sum() / (end - start)
-    return force
 
 
 def _late_change(energy: FloatArray) -> float:

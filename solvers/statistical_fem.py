@@ -1,0 +1,132 @@
+"""`statfem`: finite elements whose load is uncertain, plus a Gaussian process for what the model lacks.
+
+What is observed is d = ρ B u + δ + e: the displacement u of finite elements at the markers, times a factor, a
+discrepancy δ and the error e of the observations. Random are, and normal a priori:
+
+- the prescribed displacement of the contact, about its nominal value, each component with the standard
+  deviation `stroke_deviation`; as the problem is linear, u is a sum of one field for each component;
+- δ, a process of mean zero with a squared exponential kernel, one length, an amplitude each for u and v;
+- e, with the observations' standard deviations.
+
+ρ, the amplitudes and the length have the largest marginal likelihood. The displacement that is returned is
+the posterior mean of ρ u + δ.
+
+Source: M. Girolami, E. Febrianto, G. Yin, F. Cirak, The statistical finite element method (statFEM) for
+coherent synthesis of observation data and model predictions, Comput. Methods Appl. Mech. Engrg. 375 (2021)
+113533: the model of the data, its conditioning and its marginal likelihood. There the source term is random;
+here it is the prescribed displacement.
+"""
+
+import time
+from dataclasses import asdict, dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from geometry.errors import UserError
+from geometry.quadrature import body_quadrature
+from solvers.assimilation import misfit_of, standard_deviations, without_each
+from solvers.elasticity import linear_energy_density
+from solvers.fem.linear import FemSolver
+from solvers.problem import Problem
+from solvers.section_force import section_force
+from solvers.solution import Solution, Status
+from solvers.solver import Progress, check_problem, silent
+from solvers.statistical_posterior import Data, Posterior, StatFemField
+
+
+@dataclass(frozen=True)
+class StatFemSolver:
+    """Finite elements with an uncertain load and a discrepancy, conditioned on the markers.
+
+    Attributes:
+        degree: Degree of the elements, 1 or 2.
+        stroke_deviation: Standard deviation of each component of the prescribed displacement, mm.
+    """
+
+    degree: int = 2
+    stroke_deviation: float = 0.5
+    name: ClassVar[str] = "statfem"
+    laws: ClassVar[tuple[str, ...]] = FemSolver.laws
+    loads: ClassVar[tuple[str, ...]] = FemSolver.loads
+    assimilates: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        if self.degree not in (1, 2):
+            raise UserError(f"statfem has elements of degree 1 and 2, not {self.degree}")
+        if not (np.isfinite(self.stroke_deviation) and self.stroke_deviation >= 0):
+            raise UserError(
+                f"statfem: stroke_deviation must be zero or more, got {self.stroke_deviation} (mm)"
+            )
+
+    def settings(self) -> dict[str, object]:
+        """The element degree and the spread of the load."""
+        return asdict(self)
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        """Condition on the problem's observations; see `Solver`. Without any it is `fem`."""
+        check_problem(self, problem)
+        fem = FemSolver(degree=self.degree, estimate=False)
+        misfit = misfit_of(problem, marker_radius=0.0)
+        if misfit is None or problem.observations is None:
+            plain = fem.solve(problem, progress)
+            return replace(plain, solver=self.name, status=Status(True, "without markers this is fem"))
+        started = time.perf_counter()
+        shapes = []
+        for axis in problem.load.prescribed:
+            unit = [None if value is None else 0.0 for value in problem.load.displacement]
+            unit[axis] = 1.0
+            load = problem.load.model_copy(update={"displacement": tuple(unit)})
+            shapes.append(fem.solve(replace(problem, load=load, observations=None), progress))
+        data = Data(
+            points=misfit.points,
+            observed=misfit.observed,
+            deviations=standard_deviations(problem.observations),
+            shapes=np.stack([shape.displacement(misfit.points) for shape in shapes]),
+            load=problem.load.values,
+            load_deviation=self.stroke_deviation,
+        )
+        every = np.arange(len(data.points))
+        posterior = Posterior.of(data, every)
+        missed, spread = np.zeros((2, len(every), 2))
+        for marker in every:
+            progress(0.5 + marker / len(every) / 2, "leaving each marker out")
+            others = Posterior.of(data, np.delete(every, marker))
+            mean, covariance = others.at(data.points[[marker]], data.shapes[:, [marker]])
+            missed[marker] = data.observed[marker] - mean[0]
+            spread[marker] = np.sqrt(covariance[0] + data.deviations[marker] ** 2)
+        field = StatFemField(posterior, tuple(shape.field for shape in shapes))
+        rule = body_quadrature(problem.mesh, 4)
+        gradient = field.gradient(rule.location)
+        density = linear_energy_density(gradient, problem.material.lame)
+        constants = posterior.constants
+        discrepancy = constants.spreads
+        _, variances = posterior.at(data.points, data.shapes)
+        return Solution(
+            solver=self.name,
+            problem=problem,
+            field=field,
+            energy=float((rule.weights * density).sum()),
+            reaction=section_force(problem, rule, gradient),
+            status=Status(
+                True,
+                f"fem times {constants.factor:.3g} plus a discrepancy of {discrepancy[0]:.2g} mm in u and "
+                f"{discrepancy[1]:.2g} mm in v over {constants.length:.3g} mm; its energy and force include "
+                "the discrepancy's",
+            ),
+            stats={
+                "seconds": time.perf_counter() - started,
+                "unknowns": int(shapes[0].stats["unknowns"]),
+                "factor": constants.factor,
+                "discrepancy_u": float(discrepancy[0]),
+                "discrepancy_v": float(discrepancy[1]),
+                "length": constants.length,
+                "deviation_at_markers": float(np.sqrt(variances.max())),
+                "left_out_within_2sd": float((np.abs(missed) < 2 * spread).mean()),
+            }
+            | {
+                f"load_{'uv'[axis]}": float(value)
+                for axis, value in zip(problem.load.prescribed, posterior.load, strict=True)
+            },
+            left_out=without_each(problem, missed),
+        )

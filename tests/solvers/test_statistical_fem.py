@@ -1,0 +1,153 @@
+"""`statfem` against conditioning by hand, and against data that its own model has made."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.errors import UserError
+from geometry.observations import Observations
+from solvers.fem.linear import FemSolver
+from solvers.problem import Load, Problem
+from solvers.statistical_fem import StatFemSolver
+
+
+@pytest.fixture(scope="module")
+def units(coarse_mesh):
+    """`fem` under a unit displacement of the contact along u, and along v."""
+    fem = FemSolver(estimate=False)
+    return [
+        fem.solve(Problem(coarse_mesh, load=Load(displacement=unit))) for unit in ((1.0, 0.0), (0.0, 1.0))
+    ]
+
+
+def observing(mesh, displacements, *, deviation=0.01, hidden=()):
+    visible = np.ones(len(mesh.markers), dtype=bool)
+    visible[list(hidden)] = False
+    deviations = np.full(mesh.markers.shape, deviation)
+    observations = Observations(mesh.markers, displacements, deviations, visible, "by a test", True)
+    return Problem(mesh, observations=observations)
+
+
+@pytest.fixture(scope="module")
+def problem(coarse_mesh, units):
+    """A load that is off, and a discrepancy that no load explains."""
+    x = coarse_mesh.markers[:, :1]
+    lacking = 0.3 * np.concatenate([np.sin(x / 12), np.cos(x / 15)], axis=1)
+    made = sum(
+        part * unit.displacement(coarse_mesh.markers) for part, unit in zip((-1.0, -9.5), units, strict=True)
+    )
+    return observing(coarse_mesh, made + lacking, hidden=(4,))
+
+
+SOLVER = StatFemSolver(stroke_deviation=0.7)
+
+
+@pytest.fixture(scope="module")
+def solution(problem):
+    return SOLVER.solve(problem)
+
+
+def by_hand(solution, units, points):
+    """Mean and variance of ρ u + δ at points by the normal distribution of all unknowns and data at once."""
+    problem, stats = solution.problem, solution.stats
+    seen = problem.observations.visible
+    everywhere = np.concatenate([problem.observations.points[seen], points])
+    spreads = np.array([stats["discrepancy_u"], stats["discrepancy_v"]])
+    shapes = np.stack([unit.displacement(everywhere).ravel() for unit in units], axis=1) * stats["factor"]
+    squares = ((everywhere[:, None] - everywhere) ** 2).sum(axis=2)
+    prior = SOLVER.stroke_deviation**2 * shapes @ shapes.T
+    prior = prior + np.kron(np.exp(-0.5 * squares / stats["length"] ** 2), np.diag(spreads**2))
+    mean = shapes @ problem.load.values
+    given = 2 * seen.sum()
+    noise = np.diag(problem.observations.standard_deviations[seen].ravel() ** 2)
+    gain = prior[given:, :given] @ np.linalg.inv(prior[:given, :given] + noise)
+    mean = mean[given:] + gain @ (problem.observations.displacements[seen].ravel() - mean[:given])
+    variance = np.diag(prior[given:, given:] - gain @ prior[:given, given:])
+    return mean.reshape(-1, 2), variance.reshape(-1, 2)
+
+
+def test_mean_and_deviation_are_those_of_the_posterior(solution, units, coarse_mesh):
+    places = coarse_mesh.at_centroids()
+    places = coarse_mesh.locate(places.points[::30])
+    mean, variance = by_hand(solution, units, places.points)
+    np.testing.assert_allclose(solution.displacement(places), mean, atol=1e-8)
+    np.testing.assert_allclose(solution.field.standard_deviation(places) ** 2, variance, atol=1e-9)
+
+
+def test_gradient_is_the_derivative(solution, coarse_mesh):
+    points, step = coarse_mesh.at_centroids().points[::60], 1e-5
+    for axis in (0, 1):
+        shift = step * np.eye(2)[axis]
+        difference = (solution.displacement(points + shift) - solution.displacement(points - shift)) / (
+            2 * step
+        )
+        np.testing.assert_allclose(solution.gradient(points)[:, :, axis], difference, atol=1e-6)
+
+
+def test_no_other_constants_are_more_likely(solution, units):
+    """The likelihood by SciPy's normal density, about the constants that were found."""
+    from scipy.stats import multivariate_normal
+
+    problem, stats = solution.problem, solution.stats
+    seen = problem.observations.visible
+    points = problem.observations.points[seen]
+    squares = ((points[:, None] - points) ** 2).sum(axis=2)
+    noise = problem.observations.standard_deviations[seen].ravel() ** 2
+    shapes = np.stack([unit.displacement(points).ravel() for unit in units], axis=1)
+
+    def log_likelihood(factor, u, v, length):
+        covariance = (factor * SOLVER.stroke_deviation) ** 2 * shapes @ shapes.T + np.diag(noise)
+        covariance += np.kron(np.exp(-0.5 * squares / length**2), np.diag([u**2, v**2]))
+        mean = factor * shapes @ problem.load.values
+        return multivariate_normal.logpdf(problem.observations.displacements[seen].ravel(), mean, covariance)
+
+    found = np.array([stats[name] for name in ("factor", "discrepancy_u", "discrepancy_v", "length")])
+    best = log_likelihood(*found)
+    for change in 1 + 0.05 * np.concatenate([np.eye(4), -np.eye(4)]):
+        assert log_likelihood(*(found * change)) < best
+
+
+def test_a_load_that_is_off_is_found_where_nothing_else_is_wrong(coarse_mesh, units):
+    made = -1.0 * units[0].displacement(coarse_mesh.markers) - 10.0 * units[1].displacement(
+        coarse_mesh.markers
+    )
+    solution = SOLVER.solve(observing(coarse_mesh, made))
+    stats = solution.stats
+    assert stats["factor"] * stats["load_u"] == pytest.approx(-1.0, abs=0.05)
+    assert stats["factor"] * stats["load_v"] == pytest.approx(-10.0, abs=0.05)
+    centroids = coarse_mesh.at_centroids()
+    exact = -1.0 * units[0].displacement(centroids) - 10.0 * units[1].displacement(centroids)
+    assert np.abs(solution.displacement(centroids) - exact).max() < 0.1
+
+
+def test_a_marker_that_is_left_out_has_no_say_at_all(problem, solution):
+    observations = problem.observations
+    assert np.isnan(solution.left_out[4]).all()
+    visible = observations.visible.copy()
+    visible[7] = False
+    again = SOLVER.solve(replace(problem, observations=replace(observations, visible=visible)))
+    expected = again.displacement(observations.points[[7]])[0]
+    np.testing.assert_allclose(solution.left_out[7], expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("load", [Load(displacement=(None, -10.0)), Load(kind="patch")])
+def test_a_component_that_is_free_has_no_load(problem, load):
+    solution = SOLVER.solve(replace(problem, load=load))
+    assert ("load_u" in solution.stats) is (load.displacement[0] is not None)
+    observations = problem.observations
+    missed = (solution.displacement(observations.points) - observations.displacements)[observations.visible]
+    assert np.abs(missed).max() < 0.03
+
+
+def test_without_markers_it_is_fem(coarse_mesh):
+    problem = Problem(coarse_mesh)
+    solution = StatFemSolver().solve(problem)
+    assert solution.field.values.tolist() == FemSolver().solve(problem).field.values.tolist()
+    assert (solution.solver, solution.left_out) == ("statfem", None)
+
+
+@pytest.mark.parametrize("settings", [{"degree": 0}, {"stroke_deviation": -1.0}])
+def test_settings_that_make_no_sense_are_refused(settings):
+    with pytest.raises(UserError, match="statfem"):
+        StatFemSolver(**settings)
