@@ -39,7 +39,7 @@ def trained_ridges(problem: Problem, seed: int = 0) -> Iterator[LocalField]:
         fields.append(field)
         stepper.zero_grad()
         ridges = variable * scale
-        lagrangian_gradient(now, ridges, field, torch.from_numpy(solved.forces[:, 0].copy()), problem)
+        lagrangian_gradient(now, ridges, field, torch.from_numpy(now.reaction(solved.forces)), problem)
         return now.energy.total(solved.output)
 
     while True:
@@ -51,7 +51,7 @@ def with_ridges(level: Level, problem: Problem, ridges: torch.Tensor) -> Level:
     """The level with other ridges, shape (3, m, c)."""
     units = replace(level.energy.units, ridges=ridges)
     conditions = load_conditions(problem)
-    functionals = level.functionals.reshape(level.axes, -1, units.windows.count, 2, units.per_window).copy()
+    functionals = level.functionals.reshape(level.load[0], -1, units.windows.count, 2, units.per_window).copy()
     for row, axis in enumerate(problem.load.prescribed):
         functionals[row, :, :, axis] = units.functionals(conditions.points, conditions.weights)
     return replace(

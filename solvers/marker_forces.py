@@ -38,6 +38,15 @@ class Fit(NamedTuple):
     left_out: FloatArray
     energy: float
 
+    @property
+    def phrase(self) -> str:
+        """How far the markers are missed, in words."""
+        return (
+            "root mean square of what the markers are missed by: "
+            f"{root_mean_square(self.residual):.2g} mm in the fit, "
+            f"{root_mean_square(self.left_out):.2g} mm when they are left out"
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class MarkerForces:
@@ -91,3 +100,8 @@ class MarkerForces:
         values, _ = self._modes
         spread = 1 + factor * values
         return -0.5 * float((self._in_modes**2 / spread).sum() / scale + np.log(spread).sum())
+
+
+def root_mean_square(values: FloatArray) -> float:
+    """Over all entries."""
+    return float(np.sqrt((values**2).mean()))

@@ -2,11 +2,10 @@
 
 import time
 from dataclasses import asdict, dataclass, replace
-from typing import ClassVar, Literal, get_args
+from typing import ClassVar
 
 import numpy as np
 
-from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from solvers.assimilation import (
     MARKER_RADIUS,
@@ -21,15 +20,10 @@ from solvers.fem.conditions import reaction_by_residual_work
 from solvers.fem.lagrange import LagrangeField
 from solvers.fem.linear import FemSolver
 from solvers.fem.ranks import on_all_ranks
-from solvers.marker_forces import MarkerForces
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, check_problem, silent
-
-Choice = Literal["given", "left-out", "evidence"]
-
-FACTORS: FloatArray = 10.0 ** np.arange(-9, 3.25, 0.25)
-"""Factors of the weights on the L-curve, among which one can be chosen."""
+from solvers.weight_choice import Choice, WeightChoice
 
 
 @dataclass(frozen=True)
@@ -42,9 +36,8 @@ class FemAsmSolver:
         asm_weight: λ_ASM for "paper", MPa/mm².
         scale: For "precision", energy of the model's own error, N mm / mm.
         marker_radius: Of the discs over which the displacement is averaged, mm; zero for the points alone.
-        choose: "given": the weights as they are; "left-out": times that one of `FACTORS` for which markers
-            that are left out, one at a time, are missed least; "evidence": times that of the largest
-            evidence, for "precision".
+        choose: "given": the weights as they are; "left-out" or "evidence": times a factor, see
+            `WeightChoice`.
     """
 
     degree: int = 2
@@ -62,10 +55,7 @@ class FemAsmSolver:
         if self.degree not in (1, 2):
             raise UserError(f"fem-asm has elements of degree 1 and 2, not {self.degree}")
         check_weighting(self.name, self.weights, self.asm_weight, self.scale, self.marker_radius)
-        if self.choose not in get_args(Choice):
-            raise UserError(f"fem-asm: choose must be {', '.join(get_args(Choice))}, got {self.choose!r}")
-        if self.choose == "evidence" and self.weights != "precision":
-            raise UserError("fem-asm: choose=evidence needs weights=precision: the paper's are no precision")
+        _ = self.choice
 
     def settings(self) -> dict[str, object]:
         """The element degree, and what the markers weigh."""
@@ -79,6 +69,11 @@ class FemAsmSolver:
         plain = FemSolver(degree=self.degree, estimate=False).solve(problem, progress)
         status = Status(True, "without markers, or with weights of zero, this is fem")
         return replace(plain, solver=self.name, status=status)
+
+    @property
+    def choice(self) -> WeightChoice:
+        """How the factor of the weights is chosen."""
+        return WeightChoice.of(self.name, self.choose, self.weights, self.scale)
 
     def prepare(self, problem: Problem) -> tuple[MarkerCompliance, Misfit]:
         """Factorise, and solve for the forces at the markers; further weights and markers cost no solve.
@@ -102,25 +97,19 @@ class FemAsmSolver:
         finger, misfit = self.prepare(problem)
         progress(0.9, "solved for the forces at the markers")
         forces = finger.forces(misfit)
-        curve = self.curve(forces)
-        factor = self._factor(curve)
+        factor = self.choice.factor(forces)
         fit = forces.fit(factor)
         nodal, system = finger.under(fit.forces), finger.least.system
         space = system.distributed.space
         residual = system.residual(nodal)
         finger.least.factors.destroy()
-        in_sample, left_out = _rms(fit.residual), _rms(fit.left_out)
         return Solution(
             solver=self.name,
             problem=problem,
             field=LagrangeField(space, nodal),
             energy=0.5 * float((nodal * residual).sum()),
             reaction=reaction_by_residual_work(space, residual) - fit.forces.sum(axis=0),
-            status=Status(
-                True,
-                "the minimiser on this mesh; root mean square of what the markers are missed by: "
-                f"{in_sample:.2g} mm in the fit, {left_out:.2g} mm when they are left out",
-            ),
+            status=Status(True, f"the minimiser on this mesh; {fit.phrase}"),
             stats={
                 "seconds": time.perf_counter() - started,
                 "unknowns": nodal.size,
@@ -131,31 +120,6 @@ class FemAsmSolver:
                 "misfit": misfit.scaled(factor).value(misfit.observed - fit.residual),
                 "marker_force": float(np.linalg.norm(fit.forces, axis=1).max()),
             },
-            history=curve,
+            history=self.choice.curve(forces),
             left_out=without_each(problem, fit.left_out),
         )
-
-    def curve(self, forces: MarkerForces) -> dict[str, FloatArray]:
-        """The L-curve: energy and misfit over the factors of the weights, and what speaks for each factor."""
-        fits = [forces.fit(factor) for factor in FACTORS]
-        columns = {
-            "weight_factor": FACTORS,
-            "curve_energy": np.array([fit.energy for fit in fits]),
-            "curve_in_sample_mm": np.array([_rms(fit.residual) for fit in fits]),
-            "curve_left_out_mm": np.array([_rms(fit.left_out) for fit in fits]),
-        }
-        if self.weights == "precision":
-            evidence = [forces.log_evidence(self.scale, factor) for factor in FACTORS]
-            columns["curve_log_evidence"] = np.array(evidence)
-        return columns
-
-    def _factor(self, curve: dict[str, FloatArray]) -> float:
-        if self.choose == "given":
-            return 1.0
-        if self.choose == "left-out":
-            return float(FACTORS[curve["curve_left_out_mm"].argmin()])
-        return float(FACTORS[curve["curve_log_evidence"].argmax()])
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt((values**2).mean()))

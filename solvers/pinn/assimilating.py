@@ -3,21 +3,26 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from solvers.pinn.finite_basis import FiniteBasisSolver
 from solvers.pinn.local import PinnLocalSolver
-from solvers.pinn.observing import Assimilating
+from solvers.pinn.observing import Assimilating, ChoosingWeights
 from solvers.pinn.paper import PaperPinnSolver
+from solvers.pinn.pieces import pool
 from solvers.pinn.standard import PinnStdSolver
+from solvers.problem import Problem
 
 
 @dataclass(frozen=True, kw_only=True)
-class PinnAsmSolver(Assimilating, PinnStdSolver):
+class PinnAsmSolver(ChoosingWeights, PinnStdSolver):
     """The network of `PinnStdSolver`, given the markers."""
 
     name: ClassVar[str] = "pinn-asm"
 
 
 @dataclass(frozen=True, kw_only=True)
-class PinnLocalAsmSolver(Assimilating, PinnLocalSolver):
+class PinnLocalAsmSolver(ChoosingWeights, PinnLocalSolver):
     """The network of `PinnLocalSolver`, given the markers."""
 
     name: ClassVar[str] = "pinn-local-asm"
@@ -33,3 +38,17 @@ class PaperPinnAsmSolver(Assimilating, PaperPinnSolver):
 
     marker_radius: float = 0.0
     name: ClassVar[str] = "pinn-asm"
+
+
+def l_curve(solver: FiniteBasisSolver, problem: Problem) -> dict[str, FloatArray]:
+    """Energy and misfit for all weights, see `WeightChoice.curve`, in the time of one level.
+
+    Raises:
+        UserError: If there are no markers that weigh anything, or the law is not linear.
+    """
+    with pool():
+        level = solver.level(problem, 1.0)
+        state = level.step(level.rest)
+    if state is None or state.markers is None:
+        raise UserError(f"{solver.name} has an L-curve for the linear law and markers that it is given")
+    return solver.choice.curve(state.markers)

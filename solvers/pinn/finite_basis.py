@@ -10,6 +10,8 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.quadrature import body_quadrature
+from solvers.assimilation import without_each
+from solvers.marker_forces import Fit
 from solvers.pinn.base_factor import BaseFactor
 from solvers.pinn.grading import (
     Spacing,
@@ -20,7 +22,7 @@ from solvers.pinn.grading import (
 from solvers.pinn.local_level import Level
 from solvers.pinn.local_newton import Path, equilibrium, follow_load
 from solvers.pinn.local_units import LocalField, LocalUnits
-from solvers.pinn.observing import WEIGHING, Observing
+from solvers.pinn.observing import ASSIMILATION, Observing
 from solvers.pinn.pieces import pool
 from solvers.pinn.windows import Windows
 from solvers.problem import Problem
@@ -74,7 +76,7 @@ class FiniteBasisSolver(Observing, ABC):
 
     def __post_init__(self) -> None:
         for setting, value in asdict(self).items():
-            if setting not in ("seed", "growth", *WEIGHING) and not value > 0:
+            if setting not in ("seed", "growth", *ASSIMILATION) and not value > 0:
                 raise UserError(f"{self.name}: {setting} must be positive, got {value}")
         if self.seed < 0 or self.ridges < 2 or self.coarser <= 1 or self.growth < 0:
             raise UserError(f"{self.name} needs seed >= 0, ridges >= 2, coarser > 1 and growth >= 0")
@@ -96,6 +98,8 @@ class FiniteBasisSolver(Observing, ABC):
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Train the network; see `Solver`."""
         check_problem(self, problem)
+        if problem.material.law != "linear" and self.choice.choose != "given":
+            raise UserError(f"{self.name}: choose={self.choice.choose} is for the linear law; take given")
         with pool():
             return self._solve(problem, progress)
 
@@ -109,27 +113,28 @@ class FiniteBasisSolver(Observing, ABC):
         for number, scale in enumerate(scales):
             level = self.level(problem, scale)
             path = _train(level, coarse, _part(progress, number / len(scales), 1 / len(scales)))
-            field = coarse = level.field(path.output)
+            field = coarse = level.field(path.state.output)
             displacement = field.displacement(rule.location)
             change = _relative(displacement - before, displacement, rule.weights)
             finer = scales[max(number - 1, 0)] / scale
             error = change / (finer**ORDER - 1) if number else float("inf")
             before = displacement
-            energy = level.energy.total(path.output)
+            energy = level.energy.total(path.state.output)
             units = field.units.windows.count * field.units.per_window
             history.append((units, energy, error, time.perf_counter() - started))
             progress((number + 1) / len(scales), f"{units} units, energy {energy:.4f} N mm/mm")
             if path.fraction < 1 or error <= self.tolerance:
                 break
-        reaction = np.zeros(2)
-        reaction[problem.load.prescribed] = level.reaction(path.forces)
+        state, reaction = path.state, np.zeros(2)
+        reaction[problem.load.prescribed] = level.reaction(state.forces)
+        fit = None if state.markers is None else state.markers.fit(state.factor)
         return Solution(
             solver=self.name,
             problem=problem,
             field=field,
             energy=energy,
             reaction=reaction,
-            status=self._status(path, finer, change, error),
+            status=self._status(path, finer, change, error, fit),
             stats={
                 "seconds": time.perf_counter() - started,
                 "unknowns": field.output.numel(),
@@ -137,13 +142,14 @@ class FiniteBasisSolver(Observing, ABC):
                 "windows": field.units.windows.count,
                 "quadrature_points": level.energy.points,
                 "newton_iterations": path.iterations,
-                **({"misfit": level.misfit(path.forces)} if level.compliance.any() else {}),
+                **level.marker_stats(state),
                 "seed": self.seed,
                 "device": "cpu",
             },
             history=dict(
                 zip(("units", "energy", "estimated_error", "seconds"), np.array(history).T, strict=True)
             ),
+            left_out=None if fit is None else without_each(problem, fit.left_out),
         )
 
     def level(self, problem: Problem, scale: float) -> Level:
@@ -168,10 +174,14 @@ class FiniteBasisSolver(Observing, ABC):
             rng=rng,
         )
         return Level.of(
-            units, problem, *graded_quadrature(triangles, spacing, self.cell), self.misfit(problem)
+            units,
+            problem,
+            *graded_quadrature(triangles, spacing, self.cell),
+            self.misfit(problem),
+            self.choice,
         )
 
-    def _status(self, path: Path, finer: float, change: float, error: float) -> Status:
+    def _status(self, path: Path, finer: float, change: float, error: float, fit: Fit | None) -> Status:
         if path.fraction < 1:
             return Status(
                 False,
@@ -183,7 +193,8 @@ class FiniteBasisSolver(Observing, ABC):
             f"so that its error is about {error:.2%} or less (criterion {self.tolerance:.2%})"
         )
         converged = error <= self.tolerance
-        return Status(converged, message if converged else f"{message}; take a smaller spacing")
+        advice = "" if converged else "; take a smaller spacing"
+        return Status(converged, message + advice + (f"; {fit.phrase}" if fit else ""))
 
 
 def _train(level: Level, coarse: LocalField | None, progress: Progress) -> Path:

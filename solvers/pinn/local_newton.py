@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from geometry.arrays import FloatArray
 from solvers.pinn.local_level import Equilibrium, Level
 from solvers.solver import Progress
 
@@ -21,26 +20,24 @@ class Path(NamedTuple):
 
     Attributes:
         fraction: Of the load.
-        output: Output layer there, shape (c, 2, m + 1), mm.
-        forces: Of the level's springs, shape (n,), N/mm.
+        state: Equilibrium there.
         iterations: Newton iterations so far.
     """
 
     fraction: float
-    output: torch.Tensor
-    forces: FloatArray
+    state: Equilibrium
     iterations: int
 
     @classmethod
     def start(cls, level: Level) -> "Path":
         """No load yet."""
-        return cls(0.0, level.rest, np.zeros(len(level.values)), 0)
+        return cls(0.0, Equilibrium(level.rest, np.zeros(len(level.values)), 0.0), 0)
 
     def to(self, fraction: float, state: Equilibrium | None, iterations: int) -> "Path":
         """With more iterations, which led to a state at a fraction of the load or, if None, nowhere."""
         if state is None:
             return self._replace(iterations=self.iterations + iterations)
-        return Path(fraction, state.output, state.forces, self.iterations + iterations)
+        return Path(fraction, state, self.iterations + iterations)
 
 
 def equilibrium(level: Level, guess: torch.Tensor, fraction: float) -> tuple[Equilibrium | None, int]:
@@ -64,10 +61,10 @@ def follow_load(level: Level, progress: Progress) -> Path:
     step = FIRST_STEP
     while path.fraction < 1 and step >= MIN_STEP:
         fraction = min(path.fraction + step, 1.0)
-        guess = path.output
+        guess = path.state.output
         if path.fraction > 0:
             ahead = (fraction - path.fraction) / (path.fraction - before.fraction)
-            guess = guess + ahead * (guess - before.output)
+            guess = guess + ahead * (guess - before.state.output)
         state, iterations = equilibrium(level, guess, fraction)
         before, path = path if state else before, path.to(fraction, state, iterations)
         if state is None:

@@ -5,9 +5,12 @@ from typing import ClassVar
 
 from solvers.assimilation import MARKER_RADIUS, Misfit, Weighting, check_weighting, misfit_of
 from solvers.problem import Problem
+from solvers.weight_choice import Choice, WeightChoice
 
 WEIGHING = ("weights", "asm_weight", "scale", "marker_radius")
 """The settings of `Assimilating`."""
+ASSIMILATION = (*WEIGHING, "choose")
+"""Those of `ChoosingWeights`."""
 
 
 class Observing:
@@ -21,6 +24,11 @@ class Observing:
     def misfit(self, problem: Problem) -> Misfit | None:
         """The misfit that is added to the energy, if any."""
         return None
+
+    @property
+    def choice(self) -> WeightChoice:
+        """How the factor of its weights is chosen."""
+        return WeightChoice("given", None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,3 +55,23 @@ class Assimilating(Observing):
     def misfit(self, problem: Problem) -> Misfit | None:
         """The misfit to the problem's observations, if it has any; see `misfit_of`."""
         return misfit_of(problem, **{setting: getattr(self, setting) for setting in WEIGHING})
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChoosingWeights(Assimilating):
+    """A network that is given the markers and knows its minimiser for all weights at once.
+
+    Attributes:
+        choose: "given", "left-out" or "evidence": which factor of the weights is taken, see `WeightChoice`.
+    """
+
+    choose: Choice = "given"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _ = self.choice
+
+    @property
+    def choice(self) -> WeightChoice:
+        """How the factor of the weights is chosen."""
+        return WeightChoice.of(self.name, self.choose, self.weights, self.scale)

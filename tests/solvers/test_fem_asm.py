@@ -8,11 +8,12 @@ import pytest
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.assimilation import misfit_of
-from solvers.fem.assimilating import FACTORS, FemAsmSolver
+from solvers.fem.assimilating import FemAsmSolver
 from solvers.fem.lagrange import LagrangeSpace
 from solvers.fem.least_energy import LinearSystem
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Problem, contact_functional
+from solvers.weight_choice import FACTORS
 
 LOADS = ("mean", "point", "patch")
 

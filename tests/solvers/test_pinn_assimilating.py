@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 import torch
 
+from compare.virtual_experiment import virtual_experiment
+from geometry.cache import finger_mesh
+from geometry.design import Design
 from geometry.errors import UserError
 from geometry.observations import Observations
+from geometry.quadrature import body_quadrature
 from solvers.assimilation import assimilates
-from solvers.pinn.assimilating import PaperPinnAsmSolver, PinnAsmSolver, PinnLocalAsmSolver
+from solvers.fem.assimilating import FemAsmSolver
+from solvers.pinn.assimilating import PaperPinnAsmSolver, PinnAsmSolver, PinnLocalAsmSolver, l_curve
 from solvers.pinn.local_newton import equilibrium
 from solvers.pinn.mlp_field import MlpField
 from solvers.pinn.standard import PinnStdSolver
@@ -82,7 +87,7 @@ def test_it_has_the_least_energy_plus_misfit(problem, weights):
     for size in (1.0, 1e-3):
         rise = total(least.output + size * direction) - total(least.output)
         assert rise == pytest.approx(size**2 * quadratic, rel=1e-5)
-    assert misfit.value(seen(least.output)) == pytest.approx(level.misfit(least.forces), rel=1e-6)
+    assert misfit.value(seen(least.output)) == pytest.approx(level.marker_stats(least)["misfit"], rel=1e-6)
     assert least.forces @ level.values == pytest.approx(2 * total(least.output), rel=1e-6), "Clapeyron"
 
 
@@ -107,7 +112,90 @@ def test_finite_strain_has_the_least_energy_plus_misfit_nearby(bent):
     curvature = ahead - 2 * here + behind
     assert curvature > 0
     assert abs(ahead - behind) < 0.01 * curvature
-    assert solution.stats["misfit"] == pytest.approx(level.misfit(least.forces), rel=1e-6)
+    assert solution.stats["misfit"] == pytest.approx(level.marker_stats(least)["misfit"], rel=1e-6)
+
+
+def distances(found, exact, problem: Problem) -> tuple[float, float]:
+    """Relative L2 distance of two displacements over the body, and farther than 2 mm from every marker."""
+    rule = body_quadrature(problem.mesh)
+    ours, theirs = (solution.displacement(rule.location) for solution in (found, exact))
+    gap = rule.location.points[:, None] - problem.observations.points
+    weights = rule.weights * (np.linalg.norm(gap, axis=2).min(axis=1) > [[0.0], [2.0]])
+    return tuple(
+        np.sqrt((weights @ ((ours - theirs) ** 2).sum(axis=1)) / (weights @ (theirs**2).sum(axis=1)))
+    )
+
+
+@pytest.mark.parametrize("weights", ["paper", "precision"])
+@pytest.mark.parametrize("solver", [PinnAsmSolver, PinnLocalAsmSolver])
+def test_it_is_near_the_exact_minimiser_of_finite_elements(problem, solver, weights):
+    """Within 1 % with few units; the network without the markers is 3 % away."""
+    given = {"weights": weights}
+    exact = FemAsmSolver(**given).solve(problem)
+    assert max(distances(solver(**QUICK, **given).solve(problem), exact, problem)) < 0.01
+
+
+def test_the_curve_is_that_of_finite_elements(problem):
+    """Energy and misfits for all weights that matter, within what the few units cost."""
+    ours, exact = l_curve(PINN_ASM, problem), FemAsmSolver().solve(problem).history
+    assert ours.keys() == exact.keys()
+    matter = (ours["weight_factor"] > 1e-8) & (ours["weight_factor"] < 1)
+    for name in ours:
+        np.testing.assert_allclose(ours[name][matter], exact[name][matter], rtol=0.2, err_msg=name)
+
+
+def test_what_it_says_of_a_marker_that_is_left_out_is_what_it_says_without(problem):
+    """In closed form, against a network that was not given that marker; its own weights are those of all."""
+    settings = {**QUICK, "weights": "precision", "scale": 1e-4}
+    solution = PinnAsmSolver(**settings).solve(problem)
+    visible = np.arange(9) != 6
+    again = PinnAsmSolver(**settings).solve(
+        replace(problem, observations=replace(problem.observations, visible=visible))
+    )
+    only = replace(problem, observations=replace(problem.observations, visible=~visible))
+    points, shares = PINN_ASM.misfit(only).sampling()
+    np.testing.assert_allclose(solution.left_out[[6]], shares @ again.displacement(points), atol=1e-6)
+    assert np.abs(solution.left_out - again.displacement(problem.mesh.markers))[:6].max() > 1e-3
+
+
+@pytest.mark.parametrize("choose", ["left-out", "evidence"])
+def test_the_chosen_weights_are_the_best_on_the_curve(problem, choose):
+    solver = PinnAsmSolver(**{**QUICK, "tolerance": 1.0}, weights="precision", choose=choose)
+    curve = l_curve(solver, problem)
+    score = -curve["curve_left_out_mm"] if choose == "left-out" else curve["curve_log_evidence"]
+    solution = solver.solve(problem)
+    best = curve["weight_factor"][score.argmax()]
+    assert solution.stats["weight_factor"] == best
+    given = PinnAsmSolver(**{**QUICK, "tolerance": 1.0}, weights="precision", scale=best).solve(problem)
+    np.testing.assert_allclose(
+        solution.displacement(problem.mesh.points), given.displacement(problem.mesh.points), atol=1e-8
+    )
+    assert solution.stats["misfit"] == pytest.approx(given.stats["misfit"], rel=1e-6)
+
+
+def test_no_weights_are_chosen_at_finite_strain(bent):
+    with pytest.raises(UserError, match="choose=left-out is for the linear law; take given"):
+        PinnAsmSolver(choose="left-out").solve(bent)
+    with pytest.raises(UserError, match="L-curve for the linear law and markers that it is given"):
+        l_curve(PINN_ASM, replace(bent, material=Material(), observations=None))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("solver", [PinnAsmSolver, PinnLocalAsmSolver])
+def test_simulated_markers_are_met_as_by_finite_elements(solver):
+    """The default finger and settings, where the model cannot follow: 0.05 % and 0.011 mm are usual.
+
+    With the centres in place of the discs the two are 1 % apart, since both have no limit under refinement.
+    """
+    plain = Problem(finger_mesh(Design()))
+    problem = replace(plain, observations=virtual_experiment(plain))
+    found, exact = solver().solve(problem), FemAsmSolver().solve(problem)
+    assert found.status.converged, found.status.message
+    assert max(distances(found, exact, problem)) < 0.001
+    errors = np.abs(found.displacement(problem.observations.points) - problem.observations.displacements)
+    assert errors.mean(axis=0).max() < 0.03
+    at_points, exact_at_points = (kind(marker_radius=0.0).solve(problem) for kind in (solver, FemAsmSolver))
+    assert max(distances(at_points, exact_at_points, problem)) < 0.02
 
 
 def test_markers_are_met_and_energy_pays_for_it(solution, plain, problem):
