@@ -51,7 +51,8 @@ def with_ridges(level: Level, problem: Problem, ridges: torch.Tensor) -> Level:
     """The level with other ridges, shape (3, m, c)."""
     units = replace(level.energy.units, ridges=ridges)
     conditions = load_conditions(problem)
-    functionals = level.functionals.reshape(level.load[0], -1, units.windows.count, 2, units.per_window).copy()
+    shape = (*level.load, units.windows.count, 2, units.per_window)
+    functionals = level.functionals.reshape(shape).copy()
     for row, axis in enumerate(problem.load.prescribed):
         functionals[row, :, :, axis] = units.functionals(conditions.points, conditions.weights)
     return replace(
