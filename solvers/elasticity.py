@@ -48,6 +48,15 @@ def lame_constants(young: float, poisson: float, plane: str) -> Lame:
     return Lame(λ=λ, μ=μ, λ_out=λ)
 
 
+def lame_slopes(young: float, poisson: float, plane: str) -> Lame:
+    """Derivatives of the Lamé constants by Poisson's ratio, MPa; λ_out's is λ's, or 0 in plane stress."""
+    μ = -young / (2 * (1 + poisson) ** 2)
+    if plane == "stress":
+        return Lame(λ=young * (1 + poisson**2) / (1 - poisson**2) ** 2, μ=μ, λ_out=0.0)
+    λ = young * (1 + 2 * poisson**2) / ((1 + poisson) * (1 - 2 * poisson)) ** 2
+    return Lame(λ=λ, μ=μ, λ_out=λ)
+
+
 def small_strain(gradient: Field, lame: Lame) -> Plane:
     """Infinitesimal strain, tensor components (the shear is half the engineering shear)."""
     xx, yy = gradient[..., 0, 0], gradient[..., 1, 1]
