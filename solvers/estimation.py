@@ -1,14 +1,13 @@
 """Parameters from observations: weighted least squares with a prior, and what the observations say of each.
 
 With predictions y(θ), observations d of standard deviations σ, and a Gaussian prior with the mean θ0 and the
-standard deviations s, the estimate minimises
+standard deviations s, of θ or of its logarithm, the estimate minimises
 
-    Σ ((y(θ) - d) / φ σ)^2 + Σ ((θ - θ0) / s)^2
+    Σ ((y(θ) - d) / φ σ)^2 + Σ z^2        z = (θ - θ0) / s   or   log(θ / θ0) / s
 
-over the bounds of the parameters. φ is one where noise of the size σ explains the misfit. Where it does not,
-at a level of 95 % of χ^2, it is the root of the misfit over its degrees of freedom, found together with θ: a
-model that is wrong by φ σ must not be believed to σ. With A = (dy/dθ) s / φ σ, row by row and column by
-column, the covariance of the estimate is s (A^T A + 1)^-1 s.
+φ is one where noise of the size σ explains the misfit. Where it does not, at a level of 95 % of χ^2, it is
+the root of the misfit over its degrees of freedom, found together with θ: a model that is wrong by φ σ must
+not be believed to σ. With A = (dy/dz) / φ σ the covariance of z is (A^T A + 1)^-1.
 
 Sources: A. Tarantola, Inverse Problem Theory, SIAM 2005, section 3.2 (estimate and covariance), section 3.3
 (resolution); R. T. Birge, The calculation of errors by the method of least squares, Phys. Rev. 40 (1932)
@@ -17,12 +16,13 @@ Sources: A. Tarantola, Inverse Problem Theory, SIAM 2005, section 3.2 (estimate 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import chi2, norm, t
 
-from geometry.arrays import BoolArray, FloatArray
+from geometry.arrays import BoolArray, FloatArray, IntArray
 
 LEVEL = 0.95
 """Of confidence intervals, and of the test whether noise explains the misfit."""
@@ -31,7 +31,8 @@ RESOLVED = 0.5
 """Least share of what is known of a parameter that must come from the observations."""
 
 ROUNDS = 20
-"""Estimates at most until φ settles."""
+"""Estimates at most until φ settles, which it has done when it changes by less than `SETTLED`."""
+SETTLED = 0.01
 
 Prediction = tuple[FloatArray, FloatArray]
 """Predictions, shape (n,), and their derivatives by the parameters, shape (n, p)."""
@@ -44,10 +45,11 @@ class Unknown:
     Attributes:
         name: What it is called.
         unit: Of its value; empty for a pure number.
-        start: Mean of its prior: what it is taken for before anything is observed.
-        scale: Standard deviation of its prior: how far it may be off.
+        start: Middle of its prior: what it is taken for before anything is observed.
+        scale: Standard deviation of the prior, of the value or, if `logarithmic`, of its logarithm.
         low: Least value that it can have.
         high: Largest value.
+        logarithmic: Whether the prior is of the logarithm: for what is positive and known to a factor.
     """
 
     name: str
@@ -56,6 +58,23 @@ class Unknown:
     scale: float
     low: float = -np.inf
     high: float = np.inf
+    logarithmic: bool = False
+
+    def value(self, z: float | FloatArray) -> FloatArray:
+        """The value, z standard deviations from the middle."""
+        z = np.asarray(z)
+        return self.start * np.exp(self.scale * z) if self.logarithmic else self.start + self.scale * z
+
+    def slope(self, z: float) -> float:
+        """Derivative of the value by z."""
+        return float(self.scale * (self.value(z) if self.logarithmic else 1.0))
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Least and largest z."""
+        if self.logarithmic:
+            return -np.inf, np.inf
+        return (self.low - self.start) / self.scale, (self.high - self.start) / self.scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,56 +83,94 @@ class Estimate:
 
     Attributes:
         unknowns: The parameters.
-        values: Shape (p,).
-        covariance: Shape (p, p).
-        singular_values: Of A, shape (p,), largest first: below one, the prior says more of a combination
-            than the observations do.
-        combinations: The combinations, shape (p, p): row i has unit length in parameters over their scales.
-        residuals: Predicted minus observed over σ, shape (n,).
+        z: Where they are in their priors, shape (p,).
+        sensitivities: A, shape (n, p).
+        residuals: Predicted minus observed over φ σ, shape (n,).
         inflation: φ.
-        freedom: Degrees of freedom of the residuals: n less the number of resolved combinations.
         evaluations: Of the model.
         converged: Whether the minimum was found.
     """
 
     unknowns: Sequence[Unknown]
-    values: FloatArray
-    covariance: FloatArray
-    singular_values: FloatArray
-    combinations: FloatArray
+    z: FloatArray
+    sensitivities: FloatArray
     residuals: FloatArray
     inflation: float
-    freedom: float
     evaluations: int
     converged: bool
 
-    @property
-    def deviations(self) -> FloatArray:
-        """Standard deviations of the parameters, shape (p,)."""
-        return np.sqrt(np.diagonal(self.covariance))
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Of z, shape (p, p)."""
+        a = self.sensitivities
+        return np.linalg.inv(a.T @ a + np.eye(a.shape[1]))
+
+    @cached_property
+    def singular_values(self) -> FloatArray:
+        """Of A, shape (p,), largest first.
+
+        Where one is below one, the prior says more of that combination of parameters than the observations.
+        """
+        found = np.linalg.svd(self.sensitivities, compute_uv=False)
+        return np.append(found, np.zeros(len(self.z) - len(found)))
 
     @property
-    def intervals(self) -> FloatArray:
-        """Confidence intervals at `LEVEL`, shape (p, 2); Student's t where φ was estimated."""
-        upper = (1 + LEVEL) / 2
-        times = norm.ppf(upper) if self.inflation == 1 else t.ppf(upper, self.freedom)
-        ends = self.values[:, None] + times * self.deviations[:, None] * [-1, 1]
-        return np.clip(ends, *np.array([[[u.low], [u.high]] for u in self.unknowns]).swapaxes(0, 1))
+    def least_known(self) -> FloatArray:
+        """The combination of z, of unit length, that the observations say least of, shape (p,)."""
+        return np.asarray(np.linalg.svd(self.sensitivities)[2][-1])
 
     @property
-    def resolution(self) -> FloatArray:
-        """Share of what is known of each parameter that the observations say, shape (p,): 0 to 1."""
-        return 1 - np.diagonal(self.covariance) / np.array([u.scale for u in self.unknowns]) ** 2
-
-    @property
-    def resolved(self) -> BoolArray:
-        """Which parameters the observations determine, shape (p,)."""
-        return self.resolution >= RESOLVED
+    def freedom(self) -> float:
+        """Degrees of freedom of the residuals."""
+        return freedom_of(self.sensitivities)
 
     @property
     def condition(self) -> float:
         """Ratio of the largest to the smallest singular value."""
         return float(self.singular_values[0] / max(self.singular_values[-1], np.finfo(float).tiny))
+
+    @property
+    def values(self) -> FloatArray:
+        """Values of the parameters, shape (p,)."""
+        return np.array([float(u.value(z)) for u, z in zip(self.unknowns, self.z, strict=True)])
+
+    @property
+    def deviations(self) -> FloatArray:
+        """Standard deviations of the values, shape (p,); to first order where the prior is logarithmic."""
+        slopes = [u.slope(z) for u, z in zip(self.unknowns, self.z, strict=True)]
+        return np.sqrt(np.diagonal(self.covariance)) * slopes
+
+    @property
+    def intervals(self) -> FloatArray:
+        """Confidence intervals at `LEVEL`, shape (p, 2); by Student's t where φ was estimated."""
+        upper = (1 + LEVEL) / 2
+        times = norm.ppf(upper) if self.inflation == 1 else t.ppf(upper, self.freedom)
+        ends = self.z[:, None] + times * np.sqrt(np.diagonal(self.covariance))[:, None] * [-1, 1]
+        return np.array(
+            [np.clip(u.value(e), u.low, u.high) for u, e in zip(self.unknowns, ends, strict=True)]
+        )
+
+    @property
+    def resolution(self) -> FloatArray:
+        """Share of what is known of each parameter that the observations say, shape (p,): 0 to 1."""
+        return np.asarray(1 - np.diagonal(self.covariance))
+
+    @property
+    def resolved(self) -> BoolArray:
+        """Which parameters the observations determine, shape (p,)."""
+        return np.asarray(self.resolution >= RESOLVED)
+
+    def left_out(self, rows: IntArray) -> FloatArray:
+        """Residuals, over φ σ, of observations if they had not been used, to first order: (I - H)^-1 r.
+
+        H = A (A^T A + 1)^-1 A^T; exact for a linear model and the same φ (D. M. Allen, Technometrics 16
+        (1974) 125-127).
+
+        Args:
+            rows: The observations that are left out together, shape (k,).
+        """
+        own = self.sensitivities[rows]
+        return np.linalg.solve(np.eye(len(rows)) - own @ self.covariance @ own.T, self.residuals[rows])
 
 
 def estimate(
@@ -130,21 +187,11 @@ def estimate(
         deviations: Their standard deviations σ, shape (n,), all positive.
         unknowns: The p parameters.
     """
-    start, scale = (np.array([getattr(u, name) for u in unknowns]) for name in ("start", "scale"))
-    bounds = [(np.array([getattr(u, name) for u in unknowns]) - start) / scale for name in ("low", "high")]
-    one, count = np.eye(len(unknowns)), len(observed)
-    known: dict[bytes, Prediction] = {}
-
-    def whitened(z: FloatArray) -> Prediction:
-        if z.tobytes() not in known:
-            values, slopes = model(start + scale * z)
-            known.clear()
-            known[z.tobytes()] = (values - observed) / deviations, slopes * scale / deviations[:, None]
-            calls.append(1)
-        return known[z.tobytes()]
-
-    calls: list[int] = []
-    z, inflation = np.clip(np.zeros(len(unknowns)), *bounds), 1.0
+    whitened = _Whitened(model, observed, deviations, unknowns)
+    count, one = len(unknowns), np.eye(len(unknowns))
+    bounds = np.array([unknown.bounds for unknown in unknowns]).T
+    z = np.clip(np.zeros(count), *bounds)
+    inflation = _inflation(whitened(z)[0], len(observed))
     for _ in range(ROUNDS):
         weight = 1 / inflation
         fit = least_squares(
@@ -152,32 +199,56 @@ def estimate(
             z,
             lambda z, weight=weight: np.concatenate([weight * whitened(z)[1], one]),
             bounds=bounds,
-            method="dogbox",
-            xtol=1e-8,
+            xtol=1e-6,
             ftol=1e-10,
             gtol=1e-8,
         )
         z = fit.x
         residuals, slopes = whitened(z)
-        _, singular, combinations = np.linalg.svd(slopes * weight, full_matrices=len(unknowns) > count)
-        singular = np.append(singular, np.zeros(len(unknowns) - len(singular)))
-        freedom = max(count - float((singular**2 / (1 + singular**2)).sum()), 1.0)
-        before, inflation = inflation, _inflation(residuals, freedom)
-        if abs(inflation / before - 1) < 1e-3:
+        used, inflation = inflation, _inflation(residuals, freedom_of(weight * slopes))
+        if settled := abs(inflation / used - 1) < SETTLED:
             break
-    spread = scale[:, None] * combinations.T / np.sqrt(1 + singular**2)
     return Estimate(
         unknowns=unknowns,
-        values=start + scale * z,
-        covariance=spread @ spread.T,
-        singular_values=singular,
-        combinations=combinations,
-        residuals=residuals,
-        inflation=before,
-        freedom=freedom,
-        evaluations=len(calls),
-        converged=bool(fit.success) and abs(inflation / before - 1) < 1e-3,
+        z=z,
+        sensitivities=weight * slopes,
+        residuals=weight * residuals,
+        inflation=used,
+        evaluations=whitened.evaluations,
+        converged=bool(fit.success and settled),
     )
+
+
+def freedom_of(sensitivities: FloatArray) -> float:
+    """Observations less what the parameters take up of them, tr(A (A^T A + 1)^-1 A^T); at least one."""
+    squares = np.linalg.svd(sensitivities, compute_uv=False) ** 2
+    return max(len(sensitivities) - float((squares / (1 + squares)).sum()), 1.0)
+
+
+class _Whitened:
+    """Residuals over σ, shape (n,), and their derivatives by z, shape (n, p); the last ones are kept."""
+
+    def __init__(
+        self,
+        model: Callable[[FloatArray], Prediction],
+        observed: FloatArray,
+        deviations: FloatArray,
+        unknowns: Sequence[Unknown],
+    ) -> None:
+        self._model, self._observed, self._deviations = model, observed, deviations
+        self._unknowns = unknowns
+        self._last: tuple[bytes, Prediction] | None = None
+        self.evaluations = 0
+
+    def __call__(self, z: FloatArray) -> Prediction:
+        key = z.tobytes()
+        if self._last is None or self._last[0] != key:
+            pairs = list(zip(self._unknowns, z, strict=True))
+            predicted, slopes = self._model(np.array([float(u.value(place)) for u, place in pairs]))
+            slopes = slopes * [u.slope(place) for u, place in pairs] / self._deviations[:, None]
+            self._last = key, ((predicted - self._observed) / self._deviations, slopes)
+            self.evaluations += 1
+        return self._last[1]
 
 
 def _inflation(residuals: FloatArray, freedom: float) -> float:

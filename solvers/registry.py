@@ -30,6 +30,7 @@ PRESETS = {
 BUILT_IN = {
     "fem": "solvers.fem.linear:FemSolver",
     "fem-nonlinear": "solvers.fem.nonlinear:FemNonlinearSolver",
+    "fem-id": "solvers.fem.identification:FemIdSolver",
     "fem-asm": "solvers.fem.assimilating:FemAsmSolver",
     "gp": "solvers.gaussian_process:GaussianProcessSolver",
     "statfem": "solvers.statistical_fem:StatFemSolver",

@@ -5,9 +5,9 @@
     K = Σ_r s_r (λ L_r + μ M_r) + (E / ℓ) B           r: front wall, back wall, ribs, the rest
 
 with stiffness factors s_r, matrices L_r and M_r of the two terms of the energy, and the mass matrix B of the
-base, on which a layer of compliance ℓ (mm) answers a displacement u by the traction E u / ℓ; for a rigid clamp
-its components are held instead. With x_k = K^-1 b_k and C_ij = b_i . x_j, the derivative by a parameter,
-written ', costs one back-substitution:
+base, on which a layer of compliance ℓ (mm) answers a displacement u by the traction E u / ℓ. For a rigid
+clamp its components are held instead. With x_k = K^-1 b_k and C_ij = b_i . x_j, the derivative by a
+parameter, written ', costs one back-substitution:
 
     y = K^-1 (f_k b_k' - K' c),   f' = C^-1 (d' - b' . c - b . y),   c' = y + f_k' x_k
 """

@@ -1,6 +1,7 @@
-"""Parameters of a finger that markers may tell: what they are, what is assumed of them, the problem with them."""
+"""Parameters of a finger that markers may tell: what they are and what is assumed of them."""
 
 from collections.abc import Mapping, Sequence
+from math import log
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -27,9 +28,6 @@ MEANINGS = {
 
 STIFFNESS = {"front_stiffness": "front", "back_stiffness": "back", "rib_stiffness": "rib"}
 """From a parameter to the part whose stiffness it is."""
-
-RIGID = 1e-4
-"""Compliance of a base that is as good as rigid, mm."""
 
 
 def parse_parameters(solver: str, text: str) -> tuple[str, ...]:
@@ -68,7 +66,7 @@ def unknowns_of(problem: Problem, names: Sequence[str], width: float = 1.0) -> l
     parts = walls_and_ribs(mesh) if set(names) & set(STIFFNESS) else {}
     found = []
     for name in names:
-        if name.startswith("stroke") and (value := load.displacement["uv".index(name[-1])]) is None:
+        if name.startswith("stroke") and load.displacement["uv".index(name[-1])] is None:
             raise UserError(f"{name[-1]} of the load is free, so that there is no {name} to find")
         if name in STIFFNESS and not parts[STIFFNESS[name]].any():
             raise UserError(f"this finger has no {STIFFNESS[name]} beside cavities: leave out {name}")
@@ -81,10 +79,10 @@ def unknowns_of(problem: Problem, names: Sequence[str], width: float = 1.0) -> l
                 ),
                 "stroke_u": Unknown(name, "mm", load.displacement[0] or 0.0, 0.2 * travel * width),
                 "stroke_v": Unknown(name, "mm", load.displacement[1] or 0.0, 0.2 * travel * width),
-                "base_compliance": Unknown(name, "mm", RIGID, 1.0 * width, RIGID),
+                "base_compliance": Unknown(name, "mm", 0.1, log(10) * width, logarithmic=True),
                 "poisson": Unknown(name, "", material.poisson, 0.05 * width, 0.0, 0.499),
-                "young": Unknown(name, "MPa", material.young, 0.3 * material.young * width, 1e-6),
-            }.get(name, Unknown(name, "", 1.0, 0.3 * width, 0.05))
+                "young": Unknown(name, "MPa", material.young, 0.3 * width, logarithmic=True),
+            }.get(name, Unknown(name, "", 1.0, 0.3 * width, logarithmic=True))
         )
     return found
 

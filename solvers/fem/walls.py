@@ -44,4 +44,4 @@ def _distance(mesh: TriangleMesh, face: str, points: FloatArray) -> FloatArray:
     start, end = nodes[nodes[:, 0].argmin()], nodes[nodes[:, 0].argmax()]
     along = (end - start) / np.linalg.norm(end - start)
     away = points - start
-    return np.abs(along[0] * away[:, 1] - along[1] * away[:, 0])
+    return np.asarray(np.abs(along[0] * away[:, 1] - along[1] * away[:, 0]))

@@ -1,0 +1,135 @@
+"""`fem-id`: the parameters of a finger for which finite elements move its markers as they were observed."""
+
+import time
+from dataclasses import asdict, dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.observations import Observations
+from solvers.assimilation import MARKER_RADIUS, without_each
+from solvers.estimation import Estimate, Prediction, estimate
+from solvers.fem.identification_text import sentence
+from solvers.fem.lagrange import LagrangeField, LagrangeSpace
+from solvers.fem.linear import FemSolver
+from solvers.fem.observer import Observer
+from solvers.fem.parametrised import LinearFinger
+from solvers.fem.unknowns import parse_parameters, problem_with, unknowns_of
+from solvers.problem import Problem
+from solvers.solution import Solution, Status
+from solvers.solver import Progress, check_problem, silent
+
+
+@dataclass(frozen=True)
+class FemIdSolver:
+    """`fem` with the parameters of load, clamp and material that its markers tell.
+
+    Attributes:
+        parameters: What is to be found, names of `solvers.fem.unknowns.MEANINGS` with commas between them.
+        prior: Factor of the standard deviations that the parameters have before anything is observed.
+        reaction: Measured force of the indenter on the finger along y per depth, N/mm; None if there is none.
+        reaction_error: Standard deviation of the reaction over its size.
+        degree: Degree of the elements, 1 or 2.
+        marker_radius: Of the discs over which the displacement is averaged, mm; zero for the points alone.
+    """
+
+    parameters: str = "position,stroke_u,stroke_v"
+    prior: float = 1.0
+    reaction: float | None = None
+    reaction_error: float = 0.02
+    degree: int = 2
+    marker_radius: float = MARKER_RADIUS
+    name: ClassVar[str] = "fem-id"
+    laws: ClassVar[tuple[str, ...]] = ("linear",)
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point")
+    assimilates: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        names = parse_parameters(self.name, self.parameters)
+        if "young" in names and self.reaction is None:
+            raise UserError(
+                "fem-id cannot find young from displacements alone: the load is a displacement, so that "
+                "Young's modulus cancels out of the displacement everywhere; give reaction=, N/mm"
+            )
+        if self.degree not in (1, 2):
+            raise UserError(f"fem-id has elements of degree 1 and 2, not {self.degree}")
+        for name in ("prior", "reaction_error"):
+            if not (np.isfinite(value := getattr(self, name)) and value > 0):
+                raise UserError(f"fem-id: {name} must be positive, got {value}")
+        if self.reaction is not None and not (np.isfinite(self.reaction) and self.reaction):
+            raise UserError(
+                f"fem-id: the reaction must be a force other than zero, N/mm, got {self.reaction}"
+            )
+        if not (np.isfinite(self.marker_radius) and self.marker_radius >= 0):
+            raise UserError(f"fem-id: marker_radius must be zero or more, got {self.marker_radius}")
+
+    def settings(self) -> dict[str, object]:
+        """What is to be found, by what, and the elements."""
+        return asdict(self)
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        """Find the parameters and solve with them; see `Solver`. Without observations it is `fem`."""
+        check_problem(self, problem)
+        if problem.observations is not None:
+            return self._solve(problem, problem.observations, progress)
+        plain = FemSolver(degree=self.degree, estimate=False).solve(problem, progress)
+        return replace(plain, solver=self.name, status=Status(True, "without markers, this is fem"))
+
+    def _solve(self, problem: Problem, observations: Observations, progress: Progress) -> Solution:
+        started = time.perf_counter()
+        names = parse_parameters(self.name, self.parameters)
+        unknowns = unknowns_of(problem, names, self.prior)
+        space = LagrangeSpace(problem.mesh, self.degree)
+        finger = LinearFinger(problem, space, names)
+        observer = Observer.of(problem, space, observations, self.marker_radius)
+        if self.reaction is not None:
+            observer = observer.with_reaction(
+                problem, self.reaction, self.reaction_error * abs(self.reaction)
+            )
+
+        def model(values: FloatArray) -> Prediction:
+            progress(0.5, " ".join(f"{name} {value:.4g}" for name, value in zip(names, values, strict=True)))
+            return observer.predicted(finger.response(values))
+
+        found = estimate(model, observer.observed, observer.deviations, unknowns)
+        response = finger.response(found.values)
+        own = problem_with(problem, dict(zip(names, found.values.tolist(), strict=True)))
+        reaction = np.zeros(2)
+        reaction[problem.load.prescribed] = response.forces
+        missed = observer.missed(found)
+        return Solution(
+            solver=self.name,
+            problem=own,
+            field=LagrangeField(space, response.nodal),
+            energy=response.energy,
+            reaction=reaction,
+            status=Status(found.converged, sentence(found, missed)),
+            stats={
+                "seconds": time.perf_counter() - started,
+                "unknowns": response.nodal.size,
+                "triangles": len(problem.mesh.triangles),
+                "degree": self.degree,
+                **statistics(found),
+            },
+            left_out=without_each(problem, -observer.missed_without_each(found)),
+        )
+
+
+def statistics(found: Estimate) -> dict[str, float | int | str]:
+    """The estimate for tables: each parameter, how well it is known, and the singular values."""
+    numbers: dict[str, float | int | str] = {"evaluations": found.evaluations, "inflation": found.inflation}
+    columns = zip(
+        found.unknowns, found.values, found.deviations, found.intervals, found.resolution, strict=True
+    )
+    for unknown, value, deviation, (low, high), resolution in columns:
+        numbers |= {
+            unknown.name: float(value),
+            f"{unknown.name}_deviation": float(deviation),
+            f"{unknown.name}_low": float(low),
+            f"{unknown.name}_high": float(high),
+            f"{unknown.name}_resolution": float(resolution),
+        }
+    singular = {f"singular_value_{n}": float(value) for n, value in enumerate(found.singular_values, 1)}
+    return numbers | singular | {"condition": found.condition}
