@@ -9,8 +9,8 @@ standard deviations s, of θ or of its logarithm, the estimate minimises
 the root of the misfit over its degrees of freedom, found together with θ: a model that is wrong by φ σ must
 not be believed to σ. With A = (dy/dz) / φ σ the covariance of z is (A^T A + 1)^-1.
 
-Sources: A. Tarantola, Inverse Problem Theory, SIAM 2005, section 3.2 (estimate and covariance), section 3.3
-(resolution); R. T. Birge, The calculation of errors by the method of least squares, Phys. Rev. 40 (1932)
+Sources: A. Tarantola, Inverse Problem Theory, SIAM 2005, chapter 3 (estimate, covariance,
+resolution); R. T. Birge, The calculation of errors by the method of least squares, Phys. Rev. 40 (1932)
 207-227 (φ).
 """
 

@@ -288,6 +288,12 @@ def test_the_guide_has_the_settings_of_assimilation_as_they_are(name, settings):
     assert {key: str(own[key]) for key in own if key not in shared} == documented
 
 
+def test_the_guide_has_every_parameter_that_can_be_found():
+    from solvers.fem.unknowns import MEANINGS
+
+    assert names(table(GUIDE, "parameter that can be found")) == list(MEANINGS)
+
+
 def test_the_guide_has_every_setting_of_the_other_presets_as_it_is():
     from solvers.registry import PRESETS, make_solver
 

@@ -33,6 +33,7 @@ ACCURACY = {
     "fem-nonlinear": 1e-6,
     "fem-asm": 1e-8,
     "statfem": 1e-8,
+    "fem-id": 1e-8,
     "skfem-p1": 1e-8,
 } | dict.fromkeys(("pinn-std", "pinn-local", "pinn-asm", "pinn-local-asm"), 0.02)
 """Relative difference that two solutions of one problem may have: rounding, Newton's tolerance, training.

@@ -65,8 +65,8 @@ def test_the_solution_is_that_of_the_problem_with_what_was_found(problem):
 
 
 def test_intervals_cover_the_truth_over_draws_of_the_noise(problem):
-    """100 draws of 0.01 mm; the band holds 99.9 % of the binomial."""
-    draws, inside, random = 100, 0, np.random.default_rng(6)
+    """40 draws of 0.01 mm; the band holds 99.9 % of the binomial."""
+    draws, inside, random = 40, 0, np.random.default_rng(6)
     exact = twin(problem, TRUTH)[0]
     for _ in range(draws):
         moved = exact.observations.displacements + NOISE * random.normal(size=(9, 2))
