@@ -8,8 +8,15 @@ from numpy.typing import NDArray
 
 from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
+from vision.saddle import fit_saddles
 
 GreyImage = NDArray[np.uint8]
+EDGE = 0.45
+"""Part of a square's side along which its edges are alone."""
+RADII = (2.5, 12.0)
+"""Of the discs of pixels in which a corner is sought."""
+FEWEST_CORNERS = 4
+"""In either half of the corners: as many as determine a pose."""
 
 
 @dataclass(frozen=True)
@@ -56,14 +63,63 @@ class Board:
         """Where `corners` are in an image, shape (n, 2), pixels; None if it does not show the whole board.
 
         Source: A. Duda, U. Frese, "Accurate detection and localization of checkerboard corners for
-        calibration", BMVC 2018, as in OpenCV.
+        calibration", BMVC 2018, as in OpenCV; then `vision.saddle`.
         """
         found, corners = cv2.findChessboardCornersSB(
             image, (self.columns, self.rows), flags=cv2.CALIB_CB_ACCURACY
         )
-        return np.asarray(corners, dtype=np.float64).reshape(-1, 2) if found else None
+        if not found:
+            return None
+        refined = self.refine(image, np.asarray(corners, np.float64).reshape(-1, 2), EDGE * self.square)
+        if refined is None:
+            return None
+        seen = np.isfinite(refined[:, 0]).reshape(self.rows, self.columns)
+        whole = seen.any(axis=0).all() and seen.any(axis=1).all()  # OpenCV adds rows to smaller boards
+        return refined if whole else None
+
+    def refine(self, image: GreyImage, corners: FloatArray, reach: float) -> FloatArray | None:
+        """Corners to hundredths of a pixel from guesses, both of shape (n, 2) with NaN where one is not seen.
+
+        Args:
+            image: What shows them.
+            corners: Guesses.
+            reach: How far from a corner the board shows nothing but its edges, mm.
+
+        Returns:
+            None if those that are seen do not determine a pose.
+        """
+        seen = np.isfinite(corners[:, 0])
+        if not self._determine(seen):
+            return None
+        homography, _ = cv2.findHomography(self.corners[seen, :2], corners[seen])
+        edges = _slopes(np.asarray(homography, np.float64), self.corners[seen, :2])
+        lengths = np.linalg.norm(edges, axis=2)
+        narrowest = np.abs(np.linalg.det(edges)) / lengths.max(axis=1)
+        radii = np.clip(reach * narrowest, *RADII)
+        refined = np.full_like(corners, np.nan)
+        refined[seen] = fit_saddles(image, corners[seen], edges, radii)
+        return refined if self._determine(np.isfinite(refined[:, 0])) else None
+
+    def _determine(self, seen: BoolArray) -> bool:
+        """Whether either half of the seen corners determines a pose."""
+        for half in self.halves:
+            points = self.corners[half & seen, :2]
+            if len(points) < FEWEST_CORNERS:
+                return False
+            spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+            if spread[1] < 0.1 * spread[0]:
+                return False
+        return True
 
     def seems(self, image: GreyImage) -> str | None:
         """Another size that the board in an image seems to have; None if there is none."""
         found, _, cells = cv2.findChessboardCornersSBWithMeta(image, (3, 3), cv2.CALIB_CB_LARGER)
         return f"{max(cells.shape)}x{min(cells.shape)}" if found else None
+
+
+def _slopes(homography: FloatArray, points: FloatArray) -> FloatArray:
+    """How far a homography moves points, shape (n, 2), per mm along x and y, in rows, shape (n, 2, 2)."""
+    places = np.column_stack([points, np.ones(len(points))]) @ homography.T
+    pixels = places[:, :2] / places[:, 2:]
+    slopes = homography[:2, :2].T - homography[2, :2][:, None] * pixels[:, None, :]
+    return np.asarray(slopes / places[:, 2, None, None])

@@ -118,13 +118,13 @@ def calibrate(
             views[name] = corners
         else:
             boardless.append(name)
-            if not views and len(boardless) <= GUESSES and (guess := board.seems(image)):
+            if len(views) < FEWEST_VIEWS and len(boardless) <= GUESSES and (guess := board.seems(image)):
                 guesses[guess] += 1
-    if not views:
-        ((guess, votes),) = guesses.most_common(1) or [("", 0)]
+    guess, votes = guesses.most_common(1)[0] if guesses else ("", 0)
+    if len(views) < FEWEST_VIEWS and votes > max(1, len(views)):
         raise UserError(
-            f"none of {len(boardless)} photographs shows a board of {board}"
-            + (f"; {votes} seem to show {guess}" if votes > 1 else "; count them")
+            f"{len(views)} of {len(views) + len(boardless)} photographs show the board of {board}; "
+            f"{votes} seem to show {guess}"
         )
     return calibrate_views(views, board, first[1], lens=lens, boardless=tuple(boardless))
 

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
+from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from vision.board import Board, GreyImage
 
-FEWEST_CORNERS = 4
-"""In either half of the corners: as many as determine a pose."""
-SMALLEST_WINDOW, LARGEST_WINDOW = 2, 8
-"""Half the side of the square in which a corner is sought, pixels."""
+REACH = 0.6
+"""Distance from a corner that stays clear of its markers, over the difference of the sides of both."""
 DICTIONARIES = {
     name.removeprefix("DICT_"): int(getattr(cv2.aruco, name))
     for name in sorted(dir(cv2.aruco))
@@ -61,13 +59,11 @@ class CharucoBoard(Board):
     def find(self, image: GreyImage) -> FloatArray | None:
         """Where `corners` are in an image, shape (n, 2), pixels, NaN where one is not seen; None if few are.
 
-        OpenCV before 4.14 gives them half a pixel off; they are located anew as saddle points, in windows
-        that end where the markers begin. Boards of the layout before OpenCV 4.6 are found too.
+        Boards of the layout before OpenCV 4.6 are found too.
 
         Source: S. Garrido-Jurado et al., "Automatic generation and detection of highly reliable fiducial
-        markers under occlusion", Pattern Recognition 47, 2014; W. Förstner, E. Gülch, "A fast operator for
-        detection and precise location of distinct points, corners and centres of circular features", 1987;
-        both as in OpenCV.
+        markers under occlusion", Pattern Recognition 47, 2014, as in OpenCV,
+        which before 4.14 puts corners half a pixel to the right and below; then `vision.saddle`.
         """
         for legacy in (False, True):
             board = self._opencv(legacy=legacy)
@@ -77,13 +73,8 @@ class CharucoBoard(Board):
         else:
             return None
         corners = np.full((len(self.corners), 2), np.nan)
-        half = self._window(np.ravel(numbers), np.reshape(pixels, (-1, 2)))
-        stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 100, 1e-4)
-        pixels = np.asarray(pixels, dtype=np.float32)
-        corners[np.ravel(numbers)] = np.reshape(
-            cv2.cornerSubPix(image, pixels, (half, half), (-1, -1), stop), (-1, 2)
-        )
-        return corners if self._determined(np.isfinite(corners[:, 0])) else None
+        corners[np.ravel(numbers)] = np.reshape(pixels, (-1, 2))
+        return self.refine(image, corners, REACH * (self.square - self.marker))
 
     def seems(self, image: GreyImage) -> str | None:
         """Nothing: the markers are counted by name."""
@@ -98,22 +89,3 @@ class CharucoBoard(Board):
         )
         board.setLegacyPattern(legacy)
         return board
-
-    def _window(self, numbers: IntArray, pixels: FloatArray) -> int:
-        """Half the side of a window that does not reach the markers, pixels."""
-        apart = np.linalg.norm(pixels[:, None] - pixels, axis=2)
-        neighbours = np.linalg.norm(self.corners[numbers][:, None] - self.corners[numbers], axis=2)
-        side = np.min(apart[np.isclose(neighbours, self.square)], initial=np.inf)
-        gap = 0.5 * side * (1 - self.marker / self.square)
-        return int(np.clip(gap, SMALLEST_WINDOW, LARGEST_WINDOW))
-
-    def _determined(self, seen: BoolArray) -> bool:
-        """Whether either half of the seen corners determines a pose."""
-        for half in self.halves:
-            points = self.corners[half & seen, :2]
-            if len(points) < FEWEST_CORNERS:
-                return False
-            spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-            if spread[1] < 0.1 * spread[0]:
-                return False
-        return True

@@ -41,6 +41,7 @@ def calibrate(
 ) -> int:
     """Calibrate a camera from photographs of a chessboard or ChArUco board, and say how well it is known."""
     from compare.calibration_table import calibration_table, view_table
+    from compare.figures.calibration_picture import draw_calibration
     from vision.boards import read_board
     from vision.calibration import LensChoice, better_lens
     from vision.calibration import calibrate as calibrated
@@ -54,6 +55,11 @@ def calibrate(
     calibration = calibrated(photographs(images, without=without), chosen, lens=lens)
     versions = package_versions()
     save_calibration(out, calibration, {name: versions[name] for name in VERSIONS})
+    errors = calibration.view_errors
+    worst = max(errors, key=errors.__getitem__)
+    picture = out.with_suffix(".png")
+    photograph = next(image for name, image in photographs(images, without=without) if name == worst)
+    draw_calibration(picture, calibration, worst, photograph)
     if calibration.boardless:
         say(f"warning: no board of {chosen} was found in {', '.join(calibration.boardless)}")
     if better := better_lens(calibration, lens):
@@ -62,4 +68,5 @@ def calibrate(
     console.print(calibration_table(calibration))
     console.print(view_table(calibration))
     print(out)
+    print(picture)
     return 0

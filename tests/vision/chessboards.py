@@ -1,11 +1,13 @@
 """A camera by its formula, photographs of a board in many poses, and a board drawn analytically."""
 
+import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from geometry.arrays import FloatArray
+from geometry.arrays import BoolArray, FloatArray
 from vision.board import Board, GreyImage
 from vision.camera import Camera, Pose
+from vision.charuco import DICTIONARIES, CharucoBoard
 
 BOARD = Board(9, 6, 25.0)
 CAMERA = Camera(1280, 720, 1100.0, 1095.0, 652.0, 349.0, distortion=(-0.25, 0.08, 1e-3, -5e-4, 0.0))
@@ -59,5 +61,43 @@ def drawn(board: Board, homography: FloatArray, size: tuple[int, int], *, sample
     u, v, w = np.tensordot(homography, pixels, axes=1)
     column, row = np.floor(u / w / board.square), np.floor(v / w / board.square)
     inside = (column >= -1) & (column < board.columns) & (row >= -1) & (row < board.rows)
-    bright = np.where(inside & ((column + row) % 2 == 0), 30.0, 220.0)
+    black = inside & ((column + row) % 2 == 0)
+    if isinstance(board, CharucoBoard):
+        black |= _markers(board, u / w + board.square, v / w + board.square)
+    bright = np.where(black, 30.0, 220.0)
     return np.rint(bright.reshape(height, samples, width, samples).mean(axis=(1, 3))).astype(np.uint8)
+
+
+def photographed(
+    board: Board, pose: Pose, *, focal: float = 600.0, blur: float = 0.7, noise: float = 2.0
+) -> tuple[GreyImage, FloatArray]:
+    """A blurred and noisy photograph of 640x480 pixels by a pinhole, and where the corners truly are."""
+    matrix = np.array([[focal, 0, 319.5], [0, focal, 239.5], [0, 0, 1]])
+    turn = Rotation.from_rotvec(pose.rotation).as_matrix()
+    to_pixels = matrix @ np.column_stack([turn[:, :2], pose.translation])
+    sharp = drawn(board, np.linalg.inv(to_pixels), (640, 480), samples=4)
+    image = cv2.GaussianBlur(sharp.astype(float), (0, 0), blur)
+    image += np.random.default_rng(4).normal(0, noise, image.shape)
+    exact = np.column_stack([board.corners[:, :2], np.ones(len(board.corners))]) @ to_pixels.T
+    return np.clip(np.rint(image), 0, 255).astype(np.uint8), exact[:, :2] / exact[:, 2:]
+
+
+def _markers(board: CharucoBoard, x: FloatArray, y: FloatArray) -> BoolArray:
+    """Where the markers are black; x and y from the corner of the board, mm.
+
+    In every other square from the second one on, row by row; a marker has a black border of one bit.
+    """
+    dictionary = cv2.aruco.getPredefinedDictionary(DICTIONARIES[board.dictionary])
+    bits = dictionary.markerSize + 2
+    images = np.ones((board.rows + 1, board.columns + 1, bits, bits), dtype=bool)
+    places = [place for place in np.ndindex(images.shape[:2]) if sum(place) % 2]
+    for number, place in enumerate(places):
+        images[place] = cv2.aruco.generateImageMarker(dictionary, number, bits) > 0
+    (column, right), (row, down) = np.divmod(x, board.square), np.divmod(y, board.square)
+    margin = 0.5 * (board.square - board.marker)
+    j, i = ((inside - margin) / board.marker * bits for inside in (right, down))
+    on = (np.minimum(i, j) >= 0) & (np.maximum(i, j) < bits)
+    on &= (column >= 0) & (column <= board.columns) & (row >= 0) & (row <= board.rows)
+    black = np.zeros(x.shape, dtype=bool)
+    black[on] = ~images[tuple(index[on].astype(int) for index in (row, column, i, j))]
+    return black

@@ -1,11 +1,14 @@
 """The adjustment against the dense least-squares problem, solved by SciPy, and against OpenCV."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 from chessboards import BOARD, CAMERA, poses, views
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
 
 from vision.adjustment import Poses, Sightings, adjust
 
@@ -56,6 +59,21 @@ def test_standard_deviations_are_those_of_opencv():
     size, flags = (CAMERA.width, CAMERA.height), cv2.CALIB_FIX_K3
     expected = cv2.calibrateCameraExtended(points, pixels, size, np.eye(3), np.zeros(5), flags=flags)[5]
     np.testing.assert_allclose(found.standard_deviations, expected.ravel()[:9], rtol=2e-3)
+
+
+def test_the_covariance_covers_the_errors_of_200_fits():
+    rng, exact = np.random.default_rng(11), CAMERA.project(placed().place(ALL.points, ALL.view))
+    squares, scores = [], []
+    for _ in range(200):
+        seen = replace(ALL, pixels=exact + rng.normal(0, 0.3, exact.shape))
+        found = adjust(CAMERA, placed(), seen, free=FREE).camera
+        off = (found.intrinsics - CAMERA.intrinsics)[:8]
+        squares.append(off @ np.linalg.solve(np.array(found.covariance)[:8, :8], off))
+        scores.append(np.abs(off) / found.standard_deviations[:8])
+    # of 200: the mean of χ² with 8 degrees of freedom has a deviation of 0.28, shares of 3.3 and 1.5 points
+    assert abs(np.mean(squares) - 8) < 1
+    assert abs(np.mean(np.array(squares) < chi2(8).ppf(0.95)) - 0.95) < 0.045
+    np.testing.assert_allclose(np.mean(np.array(scores) < 1, axis=0), 0.683, rtol=0, atol=0.11)
 
 
 def test_a_known_camera_leaves_only_the_poses():
