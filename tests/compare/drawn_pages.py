@@ -23,6 +23,7 @@ MODULES = (
     "design_drawing",
     "mesh_drawing",
     "grid_chart",
+    "calibration_picture",
 )
 
 
