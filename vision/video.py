@@ -1,6 +1,7 @@
 """Frames from wherever they come, and videos that hold every frame that was written."""
 
 import os
+import re
 import sys
 from contextlib import ExitStack
 from functools import partial
@@ -32,7 +33,7 @@ def open_frames(
 
     Args:
         source: A video file; a picture; a folder or glob of pictures, taken in natural order; the number of a
-            camera; or "-", JPEG or PNG pictures one after another on standard input.
+            camera, or its device; or "-", JPEG or PNG pictures one after another on standard input.
         rate: Frames a second, where the source does not say: of pictures and pipes, 30 if not given. A camera
             is asked for it.
         size: (width, height) that a camera is asked for, pixels.
@@ -49,9 +50,10 @@ def open_frames(
             raise UserError("nothing is piped to standard input; '-' reads JPEG or PNG pictures from there")
         name, read = "standard input", partial(os.read, sys.stdin.fileno())
         return Frames(name, shots_of_stream(read, name, usual), rate=usual)
-    if isinstance(source, int) or (str(source).isdecimal() and not path.exists()):
-        return camera_frames(int(str(source)), size=size, rate=rate)
-    if path.is_dir():
+    camera = re.fullmatch(r"(?:/dev/video)?(\d+)", str(source))
+    if camera and (isinstance(source, int) or not (path.is_file() or path.is_dir())):
+        return camera_frames(int(camera[1]), size=size, rate=rate)
+    if path.is_dir() and str(source):
         paths = pictures_in(path)
     elif path.is_file() and path.suffix.lower() not in SUFFIXES:
         return video_frames(path, rate)
@@ -60,9 +62,9 @@ def open_frames(
     elif has_magic(str(source)):
         paths = sorted(filter(Path.is_file, map(Path, glob(str(source)))), key=natural_order)
     else:
-        raise UserError(f"{source}: there is no such video, picture or folder")
+        raise UserError(f"{str(source)!r}: there is no such video, picture or folder")
     if not paths:
-        raise UserError(f"{source}: there is no such picture")
+        raise UserError(f"{str(source)!r}: there is no such picture")
     return Frames(str(source), shots_of_files(paths, usual), rate=usual, count=len(paths))
 
 

@@ -15,7 +15,11 @@ AMBIGUOUS = 0.05
 
 def pick(
     source: Annotated[
-        str, Parameter(help="Picture, video, folder or glob of pictures, camera number, or -.")
+        str,
+        Parameter(
+            allow_leading_hyphen=True,
+            help="Picture, video, folder or glob of pictures, number of a camera, or - for a pipe.",
+        ),
     ],
     *,
     at: Annotated[

@@ -42,6 +42,13 @@ def test_a_click_gives_a_colour_and_a_picture(capsys):
     assert capsys.readouterr().out.splitlines()[0] == colour
 
 
+def test_a_picture_comes_through_a_pipe(monkeypatch, capsys):
+    with Path("shots/2.png").open() as file:
+        monkeypatch.setattr("sys.stdin", file)
+        assert main(["pick", "-", "--at", "51,39", "--radii", "5,12"]) == 0
+    assert "3 circles" in capsys.readouterr().out
+
+
 def test_a_colour_that_much_else_has_is_warned_of(capsys):
     assert main(["pick", "shots", "--at", "10,10"]) == 0
     assert "warning: 100% of the image has this colour" in capsys.readouterr().err
@@ -52,6 +59,7 @@ def test_a_colour_that_much_else_has_is_warned_of(capsys):
     [
         ("shots", "give either --at X,Y or --colour"),
         ("shots --at 1,1 --colour dark", "give either --at X,Y or --colour"),
+        ("shots --wrong 5 --colour dark", "--wrong"),
         ("shots --at 5", "--at '5': give 2 or 4 numbers"),
         ("shots --at 5,x", "--at '5,x': give 2 or 4 numbers"),
         ("shots --at 200,5", "200,5 is not within the image of 160x80"),
@@ -59,7 +67,7 @@ def test_a_colour_that_much_else_has_is_warned_of(capsys):
         ("shots --colour dark --radii 9,5", "radii from 9 to 5 pixels"),
         ("shots --colour dark --frame 2", "shots has no frame 2"),
         ("shots --colour dark --out pick.txt", "--out pick.txt: give the name of a picture"),
-        ("absent.mkv --colour dark", "absent.mkv: there is no such video"),
+        ("absent.mkv --colour dark", "'absent.mkv': there is no such video"),
     ],
 )
 def test_bad_input_is_one_line_and_writes_nothing(line, message, capsys):

@@ -136,10 +136,12 @@ def test_what_is_no_video_is_one_line(damage, message, tmp_path, capfd):
 
 
 def test_an_absent_source_is_one_line(tmp_path):
-    with pytest.raises(UserError, match=r"absent\.mkv: there is no such video"):
-        open_frames(tmp_path / "absent.mkv")
-    with pytest.raises(UserError, match="camera 97 cannot be opened"):
-        open_frames("97")
+    for absent in (tmp_path / "absent.mkv", ""):
+        with pytest.raises(UserError, match=f"'{absent}': there is no such video"):
+            open_frames(absent)
+    for camera in (97, "97", "/dev/video97"):
+        with pytest.raises(UserError, match="camera 97 cannot be opened"):
+            open_frames(camera)
     with pytest.raises(UserError, match="a rate of 0 frames a second"):
         open_frames(tmp_path, rate=0)
 
