@@ -1,20 +1,18 @@
 """Frames of a video file and of a camera, by OpenCV."""
 
 import math
-import os
 import time
 import warnings
-from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Generator
 from itertools import count
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 
 from geometry.errors import UserError
 from vision.frames import Frames, Image, Shot
+from vision.silence import silenced
 
 USUAL_RATE = 30.0
 FASTEST = 1000.0
@@ -39,7 +37,7 @@ def video_frames(path: Path, rate: float | None = None) -> Frames:
         raise UserError(f"cannot read the video {path}: {error.strerror}") from None
     if empty:
         raise UserError(f"cannot read the video {path}: the file is empty")
-    with silent():
+    with silenced():
         capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     if not capture.isOpened():
         raise UserError(
@@ -88,7 +86,7 @@ def camera_frames(index: int, *, size: tuple[int, int], rate: float | None = Non
     Raises:
         UserError: If there is no such camera; on iterating, if it stops.
     """
-    with silent():
+    with silenced():
         capture = cv2.VideoCapture(index)
     if not capture.isOpened():
         raise UserError(f"camera {index} cannot be opened; is it connected, and not used by another program?")
@@ -111,7 +109,7 @@ def _shots_of_camera(index: int, capture: cv2.VideoCapture) -> Generator[Shot, N
 
 
 def _next(capture: cv2.VideoCapture) -> Image | None:
-    with silent():
+    with silenced():
         done, image = capture.read()
     return np.asarray(image, dtype=np.uint8) if done else None
 
@@ -125,16 +123,3 @@ def _time(capture: cv2.VideoCapture, rate: float) -> float:
 def _rate(capture: cv2.VideoCapture, told: float | None) -> float:
     said = capture.get(cv2.CAP_PROP_FPS)
     return said if 0 < said <= FASTEST else told or USUAL_RATE
-
-
-@contextmanager
-def silent() -> Iterator[None]:
-    """Keeps remarks of OpenCV and FFmpeg off standard error: what they mean to a user, we say."""
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-    opencv: Any = cv2
-    logging = opencv if hasattr(opencv, "setLogLevel") else opencv.utils.logging  # OpenCV 4 and 5
-    level = logging.setLogLevel(0)
-    try:
-        yield
-    finally:
-        logging.setLogLevel(level)

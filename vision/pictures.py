@@ -11,6 +11,7 @@ import numpy as np
 from geometry.atomic import atomic_path
 from geometry.errors import UserError
 from vision.frames import Image, Shot
+from vision.silence import silenced
 
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm", ".jp2"})
 JPEG, PNG = b"\xff\xd8", b"\x89PNG\r\n\x1a\n"
@@ -81,9 +82,12 @@ class Decoder:
             raise UserError(f"cannot read {label}: it is empty")
         if content.startswith((JPEG, PNG)) and picture_end(content) is None:
             raise UserError(f"cannot read {label}: its end is missing")
-        image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), _AS_STORED)
+        with silenced():
+            image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), _AS_STORED)
         if image is None:
-            raise UserError(f"cannot read {label}: it is not one that OpenCV knows, such as PNG or JPEG")
+            raise UserError(
+                f"cannot read {label}: it is damaged, or not one that OpenCV knows, such as PNG or JPEG"
+            )
         if image.dtype == np.uint8:
             return np.asarray(image, dtype=np.uint8)
         if image.dtype != np.uint16:

@@ -14,9 +14,10 @@ import numpy as np
 
 from geometry.atomic import atomic_path
 from geometry.errors import ShapeError, UserError
-from vision.capture import FASTEST, USUAL_RATE, camera_frames, silent, video_frames
+from vision.capture import FASTEST, USUAL_RATE, camera_frames, video_frames
 from vision.frames import Frame, Frames, Image
 from vision.pictures import SUFFIXES, natural_order, pictures_in, shots_of_files, shots_of_stream
+from vision.silence import silenced
 
 __all__ = ["CODECS", "Frame", "Frames", "VideoWriter", "open_frames"]
 
@@ -105,7 +106,7 @@ class VideoWriter:
         with ExitStack() as stack:
             self._partial = stack.enter_context(atomic_path(self.path))
             code = cv2.VideoWriter.fourcc(*self._codec)
-            with silent():
+            with silenced():
                 self._writer = cv2.VideoWriter(
                     str(self._partial), cv2.CAP_FFMPEG, code, self.rate, self._whole_size
                 )
@@ -143,7 +144,7 @@ class VideoWriter:
             return
         if not self.written:
             raise UserError(f"no frame was given for the video {self.path}")
-        with silent():
+        with silenced():
             capture = cv2.VideoCapture(str(self._partial), cv2.CAP_FFMPEG)
             found = 0
             while capture.grab():

@@ -80,17 +80,19 @@ def test_another_size_names_both_pictures(tmp_path):
     ("content", "message"),
     [
         (b"", "it is empty"),
-        (b"no picture", "not one that OpenCV knows"),
+        (b"no picture", "it is damaged, or not one that OpenCV knows"),
+        (encoded(1, ".bmp")[:-9], "it is damaged"),
         (encoded(1)[:-12], "its end is missing"),
         (encoded(1, ".jpg")[:-2], "its end is missing"),
         (encoded(1, ".tif", dtype=np.float32), "float32"),
     ],
 )
-def test_an_unreadable_picture_is_named(content, message, tmp_path):
+def test_an_unreadable_picture_is_named(content, message, tmp_path, capfd):
     (tmp_path / "1.png").write_bytes(encoded(1))
     (tmp_path / "2.png").write_bytes(content)
     with pytest.raises(UserError, match=rf"2\.png: .*{message}"):
         levels(tmp_path)
+    assert capfd.readouterr().err == ""
 
 
 def test_no_picture_is_one_line(tmp_path):
