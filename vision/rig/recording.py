@@ -15,11 +15,12 @@ from vision.rig.bench import Bench
 from vision.rig.exposure import Exposure, Image, Light
 from vision.rig.motion import Motion
 from vision.rig.occluders import share_seen
-from vision.rig.render import light_of, noise_of
+from vision.rig.render import mean_light, noise_of
 from vision.rig.shapes import Shape
 
-STEP = 0.5
-"""How far the finger moves at most between two pictures whose mean is a picture with motion blur, pixels."""
+STEP = 1.0
+"""How far the finger moves at most between two pictures whose mean is one with motion blur, pixels: a pixel's
+own width hides such steps."""
 MOST_STEPS = 32
 
 
@@ -106,10 +107,8 @@ class Recording:
     def _seen(self, loads: Sequence[float], occluders: Sequence[Shape]) -> tuple[Light, Truth]:
         """The mean light of the states with these shares of the load, and their truth."""
         states = [load * self.displacement for load in loads]
-        light = np.zeros((self.camera.height, self.camera.width, 3), dtype=np.float32)
-        for state in states:
-            scene = self.bench.scene(state, occluders)
-            light += light_of(scene, self.camera, self.pose, self.exposure.blur) / len(states)
+        scenes = [self.bench.scene(state, occluders) for state in states]
+        light = mean_light(scenes, self.camera, self.pose, self.exposure.blur)
         worlds = [self.bench.markers(state) for state in states]
         truth = Truth(
             load=float(np.mean(loads)),

@@ -1,5 +1,7 @@
 """A scene as a camera sees it."""
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 
@@ -36,14 +38,18 @@ def noise_of(seed: int, frame: int) -> np.random.Generator:
 
 def light_of(scene: Scene, camera: Camera, pose: Pose, blur: float) -> Light:
     """The light of a scene on the pixels: its integral over each, through a lens with this blur, pixels."""
+    return mean_light([scene], camera, pose, blur)
+
+
+def mean_light(scenes: Sequence[Scene], camera: Camera, pose: Pose, blur: float) -> Light:
+    """The mean light of scenes, as of a finger that moves while the shutter is open; see `light_of`."""
     cells = fineness(blur)
     size = (camera.width * cells, camera.height * cells)
-    canvas = np.full((*size[::-1], 3), scene.background, dtype=np.float32)
-    for shape in scene.shapes:
-        rows, columns, share = coverage((seen_edges(shape, camera, pose) + 0.5) * cells, size)
-        below = canvas[rows, columns]
-        below += share[:, :, None].astype(np.float32) * (np.array(shape.colour, dtype=np.float32) - below)
-    return blurred(canvas, blur)
+    canvas = _painted(scenes[0], camera, pose, cells, size)
+    for scene in scenes[1:]:
+        canvas += _painted(scene, camera, pose, cells, size)
+    canvas /= len(scenes)
+    return _on_pixels(canvas, blur, cells)
 
 
 def fineness(blur: float) -> int:
@@ -51,13 +57,21 @@ def fineness(blur: float) -> int:
     return int(np.clip(np.ceil(2 / blur), 2, 4)) if blur else 1
 
 
-def blurred(canvas: Light, blur: float) -> Light:
-    """The light on pixels from that on cells, of which `fineness(blur)` squared make a pixel."""
+def _painted(scene: Scene, camera: Camera, pose: Pose, cells: int, size: tuple[int, int]) -> Light:
+    """The light of a scene on the cells of a grid of this width and height."""
+    canvas = np.full((*size[::-1], 3), scene.background, dtype=np.float32)
+    for shape in scene.shapes:
+        rows, columns, share = coverage((seen_edges(shape, camera, pose) + 0.5) * cells, size)
+        below = canvas[rows, columns]
+        below += share[:, :, None].astype(np.float32) * (np.array(shape.colour, dtype=np.float32) - below)
+    return canvas
+
+
+def _on_pixels(canvas: Light, blur: float, cells: int) -> Light:
+    """The light on pixels from that on cells, of which so many squared make a pixel."""
     if not blur:
         return canvas
-    cells = fineness(blur)
-    sigma = blur * cells
-    reach = 2 * int(np.ceil(5 * sigma)) + 1
-    soft = cv2.GaussianBlur(canvas, (reach, reach), sigma, borderType=cv2.BORDER_REPLICATE)
+    reach = 2 * int(np.ceil(4 * blur * cells)) + 1
+    soft = cv2.GaussianBlur(canvas, (reach, reach), blur * cells, borderType=cv2.BORDER_REPLICATE)
     size = (canvas.shape[1] // cells, canvas.shape[0] // cells)
     return np.asarray(cv2.resize(soft, size, interpolation=cv2.INTER_AREA), dtype=np.float32)
