@@ -22,7 +22,7 @@ SIZE = (0.35, 0.65)
 """Of the board's longer side, as a share of the image's."""
 RIM = 4.0
 """Between the board and the border of the image, pixels."""
-TRIES = 400
+TRIES = 150
 
 
 def board_scene(board: Board) -> Scene:
