@@ -13,8 +13,24 @@ from numpy.typing import ArrayLike
 from geometry.arrays import BoolArray, FloatArray, frozen_array
 from geometry.errors import UserError
 from vision.board import GreyImage
-from vision.disc_model import BLUR, CONTRAST, COUNT, LIGHT, RADIUS, SHADE_X, SHADE_Y, SLANT, STRETCH, X, Y
-from vision.robust_fit import Fit, Prior, Window, adjust, median_where
+from vision.disc_model import (
+    BLUR,
+    CONTRAST,
+    COUNT,
+    EDGE,
+    LIGHT,
+    RADIUS,
+    SHADE_X,
+    SHADE_Y,
+    SLANT,
+    STRETCH,
+    X,
+    Y,
+)
+from vision.disc_neighbours import EDGES, with_edges
+from vision.disc_votes import elect, sector
+from vision.disc_window import Window, median_where
+from vision.robust_fit import Fit, Prior, adjust, coherent
 
 MARGIN = 5
 """Pixels used on either side of the edge."""
@@ -26,11 +42,23 @@ of the edge is seen."""
 KNOWN_RADIUS = 0.01
 """Relative standard deviation of a radius that is called known: a marker turns and comes nearer a little."""
 
-SOFT, SHARP = 1.5, 1.2
-"""Width of the edge, pixels, while the disc is sought and when it is first adjusted."""
+TYPICAL_BLUR = 1.0
+"""Width of the edge, pixels, to start with."""
 
-LEAST_SEEN = 0.35
-"""Share of the edge below which a disc with a known radius is not found; twice that without."""
+LEAST_REACH = 4.0
+"""How far from its guess a disc is sought, pixels; or a radius, if that is more."""
+
+STEPS = {X: 1.0, Y: 1.0, STRETCH: 0.3, SLANT: 0.3, BLUR: 0.7, SHADE_X: 0.02, SHADE_Y: 0.02}
+"""Longest steps of an iteration."""
+
+EDGE_DEVIATIONS, EDGE_STEPS, MISSING = (0.5, 1.5, 100.0), (0.3, 1.0, 1e3), 1e-3
+"""The same for straight edges: rad, pixels, grey levels; and the deviation of all where there is none."""
+
+REFINEMENTS = 3
+"""How often the pixels to use are chosen anew, at most."""
+
+LEAST_SEEN, LEAST_SEEN_UNKNOWN = 0.25, 0.5
+"""Share of the edge below which a disc is not found, with a known radius and without."""
 
 LARGEST_DEVIATION = 0.5
 """Standard deviation of the centre, pixels, above which a disc is not found."""
@@ -107,43 +135,54 @@ def fit_discs(grey: GreyImage, guesses: ArrayLike, *, radii: ArrayLike | None = 
     for size in np.unique(sizes):  # discs of a size share their window
         (alike,) = np.nonzero(sizes == size)
         fit.put(alike, _fit_alike(grey, guesses[alike], known[alike], tolerance))
-    return _judged(fit, guesses, LEAST_SEEN * (1 if radii is not None else 2))
+    return _judged(fit, guesses, LEAST_SEEN_UNKNOWN if radii is None else LEAST_SEEN)
 
 
 def _fit_alike(grey: GreyImage, guesses: FloatArray, radii: FloatArray, tolerance: float) -> Fit:
-    """Seek the discs near the guesses with a soft edge, then adjust them in a window about what was found."""
-    smallest, largest = radii.min(), radii.max()
-    window = Window.of(grey, guesses[:, :2], 0, largest + MARGIN)
-    start, limits = _start(window, guesses, radii)
-    mean = start.copy()
-    mean[:, [STRETCH, SLANT, SHADE_X, SHADE_Y]] = 0
-    deviations = np.full(mean.shape, np.inf)
-    deviations[:, list(DEVIATIONS)] = list(DEVIATIONS.values())
-    deviations[:, RADIUS] = tolerance * radii
-    prior = Prior(mean, deviations**-2.0)
-    sought = adjust(window, start, prior, limits, steps=5, tolerance=0.3)
-    window, start = sought.recentred(grey, smallest - MARGIN, largest + MARGIN)
-    start[:, BLUR] = SHARP
-    return adjust(window, start, prior, limits, steps=15, tolerance=0.003)
-
-
-def _start(window: Window, guesses: FloatArray, radii: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Parameters at the guesses with the levels that are seen there, and the longest admissible step."""
-    away = np.hypot(window.x, window.y)
-    inside, around = away <= 0.6 * radii.min(), away > radii.max() + 1
+    """Elect centres near the guesses, look for edges beside the discs, then adjust all."""
+    reach = max(radii.max(), LEAST_REACH)
+    election = elect(grey, guesses[:, :2], radii, reach, known=tolerance < np.inf)
+    radii = election.radii
+    window = Window.of(grey, election.centres, radii.min() - MARGIN, radii.max() + MARGIN)
+    x, y = election.centres.T[:, :, None] - window.origins.T[:, :, None]
+    sectors = sector(window.x - x, window.y - y)
+    trusted = np.take_along_axis(election.trusted, sectors, axis=1) & window.within
     start = np.zeros((len(guesses), COUNT))
-    start[:, [X, Y]] = guesses[:, :2] - window.origins
+    start[:, [X, Y]] = election.centres - window.origins
     start[:, RADIUS] = radii
-    start[:, BLUR] = SOFT
-    start[:, LIGHT] = median_where(window.values[:, around], window.within[:, around])
-    start[:, CONTRAST] = start[:, LIGHT] - median_where(window.values[:, inside], window.within[:, inside])
-    limits = np.full(start.shape, 1e3)
-    limits[:, [X, Y]] = np.maximum(1, 0.3 * radii)[:, None]
-    limits[:, RADIUS] = np.maximum(0.5, 0.2 * radii)
-    limits[:, [STRETCH, SLANT]] = 0.3
-    limits[:, BLUR] = 0.7
-    limits[:, [SHADE_X, SHADE_Y]] = 0.02
-    return start, limits
+    start[:, BLUR] = TYPICAL_BLUR
+    outside = np.hypot(window.x - x, window.y - y) - radii[:, None]
+    start[:, LIGHT] = median_where(window.values, trusted & (outside > 1) & (outside < 3))
+    start[:, CONTRAST] = start[:, LIGHT] - median_where(window.values, trusted & (outside < -1))
+    start, present = with_edges(window, start, trusted)
+    prior, limits = _prior(start, present, tolerance)
+    fit, parameters = adjust(window, start, prior, limits, trusted)
+    for _ in range(REFINEMENTS):
+        chosen = coherent(window, parameters, fit.variance)
+        (again,) = np.nonzero((chosen != trusted).mean(axis=1) > 0.01)
+        if not len(again):
+            break
+        trusted[again] = chosen[again]
+        part, parameters[again] = adjust(
+            window.at(again), parameters[again], prior.at(again), limits[again], trusted[again]
+        )
+        fit.put(again, part)
+    return fit
+
+
+def _prior(start: FloatArray, present: BoolArray, tolerance: float) -> tuple[Prior, FloatArray]:
+    """What is assumed of the parameters, and their longest steps; missing edges stay without strength."""
+    start[:, COUNT:] *= np.repeat(present, EDGE, axis=1)
+    mean, deviations, limits = start.copy(), np.full(start.shape, 1e3), np.full(start.shape, 1e3)
+    mean[:, [STRETCH, SLANT, SHADE_X, SHADE_Y]] = 0
+    deviations[:, list(DEVIATIONS)] = list(DEVIATIONS.values())
+    deviations[:, RADIUS] = np.minimum(tolerance * start[:, RADIUS], 1e3)
+    edges = np.where(present[:, :, None], EDGE_DEVIATIONS, MISSING)
+    deviations[:, COUNT:] = edges.reshape(len(start), -1)
+    limits[:, list(STEPS)] = list(STEPS.values())
+    limits[:, RADIUS] = np.maximum(0.5, 0.2 * start[:, RADIUS])
+    limits[:, COUNT:] = EDGE_STEPS * EDGES
+    return Prior(mean, deviations**-2.0), limits
 
 
 def _judged(fit: Fit, guesses: FloatArray, least_seen: float) -> Discs:
@@ -154,8 +193,7 @@ def _judged(fit: Fit, guesses: FloatArray, least_seen: float) -> Discs:
     centres = (
         centres + blur[:, None] ** 2 * shade
     )  # the light is blurred as well, which moves the picture back
-    covariances = np.linalg.inv(fit.information)[:, :2, :2]
-    deviations = np.sqrt(np.linalg.eigvalsh(covariances)[:, 1])
+    deviations = np.sqrt(np.linalg.eigvalsh(fit.covariances)[:, 1])
     contrast = parameters[:, CONTRAST]
     residual = np.sqrt(fit.variance)
     ratio = radii / guesses[:, 2]
@@ -171,7 +209,7 @@ def _judged(fit: Fit, guesses: FloatArray, least_seen: float) -> Discs:
     kept = np.where(found, 1.0, np.nan)
     return Discs(
         centres=centres * kept[:, None],
-        covariances=covariances * kept[:, None, None],
+        covariances=fit.covariances * kept[:, None, None],
         radii=radii * kept,
         shapes=parameters[:, [STRETCH, SLANT]] * kept[:, None],
         contrast=contrast * kept,

@@ -1,11 +1,13 @@
 """The picture of a disc: what every pixel near its edge shows, and how that changes with the parameters.
 
-    I(p) = (1 + g·(p - p₀)) (L - A Φ((R(φ) - √(ρ² + s²)) / s))
+    I(p) = (1 + g·(p - p₀)) (L - A Φ((R(φ) - √(ρ² + s²)) / s) + Σ B Φ((n·(p - p₀) - h) / s))
 
 Here ρ and φ are the distance and the direction of the pixel p from the centre; R(φ) is an ellipse; Φ is the
 normal distribution, s the width of the edge, L the level around the disc, L - A the level within and g the
 gradient of the light about the fixed point p₀. The square root is the mean distance to the centre of a point
-that is blurred by s: it accounts for the curvature of the edge, which shrinks a blurred disc by s²/2R.
+that is blurred by s: it accounts for the curvature of the edge, which shrinks a blurred disc by s²/2R. The
+sum is over straight edges beside the disc, such as those of the wall that it is printed on, with normals n,
+offsets h and levels L + B beyond.
 
 Many discs at once, in single precision. Units: pixels, grey levels.
 """
@@ -23,32 +25,38 @@ sin 2φ)^-½ has semi-axes R e^(±ε), where sinh 2ε is the length of (a, b).""
 COUNT = 10
 
 
+EDGE = 3
+"""Further parameters of every straight edge in the neighbourhood: angle of its normal, offset of the edge
+along that from p₀, and how much lighter it is beyond."""
+
+
 def picture(parameters: Array, x: Array, y: Array) -> tuple[Array, Array]:
     """Grey levels and their derivatives.
 
     Args:
-        parameters: Shape (n, 10), in the order above; the centre is relative to p₀.
+        parameters: Shape (n, m), in the order above; the centre is relative to p₀. There are 10 and 3 for
+        every
+            straight edge.
         x: Pixels relative to p₀, to the right, shape (p,).
         y: Likewise, down.
 
     Returns:
-        Levels, shape (n, p), and derivatives by the parameters, shape (n, 10, p).
+        Levels, shape (n, p), and derivatives by the parameters, shape (n, m, p).
     """
-    cx, cy, radius, a, b, s, light, contrast, gx, gy = np.ascontiguousarray(parameters.T)[:, :, None]
+    columns = np.ascontiguousarray(parameters.T)[:, :, None]
+    cx, cy, radius, a, b, s, light, contrast, gx, gy = columns[:COUNT]
     dx, dy = x - cx, y - cy
     square = dx * dx + dy * dy + np.float32(1e-6)
     twice_cosine, twice_sine = (dx * dx - dy * dy) / square, 2 * dx * dy / square
     length = np.sqrt(1 + a * a + b * b)
     shape = 1 / np.sqrt(length - a * twice_cosine - b * twice_sine)
     distance = np.sqrt(square + s * s)
-    z = (radius * shape - distance) / s
-    covered = (1 + erf(np.float32(np.sqrt(0.5)) * z)) / 2
+    covered, density, z = _step((radius * shape - distance) / s)
     shade = 1 + gx * x + gy * y
     reflectance = light - contrast * covered
 
-    derivatives = np.empty((*z.shape[:1], COUNT, z.shape[1]), dtype=np.float32)
-    by_z = np.float32(-1 / np.sqrt(2 * np.pi)) * np.exp(-z * z / 2) * shade * contrast
-    by_edge = by_z / s
+    derivatives = np.empty((len(z), len(columns), z.shape[1]), dtype=np.float32)
+    by_edge = density * shade * (-contrast / s)
     by_shape = radius * shape**3 / 2 * by_edge
     turning = 2 * (a * twice_sine - b * twice_cosine) / square * by_shape  # of R(φ) by φ, over ρ²
     radial = by_edge / distance
@@ -60,6 +68,22 @@ def picture(parameters: Array, x: Array, y: Array) -> tuple[Array, Array]:
     derivatives[:, BLUR] = -(s / distance + z) * by_edge
     derivatives[:, LIGHT] = shade
     derivatives[:, CONTRAST] = -shade * covered
+    for first in range(COUNT, len(columns), EDGE):
+        angle, offset, lighter = columns[first : first + EDGE]
+        cosine, sine = np.cos(angle), np.sin(angle)
+        beyond, density, z = _step((cosine * x + sine * y - offset) / s)
+        reflectance += lighter * beyond
+        by_edge = density * shade * (lighter / s)
+        derivatives[:, first] = by_edge * (cosine * y - sine * x)
+        derivatives[:, first + 1] = -by_edge
+        derivatives[:, first + 2] = shade * beyond
+        derivatives[:, BLUR] -= z * by_edge
     derivatives[:, SHADE_X] = reflectance * x
     derivatives[:, SHADE_Y] = reflectance * y
     return shade * reflectance, derivatives
+
+
+def _step(z: Array) -> tuple[Array, Array, Array]:
+    """A blurred step, its slope, and its argument."""
+    covered = (1 + erf(np.float32(np.sqrt(0.5)) * z)) / 2
+    return covered, np.float32(1 / np.sqrt(2 * np.pi)) * np.exp(-z * z / 2), z

@@ -1,8 +1,8 @@
 """Weighted Gauss-Newton on the pictures of many discs at once.
 
-Pixels that do not fit lose their weight, from three standard deviations of the noise on: hidden parts and
-neighbours. The noise is taken from the residuals themselves, so that far from the solution nothing is
-rejected.
+Pixels that do not fit lose their weight, from three standard deviations of the noise on. At first the noise
+is what the residuals say, so that nothing is rejected far from the solution; in the end it is at most what
+neighbouring pixels say, so that a wrong fit cannot excuse itself.
 
 Source: F. R. Hampel et al., Robust Statistics, Wiley 1986, section 2.6 (redescending weights); P. J. Huber,
 Robust Statistics, Wiley 1981, chapter 7 (regression, scale by the median absolute residual).
@@ -14,14 +14,32 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
-from vision.board import GreyImage
-from vision.disc_model import BLUR, CONTRAST, COUNT, LIGHT, RADIUS, SHADE_X, SHADE_Y, Array, X, Y, picture
+from vision.disc_model import BLUR, CONTRAST, COUNT, RADIUS, X, Y, picture
+from vision.disc_window import SCALE, Window, median_where
 
 FULL, NONE = 3.0, 6.0
 """Residuals over the noise up to which a pixel has full weight, and from which on it has none."""
 
 QUANTISATION = 1 / 12
 """Variance of rounding to grey levels: the least that the noise can be."""
+
+COHERENT = 1.5
+"""Mean of nine residuals over the noise, above which they are no noise."""
+
+LENIENT = 2
+"""First steps, in which the noise may be as large as the residuals say."""
+
+STEPS = 15
+"""At most."""
+
+TOLERANCE = 0.003
+"""Last step of a centre, pixels."""
+
+MODEL_ERROR = 0.04
+"""Residual over contrast that is put down to the model, not to hidden parts."""
+
+DARKEST, LIGHTEST, DOUBT = 5, 250, 10
+"""Grey levels beyond which pixels may be clipped, and by how much noise can hide it."""
 
 SHARPEST = 0.3
 """Width of an edge without any blur, pixels: that of the pixels themselves."""
@@ -33,41 +51,9 @@ class Prior(NamedTuple):
     mean: FloatArray
     precision: FloatArray
 
-
-@dataclass(frozen=True)
-class Window:
-    """The pixels around some discs.
-
-    Attributes:
-        origins: Pixels that the others are relative to, shape (n, 2).
-        x, y: Of the pixels, shape (p,).
-        values: Grey levels, shape (n, p).
-        within: Whether the image has that pixel, shape (n, p).
-    """
-
-    origins: IntArray
-    x: Array
-    y: Array
-    values: Array
-    within: BoolArray
-
-    @classmethod
-    def of(cls, grey: GreyImage, centres: FloatArray, inner: float, outer: float) -> Self:
-        """Pixels at distances from `inner` to `outer` from the centres, shape (n, 2)."""
-        origins = np.rint(centres).astype(np.int64)
-        reach = int(np.ceil(outer))
-        y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]
-        away = np.hypot(x, y)
-        ring = (away >= inner) & (away <= outer)
-        columns, rows = origins[:, :1] + x[ring], origins[:, 1:] + y[ring]
-        height, width = grey.shape
-        return cls(
-            origins=origins,
-            x=x[ring].astype(np.float32),
-            y=y[ring].astype(np.float32),
-            values=grey[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)].astype(np.float32),
-            within=(columns >= 0) & (columns < width) & (rows >= 0) & (rows < height),
-        )
+    def at(self, places: IntArray) -> "Prior":
+        """Those of some discs."""
+        return Prior(self.mean[places], self.precision[places])
 
 
 @dataclass
@@ -77,7 +63,7 @@ class Fit:
     Attributes:
         parameters: As in `vision.disc_model`, relative to the origins, shape (n, m).
         origins: Shape (n, 2), pixels.
-        information: Inverse covariances of the parameters, shape (n, m, m).
+        covariances: Of the centres, shape (n, 2, 2), pixels².
         variance: Of the noise, shape (n,), grey levels².
         seen: Share of the information on the radius that kept its weight, shape (n,).
         settled: Whether the last step was small, shape (n,).
@@ -85,7 +71,7 @@ class Fit:
 
     parameters: FloatArray
     origins: IntArray
-    information: FloatArray
+    covariances: FloatArray
     variance: FloatArray
     seen: FloatArray
     settled: BoolArray
@@ -96,7 +82,7 @@ class Fit:
         return cls(
             parameters=np.zeros((count, COUNT)),
             origins=np.zeros((count, 2), dtype=np.int64),
-            information=np.tile(np.eye(COUNT), (count, 1, 1)),
+            covariances=np.tile(np.eye(2), (count, 1, 1)),
             variance=np.ones(count),
             seen=np.zeros(count),
             settled=np.zeros(count, dtype=bool),
@@ -107,75 +93,69 @@ class Fit:
         for name, values in vars(part).items():
             getattr(self, name)[places] = values
 
-    def recentred(self, grey: GreyImage, inner: float, outer: float) -> tuple[Window, FloatArray]:
-        """A window about what was found, and the parameters relative to its origins."""
-        window = Window.of(grey, self.parameters[:, [X, Y]] + self.origins, inner, outer)
-        parameters, moved = self.parameters.copy(), window.origins - self.origins
-        parameters[:, [X, Y]] -= moved
-        shade = 1 + (parameters[:, [SHADE_X, SHADE_Y]] * moved).sum(axis=1, keepdims=True)
-        parameters[:, [LIGHT, CONTRAST]] *= shade
-        parameters[:, [SHADE_X, SHADE_Y]] /= shade
-        return window, parameters
-
 
 def adjust(
-    window: Window, start: FloatArray, prior: Prior, limits: FloatArray, *, steps: int, tolerance: float
-) -> Fit:
-    """Least squares from a start, each disc until its centre moves by less than `tolerance` pixels.
+    window: Window, start: FloatArray, prior: Prior, limits: FloatArray, chosen: BoolArray
+) -> tuple[Fit, FloatArray]:
+    """Least squares from a start, each disc until its centre moves by less than `TOLERANCE`.
 
     Args:
         window: The pixels to fit.
         start: Parameters relative to the origins of the window, shape (n, m).
         prior: Of the parameters.
         limits: Longest step of every parameter, shape (n, m).
-        steps: At most.
-        tolerance: Pixels.
+        chosen: Pixels that may be used, shape (n, p).
     """
-    fit = Fit.empty(len(start))
-    fit.parameters[:], fit.origins[:] = start, window.origins
-    active = np.arange(len(start))
-    for _ in range(steps):
-        now, within = fit.parameters[active], window.within[active]
+    count, width = start.shape
+    fit = Fit.empty(count)
+    parameters, information = start.copy(), np.tile(np.eye(width), (count, 1, 1))
+    active = np.arange(count)
+    for number in range(STEPS):
+        now, allowed, values = parameters[active], chosen[active], window.values[active]
         levels, derivatives = picture(now.astype(np.float32), window.x, window.y)
-        values = window.values[active]
-        free = (levels < 255) & (levels > 0) | (values < 255) & (values > 0)  # a clipped pixel tells nothing
+        clipped = np.minimum(levels, values + DOUBT) >= LIGHTEST
+        clipped |= np.maximum(levels, values - DOUBT) <= DARKEST
+        free = ~clipped  # of a clipped pixel nothing is known
         residuals = (values - levels) * free
-        agreement = _agreement(residuals, within & free) * within
+        most = np.maximum(2 * window.noise[active], MODEL_ERROR * np.abs(now[:, CONTRAST]))
+        if number < LENIENT:
+            most = most + 1e3
+        noise = np.clip(SCALE * median_where(np.abs(residuals), allowed & free), QUANTISATION**0.5, most)
+        ratio = np.abs(residuals) / noise[:, None].astype(np.float32)
+        agreement = np.clip((NONE - ratio) / (NONE - FULL), 0, 1) * allowed
         weights = agreement * free
         weighted = derivatives * weights[:, None]
-        squares = np.maximum((weights * residuals**2).sum(axis=1), 0.0)
-        variance = np.maximum(squares / np.maximum(weights.sum(axis=1) - COUNT, 1), QUANTISATION)
+        squares = (weights * residuals**2).sum(axis=1)
+        variance = np.maximum(squares / np.maximum(weights.sum(axis=1) - width, 1), QUANTISATION)
         precision = prior.precision[active]
-        information = (weighted @ derivatives.transpose(0, 2, 1)) / variance[:, None, None]
-        information[:, range(COUNT), range(COUNT)] += precision + 1e-12
+        normal = (weighted @ derivatives.transpose(0, 2, 1)) / variance[:, None, None]
+        normal[:, range(width), range(width)] += precision
         slope = (weighted @ residuals[:, :, None])[:, :, 0] / variance[:, None]
         slope += precision * (prior.mean[active] - now)
-        step = np.linalg.solve(information, slope[:, :, None])[:, :, 0]
+        step = np.linalg.solve(normal, slope[:, :, None])[:, :, 0]
         shortened = np.minimum(1, (limits[active] / np.maximum(np.abs(step), 1e-12)).min(axis=1))
-        fit.parameters[active] = now + shortened[:, None] * step
-        fit.parameters[active, BLUR] = np.clip(
-            fit.parameters[active, BLUR], SHARPEST, np.maximum(now[:, RADIUS], SHARPEST)
-        )
+        now = now + shortened[:, None] * step
+        now[:, BLUR] = np.clip(now[:, BLUR], SHARPEST, np.maximum(now[:, RADIUS], SHARPEST))
+        parameters[active], information[active], fit.variance[active] = now, normal, variance
         by_radius = derivatives[:, RADIUS] ** 2
         fit.seen[active] = (by_radius * agreement).sum(axis=1) / np.maximum(by_radius.sum(axis=1), 1e-6)
-        fit.information[active], fit.variance[active] = information, variance
-        fit.settled[active] = np.hypot(step[:, X], step[:, Y]) < tolerance
+        fit.settled[active] = (np.hypot(step[:, X], step[:, Y]) < TOLERANCE) & (number >= LENIENT)
         active = active[~fit.settled[active]]
         if not len(active):
             break
-    return fit
+    fit.parameters[:], fit.origins[:] = parameters[:, :COUNT], window.origins
+    fit.covariances[:] = np.linalg.inv(information)[:, :2, :2]
+    return fit, parameters
 
 
-def median_where(values: Array, chosen: BoolArray) -> FloatArray:
-    """The median of the chosen values of every row, shape (n,); zero where there is none."""
-    ordered = np.sort(np.where(chosen, values, np.inf), axis=1)
-    middle = np.take_along_axis(ordered, chosen.sum(axis=1, keepdims=True) // 2, axis=1)[:, 0]
-    return np.where(chosen.any(axis=1), middle, 0.0)
+def coherent(window: Window, parameters: FloatArray, variance: FloatArray) -> BoolArray:
+    """Where the picture is that of the model, and all pixels beside are as well, shape (n, p).
 
-
-def _agreement(residuals: Array, chosen: BoolArray) -> Array:
-    """Weights, with the noise from the chosen pixels."""
-    size = np.abs(residuals)
-    noise = np.maximum(1.4826 * median_where(size, chosen), QUANTISATION**0.5)
-    ratio = size / noise[:, None].astype(np.float32)
-    return np.clip((NONE - ratio) / (NONE - FULL), 0, 1)
+    Means of nine residuals show what is hidden or unexpected where a single one drowns in noise.
+    """
+    levels, _ = picture(parameters.astype(np.float32), window.x, window.y)
+    residuals = (window.values - np.clip(levels, 0, 255)) * window.within
+    most = COHERENT * np.maximum(variance, (MODEL_ERROR / 2 * parameters[:, CONTRAST]) ** 2) ** 0.5
+    wrong = np.abs(window.smoothed(residuals, 3)) > most[:, None]
+    near = window.smoothed(wrong.astype(np.float32), 3) > 0
+    return np.asarray(window.within & ~near)

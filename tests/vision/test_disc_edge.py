@@ -115,11 +115,46 @@ def test_what_is_not_there_is_not_found(image):
     assert np.isnan(discs.centres).all()
 
 
-def test_a_disc_beyond_the_border_needs_its_radius():
-    discs, errors = measured(DiscImage(centre=(20, 1)), radii=8.0)
+WALL = tuple(Edge(angle, 20 * np.cos(angle) + 20 * np.sin(angle) + 9.9, 20.0) for angle in (0.4, 0.4 + np.pi))
+"""Of a wall that ends 1.9 pixels from the disc on either side, before a dark ground."""
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        DiscImage(edges=WALL),
+        DiscImage(edges=WALL, blur=1.5),  # disc and wall run into each other
+        DiscImage(edges=tuple(replace(edge, level=240.0) for edge in WALL)),  # a light ground
+        DiscImage(edges=(Edge(0.0, 29.9, 30.0), Edge(np.pi, -10.1, 220.0))),  # light and dark
+        DiscImage(edges=WALL[:1]),
+    ],
+)
+def test_the_wall_beside_the_disc_does_not_move_it(image):
+    discs, errors = measured(image)
     assert_covered(discs, errors)
-    assert discs.seen.max() < 0.65
-    assert not measured(DiscImage(centre=(20, 1)))[0].found.any()
+    assert np.sqrt((errors**2).mean()) < (0.0105 if image.blur < 1 else 0.017)
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        DiscImage(centre=(20, 0)),  # beyond the border
+        DiscImage(edges=(Edge(0.0, 24.0, 120.0, occludes=True),)),
+        DiscImage(edges=(Edge(0.0, 20.0, 120.0, occludes=True),)),  # of a level between light and dark
+        DiscImage(edges=(Edge(0.3, 28.0, 240.0, occludes=True),)),
+    ],
+)
+def test_a_disc_that_is_partly_hidden_is_found_by_its_arc(image):
+    discs, errors = measured(image, radii=8.0)
+    found = discs.found
+    assert found.mean() > 0.9
+    scores = np.einsum("ni,nij,nj->", errors[found], np.linalg.inv(discs.covariances[found]), errors[found])
+    assert scores < chi2.ppf(1 - 1e-3, 2 * found.sum())  # the radius is better than it is said to be
+    assert discs.seen[found].max() < 0.9
+
+
+def test_a_disc_of_unknown_radius_must_be_seen_by_half():
+    assert not measured(DiscImage(centre=(20, -1)))[0].found.any()
 
 
 def test_discs_of_many_sizes_keep_their_order():
