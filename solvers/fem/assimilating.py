@@ -36,6 +36,9 @@ class FemAsmSolver:
         asm_weight: λ_ASM for "paper", MPa/mm².
         scale: For "precision", energy of the model's own error, N mm / mm.
         marker_radius: Of the discs over which the displacement is averaged, mm; zero for the points alone.
+        contact_deviation: Standard deviation of the contact's displacement about what is prescribed, mm,
+            where the prior is exp(-E / scale): a spring of the stiffness scale / contact_deviation² between
+            contact and indenter. Zero: the contact moves as prescribed, as it does for other solvers.
         choose: "given": the weights as they are; "left-out" or "evidence": times a factor, see
             `WeightChoice`.
     """
@@ -45,6 +48,7 @@ class FemAsmSolver:
     asm_weight: float = 1000.0
     scale: float = 1.0
     marker_radius: float = MARKER_RADIUS
+    contact_deviation: float = 0.0
     choose: Choice = "given"
     name: ClassVar[str] = "fem-asm"
     laws: ClassVar[tuple[str, ...]] = FemSolver.laws
@@ -55,6 +59,10 @@ class FemAsmSolver:
         if self.degree not in (1, 2):
             raise UserError(f"fem-asm has elements of degree 1 and 2, not {self.degree}")
         check_weighting(self.name, self.weights, self.asm_weight, self.scale, self.marker_radius)
+        if not (np.isfinite(self.contact_deviation) and self.contact_deviation >= 0):
+            raise UserError(
+                f"fem-asm: contact_deviation must be zero or more, got {self.contact_deviation} (mm)"
+            )
         _ = self.choice
 
     def settings(self) -> dict[str, object]:
@@ -79,8 +87,12 @@ class FemAsmSolver:
         """Factorise, and solve for the forces at the markers; further weights and markers cost no solve.
 
         Raises:
-            UserError: If the problem has no observations.
+            UserError: If the problem has no observations, or a patch is to have a deviation.
         """
+        if self.contact_deviation and problem.load.kind == "patch":
+            raise UserError(
+                "fem-asm: every point of a patch moves as prescribed; contact_deviation must be 0"
+            )
         misfit = misfit_of(
             problem,
             weights=self.weights,
@@ -90,7 +102,8 @@ class FemAsmSolver:
         )
         if misfit is None:
             raise UserError("fem-asm was given no markers to assimilate")
-        return MarkerCompliance.of(problem, self.degree, misfit), misfit
+        slack = self.contact_deviation**2 / self.scale
+        return MarkerCompliance.of(problem, self.degree, misfit, slack), misfit
 
     def _solve(self, problem: Problem, progress: Progress) -> Solution:
         started = time.perf_counter()

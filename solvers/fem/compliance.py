@@ -1,6 +1,6 @@
 """How the finger gives way to forces at markers, while its conditions at base and contact hold."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,14 +30,19 @@ class MarkerCompliance:
     responses: FloatArray
 
     @classmethod
-    def of(cls, problem: Problem, degree: int, misfit: Misfit | None) -> "MarkerCompliance":
-        """Factorise once; solve once for the problem and once for every component of a marker."""
+    def of(cls, problem: Problem, degree: int, misfit: Misfit, slack: float = 0.0) -> "MarkerCompliance":
+        """Factorise once; solve once for the problem and once for every component of a marker.
+
+        Args:
+            problem: With the conditions that hold.
+            degree: Of the elements.
+            misfit: Where the markers are.
+            slack: Compliance of springs between contact and indenter, mm per N/mm, for `mean` and `point`.
+        """
         space = LagrangeSpace(problem.mesh, degree)
-        least = LeastEnergy.of(LinearSystem.of(problem, space))
-        sampling = np.zeros((0, len(space.nodes)))
-        if misfit is not None:
-            points, weights = misfit.sampling()
-            sampling = weights @ space.shape_functions(problem.mesh.locate(points)).toarray()
+        least = replace(LeastEnergy.of(LinearSystem.of(problem, space)), slack=slack)
+        points, weights = misfit.sampling()
+        sampling = weights @ space.shape_functions(problem.mesh.locate(points)).toarray()
         forces = np.kron(sampling, np.eye(2)).reshape(-1, *least.held.shape)
         responses = np.array([least.unbalanced(force)[1] for force in forces]).reshape(forces.shape)
         return cls(least, least.solution(), sampling, responses)

@@ -87,6 +87,8 @@ class LeastEnergy:
         functionals: The load's functionals whose values are given, shape (k, N, 2); none for a `patch`.
         factors: Of the stiffness with the components of `held` clamped.
         responses: Displacement under the unit force of each functional, shape (k, N, 2), mm per N/mm.
+        slack: Compliance of springs through which the functionals' values are given, mm per N/mm; zero: they
+            are rigid.
     """
 
     system: LinearSystem
@@ -94,6 +96,7 @@ class LeastEnergy:
     functionals: FloatArray
     factors: Factorisation | Multigrid
     responses: FloatArray
+    slack: float = 0.0
 
     @classmethod
     def of(cls, system: LinearSystem) -> "LeastEnergy":
@@ -117,8 +120,9 @@ class LeastEnergy:
 
     @cached_property
     def compliance(self) -> FloatArray:
-        """Values of the functionals under their unit forces, shape (k, k), mm per N/mm."""
-        return np.asarray(np.einsum("inx,jnx->ij", self.functionals, self.responses))
+        """Values of the functionals, and of their springs, under unit forces, shape (k, k), mm per N/mm."""
+        own = np.einsum("inx,jnx->ij", self.functionals, self.responses)
+        return np.asarray(own + self.slack * np.eye(len(own)))
 
     def values(self, nodal: FloatArray) -> FloatArray:
         """The load's functionals of nodal displacements, shape (k,), mm."""

@@ -53,12 +53,13 @@ def dense(problem, solver):
     misfit = misfit_of(problem, weights=solver.weights, scale=solver.scale)
     points, weights = misfit.sampling()
     at = np.kron(weights @ space.shape_functions(problem.mesh.locate(points)).toarray(), np.eye(2))
-    conditions, values = [], []
+    conditions, values, slacks = [], [], []
 
-    def hold(rows, axis, to):
+    def hold(rows, axis, to, slack=0.0):
         for row in rows:
             conditions.append(np.kron(row, np.eye(2)[axis]))
             values.append(to)
+            slacks.append(slack)
 
     for axis in (0, 1):
         hold(np.eye(len(space.nodes))[space.boundary_nodes("base")], axis, 0.0)
@@ -68,13 +69,13 @@ def dense(problem, solver):
         else:
             contact, functional = contact_functional(problem)
             row = functional @ space.shape_functions(problem.mesh.locate(contact)).toarray()
-            hold([row], axis, to)
+            hold([row], axis, to, solver.contact_deviation**2 / solver.scale)
     bordered = np.array(conditions)
     diagonal = misfit.weights.ravel()
     matrix = np.block(
         [
             [stiffness + at.T * diagonal @ at, bordered.T],
-            [bordered, np.zeros((len(bordered), len(bordered)))],
+            [bordered, -np.diag(slacks)],
         ]
     )
     right = np.concatenate([at.T @ (diagonal * misfit.observed.ravel()), values])
@@ -91,6 +92,30 @@ def test_it_is_the_minimiser_by_dense_algebra(problem):
     assert np.abs(solution.field.values - nodal).max() < 1e-8 * np.abs(nodal).max()
     assert solution.energy == pytest.approx(energy, rel=1e-8)
     np.testing.assert_allclose(solution.reaction, reaction, atol=1e-8 * np.abs(reaction).max())
+
+
+@pytest.mark.parametrize("problem", ["mean", "point"], indirect=True)
+def test_a_contact_that_is_not_certain_is_one_on_springs(problem):
+    """By the same dense algebra; markers left out as if solved again are left out of this too."""
+    solver = replace(SOFT, degree=1, contact_deviation=0.8)
+    solution = solver.solve(problem)
+    nodal, energy, reaction = dense(problem, solver)
+    assert np.abs(solution.field.values - nodal).max() < 1e-8 * np.abs(nodal).max()
+    assert solution.energy == pytest.approx(energy, rel=1e-8)
+    np.testing.assert_allclose(solution.reaction, reaction, atol=1e-8 * np.abs(reaction).max())
+    contact, functional = contact_functional(problem)
+    moved = functional @ solution.displacement(contact)
+    np.testing.assert_allclose(
+        solver.scale / solver.contact_deviation**2 * (problem.load.values - moved),
+        solution.reaction,
+        rtol=1e-6,
+    )
+    observations = problem.observations
+    visible = observations.visible & (np.arange(9) != 5)
+    again = solver.solve(replace(problem, observations=replace(observations, visible=visible)))
+    here = replace(misfit_of(problem), points=observations.points[[5]])
+    points, weights = replace(here, observed=here.observed[:1], weights=here.weights[:1]).sampling()
+    np.testing.assert_allclose(solution.left_out[[5]], weights @ again.displacement(points), atol=1e-8)
 
 
 def test_leaving_a_marker_out_in_closed_form_is_solving_again_without_it(problem):
@@ -203,6 +228,12 @@ def test_without_markers_it_is_fem(coarse_mesh):
     assert solution.left_out is None
 
 
+@pytest.mark.parametrize("problem", ["patch"], indirect=True)
+def test_a_patch_is_certain(problem):
+    with pytest.raises(UserError, match="every point of a patch moves as prescribed"):
+        replace(SOFT, contact_deviation=1.0).solve(problem)
+
+
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
@@ -210,6 +241,7 @@ def test_without_markers_it_is_fem(coarse_mesh):
         ({"weights": "equal"}, "weights must be paper or precision"),
         ({"choose": "best"}, "choose must be given, left-out, evidence"),
         ({"choose": "evidence"}, "needs weights=precision"),
+        ({"contact_deviation": -1.0}, "contact_deviation must be zero or more"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(settings, said):
