@@ -15,6 +15,7 @@ from compare.verbs.pick import pick
 from compare.verbs.rig import rig
 from compare.verbs.solve import solve
 from compare.verbs.solvers import solvers
+from compare.verbs.track import track
 
 pinnray = App(
     name="pinnray",
@@ -23,7 +24,7 @@ pinnray = App(
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
-for verb in (compare, design, mesh, solve, gridsearch, solvers, calibrate, pick, rig):
+for verb in (compare, design, mesh, solve, gridsearch, solvers, calibrate, pick, rig, track):
     pinnray.command(verb, help_epilogue=EXIT_CODES)
 
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from geometry.arrays import FloatArray
+from geometry.arrays import BoolArray, FloatArray
 from geometry.parameters import Parameters
 
 
@@ -36,6 +36,13 @@ class Section:
             polygon_area(cell) - sum(corner_area(angle, self.fillet_radius) for angle in corner_angles(cell))
             for cell in self.cells
         )
+
+    def holds(self, points: FloatArray) -> BoolArray:
+        """Which points, shape (n, 2), mm, lie in the body or on its boundary; fillets do not count."""
+        inside = _within(self.outer, points)
+        for cell in self.cells:
+            inside &= ~_within(cell, points, strictly=True)
+        return inside
 
     @property
     def boundary_lengths(self) -> dict[str, float]:
@@ -164,3 +171,11 @@ def _to_back(p: Parameters, start: FloatArray, direction: FloatArray, distance: 
     return np.asarray(
         start + direction * (start[1] - slope * start[0] - intercept) / closing, dtype=np.float64
     )
+
+
+def _within(corners: FloatArray, points: FloatArray, *, strictly: bool = False) -> BoolArray:
+    """Which points lie in a convex polygon whose corners run counter-clockwise."""
+    sides = np.roll(corners, -1, axis=0) - corners
+    away = points[:, None] - corners
+    left = sides[:, 0] * away[..., 1] - sides[:, 1] * away[..., 0]
+    return np.asarray((left > 0 if strictly else left >= 0).all(axis=1))

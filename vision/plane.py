@@ -7,6 +7,7 @@ parameters. All is linear propagation of covariances by the implicit function th
 A. Zisserman, "Multiple View Geometry", 2nd ed., 2003, chapter 5). Units: pixels, mm.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -20,6 +21,8 @@ from vision.camera import Camera, Pose
 STEPS = 50
 CONVERGED = 1e-9
 """Relative length of the last step."""
+UNDETERMINED = "the fiducials do not determine where the camera is"
+CROSS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
 
 
 class Slopes(NamedTuple):
@@ -69,10 +72,20 @@ class Plane:
         """Where points of the plane are seen; shapes (n, 2), pixels."""
         return self.view.pixels(points, self.parameters)
 
-    def point_covariances(self, points: FloatArray, covariances: FloatArray) -> FloatArray:
-        """Covariances of points from those of their pixels alone, shapes (n, 2, 2), mm² from pixels²."""
-        inverse = np.linalg.inv(self.view.slopes(points, self.parameters).point)
-        return np.asarray(inverse @ covariances @ inverse.transpose(0, 2, 1))
+    def circles(self, pixels: FloatArray, radius: float) -> FloatArray:
+        """Centres of circles in the plane from those of their pictures, shapes (n, 2), mm.
+
+        The picture's centre is the mean of what is seen along the circle, which the curvature of the map puts
+        beside the picture of the centre.
+        """
+        centres = self.points(pixels)
+        around = [self.pixels(centres + radius * step) for step in CROSS]
+        beside = np.mean(around, axis=0) - self.pixels(centres)
+        return self.points(pixels - beside)
+
+    def scales(self, points: FloatArray) -> FloatArray:
+        """Pixels per mm at points of the plane, shape (n,): the root of the ratio of areas."""
+        return np.asarray(np.sqrt(np.abs(np.linalg.det(self.view.slopes(points, self.parameters).point))))
 
     def displacement_covariance(
         self, initial: FloatArray, final: FloatArray, initial_noise: FloatArray, final_noise: FloatArray
@@ -203,10 +216,14 @@ def camera_plane(
     _, rotations, translations, _ = cv2.solvePnPGeneric(
         flat, rays, camera.matrix, np.zeros(5), flags=cv2.SOLVEPNP_IPPE
     )
-    # A plane that is seen obliquely looks almost like another one; the better of both is kept.
     view = CameraView(camera)
-    starts = [np.concatenate([r.ravel(), t.ravel()]) for r, t in zip(rotations, translations, strict=True)]
-    fits = [_refined(view, start, points, pixels, covariances) for start in starts]
+    fits = []
+    for start in zip(rotations, translations, strict=True):
+        with suppress(UserError):  # behind the camera
+            fits.append(_refined(view, np.ravel(start), points, pixels, covariances))
+    if not fits:
+        raise UserError(f"{UNDETERMINED}; give the camera of the video")
+    # A plane that is seen obliquely looks almost like another one; the better of both is kept.
     pose, squares = min(fits, key=lambda fit: fit[1])
     slopes = view.slopes(points, pose).parameters.reshape(2 * len(points), -1)
     gain, inverse = _gain(slopes[:, :6], covariances)
@@ -253,7 +270,7 @@ def _refined(
         parameters = parameters + step
         if np.abs(step * scale).max() < CONVERGED * (1 + np.abs(parameters * scale).max()):
             return parameters, float(missed @ missed)
-    raise UserError("the fiducials do not determine where the camera is; spread them around the finger")
+    raise UserError(f"{UNDETERMINED}; spread them around the finger")
 
 
 def _gain(slopes: FloatArray, covariances: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -22,11 +22,12 @@ class Rest(NamedTuple):
     final: range
 
 
-def find_rest(positions: FloatArray) -> Rest:
+def find_rest(positions: FloatArray, noise: float = 0.0) -> Rest:
     """Find when the finger rests.
 
     Args:
         positions: Of markers in every frame, shape (f, m, 2), mm; nan where one was not seen.
+        noise: Standard deviation of a coordinate that is known beforehand, mm.
 
     Raises:
         UserError: If there is only one frame, or the finger does not rest at either end, or does not move.
@@ -34,7 +35,7 @@ def find_rest(positions: FloatArray) -> Rest:
     count = len(positions)
     if count < 2:
         raise UserError(f"{count} frame; show the finger at rest before and after it is pressed")
-    limit = max(STILL, NOISE_FACTOR * _noise(positions))
+    limit = max(STILL, NOISE_FACTOR * max(noise, _noise(positions)))
     fewest = max(1, min(FEWEST, count // 2))
     first = _resting(positions, fewest, limit)
     last = _resting(positions[::-1], fewest, limit)

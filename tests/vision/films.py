@@ -1,0 +1,62 @@
+"""Short films of the default finger: at rest, then bent by a cantilever's deflection, 10 mm at the tip."""
+
+from collections.abc import Iterator, Sequence
+from functools import cache
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.cache import finger_mesh
+from geometry.design import Design
+from geometry.settings import MeshSettings
+from vision.frames import Frames, Image, Shot
+from vision.rig.bench import Bench
+from vision.rig.exposure import Exposure
+from vision.rig.motion import Motion
+from vision.rig.occluders import cable
+from vision.rig.recording import Recording
+from vision.rig.view import default_camera, view
+from vision.workspace import default_workspace
+
+DESIGN = Design()
+WORKSPACE = default_workspace(DESIGN)
+CAMERA = default_camera()
+
+
+def bent(points: FloatArray) -> FloatArray:
+    """Displacements of points, shape (n, 2), mm."""
+    x = points[:, 0] / DESIGN.height
+    return np.asarray(-10 * np.column_stack([0.2 * x**2, x**2]))
+
+
+@cache
+def recording(*, hidden: int | None = None, tilt: float = 5.0) -> Recording:
+    """Three frames at rest and three bent, with a jump between; a cable before one marker, if asked for."""
+    mesh = finger_mesh(DESIGN, settings=MeshSettings(size=1.0))
+    where = None if hidden is None else (mesh.markers + bent(mesh.markers))[hidden]
+    cover = [] if where is None else [cable(where, DESIGN.marker_diameter / 2, 1.2)]
+    return Recording(
+        bench=Bench(mesh, DESIGN, WORKSPACE),
+        displacement=bent(mesh.points),
+        camera=CAMERA,
+        pose=view(CAMERA, WORKSPACE, tilt=tilt),
+        exposure=Exposure(noise=2),
+        motion=Motion(rest=3, moving=0, held=3),
+        occluders=lambda frame: cover if frame >= 3 else [],
+    )
+
+
+@cache
+def images(*, hidden: int | None = None, tilt: float = 5.0) -> tuple[Image, ...]:
+    """The frames of `recording`."""
+    return tuple(image for image, _ in recording(hidden=hidden, tilt=tilt).frames())
+
+
+def frames_of(pictures: Sequence[Image]) -> Frames:
+    """Images as a film."""
+
+    def shots() -> Iterator[Shot]:
+        for number, picture in enumerate(pictures):
+            yield Shot(np.ascontiguousarray(picture), number / 30, f"picture {number}")
+
+    return Frames("the film", shots(), rate=30.0, count=len(pictures))

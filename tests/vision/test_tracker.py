@@ -1,0 +1,150 @@
+"""Films of the virtual rig, tracked, against their truth; and films that show something else."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from films import CAMERA, DESIGN, WORKSPACE, bent, frames_of, images, recording
+
+from geometry.design import Design
+from geometry.errors import UserError
+from geometry.markers import marker_positions
+from vision.camera import Camera
+from vision.setup import Setup
+from vision.tracker import track
+from vision.workspace import Workspace
+
+MARKERS = marker_positions(DESIGN)
+TRUE = bent(MARKERS)
+
+
+def tracked(pictures, **changes):
+    return track(
+        frames_of(pictures), Setup(**{"design": DESIGN, "workspace": WORKSPACE, "camera": CAMERA} | changes)
+    )
+
+
+def error_of(observations):
+    """Mean over the markers of the sum of the absolute errors, mm."""
+    return np.abs(observations.displacements - TRUE)[observations.visible].sum(axis=1).mean()
+
+
+@pytest.fixture(scope="module")
+def tracking():
+    return tracked(images())
+
+
+def test_a_tilted_camera_measures_a_jump_of_10_mm_to_hundredths_of_a_millimetre(tracking):
+    observations = tracking.observations("rig")
+    assert observations.visible.all()
+    assert error_of(observations) < 0.01  # 0.02 is asked for
+    np.testing.assert_allclose(observations.points, MARKERS, rtol=0, atol=0.02)
+    assert not observations.simulated
+    assert (tracking.rest.initial, tracking.rest.final) == (range(3), range(3, 6))
+
+
+def test_the_standard_deviations_are_of_the_size_of_the_errors(tracking):
+    observations = tracking.observations("rig")
+    errors = (observations.displacements - TRUE) / observations.standard_deviations
+    assert 0.3 < np.sqrt(np.mean(errors**2)) < 1.7
+    assert observations.standard_deviations.max() < 0.02
+
+
+def test_pixels_are_those_of_the_truth(tracking):
+    _, truth = recording().frame(0)
+    for number in range(3):
+        np.testing.assert_allclose(tracking.pixels[number], truth.pixels, rtol=0, atol=0.15)
+
+
+def test_the_papers_pipeline_is_an_order_of_magnitude_worse():
+    tracking = tracked(images(), method="hough")
+    observations = tracking.observations("rig")
+    assert 0.03 < error_of(observations) < 0.4
+    assert 0.05 < observations.standard_deviations.mean() < 0.2
+    np.testing.assert_array_equal(observations.points, MARKERS)
+
+
+def test_a_marker_behind_a_cable_is_missing_and_no_other_takes_its_name():
+    tracking = tracked(images(hidden=4))
+    observations = tracking.observations("rig")
+    np.testing.assert_array_equal(np.nonzero(~observations.visible)[0], [4])
+    assert error_of(observations) < 0.015
+    np.testing.assert_array_equal(observations.points[4], MARKERS[4])
+    assert any("reported missing: marker 5" in warning for warning in tracking.warnings)
+
+
+@pytest.mark.parametrize("turns", [1, 2, 3])
+def test_a_camera_may_be_turned_if_the_fiducials_are_seen(turns):
+    tracking = tracked([np.rot90(image, turns) for image in images()], camera=None)
+    assert error_of(tracking.observations("rig")) < 0.2  # the lens is not undone
+    assert any("no camera" in warning for warning in tracking.warnings)
+
+
+def test_without_a_camera_the_residual_of_the_fiducials_is_told():
+    tracking = tracked(images(), camera=None)
+    assert tracking.plane.residual > 0.1
+    assert any(f"{tracking.plane.residual:.3f} mm" in warning for warning in tracking.warnings)
+
+
+def test_grey_images_do_as_well():
+    observations = tracked([cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in images()]).observations(
+        "rig"
+    )
+    assert error_of(observations) < 0.01
+
+
+def test_covariances_of_the_camera_are_in_the_standard_deviations(tracking):
+    sure = tracking.observations("rig").standard_deviations
+    wide = np.diag(np.square([40.0, 40.0, 5.0, 5.0, 0.05, 0.05, 1e-3, 1e-3, 0.0]))
+    known = replace(CAMERA, covariance=tuple(map(tuple, wide.tolist())))
+    unsure = tracked(images(), camera=known).observations("rig").standard_deviations
+    assert (unsure > sure).all()
+
+
+def painted_over(image, points, radius=30):
+    image = image.copy()
+    for x, y in points:
+        cv2.circle(image, (round(x), round(y)), radius, (150, 150, 150), -1)
+    return image
+
+
+def fiducials():
+    flat = np.column_stack([WORKSPACE.points, np.zeros(len(WORKSPACE.points))])
+    return CAMERA.project(flat, recording().pose)
+
+
+@pytest.mark.parametrize(
+    ("change", "settings", "said"),
+    [
+        (lambda image: image[:, ::-1], {"camera": None}, "the image is mirrored"),
+        (lambda image: np.full_like(image, 128), {}, "fiducials cannot be made out among 0 discs"),
+        (lambda image: painted_over(image, fiducials()[:4]), {}, "cannot be made out among 12 discs"),
+        (
+            lambda image: image,
+            {"design": Design(height=60, tip_length=12)},
+            "of 9 markers are where the design has",
+        ),
+        (lambda image: image[::2, ::2], {}, "640x360 pixels, but the camera was calibrated with 1280x720"),
+        (
+            lambda image: image,
+            {"workspace": Workspace(fiducials=((0, 0), (50, 0), (50, 30), (0, 30), (20, 60)))},
+            "5 fiducials cannot be made out",
+        ),
+        (lambda image: image, {"camera": Camera(1280, 720, 400.0, 900.0, 640.0, 360.0)}, "fiducials"),
+    ],
+)
+def test_what_the_film_should_not_show_is_one_line(change, settings, said):
+    with pytest.raises(UserError, match=said) as caught:
+        tracked([change(image) for image in images()], **settings)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_finger_that_does_not_move_is_refused():
+    with pytest.raises(UserError, match="in the end where it was at the start"):
+        tracked(images()[:3])
+
+
+def test_two_pictures_are_enough():
+    observations = tracked([images()[0], images()[-1]]).observations("rig")
+    assert error_of(observations) < 0.015

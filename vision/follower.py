@@ -1,0 +1,126 @@
+"""The markers from frame to frame: sought where they are expected, and around the finger if one is lost."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from geometry.arrays import FloatArray, IntArray
+from geometry.errors import UserError
+from geometry.markers import marker_positions
+from vision.colour import DARK
+from vision.frames import Image
+from vision.identity import filled, identify, moved, placed
+from vision.localiser import Spots, follow, look
+from vision.plane import Plane
+from vision.setup import Setup
+
+FEWEST = 3
+"""Markers without which a finger is not known."""
+AROUND = 15.0
+"""How far around the markers a lost one is looked for, mm."""
+PATIENCE = 5
+"""Frames between two searches for markers that stay lost."""
+SAME_SIZE = 1.3
+"""Ratio of the radii of a disc and of a marker beyond which the disc is no marker."""
+
+
+class Sighting(NamedTuple):
+    """What a frame shows.
+
+    Attributes:
+        markers: Every marker, shape (m, ...); nan where it was not seen.
+        fiducials: Every fiducial of the workspace, shape (f, ...); nan where it was not seen.
+        places: Where the markers are, or probably are if they were not seen, shape (m, 2), mm, by the plane
+            of the first frame.
+        guesses: The same in the image, pixels.
+    """
+
+    markers: Spots
+    fiducials: Spots
+    places: FloatArray
+    guesses: FloatArray
+
+
+class Follower:
+    """Knows the markers in one frame after another.
+
+    Attributes:
+        plane: Of the markers, as the first frame shows it.
+        first: What that frame shows.
+
+    Raises:
+        UserError: If the first frame shows too few fiducials or markers.
+    """
+
+    def __init__(self, setup: Setup, image: Image) -> None:
+        self._setup = setup
+        fiducials = setup.find_fiducials(image)
+        self.plane: Plane = setup.plane(fiducials)
+        self._fiducials = fiducials
+        self._rest = self._places = marker_positions(setup.design)
+        self._step = np.zeros_like(self._rest)
+        self._steps = moved(self._rest)
+        self._size = 1.0
+        spots = self._search(image)
+        names = self._named(spots, self._rest, placed(self._rest))
+        seen = names >= 0
+        if seen.sum() < (least := min(FEWEST, len(names))):
+            raise UserError(
+                f"{seen.sum()} of {len(names)} markers are where the design has them, and {least} must be; "
+                "show the finger before it is pressed, and give its design and its markers' colour"
+            )
+        self._size = float(np.median(spots.radii[names[seen]] / self._radii(self._rest)[seen]))
+        self._lost = 0
+        self.first = self._sighting(spots, names, image)
+        self._step = np.zeros_like(self._rest)
+
+    def see(self, image: Image) -> Sighting:
+        """What the next frame shows."""
+        setup, expected = self._setup, self._places + self._step
+        radii = self._radii(expected)
+        spots = follow(image, setup.colour, self.plane.pixels(expected), radii, setup.method)
+        names = self._named(spots, self._places, self._steps)
+        missing = int((names < 0).sum())
+        if missing > self._missing or (missing and self._lost >= PATIENCE):
+            self._lost = 0
+            spots = spots.together(self._search(image))
+            names = self._named(spots, self._places, self._steps)
+        self._lost += 1
+        return self._sighting(spots, names, image)
+
+    def _search(self, image: Image) -> Spots:
+        """Discs of the markers' size in the part of the image that the finger can reach."""
+        (x0, y0), (x1, y1) = self._places.min(axis=0) - AROUND, self._places.max(axis=0) + AROUND
+        corners = self.plane.pixels(np.array([(x0, y0), (x0, y1), (x1, y0), (x1, y1)]))
+        low, high = np.floor(corners.min(axis=0)).astype(int), np.ceil(corners.max(axis=0)).astype(int) + 1
+        radii = self._radii(self._places)
+        limits = (radii.min() / SAME_SIZE, radii.max() * SAME_SIZE)
+        window = (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
+        return look(image, self._setup.colour, limits, self._setup.method, window)
+
+    def _named(self, spots: Spots, places: FloatArray, fields: FloatArray) -> IntArray:
+        """The number of its disc for every marker that was at `places`, shape (m,); -1 if it has none."""
+        return identify(self.plane.points(spots.centres), places, fields)
+
+    def _radii(self, places: FloatArray) -> FloatArray:
+        """Of the pictures of markers, shape (m,), pixels."""
+        return self._size * self._setup.design.marker_diameter / 2 * self.plane.scales(places)
+
+    def _sighting(self, spots: Spots, names: IntArray, image: Image) -> Sighting:
+        """Put in order what was found, and remember it."""
+        markers = spots.numbered(names)
+        known = self.plane.points(markers.centres[names >= 0])
+        step = np.full_like(self._places, np.nan)
+        step[names >= 0] = known - self._places[names >= 0]
+        self._missing = int((names < 0).sum())
+        self._step = filled(self._rest, step)
+        self._places = self._places + self._step
+        numbers, old = self._fiducials
+        found = follow(image, DARK, old.centres, old.radii, self._setup.method)
+        away = np.linalg.norm(old.centres[:, None] - found.centres, axis=2)
+        nearest = away.argmin(axis=1) if len(found.radii) else np.zeros(len(numbers), dtype=int)
+        near = away.min(axis=1, initial=np.inf) < old.radii
+        discs = np.full(len(self._setup.workspace.fiducials), -1)
+        discs[numbers] = np.where(near, nearest, -1)
+        places = self._places
+        return Sighting(markers, found.numbered(discs), places, self.plane.pixels(places))

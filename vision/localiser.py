@@ -1,0 +1,92 @@
+"""Where discs are in an image: by the fit of their edge, or by the circles of the paper's pipeline alone."""
+
+from typing import Literal, NamedTuple
+
+import cv2
+import numpy as np
+
+from geometry.arrays import BoolArray, FloatArray, IntArray
+from vision.board import GreyImage
+from vision.colour import Colour
+from vision.disc_edge import fit_discs
+from vision.frames import Image
+from vision.proposal import Window, propose
+
+Method = Literal["precise", "hough"]
+METHODS: tuple[Method, ...] = ("precise", "hough")
+
+FLOOR = {"precise": 0.005, "hough": 0.45}
+"""Standard deviation of what a mean over frames keeps of the error of a coordinate, pixels: light, paint and
+the wall beside a disc stay as they are, and Hough circles sit on a lattice."""
+
+REACH = 0.8
+"""How far from its guess a circle is looked for, in radii."""
+
+
+class Spots(NamedTuple):
+    """Discs: centres, shape (n, 2), covariances, (n, 2, 2), and radii, (n,), pixels."""
+
+    centres: FloatArray
+    covariances: FloatArray
+    radii: FloatArray
+
+    def where(self, kept: BoolArray) -> "Spots":
+        """Some of them."""
+        return Spots(self.centres[kept], self.covariances[kept], self.radii[kept])
+
+    def numbered(self, discs: IntArray) -> "Spots":
+        """The disc with each of the numbers `discs`; nan for the number -1."""
+        known = np.where(discs >= 0, 1.0, np.nan)
+        if not len(self.radii):
+            return Spots(np.full((len(discs), 2), np.nan), np.full((len(discs), 2, 2), np.nan), known)
+        centres, covariances, radii = (part[discs] for part in self)
+        return Spots(centres * known[:, None], covariances * known[:, None, None], radii * known)
+
+    def together(self, others: "Spots") -> "Spots":
+        """These, and those of the others that are not among them."""
+        away = np.linalg.norm(others.centres[:, None] - self.centres, axis=2)
+        new = others.where((away > others.radii[:, None]).all(axis=1))
+        return Spots(*(np.concatenate(parts) for parts in zip(self, new, strict=True)))
+
+
+def look(
+    image: Image, colour: Colour, radii: tuple[float, float], method: Method, window: Window | None = None
+) -> Spots:
+    """All discs of a colour whose radii, pixels, lie between two limits."""
+    circles = propose(image, colour, radii=radii, window=window)
+    return _circles(circles) if method == "hough" else _fitted(image, circles, None)
+
+
+def follow(image: Image, colour: Colour, guesses: FloatArray, radii: FloatArray, method: Method) -> Spots:
+    """The discs with known radii, shape (n,), that are near guesses, shape (n, 2), pixels; perhaps fewer."""
+    if not len(guesses):
+        return _circles(np.empty((0, 3)))
+    if method == "precise":
+        return _fitted(image, np.column_stack([guesses, radii]), radii)
+    low = np.floor(guesses.min(axis=0) - 2.5 * radii.max()).astype(int)
+    high = np.ceil(guesses.max(axis=0) + 2.5 * radii.max()).astype(int) + 1
+    limits = (0.75 * radii.min(), 1.35 * radii.max())
+    found = propose(image, colour, radii=limits, window=(low[0], low[1], high[0], high[1]))
+    away = np.linalg.norm(found[:, None, :2] - guesses, axis=2) / radii
+    return _circles(found[(away < REACH).any(axis=1)])
+
+
+def grey_of(image: Image) -> GreyImage:
+    """Luma: chroma has fewer pixels in most videos."""
+    return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+
+
+def _fitted(image: Image, circles: FloatArray, radii: FloatArray | None) -> Spots:
+    """What the fit finds at circles, shape (n, 3), each disc once."""
+    discs = fit_discs(grey_of(image), circles, radii=radii)
+    kept = discs.found.copy()
+    apart = np.linalg.norm(discs.centres[:, None] - discs.centres, axis=2)
+    for number in np.nonzero(kept)[0]:
+        kept[number + 1 :] &= ~(apart[number, number + 1 :] < circles[number, 2])
+    return Spots(discs.centres[kept], discs.covariances[kept], discs.radii[kept])
+
+
+def _circles(circles: FloatArray) -> Spots:
+    """Circles as they are: their error is not seen from one frame."""
+    covariances = np.repeat(FLOOR["hough"] ** 2 * np.eye(2)[None], len(circles), axis=0)
+    return Spots(circles[:, :2], covariances, circles[:, 2])

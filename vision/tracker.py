@@ -1,0 +1,104 @@
+"""From frames to the markers' displacements."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from geometry.errors import UserError
+from geometry.markers import marker_positions
+from vision.follower import Follower, Sighting
+from vision.frames import Frame, Frames
+from vision.localiser import FLOOR, Spots
+from vision.rest import find_rest
+from vision.setup import Fiducials, Setup, check_size
+from vision.tracking import Tracking, mean_spots, placed
+
+FAR = 0.5
+"""Root mean square distance of the markers at rest from the design's, mm, that is worth a word."""
+SHAKE = 0.3
+"""Way of the fiducials between start and end that is worth a word, pixels."""
+
+
+def ignore(frame: Frame, sighting: Sighting) -> None:
+    """Watch nothing."""
+
+
+def track(frames: Frames, setup: Setup, watch: Callable[[Frame, Sighting], None] = ignore) -> Tracking:
+    """Track the markers through a video.
+
+    The plane comes from the fiducials in all frames at rest; the displacements are those of the markers'
+    means over the frames at rest, from before to after the motion. What has no end of its own, a camera or a
+    pipe, is ended by an interrupt from the keyboard.
+
+    Args:
+        frames: From the finger at rest until it is held.
+        setup: What they show.
+        watch: Is told what every frame shows, while it is tracked.
+
+    Raises:
+        UserError: If the frames do not show what they should; one line says what is amiss.
+    """
+    check_size(setup.camera, frames.size, frames.name)
+    times: list[float] = []
+    sightings: list[Sighting] = []
+    follower = None
+    try:
+        for frame in frames:
+            if follower is None:
+                follower = Follower(setup, frame.image)
+                sighting = follower.first
+            else:
+                sighting = follower.see(frame.image)
+            times.append(frame.time)
+            sightings.append(sighting)
+            watch(frame, sighting)
+    except KeyboardInterrupt:
+        if frames.count is not None:
+            raise
+    if follower is None:
+        raise UserError(f"{frames.name} has no frame")
+    pixels = np.stack([sighting.markers.centres for sighting in sightings])
+    positions = placed(follower.plane, pixels, setup.design)
+    scale = follower.plane.scales(marker_positions(setup.design)).mean()
+    rest = find_rest(positions, noise=FLOOR[setup.method] / scale)
+    still = [[sightings[number] for number in end] for end in rest]
+    initial, final = (mean_spots([s.markers for s in end], setup.method) for end in still)
+    anchors = [mean_spots([s.fiducials for s in end], setup.method) for end in (*still, still[0] + still[1])]
+    numbers = np.nonzero(np.isfinite(anchors[2].radii))[0]
+    plane = setup.plane(Fiducials(numbers, anchors[2].numbered(numbers)))
+    tracking = Tracking(
+        design=setup.design,
+        expected=marker_positions(setup.design),
+        times=np.array(times),
+        pixels=pixels,
+        covariances=np.stack([sighting.markers.covariances for sighting in sightings]),
+        plane=plane,
+        rest=rest,
+        initial=initial,
+        final=final,
+        method=setup.method,
+    )
+    return replace(tracking, warnings=tuple(_remarks(setup, tracking, anchors[0], anchors[1])))
+
+
+def _remarks(setup: Setup, tracking: Tracking, before: Spots, after: Spots) -> Iterator[str]:
+    """What a person should know; `before` and `after` are the fiducials."""
+    residual = tracking.plane.residual
+    if setup.camera is None and setup.method == "precise":
+        yield f"no camera: its lens is not undone; the fiducials are {residual:.3f} mm (rms) off their places"
+        if setup.workspace.marker_plane:
+            yield "no camera: the height of the markers above the fiducials is not accounted for"
+    elif setup.camera is not None and setup.camera.covariance is None:
+        yield "the camera file has no covariance, so the standard deviations leave the camera's errors out"
+    if (hidden := int(np.isnan(after.radii).sum())) > 0:
+        yield f"{hidden} of {len(after.radii)} fiducials were not seen"
+    shake = np.linalg.norm(after.centres - before.centres, axis=1)
+    if (shake := np.nanmedian(shake)) > SHAKE:
+        yield f"the fiducials moved by {shake:.2f} pixels between start and end: the camera was not at rest"
+    far = float(np.sqrt(np.nanmean((tracking.offsets**2).sum(axis=1))))
+    if far > FAR:
+        yield f"at rest the markers are {far:.2f} mm (rms) from where the design has them"
+    if not tracking.visible.all():
+        names = ", ".join(str(number + 1) for number in np.nonzero(~tracking.visible)[0])
+        yield f"not seen at rest both before and after, so reported missing: marker {names}"

@@ -1,0 +1,140 @@
+"""What a video says about the markers: their way, their means at rest, and the displacements with errors."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import BoolArray, FloatArray
+from geometry.errors import UserError
+from geometry.observations import Observations
+from geometry.parameters import Parameters
+from geometry.section import finger_section
+from vision.localiser import FLOOR, Method, Spots
+from vision.plane import Plane
+from vision.rest import Rest
+
+LEAST_SHARE = 0.2
+"""Of the frames at rest; a marker that is seen in fewer counts as not visible."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tracking:
+    """The markers in a video of f frames.
+
+    Attributes:
+        design: The finger.
+        expected: Where its markers should be before loading, shape (m, 2), mm.
+        times: Of the frames, shape (f,), s.
+        pixels: Of the markers, shape (f, m, 2); nan where one was not seen.
+        covariances: Of the pixels, shape (f, m, 2, 2), pixels².
+        plane: From pixels to the finger's frame.
+        rest: The frames before and after the motion.
+        initial, final: Means of the markers over those frames.
+        method: How the markers were found.
+        warnings: What a person should know, one line each.
+    """
+
+    design: Parameters
+    expected: FloatArray
+    times: FloatArray
+    pixels: FloatArray
+    covariances: FloatArray
+    plane: Plane
+    rest: Rest
+    initial: Spots
+    final: Spots
+    method: Method
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def visible(self) -> BoolArray:
+        """Which markers were seen before and after the motion, shape (m,)."""
+        return np.asarray(np.isfinite(self.initial.radii + self.final.radii))
+
+    @property
+    def positions(self) -> FloatArray:
+        """Of the markers in every frame, shape (f, m, 2), mm; nan where one was not seen."""
+        return placed(self.plane, self.pixels, self.design)
+
+    @property
+    def offsets(self) -> FloatArray:
+        """Initial positions minus those of the design, shape (m, 2), mm; nan for markers not visible."""
+        initial = placed(self.plane, self.initial.centres, self.design)
+        return np.where(self.visible[:, None], initial - self.expected, np.nan)
+
+    @property
+    def displacement_covariance(self) -> FloatArray:
+        """Of the displacements of the visible markers, shape (2 v, 2 v), mm², in the order u1, v1, u2, ..."""
+        seen = self.visible
+        before, after = (
+            placed(self.plane, end.centres[seen], self.design) for end in (self.initial, self.final)
+        )
+        noise = (self.initial.covariances[seen], self.final.covariances[seen])
+        return self.plane.displacement_covariance(before, after, *noise)
+
+    def observations(self, source: str) -> Observations:
+        """The displacements, final minus initial; markers that are not visible are where the design has them.
+
+        So are all of the method "hough", whose linear map does not find places: the lens shifts them.
+
+        Raises:
+            UserError: If no marker is visible, or one lies outside the finger.
+        """
+        seen = self.visible
+        if not seen.any():
+            raise UserError("no marker was seen both before and after the motion; show them all at rest")
+        points = self.expected.copy()
+        displacements, deviations = np.zeros_like(points), np.zeros_like(points)
+        initial, final = (placed(self.plane, end.centres, self.design) for end in (self.initial, self.final))
+        if self.method != "hough":
+            points[seen] = initial[seen]
+        displacements[seen] = (final - initial)[seen]
+        deviations[seen] = np.sqrt(np.diag(self.displacement_covariance)).reshape(-1, 2)
+        if (outside := ~finger_section(self.design).holds(points)).any():
+            number = int(outside.argmax())
+            x, y = points[number]
+            wanted_x, wanted_y = self.expected[number]
+            raise UserError(
+                f"marker {number + 1} was seen at ({x:.2f}, {y:.2f}) mm, outside the finger; the design has "
+                f"it at ({wanted_x:.2f}, {wanted_y:.2f}) mm: give the design and the workspace of the video"
+            )
+        return Observations(points, displacements, deviations, seen, source, simulated=False)
+
+
+def placed(plane: Plane, pixels: FloatArray, design: Parameters) -> FloatArray:
+    """Where markers lie in the plane; shapes (..., 2), mm, nan where the pixels are."""
+    flat = pixels.reshape(-1, 2)
+    known = np.isfinite(flat).all(axis=1)
+    places = np.full_like(flat, np.nan)
+    places[known] = plane.circles(flat[known], design.marker_diameter / 2)
+    return places.reshape(pixels.shape)
+
+
+def mean_spots(frames: Sequence[Spots], method: Method) -> Spots:
+    """Every disc's mean over frames; nan for those hardly seen.
+
+    Weights are inverse covariances. Those of the best fitted quarter of the discs are noise, which a mean
+    over independent frames reduces; what others have beyond is misfit, of the wall beside a disc for one, and
+    common to all frames, as is `FLOOR`.
+    """
+    centres, covariances, radii = (np.stack(parts) for parts in zip(*frames, strict=True))
+    seen = np.isfinite(radii)
+    count = seen.sum(axis=0)
+    known = count >= max(1.0, LEAST_SHARE * len(frames))
+    mean, radius = np.full(centres.shape[1:], np.nan), np.full(len(known), np.nan)
+    covariance = np.full(covariances.shape[1:], np.nan)
+    if not known.any():
+        return Spots(mean, covariance, radius)
+    weights = np.zeros_like(covariances)
+    weights[seen] = np.linalg.inv(covariances[seen])
+    total = np.linalg.inv(weights.sum(axis=0)[known])
+    centres = np.where(seen[:, :, None], centres, 0.0)
+    mean[known] = np.einsum("mij,fmjk,fmk->mi", total, weights[:, known], centres[:, known])
+    radius[known] = np.nanmean(radii[:, known], axis=0)
+    usual = np.nanmean(covariances[:, known], axis=0)
+    size = np.trace(usual, axis1=1, axis2=2)
+    noise = np.minimum(np.percentile(size, 25) / size, 1.0)
+    share = 1 - noise + noise / count[known]
+    covariance[known] = share[:, None, None] * usual + FLOOR[method] ** 2 * np.eye(2)
+    return Spots(mean, covariance, radius)
