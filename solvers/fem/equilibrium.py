@@ -7,6 +7,7 @@ energy and, for a cylinder, of contact, equilibrium is
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import ufl
@@ -64,6 +65,7 @@ class Equilibrium:
         self._derivatives = space.shape_gradients(body_quadrature(problem.mesh, QUADRATURE_DEGREE).location)
         lame = problem.material.lame
         constants = Lame(self.distributed.constant(lame.λ), self.distributed.constant(lame.μ), lame.λ_out)
+        self._moduli: tuple[Any, Any] = constants[:2]
         u = self.distributed.function
         measure = ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
         energy = energy_density_of(problem.material.law, ufl.grad(u), constants, ufl.ln) * measure
@@ -78,6 +80,29 @@ class Equilibrium:
         matrix = self.distributed.assemble_matrix(self._tangent, self._conditions)
         self.matrix = matrix
         self.factors = Factorisation(self.distributed, matrix, self.clamped, positive_definite=False)
+
+    def become(self, problem: Problem) -> None:
+        """Take another `mean` or `point` load, with the same components prescribed, and other moduli."""
+        self.functionals = load_functionals(problem, self.distributed.space)
+        self.targets = problem.load.values
+        self._set_moduli(problem.material.lame)
+
+    def force_slope(self, nodal: FloatArray, moduli: Lame, slopes: Lame) -> FloatArray:
+        """Derivative of the internal force, which is linear in λ and μ, along a change of them, (N, 2), N/mm.
+
+        Args:
+            nodal: Displacements, shape (N, 2), mm.
+            moduli: What λ and μ are, MPa.
+            slopes: How they change.
+        """
+        self._set_moduli(slopes)
+        force = self.internal_force(nodal)
+        self._set_moduli(moduli)
+        return force
+
+    def _set_moduli(self, lame: Lame) -> None:
+        for constant, value in zip(self._moduli, lame[:2], strict=True):
+            constant.value = value
 
     def energy(self, nodal: FloatArray) -> float:
         """Elastic energy per depth, N mm / mm."""

@@ -2,7 +2,7 @@
 
 import time
 from dataclasses import asdict, dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
@@ -14,12 +14,16 @@ from solvers.estimation import Estimate, Prediction, estimate
 from solvers.fem.identification_text import sentence
 from solvers.fem.lagrange import LagrangeField, LagrangeSpace
 from solvers.fem.linear import FemSolver
+from solvers.fem.nonlinear import FemNonlinearSolver
 from solvers.fem.observer import Observer
 from solvers.fem.parametrised import LinearFinger
+from solvers.fem.parametrised_nonlinear import PARAMETERS, NonlinearFinger
 from solvers.fem.unknowns import parse_parameters, problem_with, unknowns_of
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, check_problem, silent
+
+Model = Literal["fem", "fem-nonlinear"]
 
 
 @dataclass(frozen=True)
@@ -27,6 +31,7 @@ class FemIdSolver:
     """`fem` with the parameters of load, clamp and material that its markers tell.
 
     Attributes:
+        model: "fem", or "fem-nonlinear" for finite strain, where the base is rigid and walls are as drawn.
         parameters: What is to be found, names of `solvers.fem.unknowns.MEANINGS` with commas between them.
         prior: Factor of the standard deviations that the parameters have before anything is observed.
         reaction: Measured force of the indenter on the finger along y per depth, N/mm; None if there is none.
@@ -35,6 +40,7 @@ class FemIdSolver:
         marker_radius: Of the discs over which the displacement is averaged, mm; zero for the points alone.
     """
 
+    model: Model = "fem"
     parameters: str = "position,stroke_u,stroke_v"
     prior: float = 1.0
     reaction: float | None = None
@@ -42,12 +48,15 @@ class FemIdSolver:
     degree: int = 2
     marker_radius: float = MARKER_RADIUS
     name: ClassVar[str] = "fem-id"
-    laws: ClassVar[tuple[str, ...]] = ("linear",)
     loads: ClassVar[tuple[str, ...]] = ("mean", "point")
     assimilates: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         names = parse_parameters(self.name, self.parameters)
+        if self.model not in get_args(Model):
+            raise UserError(f"fem-id: model must be {' or '.join(get_args(Model))}, got {self.model!r}")
+        if self.model == "fem-nonlinear" and (linear := sorted(set(names) - set(PARAMETERS))):
+            raise UserError(f"fem-id finds {', '.join(linear)} with model=fem only")
         if "young" in names and self.reaction is None:
             raise UserError(
                 "fem-id cannot find young from displacements alone: the load is a displacement, so that "
@@ -65,24 +74,36 @@ class FemIdSolver:
         if not (np.isfinite(self.marker_radius) and self.marker_radius >= 0):
             raise UserError(f"fem-id: marker_radius must be zero or more, got {self.marker_radius}")
 
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """Those of the model."""
+        return self._plain().laws
+
+    def _plain(self) -> FemSolver | FemNonlinearSolver:
+        """The model without any parameters to find."""
+        if self.model == "fem":
+            return FemSolver(degree=self.degree, estimate=False)
+        return FemNonlinearSolver(degree=self.degree)
+
     def settings(self) -> dict[str, object]:
         """What is to be found, by what, and the elements."""
         return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
-        """Find the parameters and solve with them; see `Solver`. Without observations it is `fem`."""
+        """Find the parameters and solve with them; see `Solver`. Without observations it is its model."""
         check_problem(self, problem)
         if problem.observations is not None:
             return self._solve(problem, problem.observations, progress)
-        plain = FemSolver(degree=self.degree, estimate=False).solve(problem, progress)
-        return replace(plain, solver=self.name, status=Status(True, "without markers, this is fem"))
+        plain = self._plain().solve(problem, progress)
+        said = f"without markers, this is {self.model}: {plain.status.message}"
+        return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
 
     def _solve(self, problem: Problem, observations: Observations, progress: Progress) -> Solution:
         started = time.perf_counter()
         names = parse_parameters(self.name, self.parameters)
         unknowns = unknowns_of(problem, names, self.prior)
         space = LagrangeSpace(problem.mesh, self.degree)
-        finger = LinearFinger(problem, space, names)
+        finger = (LinearFinger if self.model == "fem" else NonlinearFinger)(problem, space, names)
         observer = Observer.of(problem, space, observations, self.marker_radius)
         if self.reaction is not None:
             observer = observer.with_reaction(
@@ -96,6 +117,7 @@ class FemIdSolver:
         found = estimate(model, observer.observed, observer.deviations, unknowns)
         response = finger.response(found.values)
         own = problem_with(problem, dict(zip(names, found.values.tolist(), strict=True)))
+        finger.close()
         reaction = np.zeros(2)
         reaction[problem.load.prescribed] = response.forces
         missed = observer.missed(found)

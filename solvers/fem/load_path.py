@@ -110,6 +110,21 @@ class LoadPath:
             progress(fraction, f"{fraction:.0%} of the load, {self.iterations - before} Newton iterations")
             step = min(self._longest, step * (2 if hardest <= QUICK else 1))
 
+    def continued(self, problem: Problem, nodal: FloatArray, forces: FloatArray) -> PathPoint | None:
+        """Equilibrium at the full load of a problem for which `Equilibrium.become` is; None if none is found.
+
+        Args:
+            problem: With another load and moduli.
+            nodal: Displacements that are near, shape (N, 2), mm.
+            forces: Multipliers that are near, shape (k,), N/mm.
+        """
+        self.equilibrium.become(problem)
+        balance = self._newton.solve(nodal, forces, Stage(1.0, np.zeros(0)))
+        self.iterations += balance.iterations
+        if not balance.converged:
+            return None
+        return PathPoint(1.0, balance.nodal, balance.forces, np.zeros(0))
+
     def _step(self, fraction: float) -> tuple[PathPoint | None, int]:
         """Equilibrium at a fraction of the load, None if there is none; iterations of the hardest solve."""
         nodal, forces, pressed = self._guess(fraction)

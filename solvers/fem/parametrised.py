@@ -6,10 +6,9 @@
 
 with stiffness factors s_r, matrices L_r and M_r of the two terms of the energy, and the mass matrix B of the
 base, on which a layer of compliance ℓ (mm) answers a displacement u by the traction E u / ℓ. For a rigid
-clamp its components are held instead. With x_k = K^-1 b_k and C_ij = b_i . x_j, the derivative by a
-parameter, written ', costs one back-substitution:
+clamp its components are held instead. The derivative by a parameter, written ', costs one back-substitution:
 
-    y = K^-1 (f_k b_k' - K' c),   f' = C^-1 (d' - b' . c - b . y),   c' = y + f_k' x_k
+    K c' - f_k' b_k = f_k b_k' - K' c,   b_k . c' = d_k' - b_k' . c
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,9 +21,10 @@ from scipy.sparse.linalg import SuperLU, splu
 from geometry.arrays import FloatArray
 from geometry.quadrature import body_quadrature, edge_quadrature
 from solvers.elasticity import lame_slopes
+from solvers.fem.bordered import Bordered
 from solvers.fem.conditions import load_functionals
 from solvers.fem.lagrange import LagrangeSpace
-from solvers.fem.unknowns import STIFFNESS, functional_slopes, problem_with
+from solvers.fem.unknowns import STIFFNESS, moved_functionals, problem_with, target_slope
 from solvers.fem.walls import walls_and_ribs
 from solvers.problem import Problem
 
@@ -66,32 +66,31 @@ class LinearFinger:
         self._base = _base_mass(space)
         self._factors: tuple[bytes, SuperLU] | None = None
 
+    def close(self) -> None:
+        """Free the factors."""
+        self._factors = None
+
     def response(self, values: FloatArray) -> Response:
         """The response at parameters of shape (p,)."""
         named = dict(zip(self._names, map(float, values), strict=True))
         problem = problem_with(self._problem, named)
         body, layer = self._stiffness(problem, named), self._layer(problem, named)
         self._factorise(body + layer)
-        count = len(problem.load.prescribed)
-        functionals = _flat(load_functionals(problem, self._space))
-        unit = self._solve(functionals)
-        compliance = functionals @ unit.T
-        forces = np.linalg.solve(compliance, problem.load.values)
-        nodal = forces @ unit
-        nodal_slopes, force_slopes = np.empty((len(named), nodal.size)), np.empty((len(named), count))
+        functionals = flat(load_functionals(problem, self._space))
+        bordered = Bordered.of(self._solve, functionals)
+        nodal, forces = bordered.solution(np.zeros(self._free.size), problem.load.values)
+        nodal_slopes = np.empty((len(named), nodal.size))
+        force_slopes = np.empty((len(named), len(forces)))
         for row, name in enumerate(self._names):
-            moved = np.zeros_like(functionals)
-            if name == "position":
-                moved = _flat(functional_slopes(problem, self._space))
+            moved = flat(moved_functionals(name, problem, self._space))
             change = self._stiffness_slope(name, problem, named, body + layer) @ nodal
-            shift = self._solve((forces @ moved - change)[None])[0]
-            wanted = _target_slope(name, problem) - moved @ nodal - functionals @ shift
-            force_slopes[row] = np.linalg.solve(compliance, wanted)
-            nodal_slopes[row] = shift + force_slopes[row] @ unit
+            nodal_slopes[row], force_slopes[row] = bordered.solution(
+                forces @ moved - change, target_slope(name, problem) - moved @ nodal
+            )
         return Response(
-            nodal=_pairs(nodal),
+            nodal=pairs(nodal),
             forces=forces,
-            nodal_slopes=_pairs(nodal_slopes),
+            nodal_slopes=pairs(nodal_slopes),
             force_slopes=force_slopes,
             energy=0.5 * float(nodal @ (body @ nodal)),
         )
@@ -134,10 +133,10 @@ class LinearFinger:
             self._factors = key, splu(free, **symmetric, options={"SymmetricMode": True})
 
     def _solve(self, right: FloatArray) -> FloatArray:
-        """K^-1 of right-hand sides of shape (r, 2 N)."""
+        """K^-1 of a right-hand side of shape (2 N,)."""
         solution = np.zeros_like(right)
         if self._factors is not None:
-            solution[:, self._free] = self._factors[1].solve(right[:, self._free].T).T
+            solution[self._free] = self._factors[1].solve(right[self._free])
         return solution
 
 
@@ -166,16 +165,11 @@ def _base_mass(space: LagrangeSpace) -> csc_matrix:
     return block_diag([mass, mass], format="csc")
 
 
-def _target_slope(name: str, problem: Problem) -> FloatArray:
-    """Derivative of the prescribed displacements, shape (k,)."""
-    return np.array([float(name == f"stroke_{'uv'[axis]}") for axis in problem.load.prescribed])
-
-
-def _flat(nodal: FloatArray) -> FloatArray:
+def flat(nodal: FloatArray) -> FloatArray:
     """From (k, N, 2) to (k, 2 N), all u first."""
     return nodal.swapaxes(1, 2).reshape(len(nodal), -1)
 
 
-def _pairs(flat: FloatArray) -> FloatArray:
+def pairs(flat: FloatArray) -> FloatArray:
     """From (..., 2 N) to (..., N, 2)."""
     return flat.reshape(*flat.shape[:-1], 2, flat.shape[-1] // 2).swapaxes(-2, -1)

@@ -104,14 +104,21 @@ def problem_with(problem: Problem, values: Mapping[str, float]) -> Problem:
     )
 
 
-def functional_slopes(problem: Problem, space: LagrangeSpace) -> FloatArray:
-    """Derivatives of `load_functionals` by the contact's position, shape (k, N, 2), 1/mm.
+def moved_functionals(name: str, problem: Problem, space: LagrangeSpace) -> FloatArray:
+    """Derivatives of `load_functionals` by a parameter, shape (k, N, 2).
 
-    The weight moves with the contact: the mean of the displacement over it changes by the mean of du/dx.
+    The weight moves with the contact: by its position, the mean of the displacement over it changes by the
+    mean of du/dx.
     """
-    points, weights = contact_functional(problem)
-    along: csr_matrix = space.shape_gradients(problem.mesh.locate(points))[0]
     slopes = np.zeros((len(problem.load.prescribed), len(space.nodes), 2))
-    for row, axis in enumerate(problem.load.prescribed):
-        slopes[row, :, axis] = along.T @ weights
+    if name == "position":
+        points, weights = contact_functional(problem)
+        along: csr_matrix = space.shape_gradients(problem.mesh.locate(points))[0]
+        for row, axis in enumerate(problem.load.prescribed):
+            slopes[row, :, axis] = along.T @ weights
     return slopes
+
+
+def target_slope(name: str, problem: Problem) -> FloatArray:
+    """Derivative of the prescribed displacements by a parameter, shape (k,)."""
+    return np.array([float(name == f"stroke_{'uv'[axis]}") for axis in problem.load.prescribed])

@@ -185,7 +185,8 @@ def test_a_marker_is_the_mean_over_its_disc(problem):
 def test_without_markers_it_is_fem(problem):
     plain, fem = solver().solve(problem), FemSolver(degree=1, estimate=False).solve(problem)
     np.testing.assert_array_equal(plain.field.values, fem.field.values)
-    assert (plain.solver, plain.status.message) == ("fem-id", "without markers, this is fem")
+    assert plain.solver == "fem-id"
+    assert plain.status.message.startswith("without markers, this is fem: ")
 
 
 @pytest.mark.parametrize(
