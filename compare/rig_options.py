@@ -70,6 +70,9 @@ class SceneOptions:
             help="Let a cable hide a share of a marker's diameter, as in --cover 5=0.4; may be repeated.",
         ),
     ] = ()
+    cover_paint: Annotated[
+        Literal["dark", "light"], Parameter(help="Of the cables, like dark markers or unlike.")
+    ] = "dark"
     cover_during: Annotated[
         Literal["all", "rest", "moving", "held"], Parameter(help="When the cables are there.")
     ] = "all"

@@ -74,7 +74,9 @@ def rig(
             pose=pose,
             exposure=exposure,
             motion=motion,
-            occluders=cables(bench, displacement, motion, covered, scene.cover_during),
+            occluders=cables(
+                bench, displacement, motion, covered, scene.cover_during, paint=scene.cover_paint
+            ),
             seed=options.seed,
         )
         with replaced_folder(out) as folder:

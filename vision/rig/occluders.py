@@ -12,15 +12,23 @@ from vision.camera import Camera, Pose
 from vision.rig.bench import Bench
 from vision.rig.coverage import coverage
 from vision.rig.motion import Motion
-from vision.rig.shapes import Shape, closed, seen_edges
+from vision.rig.shapes import Colour, Shape, area, closed, seen_edges
 
-CABLE = (0.10, 0.10, 0.11)
+CABLES: dict[str, Colour] = {"dark": (0.10, 0.10, 0.11), "light": (0.52, 0.50, 0.50)}
+"""Paints of cables: one like dark markers, and one unlike."""
 REACH = 75.0
 """Half of the length of a cable, mm."""
 
 
 def cable(
-    point: ArrayLike, radius: float, share: float, *, angle: float = 70.0, width: float = 4.0, z: float = 1.0
+    point: ArrayLike,
+    radius: float,
+    share: float,
+    *,
+    angle: float = 70.0,
+    width: float = 4.0,
+    z: float = 1.0,
+    paint: str = "dark",
 ) -> Shape:
     """A straight cable that hides a share of the diameter of a disc.
 
@@ -31,17 +39,24 @@ def cable(
         angle: Of the cable with the x axis, degrees.
         width: Of the cable, mm.
         z: Of the cable's plane, mm.
+        paint: One of `CABLES`.
     """
     along = np.array([np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))])
     across = np.array([along[1], -along[0]])
     near = np.asarray(point) + radius * (1 - 2 * share) * across
     far = near + width * across
     ends = [near - REACH * along, far - REACH * along, far + REACH * along, near + REACH * along]
-    return Shape(closed(ends), CABLE, z)
+    return Shape(closed(ends), CABLES[paint], z)
 
 
 def cables(
-    bench: Bench, displacement: FloatArray, motion: Motion, shares: Mapping[int, float], during: str = "all"
+    bench: Bench,
+    displacement: FloatArray,
+    motion: Motion,
+    shares: Mapping[int, float],
+    during: str = "all",
+    *,
+    paint: str = "dark",
 ) -> Callable[[int], Sequence[Shape]]:
     """Cables that hide the same shares of some markers' diameters in every frame of a part of a recording.
 
@@ -51,6 +66,7 @@ def cables(
         motion: Whose frames they are.
         shares: By the number of the marker.
         during: One of `motion.parts`.
+        paint: One of `CABLES`.
 
     Returns:
         What is before the finger in a frame.
@@ -70,7 +86,7 @@ def cables(
         centres = bench.markers(load * displacement)
         radius = bench.parameters.marker_diameter / 2
         return tuple(
-            cable(centres[number - 1, :2], radius, share, z=bench.workspace.marker_plane)
+            cable(centres[number - 1, :2], radius, share, z=bench.workspace.marker_plane, paint=paint)
             for number, share in shares.items()
         )
 
@@ -84,7 +100,7 @@ def share_seen(shape: Shape, occluders: Sequence[Shape], camera: Camera, pose: P
     """Share of a shape's picture that lies in the image and that the occluders leave, to a hundredth."""
     size = (camera.width, camera.height)
     edges = seen_edges(shape, camera, pose) + 0.5
-    whole = abs(_area(edges))
+    whole = abs(area(edges))
     rows, columns, left = coverage(edges, size)
     for occluder in occluders:
         hidden = np.zeros(size[::-1])
@@ -92,9 +108,3 @@ def share_seen(shape: Shape, occluders: Sequence[Shape], camera: Camera, pose: P
         hidden[where.rows, where.columns] = where.share
         left = left * (1 - hidden[rows, columns])
     return float(left.sum() / whole)
-
-
-def _area(edges: FloatArray) -> float:
-    """Signed area within closed edges, square pixels."""
-    (x0, y0), (x1, y1) = edges[:, 0].T, edges[:, 1].T
-    return float((x0 * y1 - x1 * y0).sum() / 2)

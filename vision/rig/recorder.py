@@ -6,6 +6,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import cv2
+import numpy as np
 
 from geometry.atomic import write_json
 from geometry.errors import UserError
@@ -21,7 +22,10 @@ from vision.video import CODECS, VideoWriter
 PICTURES = "png"
 FILES = {codec.lower(): f"video{suffix}" for suffix, codec in CODECS.items()} | {PICTURES: "frames"}
 """Where the frames are by the codec: a video, or a folder of pictures."""
-TRUTH_COLUMNS = ("frame", "time_s", "load", "marker", "x_mm", "y_mm", "z_mm", "x_px", "y_px", "seen")
+TRUTH_COLUMNS = (
+    *("frame", "time_s", "load", "marker"),
+    *("x_mm", "y_mm", "z_mm", "x_px", "y_px", "x_disc_mm", "y_disc_mm", "seen"),
+)
 
 
 def record(
@@ -113,9 +117,9 @@ def write_picture(path: Path, image: Image) -> None:
 
 
 def _rows(number: int, time: float, truth: Truth) -> Iterator[tuple[float, ...]]:
-    columns = zip(truth.world.tolist(), truth.pixels.tolist(), truth.seen.tolist(), strict=True)
-    for marker, (world, pixels, seen) in enumerate(columns, start=1):
-        yield (number, time, truth.load, marker, *world, *pixels, seen)
+    markers = np.column_stack([truth.world, truth.pixels, truth.discs, truth.seen]).tolist()
+    for marker, values in enumerate(markers, start=1):
+        yield (number, time, truth.load, marker, *values)
 
 
 def _settings(recording: Recording) -> dict[str, object]:

@@ -16,7 +16,7 @@ from vision.rig.exposure import Exposure, Image, Light
 from vision.rig.motion import Motion
 from vision.rig.occluders import share_seen
 from vision.rig.render import mean_light, noise_of
-from vision.rig.shapes import Shape
+from vision.rig.shapes import Shape, centroid
 
 STEP = 1.0
 """How far the finger moves at most between two pictures whose mean is one with motion blur, pixels: a pixel's
@@ -31,12 +31,15 @@ class Truth(NamedTuple):
         load: Share of the load, the mean while the shutter is open.
         world: The markers' centres, the mean while the shutter is open, shape (m, 3), mm.
         pixels: Their pictures, shape (m, 2).
+        discs: The middles of the deformed discs, shape (m, 2), mm: in a finger that bends they are not where
+            the centres are, and it is discs that a camera sees.
         seen: Share of every marker's picture that nothing hides, shape (m,).
     """
 
     load: float
     world: FloatArray
     pixels: FloatArray
+    discs: FloatArray
     seen: FloatArray
 
 
@@ -110,15 +113,13 @@ class Recording:
         scenes = [self.bench.scene(state, occluders) for state in states]
         light = mean_light(scenes, self.camera, self.pose, self.exposure.blur)
         worlds = [self.bench.markers(state) for state in states]
+        discs = [self.bench.discs(state) for state in states]
+        seen = [share_seen(disc, occluders, self.camera, self.pose) for disc in discs[len(discs) // 2]]
         truth = Truth(
             load=float(np.mean(loads)),
             world=np.mean(worlds, axis=0),
             pixels=np.mean([self.camera.project(world, self.pose) for world in worlds], axis=0),
-            seen=np.array(
-                [
-                    share_seen(disc, occluders, self.camera, self.pose)
-                    for disc in self.bench.discs(states[len(states) // 2])
-                ]
-            ),
+            discs=np.mean([[centroid(disc.edges) for disc in state] for state in discs], axis=0),
+            seen=np.array(seen),
         )
         return light, truth

@@ -60,6 +60,21 @@ def circle(centre: ArrayLike, radius: float) -> FloatArray:
     return np.asarray(centre + reach * np.stack([np.cos(angle), np.sin(angle)], axis=1))
 
 
+def area(edges: FloatArray) -> float:
+    """Signed area within edges of shape (n, 2, 2), in their unit squared; positive if counter-clockwise."""
+    return float(_turns(edges).sum() / 2)
+
+
+def centroid(edges: FloatArray) -> FloatArray:
+    """The middle of what edges of shape (n, 2, 2) enclose, shape (2,)."""
+    return np.asarray((edges.sum(axis=1) * _turns(edges)[:, None]).sum(axis=0) / (6 * area(edges)))
+
+
+def _turns(edges: FloatArray) -> FloatArray:
+    (x0, y0), (x1, y1) = edges[:, 0].T, edges[:, 1].T
+    return np.asarray(x0 * y1 - x1 * y0)
+
+
 def seen_edges(shape: Shape, camera: Camera, pose: Pose) -> FloatArray:
     """The edges of the shape's picture, shape (m, 2, 2), pixels; those that the lens bends are cut."""
     start, end = shape.edges[:, 0], shape.edges[:, 1]

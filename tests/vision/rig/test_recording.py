@@ -64,6 +64,17 @@ def test_the_truth_goes_from_rest_to_the_whole_displacement(bench):
     np.testing.assert_allclose((end - start)[:, :2], moved, atol=1e-12)
     np.testing.assert_allclose(truths[2].world, start + truths[2].load * (end - start), atol=1e-12)
     np.testing.assert_array_equal(truths[-1].pixels, CAMERA.project(end, POSE))
+    np.testing.assert_allclose(truths[0].discs, bench.mesh.markers, atol=1e-12)
+
+
+def test_the_middle_of_a_disc_that_bends_is_the_mean_over_the_disc(bench):
+    x, slope = bench.mesh.points[:, 0], 0.002
+    recording = film(bench, displacement=np.column_stack([0 * x, slope * x**2]))
+    _, truth = recording.frame(5)
+    # The mean of slope (x - c)² over a disc is slope r²/4; linear elements, of 0.7 mm in the wall, add to it.
+    lifted = truth.discs[:8, 1] - truth.world[:8, 1]
+    np.testing.assert_allclose(lifted, slope * 0.8**2 / 4, rtol=0.35)
+    np.testing.assert_allclose(truth.discs[:, 0], truth.world[:, 0], atol=1e-9)
 
 
 def test_motion_blur_is_the_mean_of_what_is_seen_while_the_shutter_is_open(bench):
