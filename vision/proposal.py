@@ -23,7 +23,7 @@ VOTES = (5.0, 8.0)
 """Gradients that must point at a centre: twice the least radius, a third of the edge, within these limits."""
 EDGE = 100.0
 """Canny's higher threshold; the blurred mask's edges have 160 or more whatever the light."""
-LEAST_FILL = 0.5
+LEAST_FILL = 0.4
 """Share of the colour within a circle minus that around it: 1 for a whole marker, about 0 for a corner."""
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from dots import Dots, dots, draw_disc
+from dots import Dots, dots, draw_disc, exposed, step
 
 from geometry.arrays import FloatArray
 from geometry.design import Design
@@ -102,6 +102,21 @@ def test_a_window_beyond_the_image_gives_nothing(window):
 @pytest.mark.parametrize(("shape", "level"), [((200, 300), 128), ((200, 300, 3), 0), ((3, 3), 255)])
 def test_an_empty_image_gives_nothing(shape, level):
     assert propose(np.full(shape, level, np.uint8), radii=(4, 25)).shape == (0, 3)
+
+
+@pytest.mark.parametrize(("level", "hidden"), [(215, 5.0), (120, 5.0), (45, 2.5)])
+@pytest.mark.parametrize("turn", [0, 50, 100, 150])
+def test_a_partly_hidden_disc_is_proposed(level, hidden, turn):
+    """A straight edge hides `hidden` of its diameter of 15.2 pixels: 28 or 11 % of the area."""
+    disc = np.array([30.3, 29.8, 7.6])
+    canvas = np.full((60, 60, 3), 215.0)
+    draw_disc(canvas, disc, (45, 45, 45), 1.0)
+    rows, columns = np.ogrid[:60, :60]
+    angle = np.deg2rad(turn)
+    beyond = (columns - disc[0]) * np.cos(angle) + (rows - disc[1]) * np.sin(angle) - (7.6 - hidden)
+    canvas += step(beyond, 1.0)[:, :, None] * (level - canvas)
+    found = propose(exposed(canvas, shading=0.1, noise=3.0, seed=turn), radii=(5.3, 9.9))
+    assert np.hypot(*(found[:, :2] - disc[:2]).T).min() < 3
 
 
 def test_discs_that_touch_are_told_apart_and_none_is_proposed_twice():
