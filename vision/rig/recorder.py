@@ -17,6 +17,7 @@ from vision.rig.exposure import Image
 from vision.rig.recording import Recording, Truth
 from vision.rig.render import render
 from vision.rig.shapes import Scene
+from vision.sheet import workspace_svg
 from vision.video import CODECS, VideoWriter
 
 PICTURES = "png"
@@ -39,7 +40,8 @@ def record(
     """Write a recording into a folder that exists.
 
     The frames (`FILES` by the codec), `truth.csv` with every marker in every frame, `observations_true.csv`
-    with the displacements, `camera.json`, `workspace.json` and `truth.json` with the rest of the settings.
+    with the displacements, `camera.json`, `workspace.json`, `fiducials.svg` to print, and `truth.json` with
+    the rest of the settings.
 
     Args:
         recording: What is filmed, and how.
@@ -64,7 +66,10 @@ def record(
             progress((number + 1) / count, f"{number + 1} of {count} frames")
     write_measurements(folder / "observations_true.csv", recording.observations(source))
     save_camera(folder / "camera.json", recording.camera)
-    write_json(folder / "workspace.json", recording.bench.workspace.model_dump(mode="json"))
+    bench = recording.bench
+    write_json(folder / "workspace.json", bench.workspace.model_dump(mode="json"))
+    sheet = workspace_svg(bench.workspace, bench.parameters)
+    (folder / "fiducials.svg").write_text(sheet, encoding="utf-8")
     write_json(folder / "truth.json", _settings(recording))
 
 
