@@ -15,6 +15,8 @@ EDGE = 0.45
 """Part of a square's side along which its edges are alone."""
 RADII = (2.5, 12.0)
 """Of the discs of pixels in which a corner is sought."""
+LARGE = 1600
+"""Longer side of an image, pixels, from which on corners are first sought in a smaller one."""
 FEWEST_CORNERS = 4
 """In either half of the corners: as many as determine a pose."""
 
@@ -65,17 +67,28 @@ class Board:
         Source: A. Duda, U. Frese, "Accurate detection and localization of checkerboard corners for
         calibration", BMVC 2018, as in OpenCV; then `vision.saddle`.
         """
-        found, corners = cv2.findChessboardCornersSB(
-            image, (self.columns, self.rows), flags=cv2.CALIB_CB_ACCURACY
-        )
-        if not found:
-            return None
-        refined = self.refine(image, np.asarray(corners, np.float64).reshape(-1, 2), EDGE * self.square)
+        shrink = max(1.0, max(image.shape) / LARGE)
+        guesses = self._guesses(image, shrink)
+        if guesses is None:
+            guesses = self._guesses(image, 2 * shrink)  # which sharpens a blurred one
+        refined = None if guesses is None else self.refine(image, guesses, EDGE * self.square)
         if refined is None:
             return None
         seen = np.isfinite(refined[:, 0]).reshape(self.rows, self.columns)
         whole = seen.any(axis=0).all() and seen.any(axis=1).all()  # OpenCV adds rows to smaller boards
         return refined if whole else None
+
+    def _guesses(self, image: GreyImage, shrink: float) -> FloatArray | None:
+        """The corners in an image as OpenCV finds them in a smaller one, shape (n, 2), pixels."""
+        width, height = (round(side / shrink) for side in image.shape[::-1])
+        small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA) if shrink > 1 else image
+        found, corners = cv2.findChessboardCornersSB(
+            small, (self.columns, self.rows), flags=cv2.CALIB_CB_ACCURACY
+        )
+        if not found:
+            return None
+        scale = np.array(image.shape[::-1]) / (width, height)
+        return np.asarray((np.reshape(corners, (-1, 2)).astype(np.float64) + 0.5) * scale - 0.5)
 
     def refine(self, image: GreyImage, corners: FloatArray, reach: float) -> FloatArray | None:
         """Corners to hundredths of a pixel from guesses, both of shape (n, 2) with NaN where one is not seen.

@@ -16,7 +16,7 @@ from geometry.arrays import FloatArray
 STEPS = 12
 START_WIDTH, WIDTHS = 1.2, (0.4, 6.0)
 FARTHEST = 1.5
-"""From the guess, pixels; a corner beyond is none."""
+"""From the guess, pixels, or a quarter of the radius if that is more; a corner beyond is none."""
 LEAST_CONTRAST = 5.0
 """A, grey levels."""
 TURN = 0.2
@@ -26,7 +26,7 @@ TURN = 0.2
 def fit_saddles(
     grey: NDArray[np.uint8], guesses: FloatArray, edges: FloatArray, radii: FloatArray
 ) -> FloatArray:
-    """Corners from guesses that are off by a pixel at most, by the Gauss-Newton method on all at once.
+    """Corners from guesses that are off by a pixel or two, by the Gauss-Newton method on all at once.
 
     Args:
         grey: Shape (height, width).
@@ -62,7 +62,7 @@ def fit_saddles(
         parameters += np.clip(np.linalg.solve(normal, slope)[:, :, 0], -limits, limits)
         parameters[:, 6] = np.clip(parameters[:, 6], *WIDTHS)
     corners = parameters[:, 2:4] + origins
-    near = np.linalg.norm(corners - guesses, axis=1) <= FARTHEST
+    near = np.linalg.norm(corners - guesses, axis=1) <= np.maximum(FARTHEST, radii / 4)
     found = near & (np.abs(parameters[:, 1]) >= LEAST_CONTRAST)
     return np.where(found[:, None], corners, np.nan)
 

@@ -43,9 +43,10 @@ def calibrate(
     from compare.calibration_table import calibration_table, view_table
     from compare.figures.calibration_picture import draw_calibration
     from vision.boards import read_board
-    from vision.calibration import LensChoice, better_lens
+    from vision.calibration import better_lens
     from vision.calibration import calibrate as calibrated
     from vision.camera_file import check_format, save_calibration
+    from vision.lens_fit import LensChoice
     from vision.photographs import photographs
 
     check_format(out)

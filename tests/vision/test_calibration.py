@@ -12,9 +12,10 @@ from scipy.spatial.transform import Rotation
 from compare.cli import main
 from geometry.errors import UserError
 from vision.board import Board
-from vision.calibration import LensChoice, better_lens, calibrate, calibrate_views
+from vision.calibration import better_lens, calibrate, calibrate_views
 from vision.camera import Camera, Pose
 from vision.camera_file import load_camera
+from vision.lens_fit import LensChoice
 from vision.photographs import photographs
 
 SIZE = (CAMERA.width, CAMERA.height)
@@ -131,6 +132,25 @@ def test_boards_that_are_never_tilted_do_not_determine_the_camera():
         calibrate_views(flat, BOARD, SIZE)
 
 
+@pytest.mark.parametrize("noise", [0.05, 0.5])
+def test_noise_does_not_hide_that_they_are_never_tilted(noise):
+    rng = np.random.default_rng(6)
+    flat = {}
+    for number in range(8):
+        scale, shift = rng.uniform(2, 4), rng.uniform((0, 0), (400, 200))
+        pixels = scale * BOARD.corners[:, :2] + shift
+        flat[str(number)] = pixels + rng.normal(0, noise, pixels.shape)
+    with pytest.raises(UserError, match="do not determine the camera"):
+        calibrate_views(flat, BOARD, SIZE)
+
+
+def test_copies_of_one_photograph_are_not_enough():
+    (pixels,) = views(1, noise=NOISE).values()
+    copies = {str(number): pixels for number in range(6)}
+    with pytest.raises(UserError, match="do not determine the camera"):
+        calibrate_views(copies, BOARD, SIZE)
+
+
 def test_photographs_of_different_sizes_are_refused():
     images = {"a.png": np.zeros((40, 60), np.uint8), "b.png": np.zeros((60, 40), np.uint8)}
     with pytest.raises(UserError, match=r"a\.png has 60x40 pixels and b\.png 40x60"):
@@ -204,11 +224,12 @@ def test_bad_input_is_one_line(arguments, message, folder, tmp_path, monkeypatch
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("model", ["brown", "fisheye"])
 @pytest.mark.skipif(not PHOTOGRAPHS, reason="no photographs in /usr/share/doc/opencv-doc (Debian)")
-def test_the_photographs_of_opencv_give_their_known_camera():
-    found = calibrate(photographs(PHOTOGRAPHS), BOARD)
+def test_the_photographs_of_opencv_give_their_known_camera(model):
+    found = calibrate(photographs(PHOTOGRAPHS), BOARD, lens=LensChoice(model))
     assert found.boardless == ()
     assert 530 < found.camera.fx < 540
     assert abs(found.camera.fy - found.camera.fx) < 3
-    assert found.rms < 0.5
-    assert found.rms < found.held_out < 0.5
+    assert found.rms < 0.2  # 0.23 without the fit of `vision.saddle`
+    assert found.rms < found.held_out < 0.22
