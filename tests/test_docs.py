@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from pydantic import BaseModel
 
 from geometry.cache import CAD_FORMATS
 from geometry.markers import marker_positions
@@ -208,7 +209,7 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in headings}
 
 
-def described(model: type[Parameters] | type[MeshSettings], *, symbols: bool) -> list[str]:
+def described(model: type[BaseModel], *, symbols: bool) -> list[str]:
     """The rows that the guide must have for a model's fields."""
     rows = []
     for name, field in model.model_fields.items():
@@ -238,6 +239,28 @@ def test_the_guide_has_every_mesh_setting_as_it_is():
     expected = described(MeshSettings, symbols=False)
     assert [row for row in expected if row not in lines] == []
     assert names(table(GUIDE, "setting")) == list(MeshSettings.model_fields)
+
+
+def test_the_guide_has_every_setting_of_the_virtual_rig_as_it_is():
+    from vision.rig.exposure import Exposure
+    from vision.rig.motion import Motion
+
+    lines = GUIDE.read_text(encoding="utf-8").splitlines()
+    for model in (Exposure, Motion):
+        assert names(table(GUIDE, model.__name__.lower())) == list(model.model_fields)
+        expected = [row for row in described(model, symbols=False) if "`monochrome`" not in row]
+        assert [row for row in expected if row not in lines] == []
+
+
+def test_the_guide_has_every_file_of_a_film(tmp_path):
+    from compare.cli import main
+
+    film = "--mesh-size 1 --size 320x180 --rest 1 --moving 0 --held 1 --boards 1 --square 20"
+    assert main(["rig", *film.split(), "--out", str(tmp_path / "film")]) == 0
+    actual = [
+        path.relative_to(tmp_path / "film").as_posix() for path in tmp_path.rglob("*") if path.is_file()
+    ]
+    assert_same([name.replace("NUMBER", "NAME") for name in names(table(GUIDE, "file of a film"))], actual)
 
 
 def test_the_guide_has_every_preset_as_it_is():
