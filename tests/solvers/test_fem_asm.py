@@ -247,3 +247,37 @@ def test_a_patch_is_certain(problem):
 def test_settings_that_make_no_sense_are_refused(settings, said):
     with pytest.raises(UserError, match=said):
         FemAsmSolver(**settings)
+
+
+@pytest.mark.parametrize("deviation", [0.0, 1.0])
+def test_markers_of_a_richer_model_improve_the_displacement_and_not_the_stress(coarse_mesh, deviation):
+    """The finger turns by more than the linear law allows for: to meet the markers it must strain."""
+    from geometry.quadrature import body_quadrature
+    from solvers.fem.nonlinear import FemNonlinearSolver
+    from solvers.problem import Material
+
+    pressed = Load(kind="patch", displacement=(None, -10.0))
+    truth = FemNonlinearSolver().solve(Problem(coarse_mesh, Material(law="neo-hookean"), pressed))
+    points = coarse_mesh.markers
+    problem = Problem(
+        coarse_mesh,
+        observations=Observations(
+            points, truth.displacement(points), np.zeros((9, 2)), np.ones(9, dtype=bool), "by a test", True
+        ),
+    )
+    rule = body_quadrature(coarse_mesh)
+
+    def distance(solution):
+        moved, stressed = (
+            np.linalg.norm(got - expected) / np.linalg.norm(expected)
+            for got, expected in (
+                (solution.displacement(rule.location), truth.displacement(rule.location)),
+                (solution.state(rule.location).von_mises, truth.state(rule.location).von_mises),
+            )
+        )
+        return moved, stressed
+
+    plain = distance(FemSolver(estimate=False).solve(replace(problem, observations=None)))
+    given = distance(FemAsmSolver(contact_deviation=deviation).solve(problem))
+    assert given[0] < 0.4 * plain[0]
+    assert given[1] > 3 * plain[1]
