@@ -104,7 +104,7 @@ def run(job: Job, stages: Stages) -> Outcome:
             material=job.material,
             load=job.load,
             solvers=job.solvers,
-            check=partial(_check_inside, given) if given else None,
+            check=partial(check_inside, given) if given else None,
         )
         if adaptation is not None:
             write_rounds(folder / "adapt.csv", adaptation)
@@ -276,7 +276,8 @@ def _key(solver: Solver, problem: Problem, observations: Observations) -> str:
     return sha256((text + problem.digest).encode() + observations.points.tobytes()).hexdigest()
 
 
-def _check_inside(observations: Observations, mesh: TriangleMesh) -> None:
+def check_inside(observations: Observations, mesh: TriangleMesh) -> None:
+    """Raise a `UserError` if a marker is not on the body."""
     try:
         mesh.locate(observations.points)
     except OutsideBodyError as error:

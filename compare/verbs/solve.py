@@ -1,5 +1,6 @@
 """Solve one finger with one solver."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -7,7 +8,7 @@ from cyclopts import Parameter
 from rich.console import Console
 
 from compare.exits import NOT_CONVERGED
-from compare.options import Adapt, FingerOptions, PhysicsOptions, SolverOptions
+from compare.options import Adapt, FingerOptions, PhysicsOptions, SolverOptions, existing
 from geometry.errors import UserError
 
 
@@ -18,6 +19,10 @@ def solve(
     options: SolverOptions = SolverOptions(),
     *,
     adapt: Adapt = None,
+    measurements: Annotated[
+        Path | None,
+        Parameter(help="CSV file of marker displacements, for a solver that assimilates them."),
+    ] = None,
     out: Annotated[Path, Parameter(help="The VTU file for the fields.")] = Path("out/solution.vtu"),
 ) -> int:
     """Solve one finger with one solver and write its fields, without comparing anything."""
@@ -26,11 +31,14 @@ def solve(
     from compare.figures.force_chart import draw_force_displacement
     from compare.figures.labels import solver_label
     from compare.force_displacement import force_curves, write_force_displacement
+    from compare.pipeline import check_inside
     from compare.stages import Stages
     from compare.uncertainty import evaluated
     from compare.verdict import certified
+    from solvers.assimilation import assimilates
     from solvers.problem import Problem
     from solvers.solver import with_law
+    from vision.measurements import read_measurements
 
     chosen, settings = finger.read(options.preset)
     material, load = physics.read(options.preset)
@@ -41,12 +49,22 @@ def solve(
         raise UserError(f"name one solver, not {solver!r}; `compare` takes several")
     physics.check_law(chosen_solvers)
     (made,) = chosen_solvers
+    given = read_measurements(file) if (file := existing(measurements)) else None
+    if given and not assimilates(made):
+        raise UserError(f"{made.name} does not assimilate markers; `compare` compares it with --measurements")
     with Stages(Console(stderr=True)) as stages:
         triangles, adaptation = shared_mesh(
-            chosen, settings, stages, tolerance=adapt, material=material, load=load, solvers=[made]
+            chosen,
+            settings,
+            stages,
+            tolerance=adapt,
+            material=material,
+            load=load,
+            solvers=[made],
+            check=partial(check_inside, given) if given else None,
         )
         with stages.stage(made.name) as progress:
-            problem = Problem(triangles, with_law(material, made), load)
+            problem = Problem(triangles, with_law(material, made), load, given)
             solution = made.solve(problem, progress)
         with stages.stage("certificate"):
             (evaluation,) = certified([evaluated(solution, triangles)], problem)

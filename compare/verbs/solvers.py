@@ -9,7 +9,8 @@ def solvers() -> int:
 
     from solvers.registry import PRESETS, make_solver, usable_solvers
 
-    table = Table("solver", "laws", "loads", "settings")
+    table = Table("solver", "laws", "loads")
+    table.add_column("settings", overflow="fold")
     for name, usual in usable_solvers().items():
         _, *others = PRESETS.get(name, [""])
         for solver in [usual, *(make_solver(name, preset=preset) for preset in others)]:

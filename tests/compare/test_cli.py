@@ -157,6 +157,9 @@ BAD = [
     ("compare --measurements empty.csv", "empty.csv has no column x_mm"),
     ("compare --measurements binary.csv", "binary.csv: it is not a CSV file in UTF-8"),
     ("compare --mesh-size 1 --measurements outside.csv", "not of this finger: .* outside the body"),
+    ("solve fem --measurements outside.csv", "fem does not assimilate markers; `compare` compares"),
+    ("solve fem-asm --measurements absent.csv", "there is no file absent.csv"),
+    ("solve fem-asm --mesh-size 1 --measurements outside.csv", "not of this finger: .* outside the body"),
     # where to write
     ("compare --out foreign", "foreign holds thesis.txt, which no run has written"),
     ("compare --out file", "file is a file; name a folder with --out"),
@@ -569,3 +572,13 @@ def test_a_tolerance_that_is_not_reached_ends_with_its_own_code(monkeypatch, tmp
     assert error.startswith("the markers are known to 0.00")
     assert len((tmp_path / "mesh" / "adapt.csv").read_text(encoding="utf-8").splitlines()) == 3
     assert len(TriangleMesh.load(tmp_path / "mesh" / "mesh.npz").triangles) > 3520
+
+
+def test_solve_gives_the_markers_to_a_solver_that_assimilates(tmp_path, capsys):
+    markers = tmp_path / "markers.csv"
+    markers.write_text("x_mm,y_mm,u_mm,v_mm\n50,-1,-1.5,-8.5\n85,-1,-2,-0.5\n")
+    out = tmp_path / "pulled.vtu"
+    options = ["--mesh-size", "1.0", "--measurements", str(markers), "--out", str(out)]
+    assert main(["solve", "fem-asm", *options]) == 0
+    assert "mm when they are left out" in capsys.readouterr().out
+    assert out.exists()
