@@ -12,7 +12,8 @@ from typing import Any
 from compare.adaptation import shared_mesh, write_rounds
 from compare.evaluation import Evaluation
 from compare.fields import write_vtu
-from compare.figures import draw_all
+from compare.figures import Figure, draw_all
+from compare.film import Film
 from compare.force_displacement import force_curves, write_force_displacement
 from compare.metrics import pick_reference
 from compare.output_folder import SOLUTIONS, TRAINING, check_output, replaced_folder, take_training, write_run
@@ -37,6 +38,9 @@ from solvers.solver import Solver, check_load, with_law
 from solvers.training import TrainedSolver, TrainingContext
 from vision.measurements import read_measurements, write_measurements
 
+TRACK = "track"
+"""Folder of what tracking a film wrote."""
+
 
 @dataclass(frozen=True)
 class Job:
@@ -49,7 +53,7 @@ class Job:
         adapt: Tolerance to which `fem` shall know the markers, mm, for which the mesh is refined; None: not.
         material: The elastic constants; each solver takes the law that it has.
         load: What moves the finger.
-        measurements: CSV file of marker displacements; None for a virtual experiment.
+        measurements: CSV file of marker displacements, or a film to track; None for a virtual experiment.
         reference: Name of the solver that the others are compared with; `fem`, else the first, if None.
         out: Output folder.
         resume: Whether to take over solutions that an earlier run of the same job finished.
@@ -61,7 +65,7 @@ class Job:
     adapt: float | None = None
     material: Material = field(default_factory=Material)
     load: Load = field(default_factory=Load)
-    measurements: Path | None = None
+    measurements: Path | Film | None = None
     reference: str | None = None
     out: Path = Path("out/default")
     resume: bool = False
@@ -77,6 +81,7 @@ class Outcome:
         observations: What they were compared with.
         reference: One of the evaluations.
         adaptation: How the mesh was refined, if that was asked for.
+        remarks: What tracking a film had to say.
     """
 
     metrics: dict[str, Any]
@@ -84,6 +89,7 @@ class Outcome:
     observations: Observations
     reference: Evaluation
     adaptation: Adaptation | None = None
+    remarks: Sequence[str] = ()
 
 
 def run(job: Job, stages: Stages) -> Outcome:
@@ -94,8 +100,19 @@ def run(job: Job, stages: Stages) -> Outcome:
     """
     started = datetime.now(UTC)
     _check(job)
-    given = read_measurements(job.measurements) if job.measurements else None
+    given = read_measurements(job.measurements) if isinstance(job.measurements, Path) else None
+    shots: list[Figure] = []
+    remarks: Sequence[str] = ()
     with replaced_folder(job.out, keep=_names(job) if job.resume else ()) as folder:
+        if isinstance(job.measurements, Film):
+            from compare.tracked import track_figures, track_film  # needs OpenCV
+
+            with stages.stage("track") as progress:
+                (folder / TRACK).mkdir()
+                tracking, given = track_film(
+                    job.measurements, job.design, folder / TRACK, progress, video=False
+                )
+            shots, remarks = track_figures(folder / TRACK, tracking), tracking.warnings
         mesh, adaptation = shared_mesh(
             job.design,
             job.mesh,
@@ -164,6 +181,7 @@ def run(job: Job, stages: Stages) -> Outcome:
                 "material": job.material.model_dump(),
                 "load": job.load.model_dump(),
                 "measurements_sha256": file_digest(folder / "observations.csv"),
+                "film": job.measurements.provenance() if isinstance(job.measurements, Film) else None,
                 "solvers": {solver.name: solver.settings() for solver in job.solvers},
                 "seed": {
                     solver.name: solver.settings()["seed"]
@@ -186,13 +204,13 @@ def run(job: Job, stages: Stages) -> Outcome:
                     observations=observations,
                     evaluations=evaluations,
                     reference=reference,
-                    figures=figures,
+                    figures=[*figures, *shots],
                     provenance=provenance,
                     adaptation=adaptation,
                 ),
             )
             write_run(folder, provenance)
-    return Outcome(numbers, evaluations, observations, reference, adaptation)
+    return Outcome(numbers, evaluations, observations, reference, adaptation, remarks)
 
 
 def _check(job: Job) -> None:

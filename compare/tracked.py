@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,73 +9,23 @@ import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from compare.provenance import file_digest
+from compare.figures import Figure
+from compare.film import Film
 from compare.tables import Cell, write_csv
 from geometry.atomic import write_json
 from geometry.observations import Observations
 from geometry.parameters import Parameters
 from vision.annotation import annotated
-from vision.camera_file import load_camera
-from vision.colour import read_colour
 from vision.follower import Sighting
 from vision.frames import Frame, Image
-from vision.localiser import Method
 from vision.measurements import write_measurements
 from vision.pictures import write_picture
-from vision.setup import Setup
 from vision.tracker import track
 from vision.tracking import Tracking
 from vision.video import VideoWriter, open_frames
-from vision.workspace import default_workspace
-from vision.workspace_file import load_workspace
 
 Report = Callable[[float, str], None]
 Watch = Callable[[Frame, Sighting], None]
-
-
-@dataclass(frozen=True)
-class Film:
-    """A video, and the files and options that say what it shows.
-
-    Attributes:
-        source: Video, folder or glob of pictures, number of a camera, or "-".
-        camera: Its file; None if it is not known.
-        workspace: Its file; that of `default_workspace` if None.
-        colour: Of the markers, as `read_colour` takes it.
-        method: How the markers are found.
-    """
-
-    source: str
-    camera: Path | None = None
-    workspace: Path | None = None
-    colour: str = "dark"
-    method: Method = "precise"
-
-    def setup(self, design: Parameters) -> Setup:
-        """What it shows of a finger.
-
-        Raises:
-            UserError: If a file cannot be read.
-        """
-        return Setup(
-            design=design,
-            workspace=load_workspace(self.workspace) if self.workspace else default_workspace(design),
-            camera=load_camera(self.camera) if self.camera else None,
-            colour=read_colour(self.colour),
-            method=self.method,
-        )
-
-    def provenance(self) -> dict[str, Any]:
-        """Where the numbers come from, with the hash of every file."""
-        files = {"video": Path(self.source), "camera": self.camera, "workspace": self.workspace}
-        return {
-            "source": self.source,
-            "colour": self.colour,
-            "method": self.method,
-            **{
-                f"{name}_sha256": file_digest(path) for name, path in files.items() if path and path.is_file()
-            },
-        }
 
 
 def track_film(
@@ -138,9 +87,9 @@ def _sentence(film: Film, tracking: Tracking) -> str:
     """Where the numbers come from and how good they are."""
     initial, final = (len(end) for end in tracking.rest)
     deviations = np.sqrt(np.diag(tracking.displacement_covariance)) if tracking.visible.any() else np.zeros(1)
-    camera = "a calibrated camera" if film.camera else "no calibrated camera"
+    camera = "a calibrated camera" if film.options.camera else "no calibrated camera"
     return (
-        f"measured by pinnray track ({film.method}, {camera}) in {Path(film.source).name}, "
+        f"measured by pinnray track ({film.options.method}, {camera}) in {Path(film.source).name}, "
         f"means of {initial} and {final} frames at rest, standard deviations {deviations.min():.2g} to "
         f"{deviations.max():.2g} mm"
     )
@@ -204,3 +153,21 @@ def track_table(tracking: Tracking, observations: Observations) -> Table:
             cells = [f"{value:.3f} ±{deviation:.3f}" for value, deviation in pairs]
         table.add_row(str(number + 1), f"{x:.3f}", f"{y:.3f}", *cells, str(seen[number]))
     return table
+
+
+def track_figures(folder: Path, tracking: Tracking) -> list[Figure]:
+    """The annotated pictures of a track, for a report."""
+    seen, count = int(tracking.visible.sum()), len(tracking.visible)
+    remarks = " ".join(f"{warning[:1].upper()}{warning[1:]}." for warning in tracking.warnings)
+    return [
+        Figure(
+            folder / "initial.png",
+            "The finger at rest, as the camera saw it",
+            "Green: the markers with their numbers; blue: the fiducials that give the plane.",
+        ),
+        Figure(
+            folder / "final.png",
+            "The finger pressed, as the camera saw it",
+            f"Magenta: the way of every marker. {seen} of {count} markers are measured. {remarks}".strip(),
+        ),
+    ]

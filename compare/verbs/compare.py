@@ -7,7 +7,9 @@ from cyclopts import Parameter
 from rich.console import Console
 
 from compare.exits import NOT_CONVERGED, say
+from compare.film import Film, FilmOptions
 from compare.options import OUTPUT, Adapt, FingerOptions, PhysicsOptions, SolverOptions, existing
+from geometry.errors import UserError
 
 
 def compare(
@@ -20,12 +22,14 @@ def compare(
         str, Parameter(help="Names with commas between; `pinnray solvers` lists them.")
     ] = "fem,pinn-std",
     measurements: Annotated[
-        Path | None,
+        str | None,
         Parameter(
-            help="CSV file of marker displacements (x_mm, y_mm, u_mm, v_mm). Without it they are simulated "
-            "by a finite-strain run, and everything that shows them says so."
+            help="CSV file of marker displacements (x_mm, y_mm, u_mm, v_mm), or a video, a folder or glob of "
+            "pictures to track. Without it they are simulated by a finite-strain run, and everything that "
+            "shows them says so."
         ),
     ] = None,
+    film: FilmOptions = FilmOptions(),
     reference: Annotated[
         str | None, Parameter(help="Solver that the others are compared with; fem, else the first.")
     ] = None,
@@ -48,6 +52,7 @@ def compare(
     - compare --design default
     - compare --design slender --solvers fem
     - compare --set rib_count=6 --set height=110 --measurements markers.csv
+    - compare --design default --measurements video.mkv --camera camera.json
     - compare --preset paper --device cuda
     """
     from compare.adaptation import adapted_enough
@@ -66,7 +71,7 @@ def compare(
         adapt=adapt,
         material=material,
         load=load,
-        measurements=existing(measurements),
+        measurements=_measurements(measurements, film),
         reference=reference,
         out=out or Path("out") / design.name,
         resume=resume,
@@ -78,6 +83,8 @@ def compare(
         kept = job.out.with_name(f"{job.out.name}.partial").exists()
         note = "what was finished is kept; --resume goes on from it" if kept else "nothing was finished yet"
         raise KeyboardInterrupt(note) from None
+    for remark in outcome.remarks:
+        say(f"warning: {remark}")
     if json_:
         print((job.out / "metrics.json").read_text(encoding="utf-8"), end="")
     elif not quiet:
@@ -88,3 +95,12 @@ def compare(
     for evaluation in unconverged:
         say(f"error: {evaluation.solver} did not converge: {evaluation.message}")
     return NOT_CONVERGED if unconverged or not adapted_enough(outcome.adaptation) else 0
+
+
+def _measurements(source: str | None, options: FilmOptions) -> Path | Film | None:
+    """A CSV file by its suffix, else a film."""
+    if source is None or Path(source).suffix.lower() != ".csv":
+        if source is None and options != FilmOptions():
+            raise UserError("a camera, workspace, colour or method is for --measurements VIDEO; give it too")
+        return None if source is None else Film(source, options)
+    return existing(Path(source))

@@ -1,13 +1,14 @@
 """Track markers through a video."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import Parameter
 from rich.console import Console
 
 from compare.exits import say
-from compare.options import OUTPUT, FingerOptions, existing
+from compare.film import Film, FilmOptions
+from compare.options import OUTPUT, FingerOptions
 
 
 def track(
@@ -15,15 +16,8 @@ def track(
         str, Parameter(help="Video, folder or glob of pictures, number of a camera, or - for a pipe.")
     ],
     finger: FingerOptions = FingerOptions(),
+    options: FilmOptions = FilmOptions(),
     *,
-    camera: Annotated[Path | None, Parameter(help="Its file, as `pinnray calibrate` writes it.")] = None,
-    workspace: Annotated[
-        Path | None, Parameter(help="JSON file of the fiducials; those around the design if not given.")
-    ] = None,
-    colour: Annotated[str, Parameter(help="Of the markers, as `pinnray pick` prints it.")] = "dark",
-    method: Annotated[
-        Literal["precise", "hough"], Parameter(help="precise, or hough for the paper's pipeline.")
-    ] = "precise",
     live: Annotated[
         bool, Parameter(negative="", help="Print the displacements of every frame as it comes.")
     ] = False,
@@ -45,10 +39,10 @@ def track(
     from compare.output_folder import check_output, replaced_folder, write_run
     from compare.provenance import machine, package_versions
     from compare.stages import Stages
-    from compare.tracked import Film, track_film, track_table
+    from compare.tracked import track_film, track_table
 
     design, _ = finger.read()
-    film = Film(source, existing(camera), existing(workspace), colour, method)
+    film = Film(source, options)
     check_output(out)
     console = Console(stderr=True)
     with replaced_folder(out) as folder:

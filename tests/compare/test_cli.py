@@ -147,7 +147,7 @@ BAD = [
     ("solve fem --preset paper", "--preset paper: none of the solvers fem has it"),
     # measurements
     ("compare --measurements absent.csv", "there is no file absent.csv"),
-    ("compare --measurements foreign", "there is no file foreign"),  # a folder
+    ("compare --measurements foreign", "foreign holds no picture"),  # a folder
     ("compare --measurements column.csv", "column.csv has no column v_mm"),
     ("compare --measurements text.csv", "text.csv, line 2: u_mm is 'left', which is not a number"),
     ("compare --measurements nan.csv", "nan.csv, line 2: u_mm is 'nan', which is not a number"),

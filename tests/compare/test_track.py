@@ -136,3 +136,36 @@ def test_a_truncated_video_is_refused_or_tracked_as_far_as_it_goes(film, tmp_pat
     assert main(["track", str(tmp_path / "video.mkv"), "--out", str(tmp_path / "out")]) == BAD_INPUT
     assert "error" in capfd.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_compare_goes_from_pixels_to_the_table(film, tmp_path, capsys):
+    out = tmp_path / "out"
+    options = ["--solvers", "fem", "--mesh-size", "1", "--camera", str(film / "camera.json")]
+    video = str(film / "video.mkv")
+    assert main(["compare", *options, "--measurements", video, "--out", str(out)]) == 0
+    assert "Mean absolute error at 9 markers, mm (measured displacements)" in capsys.readouterr().out
+    assert read_measurements(out / "observations.csv").label == "measured"
+    metrics = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
+    assert metrics["measurements"]["source"] == "measured"
+    assert "standard deviations" in metrics["measurements"]["description"]
+    report = (out / "report.html").read_text(encoding="utf-8")
+    assert "The finger pressed, as the camera saw it" in report
+    assert {path.name for path in (out / "track").iterdir()} >= {"initial.png", "final.png"}
+    run = json.loads((out / "run.json").read_text(encoding="utf-8"))
+    assert len(run["film"]["video_sha256"]) == 64
+    assert "track/final.png" in run["files_sha256"]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--measurements", "nowhere.mkv"], "no such video"),
+        (["--measurements", "nowhere.csv"], "there is no file nowhere.csv"),
+        (["--camera", "camera.json"], "is for --measurements VIDEO"),
+    ],
+)
+def test_compare_refuses_what_is_no_film(options, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["compare", "--solvers", "fem", *options]) == BAD_INPUT
+    assert said in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
