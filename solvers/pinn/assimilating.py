@@ -5,7 +5,6 @@ from typing import ClassVar
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from solvers.pinn.finite_basis import FiniteBasisSolver
 from solvers.pinn.local import PinnLocalSolver
 from solvers.pinn.observing import Assimilating, ChoosingWeights
 from solvers.pinn.paper import PaperPinnSolver
@@ -40,7 +39,7 @@ class PaperPinnAsmSolver(Assimilating, PaperPinnSolver):
     name: ClassVar[str] = "pinn-asm"
 
 
-def l_curve(solver: FiniteBasisSolver, problem: Problem) -> dict[str, FloatArray]:
+def l_curve(solver: PinnAsmSolver | PinnLocalAsmSolver, problem: Problem) -> dict[str, FloatArray]:
     """Energy and misfit for all weights, see `WeightChoice.curve`, in the time of one level.
 
     Raises:

@@ -98,8 +98,6 @@ class FiniteBasisSolver(Observing, ABC):
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Train the network; see `Solver`."""
         check_problem(self, problem)
-        if problem.material.law != "linear" and self.choice.choose != "given":
-            raise UserError(f"{self.name}: choose={self.choice.choose} is for the linear law; take given")
         with pool():
             return self._solve(problem, progress)
 
@@ -173,13 +171,8 @@ class FiniteBasisSolver(Observing, ABC):
             factor=BaseFactor.of(mesh, self.base_length),
             rng=rng,
         )
-        return Level.of(
-            units,
-            problem,
-            *graded_quadrature(triangles, spacing, self.cell),
-            self.misfit(problem),
-            self.choice,
-        )
+        quadrature = graded_quadrature(triangles, spacing, self.cell)
+        return Level.of(units, problem, *quadrature, self.given(problem))
 
     def _status(self, path: Path, finer: float, change: float, error: float, fit: Fit | None) -> Status:
         if path.fraction < 1:

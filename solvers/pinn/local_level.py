@@ -7,15 +7,14 @@ import numpy as np
 import torch
 
 from geometry.arrays import FloatArray
-from solvers.assimilation import Misfit
 from solvers.marker_forces import MarkerForces
 from solvers.pinn.conditions import load_conditions
 from solvers.pinn.local_energy import LocalEnergy
 from solvers.pinn.local_units import LocalField, LocalUnits
+from solvers.pinn.observing import Given
 from solvers.problem import Problem
 from solvers.weight_choice import WeightChoice
 
-GIVEN = WeightChoice("given", None)
 REGULARISATION = 1e-12
 """Added to the unit diagonal of the scaled system, so that nearly dependent units do no harm."""
 
@@ -42,8 +41,8 @@ class Equilibrium(NamedTuple):
 class Level:
     """The energy of a network that springs pull on.
 
-    A spring pulls a functional of the displacement to a value. Those of the load are rigid; those of what is
-    observed yield by 1 / weight per force, which makes their energy the misfit.
+    A spring pulls a functional of the displacement to a value. Those of the load are rigid, or nearly so;
+    those of what is observed yield by 1 / weight per force, which makes their energy the misfit.
 
     Attributes:
         energy: The energy.
@@ -51,7 +50,7 @@ class Level:
         values: What they are pulled to, shape (n,), mm.
         compliance: How far they yield, shape (n,), mm per N/mm.
         load: Shape (a, k) of the load's functionals: k for each of a components.
-        choice: How a factor of the weights of what is observed is chosen.
+        choice: How a factor of the weights of what is observed is chosen; None where nothing is.
     """
 
     energy: LocalEnergy
@@ -59,7 +58,7 @@ class Level:
     values: FloatArray
     compliance: FloatArray
     load: tuple[int, ...]
-    choice: WeightChoice
+    choice: WeightChoice | None
 
     @classmethod
     def of(
@@ -68,36 +67,26 @@ class Level:
         problem: Problem,
         points: FloatArray,
         weights: FloatArray,
-        misfit: Misfit | None = None,
-        choice: WeightChoice = GIVEN,
+        given: Given | None = None,
     ) -> "Level":
-        """The level of some units with a quadrature: points (q, 2), mm, and weights (q,), mm^2.
-
-        Args:
-            units: The hidden units.
-            problem: What is solved.
-            points: Of the quadrature.
-            weights: Of the quadrature.
-            misfit: What is minimised with the energy.
-            choice: How a factor of the misfit is chosen.
-        """
+        """The level of some units with a quadrature: points (q, 2), mm, and weights (q,), mm^2."""
         conditions = load_conditions(problem)
-        rigid = _functionals(units, conditions.points, conditions.weights, problem.load.prescribed)
-        size = rigid.shape[-1]
-        functionals = [rigid.reshape(-1, size)]
-        values, compliance = [conditions.values.ravel()], [np.zeros(conditions.values.size)]
-        if misfit is not None and misfit.weights.any():
-            soft = _functionals(units, *misfit.sampling(), [0, 1])
-            functionals.append(soft.swapaxes(0, 1).reshape(-1, size))
-            values.append(misfit.observed.ravel())
-            compliance.append(1 / misfit.weights.ravel())
+        functionals = _functionals(units, conditions.points, conditions.weights, problem.load.prescribed)
+        size, values = functionals.shape[-1], conditions.values.ravel()
+        functionals, compliance = functionals.reshape(-1, size), np.zeros(len(values))
+        if given is not None:
+            misfit = given.misfit
+            pulled = _functionals(units, *misfit.sampling(), [0, 1]).swapaxes(0, 1).reshape(-1, size)
+            functionals = np.concatenate([functionals, pulled])
+            values = np.concatenate([values, misfit.observed.ravel()])
+            compliance = np.concatenate([compliance + given.slack, 1 / misfit.weights.ravel()])
         return cls(
             LocalEnergy.of(units, problem.material, points, weights),
-            np.concatenate(functionals),
-            np.concatenate(values),
-            np.concatenate(compliance),
+            functionals,
+            values,
+            compliance,
             conditions.values.shape,
-            choice,
+            None if given is None else given.choice,
         )
 
     @property
@@ -107,23 +96,24 @@ class Level:
         return torch.zeros(units.windows.count, 2, units.per_window, dtype=torch.float64)
 
     @property
-    def rigid(self) -> int:
-        """How many springs are the load's, which do not yield: a k, the first ones."""
+    def held(self) -> int:
+        """How many springs are the load's, a k: the first ones."""
         return int(np.prod(self.load))
 
     def reaction(self, forces: FloatArray) -> FloatArray:
         """The indenter's force for each prescribed component, shape (a,), N/mm, among the springs' (n,)."""
-        of_load: FloatArray = forces[: self.rigid].reshape(self.load)
+        of_load: FloatArray = forces[: self.held].reshape(self.load)
         return of_load[:, 0]
 
     def marker_stats(self, state: Equilibrium) -> dict[str, float]:
-        """The factor of the weights, the springs' energy, N mm/mm, which is the misfit, the largest force."""
-        if not self.compliance.any():
+        """The factor of the weights, the energy of the markers' springs, N mm/mm, and the largest force."""
+        if self.choice is None:
             return {}
-        pulled = state.forces[self.rigid :].reshape(-1, 2)
+        pulled = state.forces[self.held :].reshape(-1, 2)
+        yielding = self.compliance[self.held :].reshape(-1, 2) / state.factor
         return {
             "weight_factor": state.factor,
-            "misfit": 0.5 * float(self.compliance @ state.forces**2) / state.factor,
+            "misfit": 0.5 * float((yielding * pulled**2).sum()),
             "marker_force": float(np.linalg.norm(pulled, axis=1).max()),
         }
 
@@ -152,9 +142,11 @@ class Level:
         )
         gap = fraction * self.values - self.functionals @ (output.numpy().ravel() + free)
         given = self.functionals @ np.transpose(responses)
+        given[: self.held, : self.held] += np.diag(self.compliance[: self.held])
         markers = self._markers(given, gap)
-        factor = 1.0 if markers is None else self.choice.factor(markers)
-        forces = np.linalg.solve(given + np.diag(self.compliance) / factor, gap)
+        factor = self.choice.factor(markers) if self.choice and markers else 1.0
+        given[self.held :, self.held :] += np.diag(self.compliance[self.held :]) / factor
+        forces = np.linalg.solve(given, gap)
         change = free + forces @ np.array(responses)
         decrement = (forces @ self.functionals - residual) @ change
         return Equilibrium(
@@ -166,15 +158,16 @@ class Level:
         )
 
     def _markers(self, given: FloatArray, gap: FloatArray) -> MarkerForces | None:
-        """The observed markers without the load, which holds its values.
+        """The observed markers, whatever force the load needs.
 
         Args:
-            given: How far the functionals give way to unit forces, shape (n, n), mm per N/mm.
+            given: How far functionals and the load's springs give way to unit forces, shape (n, n), mm per
+                N/mm.
             gap: What the springs have to close, shape (n,), mm.
         """
-        if self.energy.material.law != "linear" or not self.compliance.any():
+        if self.energy.material.law != "linear" or self.choice is None:
             return None
-        load, soft = slice(self.rigid), slice(self.rigid, None)
+        load, soft = slice(self.held), slice(self.held, None)
         held = np.linalg.solve(given[load, load], np.column_stack([given[load, soft], gap[load]]))
         rest = np.column_stack([given[soft, soft], gap[soft]]) - given[soft, load] @ held
         compliance = 0.5 * (rest[:, :-1] + rest[:, :-1].T)

@@ -18,7 +18,7 @@ from solvers.pinn.assimilating import PaperPinnAsmSolver, PinnAsmSolver, PinnLoc
 from solvers.pinn.local_newton import equilibrium
 from solvers.pinn.mlp_field import MlpField
 from solvers.pinn.standard import PinnStdSolver
-from solvers.problem import Load, Material, Problem
+from solvers.problem import Load, Material, Problem, contact_functional
 from solvers.registry import make_solver
 from solvers.training import TrainedSolver
 from tests.solvers.autograd_reference import PlainPinn
@@ -173,6 +173,28 @@ def test_the_chosen_weights_are_the_best_on_the_curve(problem, choose):
     assert solution.stats["misfit"] == pytest.approx(given.stats["misfit"], rel=1e-6)
 
 
+def test_a_contact_that_is_not_certain_is_one_on_springs(problem):
+    """Their force is the indenter's; near the same of finite elements, far from a contact that is certain."""
+    settings = {"weights": "precision", "contact_deviation": 0.8, "scale": 0.05}
+    solver = PinnAsmSolver(**QUICK, **settings)
+    # markers that went as if the contact had moved by half a millimetre less
+    less = replace(problem.observations, displacements=0.95 * problem.observations.displacements)
+    problem = replace(problem, observations=less)
+    solution, exact = solver.solve(problem), FemAsmSolver(**settings).solve(problem)
+    points, weights = contact_functional(problem)
+    moved = weights @ solution.displacement(points)
+    np.testing.assert_allclose(0.05 / 0.8**2 * ([0.0, -10.0] - moved), solution.reaction, rtol=1e-6)
+    assert max(distances(solution, exact, problem)) < 0.01
+    np.testing.assert_allclose(solution.left_out, exact.left_out, atol=0.05)
+    certain = FemAsmSolver(**{**settings, "contact_deviation": 0.0}).solve(problem)
+    assert max(distances(certain, exact, problem)) > 0.02
+
+
+def test_a_patch_is_certain(problem):
+    with pytest.raises(UserError, match="pinn-asm: every point of a patch moves as prescribed"):
+        PinnAsmSolver(contact_deviation=1.0).solve(replace(problem, load=Load(kind="patch")))
+
+
 def test_no_weights_are_chosen_at_finite_strain(bent):
     with pytest.raises(UserError, match="choose=left-out is for the linear law; take given"):
         PinnAsmSolver(choose="left-out").solve(bent)
@@ -297,7 +319,16 @@ def test_the_papers_preset_is_trained_and_takes_the_centres():
     assert make_solver("pinn-asm").settings()["marker_radius"] == 0.8
 
 
-@pytest.mark.parametrize("settings", [{"asm_weight": -1.0}, {"preset": "paper", "asm_weight": -1.0}])
-def test_bad_weights_are_refused(settings):
-    with pytest.raises(UserError, match="pinn-asm: asm_weight must be zero or more, got -1"):
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"asm_weight": -1.0}, "asm_weight must be zero or more, got -1"),
+        ({"preset": "paper", "asm_weight": -1.0}, "asm_weight must be zero or more, got -1"),
+        ({"contact_deviation": -1.0}, "contact_deviation must be zero or more, got -1"),
+        ({"choose": "evidence"}, "choose=evidence needs weights=precision"),
+        ({"slope": 0.0}, "slope must be positive, got 0"),
+    ],
+)
+def test_bad_settings_are_refused(settings, said):
+    with pytest.raises(UserError, match=f"pinn-asm: {said}"):
         make_solver("pinn-asm", **settings)
