@@ -80,14 +80,13 @@ class Board:
 
     def _guesses(self, image: GreyImage, shrink: float) -> FloatArray | None:
         """The corners in an image as OpenCV finds them in a smaller one, shape (n, 2), pixels."""
-        width, height = (round(side / shrink) for side in image.shape[::-1])
-        small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA) if shrink > 1 else image
+        small = _smaller(image, shrink)
         found, corners = cv2.findChessboardCornersSB(
             small, (self.columns, self.rows), flags=cv2.CALIB_CB_ACCURACY
         )
         if not found:
             return None
-        scale = np.array(image.shape[::-1]) / (width, height)
+        scale = np.divide(image.shape[::-1], small.shape[::-1])
         return np.asarray((np.reshape(corners, (-1, 2)).astype(np.float64) + 0.5) * scale - 0.5)
 
     def refine(self, image: GreyImage, corners: FloatArray, reach: float) -> FloatArray | None:
@@ -126,8 +125,17 @@ class Board:
 
     def seems(self, image: GreyImage) -> str | None:
         """Another size that the board in an image seems to have; None if there is none."""
-        found, _, cells = cv2.findChessboardCornersSBWithMeta(image, (3, 3), cv2.CALIB_CB_LARGER)
+        small = _smaller(image, max(image.shape) / LARGE)
+        found, _, cells = cv2.findChessboardCornersSBWithMeta(small, (3, 3), cv2.CALIB_CB_LARGER)
         return f"{max(cells.shape)}x{min(cells.shape)}" if found else None
+
+
+def _smaller(image: GreyImage, shrink: float) -> GreyImage:
+    """An image with its sides divided by `shrink`; as it is if that is not above 1."""
+    if shrink <= 1:
+        return image
+    width, height = (round(side / shrink) for side in image.shape[::-1])
+    return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
 def _slopes(homography: FloatArray, points: FloatArray) -> FloatArray:

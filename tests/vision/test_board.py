@@ -1,5 +1,6 @@
 """The board's corners against an analytic picture of it."""
 
+import cv2
 import numpy as np
 import pytest
 from chessboards import drawn
@@ -22,6 +23,14 @@ def test_corners_are_found_where_they_are():
     exact = exact[:, :2] / exact[:, 2:]
     error = min(np.abs(order - exact).max() for order in (found, found[::-1]))  # a board has no up
     assert error < 0.02  # 0.06 without the fit of `vision.saddle`
+
+
+def test_corners_of_a_large_image_are_sought_in_a_smaller_one():
+    image = drawn(SMALL, np.linalg.inv(TO_PIXELS), (360, 260))
+    large = cv2.GaussianBlur(cv2.resize(image, None, fx=6, fy=6, interpolation=cv2.INTER_NEAREST), (0, 0), 2)
+    found, expected = SMALL.find(large), 6 * SMALL.find(image) + 2.5
+    error = min(np.abs(order - expected).max() for order in (found, found[::-1]))
+    assert error < 0.4  # of larger pixels, in whose steps the edges are
 
 
 def test_another_size_is_guessed():
