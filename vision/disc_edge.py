@@ -13,51 +13,14 @@ from numpy.typing import ArrayLike
 from geometry.arrays import BoolArray, FloatArray, frozen_array
 from geometry.errors import UserError
 from vision.board import GreyImage
-from vision.disc_model import (
-    BLUR,
-    CONTRAST,
-    COUNT,
-    EDGE,
-    LIGHT,
-    RADIUS,
-    SHADE_X,
-    SHADE_Y,
-    SLANT,
-    STRETCH,
-    X,
-    Y,
-)
-from vision.disc_neighbours import EDGES, with_edges
-from vision.disc_votes import elect, sector
-from vision.disc_window import Window, median_where
-from vision.robust_fit import Fit, Prior, adjust, coherent
-
-MARGIN = 5
-"""Pixels used on either side of the edge."""
-
-DEVIATIONS = {STRETCH: 0.05, SLANT: 0.05, BLUR: 5.0, SHADE_X: 0.05, SHADE_Y: 0.05}
-"""What is assumed of a disc: standard deviations, about zero but for the blur. They matter only where little
-of the edge is seen."""
+from vision.disc_fit import fit_alike
+from vision.disc_model import BLUR, CONTRAST, RADIUS, SHADE_X, SHADE_Y, SLANT, STRETCH, X, Y
+from vision.robust_fit import Fit
 
 KNOWN_RADIUS = 0.01
 """Relative standard deviation of a radius that is called known: a marker turns and comes nearer a little."""
 
-TYPICAL_BLUR = 1.0
-"""Width of the edge, pixels, to start with."""
-
-LEAST_REACH = 4.0
-"""How far from its guess a disc is sought, pixels; or a radius, if that is more."""
-
-STEPS = {X: 1.0, Y: 1.0, STRETCH: 0.3, SLANT: 0.3, BLUR: 0.7, SHADE_X: 0.02, SHADE_Y: 0.02}
-"""Longest steps of an iteration."""
-
-EDGE_DEVIATIONS, EDGE_STEPS, MISSING = (0.5, 1.5, 100.0), (0.3, 1.0, 1e3), 1e-3
-"""The same for straight edges: rad, pixels, grey levels; and the deviation of all where there is none."""
-
-REFINEMENTS = 3
-"""How often the pixels to use are chosen anew, at most."""
-
-LEAST_SEEN, LEAST_SEEN_UNKNOWN = 0.25, 0.5
+LEAST_SEEN, LEAST_SEEN_UNKNOWN = 0.25, 0.7
 """Share of the edge below which a disc is not found, with a known radius and without."""
 
 LARGEST_DEVIATION = 0.5
@@ -134,55 +97,8 @@ def fit_discs(grey: GreyImage, guesses: ArrayLike, *, radii: ArrayLike | None = 
     sizes = np.rint(np.log(known) / np.log(1.4))
     for size in np.unique(sizes):  # discs of a size share their window
         (alike,) = np.nonzero(sizes == size)
-        fit.put(alike, _fit_alike(grey, guesses[alike], known[alike], tolerance))
+        fit.put(alike, fit_alike(grey, guesses[alike, :2], known[alike], tolerance))
     return _judged(fit, guesses, LEAST_SEEN_UNKNOWN if radii is None else LEAST_SEEN)
-
-
-def _fit_alike(grey: GreyImage, guesses: FloatArray, radii: FloatArray, tolerance: float) -> Fit:
-    """Elect centres near the guesses, look for edges beside the discs, then adjust all."""
-    reach = max(radii.max(), LEAST_REACH)
-    election = elect(grey, guesses[:, :2], radii, reach, known=tolerance < np.inf)
-    radii = election.radii
-    window = Window.of(grey, election.centres, radii.min() - MARGIN, radii.max() + MARGIN)
-    x, y = election.centres.T[:, :, None] - window.origins.T[:, :, None]
-    sectors = sector(window.x - x, window.y - y)
-    trusted = np.take_along_axis(election.trusted, sectors, axis=1) & window.within
-    start = np.zeros((len(guesses), COUNT))
-    start[:, [X, Y]] = election.centres - window.origins
-    start[:, RADIUS] = radii
-    start[:, BLUR] = TYPICAL_BLUR
-    outside = np.hypot(window.x - x, window.y - y) - radii[:, None]
-    start[:, LIGHT] = median_where(window.values, trusted & (outside > 1) & (outside < 3))
-    start[:, CONTRAST] = start[:, LIGHT] - median_where(window.values, trusted & (outside < -1))
-    start, present = with_edges(window, start, trusted)
-    prior, limits = _prior(start, present, tolerance)
-    fit, parameters = adjust(window, start, prior, limits, trusted)
-    for _ in range(REFINEMENTS):
-        chosen = coherent(window, parameters, fit.variance)
-        (again,) = np.nonzero((chosen != trusted).mean(axis=1) > 0.01)
-        if not len(again):
-            break
-        trusted[again] = chosen[again]
-        part, parameters[again] = adjust(
-            window.at(again), parameters[again], prior.at(again), limits[again], trusted[again]
-        )
-        fit.put(again, part)
-    return fit
-
-
-def _prior(start: FloatArray, present: BoolArray, tolerance: float) -> tuple[Prior, FloatArray]:
-    """What is assumed of the parameters, and their longest steps; missing edges stay without strength."""
-    start[:, COUNT:] *= np.repeat(present, EDGE, axis=1)
-    mean, deviations, limits = start.copy(), np.full(start.shape, 1e3), np.full(start.shape, 1e3)
-    mean[:, [STRETCH, SLANT, SHADE_X, SHADE_Y]] = 0
-    deviations[:, list(DEVIATIONS)] = list(DEVIATIONS.values())
-    deviations[:, RADIUS] = np.minimum(tolerance * start[:, RADIUS], 1e3)
-    edges = np.where(present[:, :, None], EDGE_DEVIATIONS, MISSING)
-    deviations[:, COUNT:] = edges.reshape(len(start), -1)
-    limits[:, list(STEPS)] = list(STEPS.values())
-    limits[:, RADIUS] = np.maximum(0.5, 0.2 * start[:, RADIUS])
-    limits[:, COUNT:] = EDGE_STEPS * EDGES
-    return Prior(mean, deviations**-2.0), limits
 
 
 def _judged(fit: Fit, guesses: FloatArray, least_seen: float) -> Discs:

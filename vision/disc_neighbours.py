@@ -11,17 +11,17 @@ import numpy as np
 from scipy.special import ndtr
 
 from geometry.arrays import BoolArray, FloatArray
-from vision.disc_model import BLUR, COUNT, EDGE, RADIUS, picture
-from vision.disc_window import Window
+from vision.disc_model import BLUR, COUNT, EDGE, RADIUS, Array, picture
+from vision.disc_window import QUANTISATION, Window
 
 EDGES = 2
 """At most, beside every disc."""
 
-ANGLES = 32
+ANGLES = 24
 OFFSETS = np.arange(0.75, 4.0, 0.5)
 """Of the half-planes that are tried: directions of the normal, and pixels between disc and edge."""
 
-GAIN = 60.0
+GAIN = 30.0
 """Squares that an edge must explain, over the variance of the noise."""
 
 
@@ -38,28 +38,34 @@ def with_edges(window: Window, parameters: FloatArray, trusted: BoolArray) -> tu
     """
     angles, gaps = (a.ravel() for a in np.meshgrid(np.arange(ANGLES) * 2 * np.pi / ANGLES, OFFSETS))
     offsets = gaps + np.median(parameters[:, RADIUS])
-    across = np.cos(angles)[:, None] * window.x + np.sin(angles)[:, None] * window.y
-    tried = ndtr((across - offsets[:, None]) / np.median(parameters[:, BLUR])).astype(np.float32)
-    levels, known = picture(parameters.astype(np.float32), window.x, window.y)
-    known = known * trusted[:, None]
-    rest = (window.values - np.clip(levels, 0, 255)) * trusted
-    squares = trusted @ (tried * tried).T
-    result = np.zeros((len(parameters), COUNT + EDGE * EDGES))
-    result[:, :COUNT] = parameters
-    present = np.zeros((len(parameters), EDGES), dtype=bool)
+    some = slice(None, None, 2)  # half of the pixels are enough
+    x, y, used = window.x[some], window.y[some], trusted[:, some]
+    across = np.outer(np.cos(angles), x) + np.outer(np.sin(angles), y)
+    tried = ndtr((across - offsets[:, None]).astype(np.float32) / np.float32(np.median(parameters[:, BLUR])))
+    levels, known = picture(parameters.astype(np.float32), x, y)
+    known *= used[:, None]
+    rest = (window.values[:, some] - np.clip(levels, 0, 255)) * used
+    inverse = np.linalg.inv(known @ known.transpose(0, 2, 1) + 1e-3 * np.eye(COUNT)).astype(np.float32)
+
+    def beside(values: Array) -> Array:
+        """What the disc cannot explain of values at the pixels, shape (n, p)."""
+        share = inverse @ (known @ values[:, :, None])
+        return np.asarray(values - (share.transpose(0, 2, 1) @ known)[:, 0])
+
+    shared = known @ tried.T
+    squares = used @ (tried * tried).T - (shared * (inverse @ shared)).sum(axis=1)
+    rest = beside(rest)
+    each = np.arange(len(rest))
+    edges, present = np.zeros((len(rest), EDGES, EDGE)), np.zeros((len(rest), EDGES), dtype=bool)
     for number in range(EDGES):
-        inverse = np.linalg.inv(known @ known.transpose(0, 2, 1) + np.eye(known.shape[1]) * 1e-3)
-        rest = rest - ((inverse @ (known @ rest[:, :, None])).transpose(0, 2, 1) @ known)[:, 0]
-        shared = known @ tried.T
-        length = np.maximum(squares - (shared * (inverse @ shared)).sum(axis=1), 1.0)
-        alike = rest @ tried.T
+        alike, length = rest @ tried.T, np.maximum(squares, 1.0)
         best = (alike**2 / length).argmax(axis=1)
-        each = np.arange(len(best))
         lighter = alike[each, best] / length[each, best]
         gain = lighter * alike[each, best]
-        present[:, number] = gain > GAIN * np.maximum(window.noise**2, 1 / 12)
-        result[:, COUNT + EDGE * number : COUNT + EDGE * (number + 1)] = np.stack(
-            [angles[best], offsets[best], lighter], axis=1
-        )
-        known = np.concatenate([known, (tried[best] * trusted)[:, None]], axis=1)
-    return result, present
+        present[:, number] = gain > GAIN * np.maximum(window.noise**2, QUANTISATION)
+        edges[:, number] = np.stack([angles[best], offsets[best], lighter], axis=1)
+        chosen = beside(tried[best] * used)
+        rest = rest - lighter[:, None] * chosen
+        squares = squares - (chosen @ tried.T) ** 2 / np.maximum((chosen**2).sum(axis=1, keepdims=True), 1.0)
+    edges *= present[:, :, None]
+    return np.concatenate([parameters, edges.reshape(len(rest), -1)], axis=1), present

@@ -25,8 +25,8 @@ SPREAD = 1.0
 NEAR = 2
 """Votes agree on a centre that they miss by at most so much along either axis."""
 
-TRUSTED = 0.35
-"""A sector is trusted if it has this share of the votes that the better sectors have."""
+WEAK = 0.15
+"""Of the steepest slope: what is less does not vote."""
 
 UNCERTAINTY = 0.3
 """Of a radius that is guessed, relative."""
@@ -43,13 +43,18 @@ class Election(NamedTuple):
         centres: x, y, shape (n, 2).
         radii: Shape (n,).
         dark: Whether the disc is darker than what surrounds it, shape (n,).
-        trusted: Which sectors of the edge agree, shape (n, `SECTORS`), counted from the x axis toward y.
+        support: Votes of the sectors of the edge over those of the better sectors, shape (n, `SECTORS`),
+            counted from the x axis toward y.
     """
 
     centres: FloatArray
     radii: FloatArray
     dark: BoolArray
-    trusted: BoolArray
+    support: FloatArray
+
+    def at(self, places: IntArray) -> "Election":
+        """That of some discs."""
+        return Election(self.centres[places], self.radii[places], self.dark[places], self.support[places])
 
 
 def elect(grey: GreyImage, guesses: FloatArray, radii: FloatArray, reach: float, *, known: bool) -> Election:
@@ -88,9 +93,8 @@ def elect(grey: GreyImage, guesses: FloatArray, radii: FloatArray, reach: float,
     sectors = sector(x, y) + SECTORS * np.arange(count)[:, None, None]
     support = np.bincount(sectors[agree], weights=outward[agree], minlength=count * SECTORS)
     support = support.reshape(count, SECTORS)
-    trusted = support >= TRUSTED * np.sort(support, axis=1)[:, -SECTORS // 4, None]
-    trusted &= np.roll(trusted, 1, axis=1) & np.roll(trusted, -1, axis=1)  # what hides one disturbs the next
-    return Election(origins + centres, radii, dark, trusted)
+    better = np.sort(support, axis=1)[:, -SECTORS // 4, None]
+    return Election(origins + centres, radii, dark, support / np.maximum(better, 1e-9))
 
 
 def sector(x: Floats, y: Floats) -> IntArray:
@@ -133,9 +137,12 @@ def _poll(x: Floats, y: Floats, strength: Floats, most: int) -> tuple[FloatArray
     count, margin = len(x), 3
     side = 2 * (most + margin) + 1
     column, row = (np.rint(votes).astype(np.int64) + most + margin for votes in (x, y))
-    valid = (column >= 0) & (column < side) & (row >= 0) & (row < side)
+    valid = strength > WEAK * strength.max(axis=(1, 2), keepdims=True)
+    valid &= (column >= 0) & (column < side) & (row >= 0) & (row < side)
     places = (np.arange(count)[:, None, None] * side + row) * side + column
-    votes = np.bincount(places[valid], weights=strength[valid], minlength=count * side * side)
+    votes = np.bincount(places[valid], weights=strength[valid], minlength=count * side * side).astype(
+        np.float64
+    )
     strip = cv2.GaussianBlur(votes.reshape(count * side, side), (2 * margin + 1,) * 2, SPREAD)
     density = np.asarray(strip, dtype=np.float64).reshape(count, side, side)
     inner = density[:, margin:-margin, margin:-margin].reshape(count, -1)

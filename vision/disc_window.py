@@ -10,6 +10,9 @@ from geometry.arrays import BoolArray, FloatArray, IntArray
 from vision.board import GreyImage
 from vision.disc_model import Array
 
+QUANTISATION = 1 / 12
+"""Variance of rounding to grey levels: the least that the noise can be."""
+
 SCALE = 1.4826
 """Standard deviation over median absolute value, of normal noise."""
 

@@ -14,25 +14,19 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
-from vision.disc_model import BLUR, CONTRAST, COUNT, RADIUS, X, Y, picture
-from vision.disc_window import SCALE, Window, median_where
+from vision.disc_model import BLUR, CONTRAST, COUNT, RADIUS, Array, X, Y, picture
+from vision.disc_window import QUANTISATION, SCALE, Window, median_where
 
 FULL, NONE = 3.0, 6.0
 """Residuals over the noise up to which a pixel has full weight, and from which on it has none."""
 
-QUANTISATION = 1 / 12
-"""Variance of rounding to grey levels: the least that the noise can be."""
-
 COHERENT = 1.5
 """Mean of nine residuals over the noise, above which they are no noise."""
-
-LENIENT = 2
-"""First steps, in which the noise may be as large as the residuals say."""
 
 STEPS = 15
 """At most."""
 
-TOLERANCE = 0.003
+TOLERANCE = 0.01
 """Last step of a centre, pixels."""
 
 MODEL_ERROR = 0.04
@@ -88,15 +82,31 @@ class Fit:
             settled=np.zeros(count, dtype=bool),
         )
 
+    def at(self, places: IntArray) -> "Fit":
+        """That of some discs."""
+        return Fit(**{name: values[places] for name, values in vars(self).items()})
+
     def put(self, places: IntArray, part: "Fit") -> None:
         """Take the discs at some places from another fit."""
         for name, values in vars(part).items():
             getattr(self, name)[places] = values
 
 
+class Adjusted(NamedTuple):
+    """What `adjust` gives: the fit, all parameters, shape (n, m), and the residuals, shape (n, p)."""
+
+    fit: Fit
+    parameters: FloatArray
+    residuals: Array
+
+    def at(self, places: IntArray) -> "Adjusted":
+        """That of some discs."""
+        return Adjusted(self.fit.at(places), self.parameters[places], self.residuals[places])
+
+
 def adjust(
-    window: Window, start: FloatArray, prior: Prior, limits: FloatArray, chosen: BoolArray
-) -> tuple[Fit, FloatArray]:
+    window: Window, start: FloatArray, prior: Prior, limits: FloatArray, chosen: BoolArray, lenient: int
+) -> Adjusted:
     """Least squares from a start, each disc until its centre moves by less than `TOLERANCE`.
 
     Args:
@@ -105,10 +115,12 @@ def adjust(
         prior: Of the parameters.
         limits: Longest step of every parameter, shape (n, m).
         chosen: Pixels that may be used, shape (n, p).
+        lenient: First steps in which the noise may be as large as the residuals say.
     """
     count, width = start.shape
     fit = Fit.empty(count)
     parameters, information = start.copy(), np.tile(np.eye(width), (count, 1, 1))
+    left_over = np.empty_like(window.values)
     active = np.arange(count)
     for number in range(STEPS):
         now, allowed, values = parameters[active], chosen[active], window.values[active]
@@ -118,7 +130,7 @@ def adjust(
         free = ~clipped  # of a clipped pixel nothing is known
         residuals = (values - levels) * free
         most = np.maximum(2 * window.noise[active], MODEL_ERROR * np.abs(now[:, CONTRAST]))
-        if number < LENIENT:
+        if number < lenient:
             most = most + 1e3
         noise = np.clip(SCALE * median_where(np.abs(residuals), allowed & free), QUANTISATION**0.5, most)
         ratio = np.abs(residuals) / noise[:, None].astype(np.float32)
@@ -137,25 +149,25 @@ def adjust(
         now = now + shortened[:, None] * step
         now[:, BLUR] = np.clip(now[:, BLUR], SHARPEST, np.maximum(now[:, RADIUS], SHARPEST))
         parameters[active], information[active], fit.variance[active] = now, normal, variance
+        left_over[active] = residuals
         by_radius = derivatives[:, RADIUS] ** 2
         fit.seen[active] = (by_radius * agreement).sum(axis=1) / np.maximum(by_radius.sum(axis=1), 1e-6)
-        fit.settled[active] = (np.hypot(step[:, X], step[:, Y]) < TOLERANCE) & (number >= LENIENT)
+        fit.settled[active] = (np.hypot(step[:, X], step[:, Y]) < TOLERANCE) & (number >= lenient)
         active = active[~fit.settled[active]]
         if not len(active):
             break
     fit.parameters[:], fit.origins[:] = parameters[:, :COUNT], window.origins
     fit.covariances[:] = np.linalg.inv(information)[:, :2, :2]
-    return fit, parameters
+    return Adjusted(fit, parameters, left_over)
 
 
-def coherent(window: Window, parameters: FloatArray, variance: FloatArray) -> BoolArray:
+def coherent(window: Window, adjusted: Adjusted) -> BoolArray:
     """Where the picture is that of the model, and all pixels beside are as well, shape (n, p).
 
     Means of nine residuals show what is hidden or unexpected where a single one drowns in noise.
     """
-    levels, _ = picture(parameters.astype(np.float32), window.x, window.y)
-    residuals = (window.values - np.clip(levels, 0, 255)) * window.within
-    most = COHERENT * np.maximum(variance, (MODEL_ERROR / 2 * parameters[:, CONTRAST]) ** 2) ** 0.5
-    wrong = np.abs(window.smoothed(residuals, 3)) > most[:, None]
+    tolerated = MODEL_ERROR / 2 * adjusted.parameters[:, CONTRAST]
+    most = COHERENT * np.maximum(adjusted.fit.variance, tolerated**2) ** 0.5
+    wrong = np.abs(window.smoothed(adjusted.residuals * window.within, 3)) > most[:, None]
     near = window.smoothed(wrong.astype(np.float32), 3) > 0
     return np.asarray(window.within & ~near)
