@@ -100,7 +100,11 @@ def calibrate_views(
     if len(views) < FEWEST_VIEWS:
         raise UserError(
             f"{len(views)} of {len(views) + len(boardless)} photographs show the board of {board}; "
-            f"at least {FEWEST_VIEWS} must, better 15, tilted in different directions"
+            + (
+                f"at least {FEWEST_VIEWS} must, better 15, tilted in different directions"
+                if views
+                else "count them"
+            )
         )
     corners = list(views.values())
     adjusted = fit_lens(corners, board, size, lens)

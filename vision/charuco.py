@@ -16,6 +16,9 @@ DICTIONARIES = {
     for name in sorted(dir(cv2.aruco))
     if name.startswith("DICT_") and name == name.upper()
 }
+LARGEST = [name for name in DICTIONARIES if not name.endswith(("_50", "_100", "_250"))]
+"""Dictionaries that are no part of another one."""
+FEWEST_MARKERS = 3
 
 
 @dataclass(frozen=True)
@@ -77,8 +80,11 @@ class CharucoBoard(Board):
         return self.refine(image, corners, REACH * (self.square - self.marker))
 
     def seems(self, image: GreyImage) -> str | None:
-        """Nothing: the markers are counted by name."""
-        return None
+        """Another dictionary that most markers in an image seem to be of; None if it is this one."""
+        counts = {name: _markers_seen(image, name) for name in LARGEST}
+        best = max(counts, key=counts.__getitem__)
+        own = self.dictionary.rsplit("_", 1)[0] == best.rsplit("_", 1)[0]
+        return None if own or counts[best] < FEWEST_MARKERS else f"markers {best.removesuffix('_1000')}"
 
     def _opencv(self, *, legacy: bool) -> cv2.aruco.CharucoBoard:
         board = cv2.aruco.CharucoBoard(
@@ -89,3 +95,9 @@ class CharucoBoard(Board):
         )
         board.setLegacyPattern(legacy)
         return board
+
+
+def _markers_seen(image: GreyImage, dictionary: str) -> int:
+    detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(DICTIONARIES[dictionary]))
+    _, numbers, _ = detector.detectMarkers(image)
+    return 0 if numbers is None else len(numbers)

@@ -158,7 +158,7 @@ def test_photographs_of_different_sizes_are_refused():
 
 
 def test_photographs_without_a_board_are_refused():
-    with pytest.raises(UserError, match="0 of 2 photographs show the board of 9x6"):
+    with pytest.raises(UserError, match="0 of 2 photographs show the board of 9x6 inner corners; count them"):
         calibrate(dict.fromkeys("ab", np.zeros((100, 150), np.uint8)).items(), BOARD)
 
 
