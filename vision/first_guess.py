@@ -4,6 +4,8 @@ The camera is one without distortion and with its axis in the middle of the imag
 geometric series that explains the views best. Units: mm, pixels.
 """
 
+from dataclasses import fields
+
 import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -31,7 +33,7 @@ def first_camera(sightings: Sightings, size: tuple[int, int], model: str) -> Cam
     """
     best, least = None, np.inf
     for focal in (size[0] * FOCAL_LENGTHS).tolist():
-        distortion = (0.0,) * len(LENSES[model].__dataclass_fields__)
+        distortion = (0.0,) * len(fields(LENSES[model]))
         centre = (0.5 * (size[0] - 1), 0.5 * (size[1] - 1))
         camera = Camera(*size, focal, focal, *centre, distortion, model)
         try:
