@@ -39,9 +39,9 @@ def record(
 ) -> None:
     """Write a recording into a folder that exists.
 
-    The frames (`FILES` by the codec), `truth.csv` with every marker in every frame, `observations_true.csv`
-    with the displacements, `camera.json`, `workspace.json`, `fiducials.svg` to print, and `truth.json` with
-    the rest of the settings.
+    The frames (`FILES` by the codec); `truth.csv` with every marker in every frame; the true displacements of
+    the markers' centres, `observations_true.csv`, and of their discs' middles, `observations_discs.csv`;
+    `camera.json`, `workspace.json`, `fiducials.svg` to print, and `truth.json` with the rest of the settings.
 
     Args:
         recording: What is filmed, and how.
@@ -65,6 +65,8 @@ def record(
             table.writerows(_rows(number, number / rate, truth))
             progress((number + 1) / count, f"{number + 1} of {count} frames")
     write_measurements(folder / "observations_true.csv", recording.observations(source))
+    of_discs = recording.observations(f"{source}; middles of the markers' discs", discs=True)
+    write_measurements(folder / "observations_discs.csv", of_discs)
     save_camera(folder / "camera.json", recording.camera)
     bench = recording.bench
     write_json(folder / "workspace.json", bench.workspace.model_dump(mode="json"))

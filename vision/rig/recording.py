@@ -81,17 +81,29 @@ class Recording:
         light, truth = self._seen(*self._state(number))
         return self.exposure.develop(light, noise_of(self.seed, number)), truth
 
-    def observations(self, source: str) -> Observations:
-        """The true displacements of the markers between rest and whole load."""
-        moved = self.displacement[self.bench.mesh.marker_nodes]
+    def observations(self, source: str, *, discs: bool = False) -> Observations:
+        """The true displacements of the markers between rest and whole load.
+
+        Args:
+            source: One sentence on where they come from.
+            discs: Whether of the middles of their discs, which are what a camera sees, or of their centres.
+        """
+        mesh = self.bench.mesh
+        moved = self.displacement[mesh.marker_nodes]
+        if discs:
+            moved = self._middles(self.displacement) - self._middles(np.zeros_like(self.displacement))
         return Observations(
-            points=self.bench.mesh.markers,
+            points=mesh.markers,
             displacements=moved,
             standard_deviations=np.zeros_like(moved),
             visible=np.ones(len(moved), dtype=bool),
             source=source,
             simulated=True,
         )
+
+    def _middles(self, displacement: FloatArray) -> FloatArray:
+        """Middles of the markers' discs, shape (m, 2), mm."""
+        return np.array([centroid(disc.edges) for disc in self.bench.discs(displacement)])
 
     def _state(self, number: int) -> tuple[tuple[float, ...], tuple[Shape, ...]]:
         """The shares of the load in a frame's exposure, and what is before the finger."""
@@ -113,13 +125,12 @@ class Recording:
         scenes = [self.bench.scene(state, occluders) for state in states]
         light = mean_light(scenes, self.camera, self.pose, self.exposure.blur)
         worlds = [self.bench.markers(state) for state in states]
-        discs = [self.bench.discs(state) for state in states]
-        seen = [share_seen(disc, occluders, self.camera, self.pose) for disc in discs[len(discs) // 2]]
+        discs = self.bench.discs(states[len(states) // 2])
         truth = Truth(
             load=float(np.mean(loads)),
             world=np.mean(worlds, axis=0),
             pixels=np.mean([self.camera.project(world, self.pose) for world in worlds], axis=0),
-            discs=np.mean([[centroid(disc.edges) for disc in state] for state in discs], axis=0),
-            seen=np.array(seen),
+            discs=np.mean([self._middles(state) for state in states], axis=0),
+            seen=np.array([share_seen(disc, occluders, self.camera, self.pose) for disc in discs]),
         )
         return light, truth

@@ -72,6 +72,9 @@ def test_the_middle_of_a_disc_that_bends_is_the_mean_over_the_disc(bench):
     recording = film(bench, displacement=np.column_stack([0 * x, slope * x**2]))
     _, truth = recording.frame(5)
     # The mean of slope (x - c)² over a disc is slope r²/4; linear elements, of 0.7 mm in the wall, add to it.
+    start = recording.frame(0)[1].discs
+    moved = recording.observations("a test", discs=True).displacements
+    np.testing.assert_allclose(moved, truth.discs - start, atol=1e-12)
     lifted = truth.discs[:8, 1] - truth.world[:8, 1]
     np.testing.assert_allclose(lifted, slope * 0.8**2 / 4, rtol=0.35)
     np.testing.assert_allclose(truth.discs[:8, 0], truth.world[:8, 0], atol=5e-5)
