@@ -37,16 +37,16 @@ def view(
         direction: Of the axis about which it is tilted, in the image, degrees from right to down.
         turn: About the optical axis, degrees.
     """
-    low, high = workspace.points.min(axis=0), workspace.points.max(axis=0)
-    span = (high - low + workspace.fiducial_diameter) / (1 - 2 * RIM)
+    places = np.column_stack([workspace.points, np.zeros(len(workspace.points))])
+    middle = (places.min(axis=0) + places.max(axis=0)) / 2
+    turned = _rotation([0, 0, np.deg2rad(turn)])
+    facing = np.diag([1.0, -1.0, -1.0])
+    reach = np.abs((places - middle) @ (turned @ facing).T).max(axis=0) + workspace.fiducial_diameter / 2
+    span = 2 * reach / (1 - 2 * RIM)
     distance = max(camera.fx * span[0] / camera.width, camera.fy * span[1] / camera.height)
     axis = np.deg2rad(direction)
-    rotation = (
-        _rotation([0, 0, np.deg2rad(turn)])
-        @ _rotation(np.deg2rad(tilt) * np.array([np.cos(axis), np.sin(axis), 0]))
-        @ np.diag([1.0, -1.0, -1.0])
-    )
-    middle = np.append((low + high) / 2, 0.0)
+    tilted = _rotation(np.deg2rad(tilt) * np.array([np.cos(axis), np.sin(axis), 0]))
+    rotation = turned @ tilted @ facing
     # The middle of the workspace is seen in the middle of the image, which the principal point is only near.
     aim = np.linalg.solve(camera.matrix, [(camera.width - 1) / 2, (camera.height - 1) / 2, 1.0])
     return Pose(cv2.Rodrigues(rotation)[0].ravel(), distance * aim - rotation @ middle)

@@ -66,6 +66,13 @@ def test_displacements_of_another_mesh_are_refused(bench):
         bench.scene(np.zeros((7, 2)))
 
 
+@pytest.mark.parametrize("turn", [20, 90, 200])
+def test_a_turned_camera_still_sees_all_fiducials(turn):
+    pose = view(CAMERA, WORKSPACE, tilt=5, turn=turn)
+    seen = CAMERA.project(np.column_stack([WORKSPACE.points, np.zeros(7)]), pose)
+    assert ((seen > 20) & (seen < (1260, 700))).all()
+
+
 @pytest.mark.parametrize("tilt", [0.0, 3.0, 10.0])
 def test_the_view_shows_all_fiducials_upright_at_the_tilt(tilt):
     pose = view(CAMERA, WORKSPACE, tilt=tilt)
