@@ -16,6 +16,7 @@ BENCHMARKS = {
     "deepxde": "deepxde_against_ours",
     "recipes": "pinn_recipes",
     "epochs": "deepxde_epochs",
+    "scenes": "tracker_scenes",
 }
 """Names and modules; the modules' docstrings say what they do and how long they take."""
 
