@@ -20,6 +20,9 @@ MOTION = Group("Motion", sort_key=6)
 SCENE = Group("Scene", sort_key=7)
 BOARDS = Group("Calibration", sort_key=8)
 
+MOST_PIXELS = 4_000_000
+"""Of a frame: its cells, up to 16 to a pixel, have to fit into the memory."""
+
 
 @Parameter(name="*", group=CAMERA)
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +52,11 @@ class CameraOptions:
         if not abs(self.tilt) <= 30:
             raise UserError(f"--tilt {self.tilt:g}: the camera looks down on the finger; give -30 to 30")
         camera = load_camera(self.camera) if self.camera else default_camera(int(found[1]), int(found[2]))
+        if camera.width * camera.height > MOST_PIXELS:
+            raise UserError(
+                f"frames of {camera.width}x{camera.height} pixels; the rig makes up to "
+                f"{MOST_PIXELS // 1_000_000} million"
+            )
         pose = view(camera, workspace, tilt=self.tilt, direction=self.tilt_direction, turn=self.turn)
         return camera, pose
 

@@ -69,6 +69,7 @@ def test_the_run_says_what_it_depends_on_and_may_be_replaced(folder):
         ("--blur soft", "blur = 'soft' is not a finite number"),
         ("--rest 0", "rest = 0 frames is outside its range"),
         ("--size big", "--size big: give width and height"),
+        ("--size 4000x3000", "frames of 4000x3000 pixels; the rig makes up to 4 million"),
         ("--tilt 80", "--tilt 80: the camera looks down"),
         ("--codec h264", "no codec 'h264'; there are ffv1, mjpg, mp4v, png"),
         ("--cover 5", "--cover 5: write marker=share"),
