@@ -17,6 +17,7 @@ BENCHMARKS = {
     "recipes": "pinn_recipes",
     "epochs": "deepxde_epochs",
     "scenes": "tracker_scenes",
+    "live": "live_tracking",
 }
 """Names and modules; the modules' docstrings say what they do and how long they take."""
 

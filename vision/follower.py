@@ -20,6 +20,8 @@ AROUND = 15.0
 """How far around the markers a lost one is looked for, mm."""
 PATIENCE = 5
 """Frames between two searches for markers that stay lost."""
+LIVE_PERIOD = 5
+"""Frames between two looks at the fiducials, which do not move, where there is no time for more."""
 SAME_SIZE = 1.3
 """Ratio of the radii of a disc and of a marker beyond which the disc is no marker."""
 
@@ -44,6 +46,11 @@ class Sighting(NamedTuple):
 class Follower:
     """Knows the markers in one frame after another.
 
+    Args:
+        setup: What the frames show.
+        image: The first of them.
+        live: Whether time matters: the fiducials are then looked at in every fifth frame only.
+
     Attributes:
         plane: Of the markers, as the first frame shows it.
         first: What that frame shows.
@@ -52,8 +59,8 @@ class Follower:
         UserError: If the first frame shows too few fiducials or markers.
     """
 
-    def __init__(self, setup: Setup, image: Image) -> None:
-        self._setup = setup
+    def __init__(self, setup: Setup, image: Image, *, live: bool = False) -> None:
+        self._setup, self._period, self._number = setup, LIVE_PERIOD if live else 1, 0
         fiducials = setup.find_fiducials(image)
         self.plane: Plane = setup.plane(fiducials)
         self._fiducials = fiducials
@@ -115,12 +122,18 @@ class Follower:
         self._missing = int((names < 0).sum())
         self._step = filled(self._rest, step)
         self._places = self._places + self._step
-        numbers, old = self._fiducials
-        found = follow(image, DARK, old.centres, old.radii, self._setup.method)
-        away = np.linalg.norm(old.centres[:, None] - found.centres, axis=2)
-        nearest = away.argmin(axis=1) if len(found.radii) else np.zeros(len(numbers), dtype=int)
-        near = away.min(axis=1, initial=np.inf) < old.radii
-        discs = np.full(len(self._setup.workspace.fiducials), -1)
-        discs[numbers] = np.where(near, nearest, -1)
         places = self._places
-        return Sighting(markers, found.numbered(discs), places, self.plane.pixels(places))
+        return Sighting(markers, self._fixed(image), places, self.plane.pixels(places))
+
+    def _fixed(self, image: Image) -> Spots:
+        """The fiducials, if it is their turn."""
+        self._number += 1
+        numbers, old = self._fiducials
+        discs = np.full(len(self._setup.workspace.fiducials), -1)
+        if (self._number - 1) % self._period:
+            return old.numbered(discs)
+        found = follow(image, DARK, old.centres, old.radii, self._setup.method)
+        if len(found.radii):
+            away = np.linalg.norm(old.centres[:, None] - found.centres, axis=2)
+            discs[numbers] = np.where(away.min(axis=1) < old.radii, away.argmin(axis=1), -1)
+        return found.numbered(discs)

@@ -92,6 +92,11 @@ class Fit:
             getattr(self, name)[places] = values
 
 
+FAINT = 1e-5
+"""Precision, relative and absolute, that every parameter has beyond what is seen: where few pixels agree,
+nothing else may determine it."""
+
+
 class Adjusted(NamedTuple):
     """What `adjust` gives: the fit, all parameters, shape (n, m), and the residuals, shape (n, p)."""
 
@@ -141,7 +146,8 @@ def adjust(
         variance = np.maximum(squares / np.maximum(weights.sum(axis=1) - width, 1), QUANTISATION)
         precision = prior.precision[active]
         normal = (weighted @ derivatives.transpose(0, 2, 1)) / variance[:, None, None]
-        normal[:, range(width), range(width)] += precision
+        normal[:, range(width), range(width)] *= 1 + FAINT
+        normal[:, range(width), range(width)] += precision + FAINT
         slope = (weighted @ residuals[:, :, None])[:, :, 0] / variance[:, None]
         slope += precision * (prior.mean[active] - now)
         step = np.linalg.solve(normal, slope[:, :, None])[:, :, 0]

@@ -46,7 +46,7 @@ def track(frames: Frames, setup: Setup, watch: Callable[[Frame, Sighting], None]
     try:
         for frame in frames:
             if follower is None:
-                follower = Follower(setup, frame.image)
+                follower = Follower(setup, frame.image, live=frames.count is None)
                 sighting = follower.first
             else:
                 sighting = follower.see(frame.image)
@@ -93,8 +93,9 @@ def _remarks(setup: Setup, tracking: Tracking, before: Spots, after: Spots) -> I
         yield "the camera file has no covariance, so the standard deviations leave the camera's errors out"
     if (hidden := int(np.isnan(after.radii).sum())) > 0:
         yield f"{hidden} of {len(after.radii)} fiducials were not seen"
-    shake = np.linalg.norm(after.centres - before.centres, axis=1)
-    if (shake := np.nanmedian(shake)) > SHAKE:
+    both = np.isfinite(before.radii + after.radii)
+    shake = np.linalg.norm((after.centres - before.centres)[both], axis=1)
+    if both.any() and (shake := np.median(shake)) > SHAKE:
         yield f"the fiducials moved by {shake:.2f} pixels between start and end: the camera was not at rest"
     far = float(np.sqrt(np.nanmean((tracking.offsets**2).sum(axis=1))))
     if far > FAR:

@@ -187,3 +187,13 @@ GREY = np.zeros((20, 20), dtype=np.uint8)
 def test_what_cannot_be_fitted_is_refused(image, guesses, radii, error, said):
     with pytest.raises(error, match=said):
         fit_discs(image, guesses, radii=radii)
+
+
+def test_guesses_where_little_agrees_are_not_found_and_stop_no_other():
+    """On the edges of walls and between them, where a marker was before it jumped."""
+    image = np.full((240, 320), 150, dtype=np.uint8)
+    for row in range(20, 240, 40):
+        image[row : row + 19] = 210
+    image = np.asarray(np.clip(image + np.random.default_rng(0).normal(0, 3, image.shape), 0, 255), np.uint8)
+    guesses = [(x, y, 7.6) for x in range(20, 310, 23) for y in range(12, 235, 3)]
+    assert not fit_discs(image, guesses, radii=7.6).found.any()

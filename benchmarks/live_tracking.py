@@ -1,0 +1,96 @@
+"""How many frames a second are tracked, once the markers are locked, at 1280x720 pixels.
+
+A film of the virtual rig is played to and fro, so that markers move by some 5 pixels between frames. Frames
+that are in memory show the tracker alone; the same frames read from videos show it with the decoder. About a
+minute, most of it for the rig.
+"""
+
+import time
+from collections.abc import Iterable
+from itertools import chain, islice, repeat
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import cv2
+import numpy as np
+from rich.table import Table
+
+from geometry.cache import finger_mesh
+from geometry.design import Design
+from geometry.settings import MeshSettings
+from vision.follower import Follower
+from vision.frames import Image
+from vision.localiser import METHODS
+from vision.rig.bench import Bench
+from vision.rig.exposure import Exposure
+from vision.rig.motion import Motion
+from vision.rig.recording import Recording
+from vision.rig.view import default_camera, view
+from vision.setup import Setup
+from vision.video import VideoWriter, open_frames
+from vision.workspace import default_workspace
+
+FRAMES = 240
+
+
+def main() -> Table:
+    """Render, then track."""
+    table = Table(title="Tracking at 1280x720 pixels, nine markers and seven fiducials")
+    for column in ("method", "frames from", "frames a second", "median, ms", "95 %, ms", "lost markers"):
+        table.add_column(column, justify="left" if column in ("method", "frames from") else "right")
+    setup, images = _film()
+    to_and_fro = [*images, *images[-2:0:-1]]
+    whole = list(islice(chain.from_iterable(repeat(to_and_fro)), FRAMES))
+    grey = [cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in whole]
+    with TemporaryDirectory() as folder:
+        sources: dict[str, Path] = {}
+        for name, suffix in (("MJPG", ".avi"), ("mp4v", ".mp4"), ("FFV1", ".mkv")):
+            sources[name] = Path(folder) / f"film{suffix}"
+            with VideoWriter(sources[name], (1280, 720), 60.0) as writer:
+                for image in whole:
+                    writer.write(image)
+        for method in METHODS:
+            known = Setup(setup.design, setup.workspace, setup.camera, method=method)
+            table.add_row(method, "memory, coloured", *_timed(known, whole))
+            table.add_row(method, "memory, grey", *_timed(known, grey))
+            for name, path in sources.items():
+                with open_frames(path) as frames:
+                    table.add_row(method, f"{name} video", *_timed(known, (frame.image for frame in frames)))
+    return table
+
+
+def _film() -> tuple[Setup, list[Image]]:
+    """A finger that is bent by 10 mm in 24 frames."""
+    design, camera = Design(), default_camera()
+    workspace = default_workspace(design)
+    mesh = finger_mesh(design, settings=MeshSettings(size=1.0))
+    x = mesh.points[:, 0] / design.height
+    recording = Recording(
+        bench=Bench(mesh, design, workspace),
+        displacement=-10 * np.column_stack([0.2 * x**2, x**2]),
+        camera=camera,
+        pose=view(camera, workspace, tilt=3),
+        exposure=Exposure(noise=2),
+        motion=Motion(rest=1, moving=22, held=1, shutter=0),
+    )
+    return Setup(design, workspace, camera), [image for image, _ in recording.frames()]
+
+
+def _timed(setup: Setup, images: Iterable[Image]) -> tuple[str, ...]:
+    """Cells of a row; the first frame, in which the markers are found, does not count."""
+    follower, spent, lost = None, [], 0
+    before = time.perf_counter()
+    for image in images:
+        if follower is None:
+            follower = Follower(setup, image, live=True)
+        else:
+            lost += int(np.isnan(follower.see(image).markers.radii).sum())
+            spent.append(time.perf_counter() - before)
+        before = time.perf_counter()
+    times = 1000 * np.array(spent)
+    return (
+        f"{1000 / times.mean():.0f}",
+        f"{np.median(times):.1f}",
+        f"{np.percentile(times, 95):.1f}",
+        str(lost),
+    )
