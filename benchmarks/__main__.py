@@ -18,6 +18,7 @@ BENCHMARKS = {
     "epochs": "deepxde_epochs",
     "scenes": "tracker_scenes",
     "live": "live_tracking",
+    "localisation": "localisation",
 }
 """Names and modules; the modules' docstrings say what they do and how long they take."""
 
