@@ -1,8 +1,8 @@
 """Sub-pixel centres of discs against the Cramér-Rao bound, with the paper's Hough circles beside them.
 
-Exactly drawn discs at random places within a pixel, noise added. The bound follows from the derivatives of the
-drawn picture by everything that is unknown: place, size and shape of the disc, levels, blur, gradient of the light,
-straight edges. One minute; the table is kept in `localisation.md`.
+Exactly drawn discs at random places within a pixel, noise added. The bound follows from the derivatives of
+the drawn picture by everything that is unknown: place, size and shape of the disc, levels, blur, gradient of
+the light, straight edges. One minute; the table is kept in `localisation.md`.
 """
 
 import platform
@@ -44,7 +44,7 @@ class Case:
 
 
 def _wall(level: float, **values: float) -> DiscImage:
-    """On a wall of 2 mm, 19 pixels, whose edges are 1.9 pixels from the disc, before a ground of that level."""
+    """On a wall of 2 mm, whose edges are 1.9 pixels from the disc, before a ground of that level."""
     across = 20 * (np.cos(0.4) + np.sin(0.4))
     edges = (Edge(0.4, across + 9.9, level), Edge(0.4 + np.pi, 9.9 - across, level))
     return DiscImage(edges=edges, **values)
@@ -90,7 +90,9 @@ HEADER = (
 def main() -> Table:
     """Measure and write the report."""
     rows = [(name, *_measured(case)) for name, case in CASES.items()]
-    speeds = {name: _milliseconds(image) for name, image in {"clean": DiscImage(), "wall": _wall(20.0)}.items()}
+    speeds = {
+        name: _milliseconds(image) for name, image in {"clean": DiscImage(), "wall": _wall(20.0)}.items()
+    }
     REPORT.write_text(_report(rows, speeds))
     table = Table(*HEADER, title=f"{PLACES} places each; {_speed(speeds)}; written to {REPORT}")
     for row in rows:
@@ -235,15 +237,17 @@ def _report(rows: list[tuple[str, ...]], speeds: dict[str, float]) -> str:
         "# Localisation",
         "",
         f"Made by `python -m benchmarks localisation` on {datetime.now(UTC):%Y-%m-%d}: {platform.machine()}, "
-        f"Python {platform.python_version()}, numpy {version('numpy')}, OpenCV {cv2.__version__}, seed {SEED}; "
-        f"on one core {_speed(speeds)}, the best of twenty.",
+        f"Python {platform.python_version()}, numpy {version('numpy')}, OpenCV {cv2.__version__}, "
+        f"seed {SEED}; on one core {_speed(speeds)}, the best of twenty.",
         "",
-        f"{PLACES} discs each at random places within a pixel; unless a row says otherwise of radius 8 px, levels "
-        "180 around and 60 within, blur 0.8 px besides the pixels' own width, noise 2. Errors are distances in the "
-        "image. The bound is Cramér and Rao's with everything unknown that the fit estimates; the closed form, "
-        "2 (σ/A) √(s/(r √π)), takes all but the place for known and all of the edge for seen. Bounds are for noise "
-        "without a codec. Columns with sd: how many errors of a coordinate the reported standard deviations cover; "
-        "68 and 95 % if they are right, more where a known radius is better than the 1 % that is assumed.",
+        f"{PLACES} discs each at random places within a pixel; unless a row says otherwise of radius 8 px, "
+        "levels 180 around and 60 within, blur 0.8 px besides the pixels' own width, noise 2. "
+        "Errors are distances in the image. The bound is Cramér and Rao's with everything unknown "
+        "that the fit estimates; the closed form, 2 (σ/A) √(s/(r √π)), takes all but the place "
+        "for known and all of the edge for seen. Bounds are for noise without a codec. Columns "
+        "with sd: how many errors of a coordinate the reported standard deviations cover, 68 and "
+        "95 % if they are right; more where the radius is better known than the 1 % that is "
+        "assumed.",
         "",
         "| " + " | ".join(HEADER) + " |",
         "|---|" + "---:|" * (len(HEADER) - 1),

@@ -39,7 +39,8 @@ class Discs:
 
     Attributes:
         centres: x, y, shape (n, 2), pixels.
-        covariances: Of the centres, shape (n, 2, 2), pixels².
+        covariances: Of the centres, shape (n, 2, 2), pixels². Correlated noise, such as a codec's, counts, by
+            its mean over the discs of about a size.
         radii: Square root of the product of the semi-axes, shape (n,), pixels.
         shapes: Stretch and slant as in `vision.disc_model`, shape (n, 2); zero for circles.
         contrast: Level around the disc less level within, shape (n,), grey levels; negative for light discs.

@@ -20,9 +20,9 @@ from vision.disc_model import (
 from vision.disc_neighbours import with_edges
 from vision.disc_votes import Election, elect, sector
 from vision.disc_window import Window, median_where
-from vision.robust_fit import Adjusted, Fit, Prior, adjust, coherent
+from vision.robust_fit import Adjusted, Fit, Prior, adjust, coherent, correlation
 
-MARGIN = 5
+MARGIN = 6
 """Pixels used on either side of the edge."""
 
 DEVIATIONS = {STRETCH: 0.05, SLANT: 0.05, BLUR: 5.0, SHADE_X: 0.05, SHADE_Y: 0.05}
@@ -47,6 +47,9 @@ LENIENT = 2
 REFINEMENTS = 3
 """How often the pixels to use are chosen anew, at most."""
 
+NEAR = 2.0
+"""Pixels from the edge within which the noise matters most."""
+
 LOOSE, STRICT = 0.25, 0.45
 """Votes that a sector of the edge must have, over those of the better sectors, to be trusted: at first, and
 where that led to a picture that does not agree with the image."""
@@ -70,14 +73,18 @@ def fit_alike(grey: GreyImage, guesses: FloatArray, radii: FloatArray, tolerance
     window = Window.of(grey, election.centres, smallest - MARGIN, largest + MARGIN)
     trusted = _trusted(window, election, LOOSE)
     first = _first(window, election, trusted, tolerance)
-    (again,) = np.nonzero((coherent(window, first) != trusted).mean(axis=1) > CHANGED)
+    chosen = coherent(window, first)
+    (again,) = np.nonzero((chosen != trusted).mean(axis=1) > CHANGED)
+    near = np.abs(_outside(window, first.parameters)) < NEAR
+    inflation = correlation(window, first, chosen & trusted, near)
     if len(again):
         window, election = window.at(again), election.at(again)
         anew = _first(window, election, _trusted(window, election, STRICT), tolerance)
-        either, other = (_refined(window, now, tolerance) for now in (first.at(again), anew))
+        either, other = (_refined(window, now, election.radii, tolerance) for now in (first.at(again), anew))
         first.fit.put(again, either)
         (better,) = np.nonzero(_deviation(other) < _deviation(either))
         first.fit.put(again[better], other.at(better))
+    first.fit.covariances *= inflation
     return first.fit
 
 
@@ -106,15 +113,15 @@ def _first(window: Window, election: Election, trusted: BoolArray, tolerance: fl
     start[:, LIGHT] = median_where(window.values, trusted & (outside > 1) & (outside < 3))
     start[:, CONTRAST] = start[:, LIGHT] - median_where(window.values, trusted & (outside < -1))
     start, present = with_edges(window, start, trusted)
-    return adjust(window, start, *_prior(start, present, tolerance), trusted, LENIENT)
+    return adjust(window, start, *_prior(start, present, election.radii, tolerance), trusted, LENIENT)
 
 
-def _refined(window: Window, now: Adjusted, tolerance: float) -> Fit:
+def _refined(window: Window, now: Adjusted, radii: FloatArray, tolerance: float) -> Fit:
     """Adjust again to whatever agrees with the picture, once the edges have been looked for anew."""
     chosen = coherent(window, now)
     ground = chosen | window.within & (_outside(window, now.parameters) > 0)
     start, present = with_edges(window, now.parameters[:, :COUNT], ground)
-    prior, limits = _prior(start, present, tolerance)
+    prior, limits = _prior(start, present, radii, tolerance)
     for _ in range(REFINEMENTS):
         now = adjust(window, start, prior, limits, chosen, LENIENT)
         start, chosen = now.parameters, coherent(window, now)
@@ -127,15 +134,18 @@ def _outside(window: Window, parameters: FloatArray) -> FloatArray:
     return np.asarray(np.hypot(window.x - x, window.y - y) - radius, dtype=np.float64)
 
 
-def _prior(start: FloatArray, present: BoolArray, tolerance: float) -> tuple[Prior, FloatArray]:
+def _prior(
+    start: FloatArray, present: BoolArray, radii: FloatArray, tolerance: float
+) -> tuple[Prior, FloatArray]:
     """What is assumed of the parameters, and their longest steps; missing edges stay without strength."""
     mean, deviations, limits = start.copy(), np.full(start.shape, 1e3), np.full(start.shape, 1e3)
     mean[:, [STRETCH, SLANT, SHADE_X, SHADE_Y]] = 0
+    mean[:, RADIUS] = radii
     deviations[:, list(DEVIATIONS)] = list(DEVIATIONS.values())
-    deviations[:, RADIUS] = np.minimum(tolerance * start[:, RADIUS], 1e3)
+    deviations[:, RADIUS] = np.minimum(tolerance * radii, 1e3)
     edges = np.where(present[:, :, None], EDGE_DEVIATIONS, MISSING)
     deviations[:, COUNT:] = edges.reshape(len(start), -1)
     limits[:, list(STEPS)] = list(STEPS.values())
-    limits[:, RADIUS] = np.maximum(0.5, 0.2 * start[:, RADIUS])
+    limits[:, RADIUS] = np.maximum(0.5, 0.2 * radii)
     limits[:, COUNT:] = EDGE_STEPS * present.shape[1]
     return Prior(mean, deviations**-2.0), limits

@@ -113,10 +113,9 @@ def _radii(distance: Floats, outward: Floats, guesses: FloatArray) -> FloatArray
         cv2.GaussianBlur(part.reshape(count, bins), (9, 1), 2 * SPREAD) for part in (sums, areas)
     )
     radii = np.arange(bins) / 2
-    profile = np.where(
-        np.abs(radii / guesses[:, None] - 1) < UNCERTAINTY, smooth_sums / np.maximum(smooth_areas, 1), 0
-    )
-    return np.asarray(radii[profile.argmax(axis=1)], dtype=np.float64)
+    near = np.abs(radii / guesses[:, None] - 1) < UNCERTAINTY
+    best = np.where(near, smooth_sums / np.maximum(smooth_areas, 1), -1).argmax(axis=1)
+    return np.asarray(np.maximum(radii[best], 0.5))
 
 
 def _slopes(tiles: Floats) -> tuple[Floats, Floats]:

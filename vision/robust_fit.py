@@ -35,6 +35,9 @@ MODEL_ERROR = 0.04
 DARKEST, LIGHTEST, DOUBT = 5, 250, 10
 """Grey levels beyond which pixels may be clipped, and by how much noise can hide it."""
 
+NEIGHBOURS = 3
+"""Side of the squares whose means show correlated noise, pixels."""
+
 SHARPEST = 0.3
 """Width of an edge without any blur, pixels: that of the pixels themselves."""
 
@@ -57,7 +60,7 @@ class Fit:
     Attributes:
         parameters: As in `vision.disc_model`, relative to the origins, shape (n, m).
         origins: Shape (n, 2), pixels.
-        covariances: Of the centres, shape (n, 2, 2), pixels².
+        covariances: Of the centres, from the variance of the noise, shape (n, 2, 2), pixels².
         variance: Of the noise, shape (n,), grey levels².
         seen: Share of the information on the radius that kept its weight, shape (n,).
         settled: Whether the last step was small, shape (n,).
@@ -137,7 +140,8 @@ def adjust(
         most = np.maximum(2 * window.noise[active], MODEL_ERROR * np.abs(now[:, CONTRAST]))
         if number < lenient:
             most = most + 1e3
-        noise = np.clip(SCALE * median_where(np.abs(residuals), allowed & free), QUANTISATION**0.5, most)
+        noise = np.minimum(SCALE * median_where(np.abs(residuals), allowed & free), most)
+        noise = np.maximum(noise, QUANTISATION**0.5)
         ratio = np.abs(residuals) / noise[:, None].astype(np.float32)
         agreement = np.clip((NONE - ratio) / (NONE - FULL), 0, 1) * allowed
         weights = agreement * free
@@ -153,7 +157,8 @@ def adjust(
         step = np.linalg.solve(normal, slope[:, :, None])[:, :, 0]
         shortened = np.minimum(1, (limits[active] / np.maximum(np.abs(step), 1e-12)).min(axis=1))
         now = now + shortened[:, None] * step
-        now[:, BLUR] = np.clip(now[:, BLUR], SHARPEST, np.maximum(now[:, RADIUS], SHARPEST))
+        now[:, RADIUS] = np.maximum(now[:, RADIUS], 1.0)
+        now[:, BLUR] = np.clip(now[:, BLUR], SHARPEST, now[:, RADIUS])
         parameters[active], information[active], fit.variance[active] = now, normal, variance
         left_over[active] = residuals
         by_radius = derivatives[:, RADIUS] ** 2
@@ -177,3 +182,22 @@ def coherent(window: Window, adjusted: Adjusted) -> BoolArray:
     wrong = np.abs(window.smoothed(adjusted.residuals * window.within, 3)) > most[:, None]
     near = window.smoothed(wrong.astype(np.float32), 3) > 0
     return np.asarray(window.within & ~near)
+
+
+def correlation(window: Window, adjusted: Adjusted, chosen: BoolArray, near: BoolArray) -> float:
+    """Variance of means over neighbours times their number, over the variance of the noise; at least 1.
+
+    It is 1 for noise that differs from pixel to pixel. Cameras and codecs that smooth, or quantise in blocks,
+    leave noise that does not, and more of it near edges. Taken over all discs together.
+
+    Args:
+        window: The pixels.
+        adjusted: What was fitted to them.
+        chosen: Pixels that belong to the model, shape (n, p).
+        near: Pixels to look at, shape (n, p).
+    """
+    inner = window.smoothed(chosen.astype(np.float32), NEIGHBOURS) > 1 - 1e-3
+    inner &= near
+    noise = adjusted.fit.variance[:, None] ** 0.5
+    means = window.smoothed(adjusted.residuals / noise.astype(np.float32), NEIGHBOURS)[inner]
+    return max(1.0, float(NEIGHBOURS**2 * (means**2).mean())) if means.size else 1.0

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from disc_images import DiscImage, Edge
@@ -11,8 +12,6 @@ from geometry.errors import ShapeError, UserError
 from vision.disc_edge import Discs, fit_discs
 
 COUNT = 60
-BORDER = 12
-"""Light ground between the tiles of a sheet and the picture's border, pixels."""
 
 
 def sheet(images: list[DiscImage], *, noise: float = 2.0) -> tuple[np.ndarray, np.ndarray]:
@@ -151,6 +150,27 @@ def test_a_disc_that_is_partly_hidden_is_found_by_its_arc(image):
     scores = np.einsum("ni,nij,nj->", errors[found], np.linalg.inv(discs.covariances[found]), errors[found])
     assert scores < chi2.ppf(1 - 1e-3, 2 * found.sum())  # the radius is better than it is said to be
     assert discs.seen[found].max() < 0.9
+
+
+def test_noise_that_a_codec_correlates_is_accounted_for():
+    picture, centres = sheet(scattered(DiscImage(edges=WALL), 240))
+    _, content = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 60])
+    discs = fit_discs(cv2.imdecode(content, cv2.IMREAD_GRAYSCALE), guessed(centres, 8))
+    scores = (discs.centres - centres) / np.sqrt(np.diagonal(discs.covariances, axis1=1, axis2=2))
+    assert discs.found.all()
+    assert 0.8 < np.sqrt((scores**2).mean()) < 1.2  # 1.5 if the noise were taken for white
+
+
+@pytest.mark.parametrize("radii", [None, 6.0])
+def test_no_picture_is_too_odd(radii):
+    rng = np.random.default_rng(2)
+    squares = np.kron(rng.integers(0, 2, (20, 20)) * 255, np.ones((11, 11)))
+    noise = rng.integers(0, 256, (220, 220))
+    for picture in (squares, noise, np.zeros((220, 220)), np.full((220, 220), 255), squares[:3], noise[:1]):
+        guesses = np.column_stack([rng.uniform(-30, 250, (150, 2)), rng.uniform(1, 12, 150)])
+        discs = fit_discs(picture.astype(np.uint8), guesses, radii=radii)
+        assert np.isfinite(discs.centres[discs.found]).all()
+        assert discs.found.mean() < 0.05  # of white noise, chance makes a disc or two
 
 
 def test_a_disc_of_unknown_radius_must_be_seen_by_half():
