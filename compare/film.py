@@ -67,6 +67,7 @@ class Film:
             camera=load_camera(camera) if camera else None,
             colour=read_colour(self.options.colour),
             method=self.options.method,
+            alone=workspace is None,
         )
 
     def provenance(self) -> dict[str, Any]:

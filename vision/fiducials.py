@@ -28,6 +28,10 @@ LINE = 1e-3
 """Area of a triangle of three discs, over the square of the extent of all, below which they lie on a line."""
 
 
+class UnseenError(UserError):
+    """Too few fiducials are in the image."""
+
+
 class Match(NamedTuple):
     """Discs of the fiducials, shape (f,), -1 for those not found, and how far off all others are, mm."""
 
@@ -49,7 +53,8 @@ def identify_fiducials(pixels: FloatArray, radii: FloatArray, workspace: Workspa
         workspace: Whose fiducials are looked for.
 
     Raises:
-        UserError: If the discs show no such fiducials, or their mirror image.
+        UnseenError: If the discs show too few of the fiducials.
+        UserError: If they show their mirror image.
     """
     straight = _best(pixels, radii, workspace, mirrored=False)
     mirrored = _best(pixels, radii, workspace, mirrored=True)
@@ -58,7 +63,7 @@ def identify_fiducials(pixels: FloatArray, radii: FloatArray, workspace: Workspa
     if mirrored.found >= least and mirrored.found > straight.found:
         raise UserError("the image is mirrored: the fiducials appear the wrong way round; flip it back")
     if straight.found < least:
-        raise UserError(
+        raise UnseenError(
             f"the workspace's {wanted} fiducials cannot be made out among {len(pixels)} discs: at "
             f"best {straight.found} fit, and {least} must; show them all, or name the right workspace"
         )

@@ -8,11 +8,12 @@ from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
 from geometry.markers import marker_positions
 from vision.colour import DARK
+from vision.fiducials import UnseenError
 from vision.frames import Image
 from vision.identity import filled, identify, moved, placed
 from vision.localiser import Spots, follow, look
 from vision.plane import Plane
-from vision.setup import Setup
+from vision.setup import Fiducials, Setup
 
 FEWEST = 3
 """Markers without which a finger is not known."""
@@ -43,6 +44,18 @@ class Sighting(NamedTuple):
     guesses: FloatArray
 
 
+def _plane_of(setup: Setup, image: Image) -> tuple[Plane, Fiducials]:
+    """The markers' plane in the first frame, and the fiducials that gave it; none if the markers did."""
+    try:
+        fiducials = setup.find_fiducials(image)
+        return setup.plane(fiducials), fiducials
+    except UnseenError:
+        if not setup.alone:
+            raise
+        nothing = Spots(np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0))
+        return setup.find_alone(image), Fiducials(np.empty(0, dtype=np.int64), nothing)
+
+
 class Follower:
     """Knows the markers in one frame after another.
 
@@ -61,9 +74,7 @@ class Follower:
 
     def __init__(self, setup: Setup, image: Image, *, live: bool = False) -> None:
         self._setup, self._period, self._number = setup, LIVE_PERIOD if live else 1, 0
-        fiducials = setup.find_fiducials(image)
-        self.plane: Plane = setup.plane(fiducials)
-        self._fiducials = fiducials
+        self.plane, self._fiducials = _plane_of(setup, image)
         self._rest = self._places = marker_positions(setup.design)
         self._step = np.zeros_like(self._rest)
         self._steps = moved(self._rest)

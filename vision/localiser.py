@@ -15,7 +15,7 @@ from vision.proposal import Window, propose
 Method = Literal["precise", "hough"]
 METHODS: tuple[Method, ...] = ("precise", "hough")
 
-FLOOR = {"precise": 0.005, "hough": 0.45}
+FLOOR = {"precise": 0.0025, "hough": 0.45}
 """Standard deviation of what a mean over frames keeps of the error of a coordinate, pixels: light, paint and
 the wall beside a disc stay as they are, and Hough circles sit on a lattice."""
 

@@ -7,12 +7,14 @@ import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
 from geometry.errors import UserError
+from geometry.markers import marker_positions
 from geometry.parameters import Parameters
 from vision.camera import Camera
 from vision.colour import DARK, Colour
 from vision.fiducials import identify_fiducials
 from vision.frames import Image
 from vision.localiser import Method, Spots, look
+from vision.markers_alone import find_markers
 from vision.plane import CameraView, Plane, camera_plane, homography_plane, similarity_plane
 from vision.workspace import Workspace
 
@@ -48,6 +50,7 @@ class Setup:
         workspace: The fiducials around it.
         camera: The calibrated camera; None if it is not known.
         colour: Of the markers; the fiducials are dark.
+        alone: Whether the markers alone may give the plane if the fiducials cannot be made out.
         method: "precise", or "hough" for the paper's pipeline, whose map from pixels to mm is linear.
     """
 
@@ -56,6 +59,7 @@ class Setup:
     camera: Camera | None = None
     colour: Colour = DARK
     method: Method = "precise"
+    alone: bool = False
 
     def plane(self, fiducials: Fiducials) -> Plane:
         """The markers' plane from fiducials, as exact as the method and what is known allow."""
@@ -71,6 +75,23 @@ class Setup:
         if not isinstance(plane.view, CameraView):
             return plane
         return replace(plane, view=replace(plane.view, height=self.workspace.marker_plane))
+
+    def alone_plane(self, centres: FloatArray, covariances: FloatArray) -> Plane:
+        """The plane without fiducials, from the markers at rest, (m, 2), pixels; nan for hidden ones."""
+        seen = np.isfinite(centres).all(axis=1)
+        return similarity_plane(marker_positions(self.design)[seen], centres[seen], covariances[seen])
+
+    def find_alone(self, image: Image) -> Plane:
+        """The plane without fiducials, from the markers in the first frame.
+
+        Raises:
+            UserError: If they cannot be made out.
+        """
+        markers, diameter = marker_positions(self.design), self.design.marker_diameter
+        largest = float(np.linalg.norm(image.shape[:2])) / self.design.height * diameter / 2
+        spots = look(image, self.colour, (max(SMALLEST_VIEW * largest, 3.0), largest), self.method)
+        discs = spots.numbered(find_markers(spots.centres, spots.radii, markers, diameter))
+        return self.alone_plane(discs.centres, discs.covariances)
 
     def find_fiducials(self, image: Image) -> Fiducials:
         """Find the fiducials in an image.

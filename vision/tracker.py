@@ -10,6 +10,7 @@ from geometry.markers import marker_positions
 from vision.follower import Follower, Sighting
 from vision.frames import Frame, Frames
 from vision.localiser import FLOOR, Spots
+from vision.markers_alone import symmetric
 from vision.rest import find_rest
 from vision.setup import Fiducials, Setup, check_size
 from vision.tracking import Tracking, mean_spots, placed
@@ -66,7 +67,11 @@ def track(frames: Frames, setup: Setup, watch: Callable[[Frame, Sighting], None]
     initial, final = (mean_spots([s.markers for s in end], setup.method) for end in still)
     anchors = [mean_spots([s.fiducials for s in end], setup.method) for end in (*still, still[0] + still[1])]
     numbers = np.nonzero(np.isfinite(anchors[2].radii))[0]
-    plane = setup.plane(Fiducials(numbers, anchors[2].numbered(numbers)))
+    alone = not len(numbers)
+    if alone:
+        plane = setup.alone_plane(initial.centres, initial.covariances)
+    else:
+        plane = setup.plane(Fiducials(numbers, anchors[2].numbered(numbers)))
     tracking = Tracking(
         design=setup.design,
         expected=marker_positions(setup.design),
@@ -79,7 +84,49 @@ def track(frames: Frames, setup: Setup, watch: Callable[[Frame, Sighting], None]
         final=final,
         method=setup.method,
     )
+    if alone:
+        return _by_the_motion(setup, tracking)
     return replace(tracking, warnings=tuple(_remarks(setup, tracking, anchors[0], anchors[1])))
+
+
+def _by_the_motion(setup: Setup, tracking: Tracking) -> Tracking:
+    """What was tracked without fiducials, the right way round: a finger is pressed in on its front face.
+
+    Raises:
+        UserError: If the markers move out of that face and do not look the same from both ends.
+    """
+    turned = _pressed(tracking) > 0
+    if turned:
+        if not symmetric(tracking.expected):
+            raise UserError(
+                "the markers move out of the front face: the image is mirrored; flip it, or show fiducials"
+            )
+        initial, final = (Spots(*(part[::-1] for part in end)) for end in (tracking.initial, tracking.final))
+        tracking = replace(
+            tracking,
+            pixels=tracking.pixels[:, ::-1],
+            covariances=tracking.covariances[:, ::-1],
+            plane=setup.alone_plane(initial.centres, initial.covariances),
+            initial=initial,
+            final=final,
+        )
+    a, b = tracking.plane.parameters[:2]
+    remark = (
+        f"no fiducials: scale and turn are those that put the markers at rest on the design's, "
+        f"{tracking.plane.residual:.3f} mm (rms) off; lens and tilt are not undone"
+    )
+    upside_down = (
+        f"the finger points at {np.degrees(np.arctan2(-b, a)) % 360:.0f} degrees in the image, by its motion"
+    )
+    return replace(tracking, warnings=(remark, upside_down) if turned else (remark,))
+
+
+def _pressed(tracking: Tracking) -> float:
+    """Mean displacement along y of the visible markers, mm."""
+    before, after = (
+        placed(tracking.plane, end.centres, tracking.design) for end in (tracking.initial, tracking.final)
+    )
+    return float(np.nanmean((after - before)[:, 1]))
 
 
 def _remarks(setup: Setup, tracking: Tracking, before: Spots, after: Spots) -> Iterator[str]:

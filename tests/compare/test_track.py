@@ -111,7 +111,7 @@ def spoilt(kind, film, folder):
         ("empty", "video.mkv"),
         ("corrupt", "video.mkv"),
         ("text", "video.mkv"),
-        ("black", "fiducials cannot be made out"),
+        ("black", "neither the fiducials nor the markers can be made out"),
         ("mirrored", "the image is mirrored"),
         ("other design", "0 of 9 markers are where the design has them"),
         ("other workspace", "5 fiducials cannot be made out"),

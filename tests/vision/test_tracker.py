@@ -148,3 +148,25 @@ def test_a_finger_that_does_not_move_is_refused():
 def test_two_pictures_are_enough():
     observations = tracked([images()[0], images()[-1]]).observations("rig")
     assert error_of(observations) < 0.015
+
+
+def without_fiducials(turns=0):
+    return [np.rot90(painted_over(image, fiducials()), turns) for image in images()]
+
+
+@pytest.mark.parametrize("turns", [0, 1, 2, 3])
+def test_without_fiducials_the_markers_give_the_plane_and_their_motion_the_way_up(turns):
+    tracking = tracked(without_fiducials(turns), camera=None, alone=True)
+    observations = tracking.observations("rig")
+    assert observations.visible.sum() >= 7  # a jump of 10 mm is harder to follow from the wrong end
+    assert error_of(observations) < 0.3  # the lens and a tilt of 5 degrees are not undone
+    assert f"{tracking.plane.residual:.3f} mm (rms) off" in tracking.warnings[0]
+    assert ("the finger points at 180 degrees" in " ".join(tracking.warnings)) == (turns == 2)
+
+
+def test_without_fiducials_and_markers_there_is_one_line():
+    blank = [np.full_like(image, 128) for image in images()]
+    with pytest.raises(
+        UserError, match="neither the fiducials nor the markers can be made out among 0 discs"
+    ):
+        tracked(blank, camera=None, alone=True)
