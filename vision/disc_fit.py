@@ -54,8 +54,8 @@ LOOSE, STRICT = 0.25, 0.45
 """Votes that a sector of the edge must have, over those of the better sectors, to be trusted: at first, and
 where that led to a picture that does not agree with the image."""
 
-CHANGED = 0.01
-"""Share of the pixels that disagree, from which on a disc is fitted again."""
+CHANGED = 0.03
+"""Share of the pixels near the edge that disagree, from which on a disc is fitted again."""
 
 
 def fit_alike(grey: GreyImage, guesses: FloatArray, radii: FloatArray, tolerance: float) -> Fit:
@@ -74,8 +74,8 @@ def fit_alike(grey: GreyImage, guesses: FloatArray, radii: FloatArray, tolerance
     trusted = _trusted(window, election, LOOSE)
     first = _first(window, election, trusted, tolerance)
     chosen = coherent(window, first)
-    (again,) = np.nonzero((chosen != trusted).mean(axis=1) > CHANGED)
     near = np.abs(_outside(window, first.parameters)) < NEAR
+    (again,) = np.nonzero(((chosen != trusted) & near).sum(axis=1) > CHANGED * near.sum(axis=1))
     inflation = correlation(window, first, chosen & trusted, near)
     if len(again):
         window, election = window.at(again), election.at(again)
