@@ -1,7 +1,7 @@
 """The main job: mesh, measure, solve, evaluate, draw, report."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from compare.adaptation import shared_mesh, write_rounds
+from compare.choice import able, left_out_remarks
 from compare.evaluation import Evaluation
 from compare.fields import write_vtu
 from compare.figures import Figure, draw_all
@@ -34,7 +35,7 @@ from geometry.settings import MeshSettings
 from solvers.adaptation import Adaptation, check_adaptable
 from solvers.assimilation import assimilates
 from solvers.problem import Load, Material, Problem
-from solvers.solver import Solver, check_load, with_law
+from solvers.solver import Solver, UnfitError, with_law
 from solvers.training import TrainedSolver, TrainingContext
 from vision.measurements import read_measurements, write_measurements
 
@@ -49,6 +50,7 @@ class Job:
     Attributes:
         design: The finger.
         solvers: The solvers, in the order of tables and pictures.
+        spare: Names of those that are left out, with a remark, if they cannot do the job.
         mesh: Element sizes.
         adapt: Tolerance to which `fem` shall know the markers, mm, for which the mesh is refined; None: not.
         material: The elastic constants; each solver takes the law that it has.
@@ -61,6 +63,7 @@ class Job:
 
     design: Design
     solvers: Sequence[Solver]
+    spare: Collection[str] = ()
     mesh: MeshSettings = field(default_factory=MeshSettings)
     adapt: float | None = None
     material: Material = field(default_factory=Material)
@@ -81,7 +84,7 @@ class Outcome:
         observations: What they were compared with.
         reference: One of the evaluations.
         adaptation: How the mesh was refined, if that was asked for.
-        remarks: What tracking a film had to say.
+        remarks: Which solvers were left out and why, and what tracking a film had to say.
     """
 
     metrics: dict[str, Any]
@@ -100,6 +103,7 @@ def run(job: Job, stages: Stages) -> Outcome:
     """
     started = datetime.now(UTC)
     _check(job)
+    chosen, left_out = able(job.solvers, job.spare, job.material, job.load)
     given = read_measurements(job.measurements) if isinstance(job.measurements, Path) else None
     shots: list[Figure] = []
     remarks: Sequence[str] = ()
@@ -120,7 +124,7 @@ def run(job: Job, stages: Stages) -> Outcome:
             tolerance=job.adapt,
             material=job.material,
             load=job.load,
-            solvers=job.solvers,
+            solvers=chosen,
             check=partial(check_inside, given) if given else None,
         )
         if adaptation is not None:
@@ -130,9 +134,14 @@ def run(job: Job, stages: Stages) -> Outcome:
             observations = given or virtual_experiment(problem, progress)
             write_measurements(folder / "observations.csv", observations)
         evaluations: list[Evaluation] = []
-        for solver in job.solvers:
+        for solver in chosen:
             known = _in_context(solver, job, folder, evaluations)
-            evaluations.append(_evaluate(job, known, problem, observations, folder, stages))
+            try:
+                evaluations.append(_evaluate(job, known, problem, observations, folder, stages))
+            except UnfitError as error:
+                if solver.name not in job.spare:
+                    raise
+                left_out[solver.name] = str(error)
         with stages.stage("certificate"):
             evaluations = certified(evaluations, problem)
         reference = pick_reference(evaluations, job.reference)
@@ -182,11 +191,12 @@ def run(job: Job, stages: Stages) -> Outcome:
                 "load": job.load.model_dump(),
                 "measurements_sha256": file_digest(folder / "observations.csv"),
                 "film": job.measurements.provenance() if isinstance(job.measurements, Film) else None,
-                "solvers": {solver.name: solver.settings() for solver in job.solvers},
+                "solvers": {
+                    solver.name: solver.settings() for solver in chosen if solver.name not in left_out
+                },
+                "left_out": left_out,
                 "seed": {
-                    solver.name: solver.settings()["seed"]
-                    for solver in job.solvers
-                    if "seed" in solver.settings()
+                    solver.name: solver.settings()["seed"] for solver in chosen if "seed" in solver.settings()
                 },
                 "device": {
                     evaluation.solver: evaluation.stats.get("device", "cpu") for evaluation in evaluations
@@ -207,9 +217,11 @@ def run(job: Job, stages: Stages) -> Outcome:
                     figures=[*figures, *shots],
                     provenance=provenance,
                     adaptation=adaptation,
+                    left_out=left_out_remarks(left_out),
                 ),
             )
             write_run(folder, provenance)
+    remarks = [*left_out_remarks(left_out), *remarks]
     return Outcome(numbers, evaluations, observations, reference, adaptation, remarks)
 
 
@@ -224,9 +236,6 @@ def _check(job: Job) -> None:
         check_adaptable(job.adapt, job.load)
     if job.reference is not None and job.reference not in names:
         raise UserError(f"the reference {job.reference!r} is not among the solvers {', '.join(names)}")
-    for solver in job.solvers:
-        check_load(solver, job.load)
-        with_law(job.material, solver)
     check_output(job.out)
 
 

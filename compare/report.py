@@ -40,6 +40,7 @@ class ReportContent:
         figures: Pictures in the order in which they appear.
         provenance: What to state of the run (seed, versions, hashes, times); a mapping becomes a group.
         adaptation: How the mesh was refined, if that was asked for.
+        left_out: Which solvers cannot do the job, and why.
     """
 
     design: Parameters
@@ -52,6 +53,7 @@ class ReportContent:
     figures: Sequence[Figure]
     provenance: Mapping[str, object]
     adaptation: Adaptation | None = None
+    left_out: Sequence[str] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from rich.progress import (
 from rich.table import Column
 
 from solvers.solver import Progress as Report
+from solvers.solver import UnfitError
 
 
 class Stages:
@@ -72,7 +73,11 @@ class Stages:
             last = note
             self._progress.update(task, completed=fraction, note=note)
 
-        yield report
+        try:
+            yield report
+        except UnfitError:
+            self._progress.remove_task(task)
+            raise
         self._progress.update(task, completed=1.0)
         self.seconds[name] = time.perf_counter() - started
         if self._log:

@@ -127,7 +127,8 @@ class Estimate:
     @property
     def condition(self) -> float:
         """Ratio of the largest to the smallest singular value."""
-        return float(self.singular_values[0] / max(self.singular_values[-1], np.finfo(float).tiny))
+        largest, smallest = (float(self.singular_values[end]) for end in (0, -1))
+        return largest / smallest if smallest else np.inf
 
     @property
     def values(self) -> FloatArray:

@@ -14,7 +14,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.errors import UserError
 from geometry.locate import Location
 from geometry.quadrature import body_quadrature
 from solvers.assimilation import Misfit, misfit_of, standard_deviations, without_each
@@ -23,7 +22,7 @@ from solvers.kernel_field import KernelField
 from solvers.problem import Problem
 from solvers.section_force import section_force
 from solvers.solution import Solution, Status
-from solvers.solver import Progress, check_problem, silent
+from solvers.solver import Progress, UnfitError, check_problem, silent
 
 FEWEST = 3
 """Markers below which two constants of a kernel cannot be found."""
@@ -60,14 +59,14 @@ class GaussianProcessSolver:
         """Fit the processes to the problem's observations; see `Solver`.
 
         Raises:
-            UserError: If there are fewer markers than `FEWEST` and one that can be left out.
+            UnfitError: If there are fewer markers than `FEWEST` and one that can be left out.
         """
         check_problem(self, problem)
         started = time.perf_counter()
         misfit = misfit_of(problem, marker_radius=0.0)
         count = 0 if misfit is None else len(misfit.points)
         if misfit is None or problem.observations is None or count <= FEWEST:
-            raise UserError(
+            raise UnfitError(
                 f"gp goes through markers: it needs more than {FEWEST} that were seen, not {count}"
             )
         base = self._base(problem)

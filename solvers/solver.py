@@ -17,6 +17,10 @@ def silent(fraction: float, text: str) -> None:
     """A progress report that nobody reads."""
 
 
+class UnfitError(UserError):
+    """A problem is not one that a solver is made for."""
+
+
 @runtime_checkable
 class Solver(Protocol):
     """Something that solves a `Problem`.
@@ -43,7 +47,7 @@ class Solver(Protocol):
         """Solve `problem`.
 
         Raises:
-            UserError: If the problem is of a kind that the solver does not have.
+            UnfitError: If the problem is of a kind that the solver does not have.
         """
         ...
 
@@ -53,16 +57,16 @@ class Solver(Protocol):
 
 
 def check_problem(solver: Solver, problem: Problem) -> None:
-    """Raise a `UserError` if the problem's law or kind of load is not one that the solver has."""
+    """Raise an `UnfitError` if the problem's law or kind of load is not one that the solver has."""
     if problem.material.law not in solver.laws:
-        raise UserError(f"{solver.name} has the law {' or '.join(solver.laws)}, not {problem.material.law}")
+        raise UnfitError(f"{solver.name} has the law {' or '.join(solver.laws)}, not {problem.material.law}")
     check_load(solver, problem.load)
 
 
 def check_load(solver: Solver, load: Load) -> None:
-    """Raise a `UserError` if the kind of load is not one that the solver takes."""
+    """Raise an `UnfitError` if the kind of load is not one that the solver takes."""
     if load.kind not in solver.loads:
-        raise UserError(
+        raise UnfitError(
             f"{solver.name} takes the loads {', '.join(solver.loads)}, not {load.kind!r}; "
             "`pinnray solvers` lists the loads of each"
         )
@@ -72,10 +76,10 @@ def with_law(material: Material, solver: Solver) -> Material:
     """The material with a law that the solver has: its own if it can, else the solver's usual one.
 
     Raises:
-        UserError: If that law does not exist for the material's plane state.
+        UnfitError: If that law does not exist for the material's plane state.
     """
     law = material.law if material.law in solver.laws else solver.laws[0]
     try:
         return Material(**{**material.model_dump(), "law": law})
     except ValidationError as error:
-        raise UserError(f"{solver.name}: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from None
+        raise UnfitError(f"{solver.name}: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from None

@@ -1,5 +1,6 @@
 """The one-shot main job: solve one finger with several solvers and compare them."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,7 @@ from compare.exits import NOT_CONVERGED, say
 from compare.film import Film, FilmOptions
 from compare.options import OUTPUT, Adapt, FingerOptions, PhysicsOptions, SolverOptions, existing
 from geometry.errors import UserError
+from solvers.solver import Solver
 
 
 def compare(
@@ -19,8 +21,12 @@ def compare(
     *,
     adapt: Adapt = None,
     solvers: Annotated[
-        str, Parameter(help="Names with commas between; `pinnray solvers` lists them.")
-    ] = "fem,pinn-std",
+        str | None,
+        Parameter(
+            help="Names with commas between; `pinnray solvers` lists them. Without it those of the complete "
+            "table that can do the job."
+        ),
+    ] = None,
     measurements: Annotated[
         str | None,
         Parameter(
@@ -57,16 +63,18 @@ def compare(
     """
     from compare.adaptation import adapted_enough
     from compare.pipeline import Job, run
+    from compare.preset_jobs import job_defaults
     from compare.stages import Stages
     from compare.tables import mae_table
 
     design, mesh = finger.read(options.preset)
     material, load = physics.read(options.preset)
-    made = options.read(solvers)
+    made = options.read(job_defaults(options.preset).solvers if solvers is None else solvers)
     physics.check_law(made)
     job = Job(
         design=design,
         solvers=made,
+        spare=_nobodys(made, options, reference) if solvers is None else (),
         mesh=mesh,
         adapt=adapt,
         material=material,
@@ -95,6 +103,14 @@ def compare(
     for evaluation in unconverged:
         say(f"error: {evaluation.solver} did not converge: {evaluation.message}")
     return NOT_CONVERGED if unconverged or not adapted_enough(outcome.adaptation) else 0
+
+
+def _nobodys(solvers: Sequence[Solver], options: SolverOptions, reference: str | None) -> list[str]:
+    """Names of the solvers that no other option asks for."""
+    asked = {text.partition(".")[0] for text in options.solver_set} | {reference}
+    if options.preset is not None:
+        asked |= {solver.name for solver in solvers if solver.settings().get("preset") == options.preset}
+    return [solver.name for solver in solvers if solver.name not in asked]
 
 
 def _measurements(source: str | None, options: FilmOptions) -> Path | Film | None:

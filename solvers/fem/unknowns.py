@@ -12,6 +12,7 @@ from solvers.estimation import Unknown
 from solvers.fem.lagrange import LagrangeSpace
 from solvers.fem.walls import walls_and_ribs
 from solvers.problem import Load, Problem, contact_ends, contact_functional
+from solvers.solver import UnfitError
 
 MEANINGS = {
     "position": "abscissa of the contact's middle",
@@ -67,11 +68,11 @@ def unknowns_of(problem: Problem, names: Sequence[str], width: float = 1.0) -> l
     found = []
     for name in names:
         if name.startswith("stroke") and load.displacement["uv".index(name[-1])] is None:
-            raise UserError(f"{name[-1]} of the load is free, so that there is no {name} to find")
+            raise UnfitError(f"{name[-1]} of the load is free, so that there is no {name} to find")
         if name in STIFFNESS and not parts[STIFFNESS[name]].any():
             raise UserError(f"this finger has no {STIFFNESS[name]} beside cavities: leave out {name}")
         if name == "position" and load.kind == "patch":
-            raise UserError("a patch lies on whole elements and cannot move: leave out position")
+            raise UnfitError("a patch lies on whole elements and cannot move: leave out position")
         found.append(
             {
                 "position": Unknown(

@@ -18,6 +18,7 @@ import pyvista
 from compare.cli import compare_main, main
 from compare.exits import BAD_INPUT, INTERRUPTED, NOT_CONVERGED
 from compare.options import FingerOptions, PhysicsOptions, SolverOptions
+from compare.preset_jobs import JOBS, JobDefaults, job_defaults
 from geometry.cache import finger_mesh
 from geometry.mesh import TriangleMesh
 from geometry.presets import preset_names
@@ -108,14 +109,14 @@ BAD = [
     ("compare --direction 90", "--direction 90: give an angle between -90 and 90 degrees"),
     ("compare --direction 5 --slide", "--slide leaves the travel along the finger free"),
     ("compare --load pull", 'Choose from: "mean", "point", "patch"'),
-    ("compare --load cylinder", "fem takes .*, not 'cylinder'; `pinnray solvers` lists"),
+    ("compare --solvers fem --load cylinder", "fem takes .*, not 'cylinder'; `pinnray solvers` lists"),
     ("compare --radius 5", "a radius belongs to the load cylinder, and to no other"),
     ("solve fem-nonlinear --load cylinder --radius 0", "--radius 0.0: input should be greater than 0"),
     ("solve fem-nonlinear --load cylinder --slide", "a cylinder .* has no friction"),
     ("compare --plane stress --solvers fem-nonlinear", "fem-nonlinear: .* plane strain only"),
     ("compare --law hooke", 'Choose from: "linear", "neo-hookean", "st-venant-kirchhoff"'),
     (
-        "compare --law st-venant-kirchhoff",
+        "compare --solvers fem,pinn-std --law st-venant-kirchhoff",
         r"none of the solvers has it \(fem has linear; pinn-std has linear, neo-hookean\)",
     ),
     ("solve fem --law neo-hookean", r"--law neo-hookean: none of the solvers has it \(fem has linear\)"),
@@ -134,7 +135,7 @@ BAD = [
     ("compare --solvers fem --solver-set fem.degree=7", "degree 1 and 2, not 7"),
     ("compare --solvers fem --solver-set fem.degree=1 --solver-set fem.degree=2", "fem.degree is set twice"),
     ("compare --seed -1", "--seed -1: give a whole number from 0"),
-    ("compare --preset papre", r"none of the solvers fem,pinn-std has it \(pinn-std has fast, paper\)"),
+    ("compare --preset papre", r"none of the solvers fem,.* has it \(pinn-std has fast, paper; pinn-asm has"),
     ("compare --preset paper --solvers fem", "--preset paper: none of the solvers fem has it"),
     ("compare --solver-set pinn-std.preset=slow", "pinn-std has no preset 'slow'; it has fast, paper"),
     (
@@ -142,9 +143,14 @@ BAD = [
         "pinn-std has no setting 'ridges'; it has epochs",
     ),
     ("compare --preset paper --load patch", "pinn-std takes the loads mean, point, not 'patch'"),
-    ("compare --device cuda", "--device cuda: none of the solvers fem,pinn-std can choose a device"),
+    ("compare --device cuda", "--device cuda: none of the solvers fem,.*,statfem can choose a device"),
     ("compare --preset paper --device tpu", "pinn-std: device = 'tpu': input should be 'cpu' or 'cuda'"),
     ("solve fem --preset paper", "--preset paper: none of the solvers fem has it"),
+    ("compare --solvers fem,fem-id --load patch", "fem-id takes the loads mean, point, not 'patch'"),
+    ("compare --reference fem-id --load patch", "fem-id takes the loads mean, point, not 'patch'"),
+    ("compare --solver-set fem-id.prior=2 --load patch", "fem-id takes the loads mean, point, not 'patch'"),
+    ("compare --load cylinder --plane stress", "statfem takes the loads mean"),  # none can
+    ("compare --solvers gp --mesh-size 1 --quiet --measurements good.csv", "gp .* needs more than 3 .*, not 1"),
     # measurements
     ("compare --measurements absent.csv", "there is no file absent.csv"),
     ("compare --measurements foreign", "foreign holds no picture"),  # a folder
@@ -339,6 +345,33 @@ def test_a_design_with_many_changes_still_has_a_name():
     changes = ("rib_thickness=2.1", "front_thickness=2.1", "back_thickness=2.1", "base_thickness=2.1")
     names = {FingerOptions(set=(*changes, f"height={height}")).read()[0].name for height in (95, 96)}
     assert [len(name) for name in names] == [64, 64]  # and they differ
+
+
+def test_without_names_a_solver_that_cannot_do_the_job_is_left_out(folder, capsys, monkeypatch):
+    """Two are known before anything is solved, and one once the markers are."""
+    monkeypatch.setattr("compare.pipeline.draw_all", lambda folder, **_: [])
+    monkeypatch.setitem(JOBS, "", JobDefaults(solvers="gp,fem-id,fem,fem-nonlinear"))
+    options = ["--load", "patch", "--plane", "stress", "--mesh-size", "1", "--measurements", "good.csv"]
+    assert main(["compare", *options]) == 0
+    output = capsys.readouterr()
+    warnings = [line for line in output.err.splitlines() if line.startswith("warning: ")]
+    assert len(warnings) == 3
+    assert warnings[0] == "warning: left out: fem-id (no load 'patch')"
+    assert warnings[1].startswith("warning: left out: fem-nonlinear (fem-nonlinear: ")
+    assert warnings[2].startswith("warning: left out: gp (gp goes through markers")
+    assert not any(line.startswith("gp:") for line in output.err.splitlines())
+    run = json.loads(Path("out/default/run.json").read_text())
+    assert (list(run["solvers"]), list(run["left_out"])) == (["fem"], ["fem-id", "fem-nonlinear", "gp"])
+    assert "Left out: fem-id (no load &#39;patch&#39;)." in Path("out/default/report.html").read_text("utf-8")
+
+
+def test_the_complete_table_and_that_of_the_paper_are_solvers_that_exist():
+    complete, paper = (
+        SolverOptions(preset=preset).read(job_defaults(preset).solvers) for preset in (None, "paper")
+    )
+    assert len(complete) == 8
+    assert [solver.name for solver in paper] == ["fem", "pinn-std", "pinn-asm"]
+    assert [solver.settings().get("preset") for solver in paper] == [None, "paper", "paper"]
 
 
 # How a run ends

@@ -1,0 +1,55 @@
+from dataclasses import dataclass
+from typing import ClassVar
+
+import pytest
+
+from compare.choice import able, left_out_remarks
+from solvers.problem import Load, Material, Problem
+from solvers.solution import Solution
+from solvers.solver import Progress, UnfitError, silent
+
+
+@dataclass
+class Takes:
+    """A solver that is never asked to solve."""
+
+    name: str
+    loads: tuple[str, ...] = ("mean",)
+    laws: ClassVar[tuple[str, ...]] = ("linear",)
+
+    def settings(self) -> dict[str, object]:
+        return {}
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        raise NotImplementedError
+
+
+SOLVERS = [Takes("a"), Takes("b", ("mean", "patch")), Takes("c")]
+PATCH = Load(kind="patch")
+
+
+def test_every_solver_that_can_stays_in_its_place():
+    assert able(SOLVERS, (), Material(), Load()) == (SOLVERS, {})
+
+
+def test_a_spare_solver_that_cannot_is_left_out():
+    chosen, left_out = able(SOLVERS, ("a", "b", "c"), Material(), PATCH)
+    assert [solver.name for solver in chosen] == ["b"]
+    assert left_out == {"a": "no load 'patch'", "c": "no load 'patch'"}
+
+
+def test_a_solver_that_was_asked_for_is_not():
+    with pytest.raises(UnfitError, match="c takes the loads mean, not 'patch'"):
+        able(SOLVERS, ("a", "b"), Material(), PATCH)
+
+
+def test_a_job_that_no_solver_can_do_is_refused():
+    with pytest.raises(UnfitError, match="c takes the loads mean, not 'patch'"):
+        able([SOLVERS[0], SOLVERS[2]], ("a", "c"), Material(), PATCH)
+
+
+def test_solvers_with_the_same_reason_share_a_line():
+    assert left_out_remarks({"a": "no load", "b": "too few markers", "c": "no load"}) == [
+        "left out: a, c (no load)",
+        "left out: b (too few markers)",
+    ]
