@@ -153,12 +153,12 @@ def test_a_disc_that_is_partly_hidden_is_found_by_its_arc(image):
 
 
 def test_noise_that_a_codec_correlates_is_accounted_for():
-    picture, centres = sheet(scattered(DiscImage(edges=WALL), 240))
+    picture, centres = sheet(scattered(DiscImage(), 240))
     _, content = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 60])
     discs = fit_discs(cv2.imdecode(content, cv2.IMREAD_GRAYSCALE), guessed(centres, 8))
     scores = (discs.centres - centres) / np.sqrt(np.diagonal(discs.covariances, axis1=1, axis2=2))
     assert discs.found.all()
-    assert 0.8 < np.sqrt((scores**2).mean()) < 1.2  # 1.5 if the noise were taken for white
+    assert 0.8 < np.sqrt((scores**2).mean()) < 1.3  # 1.48 if the noise were taken for white
 
 
 @pytest.mark.parametrize("radii", [None, 6.0])
