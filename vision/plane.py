@@ -22,7 +22,8 @@ STEPS = 50
 CONVERGED = 1e-9
 """Relative length of the last step."""
 UNDETERMINED = "the fiducials do not determine where the camera is"
-CROSS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+CORNERS = 24
+"""Of the polygon that stands for a circle."""
 
 
 class Slopes(NamedTuple):
@@ -73,15 +74,23 @@ class Plane:
         return self.view.pixels(points, self.parameters)
 
     def circles(self, pixels: FloatArray, radius: float) -> FloatArray:
-        """Centres of circles in the plane from those of their pictures, shapes (n, 2), mm.
+        """Centres of circles in the plane from the middles of their pictures, shapes (n, 2), mm."""
+        return self.points(pixels - self.beside(self.points(pixels), radius))
 
-        The picture's centre is the mean of what is seen along the circle, which the curvature of the map puts
-        beside the picture of the centre.
+    def beside(self, centres: FloatArray, radius: float) -> FloatArray:
+        """From the pictures of circles' centres to the middles of their pictures, shape (n, 2), pixels.
+
+        Perspective and lens bend the map from the plane, so that they are not the same. The middle is the
+        centroid of the area, as it is the centre of an ellipse.
         """
-        centres = self.points(pixels)
-        around = [self.pixels(centres + radius * step) for step in CROSS]
-        beside = np.mean(around, axis=0) - self.pixels(centres)
-        return self.points(pixels - beside)
+        angles = 2 * np.pi * np.arange(CORNERS) / CORNERS
+        reach = radius * np.sqrt(angles[1] / np.sin(angles[1]))  # the polygon has the circle's area
+        around = reach * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        seen = self.pixels((centres[:, None] + around).reshape(-1, 2)).reshape(-1, CORNERS, 2)
+        x, y = np.moveaxis(seen - self.pixels(centres)[:, None], 2, 0)
+        turns = x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)
+        middle = [((of + np.roll(of, -1, axis=1)) * turns).sum(axis=1) for of in (x, y)]
+        return np.stack(middle, axis=1) / (3 * turns.sum(axis=1)[:, None])
 
     def scales(self, points: FloatArray) -> FloatArray:
         """Pixels per mm at points of the plane, shape (n,): the root of the ratio of areas."""

@@ -69,9 +69,7 @@ class Setup:
             return similarity_plane(points, centres, covariances)
         radius = self.workspace.fiducial_diameter / 2
         plane = self._plane(points, centres, covariances)
-        # The centre of a circle's picture is not quite the picture of its centre.
-        centres = centres + plane.pixels(points) - plane.pixels(plane.circles(plane.pixels(points), radius))
-        plane = self._plane(points, centres, covariances)
+        plane = self._plane(points, centres - plane.beside(points, radius), covariances)
         if not isinstance(plane.view, CameraView):
             return plane
         return replace(plane, view=replace(plane.view, height=self.workspace.marker_plane))

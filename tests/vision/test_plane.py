@@ -10,7 +10,10 @@ from test_fiducials import pose_of
 
 from geometry.parameters import Parameters
 from vision.camera import Camera
+from vision.localiser import Spots
 from vision.plane import camera_plane, homography_plane, similarity_plane
+from vision.rig.shapes import centroid, circle, closed
+from vision.setup import Fiducials, Setup
 from vision.workspace import default_workspace
 
 CAMERA = Camera(1280, 720, 1200.0, 1195.0, 652.0, 349.0, distortion=(-0.12, 0.05, 1e-3, -5e-4, 0.0))
@@ -125,3 +128,36 @@ def test_errors_of_the_fiducials_mostly_cancel_in_displacements():
     np.testing.assert_allclose(shift, 0, rtol=0, atol=1e-12)
     small = np.sqrt(np.diag(plane.displacement_covariance(BEFORE, AFTER, none, none)).max())
     assert 0 < small < 0.3 * NOISE * 145 / 1200
+
+
+def pictured(points, radius, camera):
+    """The middles of the pictures of circles in the plane z = 0, by polygons of 512 corners."""
+    return np.array([centroid(closed(seen(circle(point, radius), camera))) for point in points])
+
+
+def test_the_middle_of_an_ellipse_is_that_of_its_conic():
+    plane = homography_plane(FIDUCIALS, seen(FIDUCIALS, PINHOLE), noise(7))
+    inverse = np.linalg.inv(np.append(plane.parameters, 1.0).reshape(3, 3))
+    (x, y), radius = BEFORE[3], 2.0
+    conic = inverse.T @ np.array([[1, 0, -x], [0, 1, -y], [-x, -y, x * x + y * y - radius**2]]) @ inverse
+    middle = np.linalg.solve(conic[:2, :2], -conic[:2, 2])
+    beside = middle - plane.pixels(BEFORE[3:4])[0]
+    assert np.linalg.norm(beside) > 0.015
+    np.testing.assert_allclose(plane.beside(BEFORE[3:4], radius)[0], beside, rtol=0, atol=5e-4)
+
+
+def test_a_lens_moves_the_middles_of_discs_which_is_undone():
+    plane = camera_plane(CAMERA, FIDUCIALS, seen(FIDUCIALS), noise(7))
+    middles = pictured(FIDUCIALS, 2.0, CAMERA)
+    assert np.abs(plane.points(middles) - FIDUCIALS).max() > 4e-3
+    np.testing.assert_allclose(plane.circles(middles, 2.0), FIDUCIALS, rtol=0, atol=1e-4)
+
+
+def test_the_plane_of_fiducials_is_that_of_their_discs():
+    setup = Setup(Parameters(), default_workspace(Parameters()), CAMERA)
+    spots = Spots(pictured(FIDUCIALS, 2.0, CAMERA), noise(7), np.full(7, 16.0))
+    plane = setup.plane(Fiducials(np.arange(7), spots))
+    assert plane.residual < 1e-4
+    np.testing.assert_allclose(
+        plane.points(seen(AFTER)) - plane.points(seen(BEFORE)), AFTER - BEFORE, atol=1e-4
+    )
