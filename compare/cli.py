@@ -8,6 +8,7 @@ from compare.exits import EXIT_CODES
 from compare.launch import launched
 from compare.verbs.calibrate import calibrate
 from compare.verbs.compare import compare
+from compare.verbs.crossval import crossval
 from compare.verbs.design import design
 from compare.verbs.gridsearch import gridsearch
 from compare.verbs.mesh import mesh
@@ -24,7 +25,7 @@ pinnray = App(
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
-for verb in (compare, design, mesh, solve, gridsearch, solvers, calibrate, pick, rig, track):
+for verb in (compare, design, mesh, solve, gridsearch, crossval, solvers, calibrate, pick, rig, track):
     pinnray.command(verb, help_epilogue=EXIT_CODES)
 
 

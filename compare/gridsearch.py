@@ -1,8 +1,6 @@
 """The paper's grid search for a learning rate and a weight of the boundary conditions."""
 
-import json
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from itertools import product
@@ -11,18 +9,19 @@ from typing import Any
 
 from compare.gridsearch_run import FAILED, RESULT_FILE, Point, Reference, Run, Task, train
 from compare.gridsearch_tables import best_of, ranked, run_note, write_runs
+from compare.kept_folder import check_kept_folder
 from compare.output_folder import locked
-from compare.processes import ProcessFailed, in_processes
+from compare.processes import ProcessFailed
 from compare.provenance import machine, package_versions, sources_digest
+from compare.staged_processes import in_stages
 from compare.stages import Stages
 from geometry.atomic import write_json
 from geometry.cache import finger_mesh
 from geometry.design import Design
-from geometry.errors import UserError
 from geometry.settings import MeshSettings
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
-from solvers.solver import Progress, Solver, check_load
+from solvers.solver import Solver, check_load
 
 SEARCH_FILE = "search.json"
 
@@ -82,7 +81,7 @@ def search(wanted: Search, stages: Stages) -> list[Run]:
     solver, *_ = (wanted.solver(point) for point in wanted.points)
     check_load(solver, wanted.load)
     definition = _definition(wanted, solver)
-    _check_folder(wanted.out, definition)
+    check_kept_folder(wanted.out / SEARCH_FILE, definition, job="grid search")
     with stages.stage("mesh"):
         problem = Problem(finger_mesh(wanted.design, settings=wanted.mesh), wanted.material, wanted.load)
     wanted.out.mkdir(parents=True, exist_ok=True)
@@ -132,42 +131,6 @@ def _definition(wanted: Search, solver: Solver) -> dict[str, Any]:
     }
 
 
-def _check_folder(out: Path, definition: Mapping[str, Any]) -> None:
-    """Refuse a folder that holds another search, or something else."""
-    if out.exists() and not out.is_dir():
-        raise UserError(f"{out} is a file; name a folder with --out")
-    if not out.exists() or not any(out.iterdir()):
-        return
-    try:
-        before = json.loads((out / SEARCH_FILE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        raise UserError(
-            f"{out} holds files that are not of a grid search; name another folder with --out"
-        ) from None
-    if differing := _differing(before, definition):
-        raise UserError(
-            f"{out} holds a search with other settings ({', '.join(differing)}); "
-            "name another folder with --out, or remove that one"
-        )
-
-
-def _differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
-    """Names of the entries that differ."""
-    flat_before, flat_now = _flat(before), _flat(now)
-    return [name for name in {**flat_before, **flat_now} if flat_before.get(name) != flat_now.get(name)]
-
-
-def _flat(content: Mapping[str, Any]) -> dict[str, Any]:
-    entries: dict[str, Any] = {}
-    for key, value in content.items():
-        entries |= (
-            {f"{key}.{name}": inner for name, inner in value.items()}
-            if isinstance(value, dict)
-            else {key: value}
-        )
-    return entries
-
-
 def _trained(wanted: Search, points: Sequence[Point], problem: Problem, stages: Stages) -> dict[Point, Run]:
     """Train at points of the grid, each in a process of its own."""
     with stages.stage("fem") as progress:
@@ -187,25 +150,19 @@ def _trained(wanted: Search, points: Sequence[Point], problem: Problem, stages: 
         )
         for point in points
     }
-    results: dict[Point, Run] = {}
-    lines: dict[str, tuple[ExitStack, Progress]] = {}
 
-    def report(name: str, fraction: float, note: str) -> None:
-        if name not in lines:
-            stack = ExitStack()
-            lines[name] = stack, stack.enter_context(stages.stage(name))
-        lines[name][1](fraction, note)
+    def run_of(name: str, answer: Run | ProcessFailed) -> Run:
+        if isinstance(answer, ProcessFailed):
+            said = f"its process ended with exit code {answer.exit_code}"
+            return Run(tasks[name].point, FAILED, said)
+        return answer
 
-    with (
-        stages.stage("runs") as overall,
-        closing(in_processes(train, tasks, processes=wanted.processes, report=report)) as answers,
-    ):
-        for name, answer in answers:
-            point = tasks[name].point
-            if isinstance(answer, ProcessFailed):
-                answer = Run(point, FAILED, f"its process ended with exit code {answer.exit_code}")
-            results[point] = answer
-            report(name, 1.0, run_note(answer))
-            lines[name][0].close()
-            overall(len(results) / len(tasks), f"{len(results)} of {len(tasks)} runs")
-    return results
+    answers = in_stages(
+        train,
+        tasks,
+        processes=wanted.processes,
+        stages=stages,
+        kind="runs",
+        note=lambda name, answer: run_note(run_of(name, answer)),
+    )
+    return {tasks[name].point: run_of(name, answer) for name, answer in answers}

@@ -16,7 +16,7 @@ from solvers.fem.lagrange import LagrangeField, LagrangeSpace
 from solvers.fem.linear import FemSolver
 from solvers.fem.nonlinear import FemNonlinearSolver
 from solvers.fem.observer import Observer
-from solvers.fem.parametrised import LinearFinger
+from solvers.fem.parametrised import LinearFinger, Response
 from solvers.fem.parametrised_nonlinear import PARAMETERS, NonlinearFinger
 from solvers.fem.unknowns import parse_parameters, problem_with, unknowns_of
 from solvers.problem import Problem
@@ -98,12 +98,43 @@ class FemIdSolver:
         said = f"without markers, this is {self.model}: {plain.status.message}"
         return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
 
+    def carried(self, solution: Solution, problem: Problem, other: Problem) -> Solution:
+        """The solution of another problem with the parameters that were found for the first one.
+
+        Those of finger and clamp stay. The contact is off its nominal place by as much as it was, and off its
+        nominal travel by as much of the travel.
+        """
+        names = parse_parameters(self.name, self.parameters)
+        share = float(np.linalg.norm(other.load.values) / np.linalg.norm(problem.load.values))
+        values = []
+        for before, now in zip(unknowns_of(problem, names), unknowns_of(other, names), strict=True):
+            found = float(solution.stats[before.name])
+            off = {"position": 1.0, "stroke_u": share, "stroke_v": share}.get(before.name)
+            values.append(found if off is None else now.start + off * (found - before.start))
+        space = LagrangeSpace(other.mesh, self.degree)
+        finger = self._finger(other, space, names)
+        response = finger.response(np.array(values))
+        finger.close()
+        return replace(
+            solution,
+            problem=problem_with(other, dict(zip(names, values, strict=True))),
+            field=LagrangeField(space, response.nodal),
+            energy=response.energy,
+            reaction=_reaction(other, response),
+            left_out=None,
+        )
+
+    def _finger(
+        self, problem: Problem, space: LagrangeSpace, names: tuple[str, ...]
+    ) -> LinearFinger | NonlinearFinger:
+        return (LinearFinger if self.model == "fem" else NonlinearFinger)(problem, space, names)
+
     def _solve(self, problem: Problem, observations: Observations, progress: Progress) -> Solution:
         started = time.perf_counter()
         names = parse_parameters(self.name, self.parameters)
         unknowns = unknowns_of(problem, names, self.prior)
         space = LagrangeSpace(problem.mesh, self.degree)
-        finger = (LinearFinger if self.model == "fem" else NonlinearFinger)(problem, space, names)
+        finger = self._finger(problem, space, names)
         observer = Observer.of(problem, space, observations, self.marker_radius)
         if self.reaction is not None:
             observer = observer.with_reaction(
@@ -118,15 +149,13 @@ class FemIdSolver:
         response = finger.response(found.values)
         own = problem_with(problem, dict(zip(names, found.values.tolist(), strict=True)))
         finger.close()
-        reaction = np.zeros(2)
-        reaction[problem.load.prescribed] = response.forces
         missed = observer.missed(found)
         return Solution(
             solver=self.name,
             problem=own,
             field=LagrangeField(space, response.nodal),
             energy=response.energy,
-            reaction=reaction,
+            reaction=_reaction(problem, response),
             status=Status(found.converged, sentence(found, missed)),
             stats={
                 "seconds": time.perf_counter() - started,
@@ -137,6 +166,13 @@ class FemIdSolver:
             },
             left_out=without_each(problem, -observer.missed_without_each(found)),
         )
+
+
+def _reaction(problem: Problem, response: Response) -> FloatArray:
+    """Force of the indenter, shape (2,), N/mm."""
+    reaction = np.zeros(2)
+    reaction[problem.load.prescribed] = response.forces
+    return reaction
 
 
 def statistics(found: Estimate) -> dict[str, float | int | str]:

@@ -127,7 +127,7 @@ def scripted(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Point]]:
             for name, task in tasks.items():
                 yield name, work(task)
 
-        monkeypatch.setattr("compare.gridsearch.in_processes", inline)
+        monkeypatch.setattr("compare.staged_processes.in_processes", inline)
         return trained
 
     def train_with(task: Task, worth: Measured) -> Run:
@@ -291,7 +291,9 @@ def test_another_search_in_the_same_folder_is_refused(wanted, scripted, changes,
     scripted(distance)
     searched(wanted)
     before = (wanted.out / "gridsearch.json").read_text()
-    with pytest.raises(UserError, match=rf"holds a search with other settings \({names}\); name another"):
+    with pytest.raises(
+        UserError, match=rf"holds a grid search with other settings \({names}\); name another"
+    ):
         searched(replace(wanted, **changes))
     assert (wanted.out / "gridsearch.json").read_text() == before
 

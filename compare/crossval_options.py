@@ -1,0 +1,58 @@
+"""What the options of `pinnray crossval` stand for."""
+
+from collections.abc import Sequence
+from math import inf
+
+from compare.crossval_folds import ALL, SCHEMES
+from compare.crossval_run import Entry
+from compare.options import SolverOptions
+from geometry.errors import UserError
+
+CHOICES = {"left-out": {"weights": "precision", "choose": "left-out"}}
+CHOICES |= {"evidence": {"weights": "precision", "choose": "evidence"}}
+"""Variants of a solver that can choose the weights of the markers, beside the paper's weight as it is."""
+
+
+def read_entries(options: SolverOptions, names: str) -> list[Entry]:
+    """The solvers, and those that can choose their weights once more for each way of choosing.
+
+    The choice is made inside a fold, by the markers that are given. Where --solver-set says how to choose,
+    there is that one only.
+    """
+    told = {text.partition("=")[0] for text in options.solver_set}
+    entries = []
+    for solver in options.read(names):
+        settings = solver.settings()
+        entries.append(Entry(solver.name, solver.name, settings))
+        if "choose" in settings and not told & {f"{solver.name}.choose", f"{solver.name}.weights"}:
+            entries += [
+                Entry(f"{solver.name} {choice}", solver.name, {**settings, **changes})
+                for choice, changes in CHOICES.items()
+            ]
+    if not entries:
+        raise UserError("no solver was asked for; name at least one")
+    return entries
+
+
+def read_schemes(text: str) -> list[str]:
+    """Names of schemes with commas between them."""
+    held = [scheme for scheme in SCHEMES if scheme != ALL]
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    if unknown := next((name for name in names if name not in held), None):
+        raise UserError(f"--schemes: there is no scheme {unknown!r}; there are {', '.join(held)}")
+    if not names or len(set(names)) < len(names):
+        raise UserError(f"--schemes {text}: name at least one of {', '.join(held)}, none twice")
+    return names
+
+
+def check_draws(seeds: int, noise: float) -> None:
+    """Refuse numbers that make no sense."""
+    if seeds < 1:
+        raise UserError(f"--seeds {seeds}: give a whole number from 1")
+    if not 0 <= noise < inf:
+        raise UserError(f"--noise {noise:g}: give a standard deviation of zero or more, mm")
+
+
+def labels(entries: Sequence[Entry]) -> str:
+    """Names of the solvers, for messages."""
+    return ", ".join(entry.label for entry in entries)

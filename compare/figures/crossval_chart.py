@@ -1,0 +1,97 @@
+"""A cross-validation as pictures: errors of held-out markers, and distances from the truth."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from compare.crossval_scores import Score
+from compare.figures.style import (
+    SOLVER_COLOURS,
+    WIDTH,
+    axes_at,
+    figure,
+    heading,
+    legend_above,
+    legend_height,
+    solver_colour,
+)
+
+HEAD, HEIGHT, FOOT, LEFT, GAP = 0.5, 2.2, 0.5, 0.72, 0.45
+"""Heights, the left margin and the gap between charts, inches."""
+
+SHAPES = "os^Dv"
+"""Of the marks: another one when the colours begin again."""
+
+PANELS = {"displacement": "displacement", "strain": "strain", "von_mises": "von Mises stress"}
+
+
+def draw_held_out(path: Path, *, errors: Mapping[str, Sequence[float]], simulated: bool) -> None:
+    """Draw the mean of |du| + |dv| at every marker where it is held out, a line a solver."""
+    height = legend_height(list(errors))
+    with figure(path, HEAD + height + HEIGHT + FOOT) as drawn:
+        heading(
+            drawn,
+            "Error of each marker when it is held out",
+            f"Mean over seeds, against {'simulated' if simulated else 'measured'} displacements.",
+        )
+        axes = axes_at(drawn, (LEFT, HEAD + height, WIDTH - LEFT - 0.1, HEIGHT))
+        for number, (label, values) in enumerate(errors.items()):
+            _line(axes, np.arange(1, len(values) + 1), values, number, label)
+        axes.set_xlabel("marker (1 is nearest the base)")
+        axes.set_ylabel(r"$|\Delta u| + |\Delta v|$, mm")
+        axes.set_xticks(range(1, len(values) + 1))
+        _finish(axes)
+
+
+def draw_fields(path: Path, *, scores: Mapping[str, Mapping[str, Score]], schemes: Sequence[str]) -> bool:
+    """Draw relative L2 distances from the truth by scheme, a chart a field.
+
+    Returns:
+        Whether there was a truth to be away from.
+    """
+    if not any(score.fields for each in scores.values() for score in each.values()):
+        return False
+    height = legend_height(list(scores))
+    width = (WIDTH - LEFT - 0.1 - (len(PANELS) - 1) * GAP) / len(PANELS)
+    with figure(path, HEAD + height + 0.25 + HEIGHT + FOOT + 0.25) as drawn:
+        heading(
+            drawn,
+            "Distance from the truth over the body",
+            "Relative L², %, by what is held out; the line at 100 % is a field of zero.",
+        )
+        for column, (name, title) in enumerate(PANELS.items()):
+            box = (LEFT + column * (width + GAP), HEAD + height + 0.25, width, HEIGHT)
+            axes = axes_at(drawn, box)
+            for number, (label, each) in enumerate(scores.items()):
+                values = [100 * each[scheme].fields[name].mean for scheme in schemes]
+                _line(axes, np.arange(len(schemes)), values, number, label)
+            axes.axhline(100, color="#999999", linewidth=0.6, zorder=1)
+            axes.set_xticks(range(len(schemes)), schemes, rotation=45, ha="right")
+            _finish(axes, legend=column == 0)
+            axes.set_xlabel(title)
+        drawn.axes[0].set_ylabel("%")
+    return True
+
+
+def _line(axes: Axes, x: Sequence[float], values: Sequence[float], number: int, label: str) -> None:
+    axes.plot(
+        x,
+        values,
+        color=solver_colour(number),
+        marker=SHAPES[number // len(SOLVER_COLOURS) % len(SHAPES)],
+        linestyle="-" if number < len(SOLVER_COLOURS) else "--",
+        linewidth=0.9,
+        markersize=3.5,
+        label=label,
+    )
+
+
+def _finish(axes: Axes, *, legend: bool = True) -> None:
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.grid(color="#dddddd", linewidth=0.5)
+    axes.set_axisbelow(True)
+    if legend:
+        legend_above(axes)
