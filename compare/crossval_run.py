@@ -65,7 +65,7 @@ class Outcome:
 
     fold: Fold
     errors: Sequence[Sequence[float]]
-    deviations: Sequence[Sequence[float]] | None
+    deviations: Sequence[Sequence[float]] | None = None
     fields: Mapping[str, float] = field(default_factory=dict)
     converged: bool = True
     given: bool = True
@@ -79,14 +79,14 @@ class Outcome:
     @property
     def held_out(self) -> FloatArray:
         """Errors at markers that were not given at this load, shape (h, 2), mm."""
-        return np.array(self.errors)[self.held]
+        return np.asarray(np.array(self.errors)[self.held])
 
     @property
     def in_sample(self) -> FloatArray:
         """Errors at markers that were given at this load, shape (g, 2), mm."""
         given = np.full(len(self.errors), self.given)
         given[self.held] = False
-        return np.array(self.errors)[given]
+        return np.asarray(np.array(self.errors)[given])
 
     @property
     def ratios(self) -> FloatArray:

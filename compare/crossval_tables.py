@@ -29,10 +29,11 @@ SHORT = {"not told apart": "≈"}
 """Of verdicts, where there is no room."""
 
 CAPTION = (
-    "In-sample: at markers that were given. Held out: at markers that were not. sum: mean of |Δu| + |Δv|; "
-    "rss: √(u² + v²) of the two means. ±: Student's interval over seeds, which differ in noise alone. vs fem, "
-    "vs gp: whether the sum is better or worse, by a bootstrap over folds and seeds; ≈: not told apart. "
-    f"Within: share of held-out errors within the interval of {LEVEL:.0%} that the solver states."
+    "Given: in-sample, at markers that were given. Held out: at markers that were not. sum: mean of "
+    "|Δu| + |Δv|; rss: √(u² + v²) of the two means. ±: Student's interval of the sum over seeds, which "
+    "differ in noise alone. vs: whether the sum is better or worse, by a bootstrap over folds and seeds; "
+    "≈: not told apart. Within: share of held-out errors within the interval of "
+    f"{LEVEL:.0%} that the solver states."
 )
 
 
@@ -59,7 +60,7 @@ def grids(result: Result) -> list[Grid]:
     found = [
         Grid(
             f"{scheme}: {SCHEMES[scheme]}; mm",
-            ["solver", "in-sample\nsum", "held\nout u", "v", "sum", "rss", "vs fem", "vs gp", "within"],
+            ["solver", "given\nsum", "held\nout u", "v", "sum", "±", "rss", "vs\nfem", "vs\ngp", "with-\nin"],
             [_marker_row(result, label, scheme) for label in result.scores],
             CAPTION if scheme == held[-1] else "",
         )
@@ -111,7 +112,8 @@ def _rich(grid: Grid) -> Table:
         title=grid.title,
         caption=grid.caption,
         box=SIMPLE_HEAD,
-        collapse_padding=True,
+        padding=0,
+        pad_edge=False,
         title_justify="left",
         caption_justify="left",
     )
@@ -134,7 +136,8 @@ def _marker_row(result: Result, label: str, scheme: str) -> list[str]:
         _mm(score.in_sample.get("mae_sum")),
         _mm(held.get("mae_u")),
         _mm(held.get("mae_v")),
-        _with_half(held.get("mae_sum")),
+        _mm(held.get("mae_sum")),
+        _half(held.get("mae_sum")),
         _mm(held.get("mae_rss")),
         *verdicts,
         NONE if score.coverage is None else f"{100 * score.coverage:.0f} %",
@@ -149,10 +152,10 @@ def _mm(interval: Interval | None) -> str:
     return NONE if interval is None else f"{interval.mean:.3f}"
 
 
-def _with_half(interval: Interval | None) -> str:
+def _half(interval: Interval | None) -> str:
     if interval is None or isnan(interval.high):
-        return _mm(interval)
-    return f"{interval.mean:.3f}±{interval.high - interval.mean:.1g}"
+        return NONE
+    return significant(interval.high - interval.mean, 1)
 
 
 def _has_fields(result: Result) -> bool:
@@ -169,7 +172,7 @@ def _fields(result: Result) -> Grid:
             values = [percent(scores[scheme].fields[name].mean) for name in FIELDS]
             pairs = [text for pair in zip(values, verdicts, strict=False) for text in pair]
             rows.append([scheme, label, *pairs, values[-1]])
-    headings = ["held out", "solver", "displ.", "vs fem", "strain", "vs fem", "v. Mises", "vs fem"]
+    headings = ["held out", "solver", "displ.", "vs\nfem", "strain", "vs\nfem", "v.\nMises", "vs\nfem"]
     return Grid(
         "Relative L2 distance from the truth over the body, %",
         [*headings, "truth's\nlaw"],

@@ -403,6 +403,22 @@ def test_the_guide_has_every_file_of_a_grid_search(tmp_path):
     assert sorted(documented) == sorted(actual)
 
 
+def test_the_guide_has_every_file_of_a_cross_validation(tmp_path):
+    from compare.cli import main
+
+    study = "--solvers fem,gp --schemes one-out --seeds 1 --mesh-size 1"
+    assert main(["crossval", *study.split(), "--out", str(tmp_path / "out")]) == 0
+    actual = [path.relative_to(tmp_path / "out").as_posix() for path in tmp_path.rglob("*") if path.is_file()]
+    rows = names(table(GUIDE, "file of a cross-validation"))
+    assert_same([name.replace("SEED", "seed-NAME") for name in rows], actual)
+
+
+def test_the_guide_has_every_scheme():
+    from compare.crossval_folds import ALL, SCHEMES
+
+    assert names(table(GUIDE, "scheme")) == [scheme for scheme in SCHEMES if scheme != ALL]
+
+
 def test_the_guide_has_every_output_file(run_folder):
     actual = [path.relative_to(run_folder).as_posix() for path in run_folder.rglob("*") if path.is_file()]
     assert_same(names(table(GUIDE, "file", after="## Output")), actual)

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
 from matplotlib.axes import Axes
 
 from compare.crossval_scores import Score
@@ -24,6 +23,9 @@ HEAD, HEIGHT, FOOT, LEFT, GAP = 0.5, 2.2, 0.5, 0.72, 0.45
 SHAPES = "os^Dv"
 """Of the marks: another one when the colours begin again."""
 
+SHIFT = 0.03
+"""Of a solver's marks from those of the one before, so that none hides another."""
+
 PANELS = {"displacement": "displacement", "strain": "strain", "von_mises": "von Mises stress"}
 
 
@@ -38,7 +40,7 @@ def draw_held_out(path: Path, *, errors: Mapping[str, Sequence[float]], simulate
         )
         axes = axes_at(drawn, (LEFT, HEAD + height, WIDTH - LEFT - 0.1, HEIGHT))
         for number, (label, values) in enumerate(errors.items()):
-            _line(axes, np.arange(1, len(values) + 1), values, number, label)
+            _line(axes, range(1, len(values) + 1), values, number, label)
         axes.set_xlabel("marker (1 is nearest the base)")
         axes.set_ylabel(r"$|\Delta u| + |\Delta v|$, mm")
         axes.set_xticks(range(1, len(values) + 1))
@@ -55,18 +57,18 @@ def draw_fields(path: Path, *, scores: Mapping[str, Mapping[str, Score]], scheme
         return False
     height = legend_height(list(scores))
     width = (WIDTH - LEFT - 0.1 - (len(PANELS) - 1) * GAP) / len(PANELS)
-    with figure(path, HEAD + height + 0.25 + HEIGHT + FOOT + 0.25) as drawn:
+    with figure(path, HEAD + height + HEIGHT + FOOT + 0.25) as drawn:
         heading(
             drawn,
             "Distance from the truth over the body",
             "Relative L², %, by what is held out; the line at 100 % is a field of zero.",
         )
         for column, (name, title) in enumerate(PANELS.items()):
-            box = (LEFT + column * (width + GAP), HEAD + height + 0.25, width, HEIGHT)
+            box = (LEFT + column * (width + GAP), HEAD + height, width, HEIGHT)
             axes = axes_at(drawn, box)
             for number, (label, each) in enumerate(scores.items()):
                 values = [100 * each[scheme].fields[name].mean for scheme in schemes]
-                _line(axes, np.arange(len(schemes)), values, number, label)
+                _line(axes, range(len(schemes)), values, number, label)
             axes.axhline(100, color="#999999", linewidth=0.6, zorder=1)
             axes.set_xticks(range(len(schemes)), schemes, rotation=45, ha="right")
             _finish(axes, legend=column == 0)
@@ -77,7 +79,7 @@ def draw_fields(path: Path, *, scores: Mapping[str, Mapping[str, Score]], scheme
 
 def _line(axes: Axes, x: Sequence[float], values: Sequence[float], number: int, label: str) -> None:
     axes.plot(
-        x,
+        [place + SHIFT * number for place in x],
         values,
         color=solver_colour(number),
         marker=SHAPES[number // len(SOLVER_COLOURS) % len(SHAPES)],

@@ -24,6 +24,7 @@ MODULES = (
     "mesh_drawing",
     "grid_chart",
     "calibration_picture",
+    "crossval_chart",
 )
 
 

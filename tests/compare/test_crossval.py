@@ -1,0 +1,390 @@
+"""Cross-validation: what is held out is not seen, scores are what they say, what is finished is kept."""
+
+import csv
+import json
+import shlex
+from collections.abc import Generator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import t
+
+from compare.cli import main
+from compare.crossval_folds import (
+    ALL,
+    DRAWS,
+    LOAD,
+    ONE,
+    RANDOM,
+    TIP,
+    Condition,
+    Fold,
+    conditions_of,
+    folds_of,
+    training,
+)
+from compare.crossval_run import Entry, Outcome, Task, judge
+from compare.crossval_scores import Difference, Interval, difference, of_scheme, score
+from compare.crossval_truth import Sampler, Truth
+from compare.figures.crossval_chart import draw_fields, draw_held_out
+from geometry.mesh import TriangleMesh
+from geometry.observations import Observations
+from geometry.quadrature import body_quadrature
+from solvers.assimilation import misfit_of
+from solvers.fem.linear import FemSolver
+from solvers.problem import Load, Material, Problem
+from solvers.registry import make_solver
+from solvers.solution import Solution
+from solvers.solver import silent
+
+NOISE = 0.005
+
+
+@pytest.fixture(scope="module")
+def truth(coarse_mesh: TriangleMesh) -> Solution:
+    """Stands for a richer model: the same finger, pressed by something that sticks."""
+    return FemSolver(degree=1).solve(Problem(coarse_mesh, load=Load(kind="patch", displacement=(-1.0, -9.0))))
+
+
+@pytest.fixture(scope="module")
+def observations(coarse_mesh: TriangleMesh, truth: Solution) -> Observations:
+    points = coarse_mesh.markers
+    return Observations(
+        points,
+        truth.displacement(points),
+        np.full_like(points, NOISE),
+        np.ones(9, dtype=bool),
+        "a test",
+        True,
+    )
+
+
+@pytest.fixture
+def task(tmp_path: Path, coarse_mesh: TriangleMesh, truth: Solution, observations: Observations) -> Task:
+    """`gp` and one fold of each kind, at the full load and half of it."""
+    coarse_mesh.save(tmp_path / "mesh.npz")
+    sampler = Sampler.of(coarse_mesh, coarse_mesh.markers, 0.8)
+    sampled = sampler.of_solution(truth, coarse_mesh)
+    state = truth.state(sampler.inside)
+    paths = []
+    for share in (1.0, 0.5):
+        paths.append(tmp_path / f"truth-{share}.npz")
+        Truth(
+            share * sampled.markers,
+            share * sampled.displacement,
+            share * state.strain,
+            share * state.von_mises,
+        ).save(paths[-1])
+    half = replace(observations, displacements=0.5 * observations.displacements)
+    return Task(
+        entry=entry("gp"),
+        mesh=tmp_path / "mesh.npz",
+        material=Material(),
+        conditions=[
+            Condition("full", Load(), 1.0, 35.0),
+            Condition("half", Load(displacement=(0.0, -5.0)), 0.5, 35.0),
+        ],
+        truths=paths,
+        observations=[[observations, half]],
+        folds=[Fold(ALL, "all", ()), Fold(ONE, "marker 4", (3,)), Fold(LOAD, "half", (), 1)],
+        radius=0.8,
+        folder=tmp_path / "kept",
+        threads=1,
+    )
+
+
+def entry(name: str, **settings: object) -> Entry:
+    return Entry(name, name, make_solver(name, **settings).settings())
+
+
+def judged(task: Task) -> list[Outcome]:
+    (outcomes,) = judge(task)
+    return outcomes
+
+
+# What is held out
+
+
+def test_folds_hold_out_what_they_say(coarse_mesh):
+    conditions = conditions_of(Problem(coarse_mesh), others=True)
+    folds = folds_of([ONE, TIP, RANDOM, LOAD], 9, conditions)
+    held = {scheme: [fold.held for fold in folds if fold.scheme == scheme] for scheme in (ONE, TIP, RANDOM)}
+    assert held[ONE] == [(marker,) for marker in range(9)]
+    assert held[TIP] == [(6, 7, 8)]
+    assert len(held[RANDOM]) == DRAWS
+    assert {len(set(draw)) for draw in held[RANDOM]} == {3}
+    assert len(set(held[RANDOM])) > 5
+    assert [(c.load.displacement, c.load.position) for c in conditions] == [
+        ((0.0, -10.0), None),
+        ((0.0, -5.0), None),
+        ((0.0, -7.5), None),
+        ((0.0, -10.0), 30.0),
+        ((0.0, -10.0), 40.0),
+    ]
+    assert [fold.condition for fold in folds if fold.scheme == LOAD] == [1, 2, 3, 4]
+
+
+def test_nothing_is_left_of_what_is_held_out(observations):
+    given = training(observations, (2, 5))
+    assert np.flatnonzero(~given.visible).tolist() == [2, 5]
+    for values in (given.displacements, given.standard_deviations):
+        assert not values[[2, 5]].any()
+        assert values[[0, 1, 3, 4, 6, 7, 8]].all()
+
+
+@pytest.mark.parametrize("name", ["gp", "fem-asm", "fem-id", "statfem"])
+def test_predictions_do_not_depend_on_what_is_held_out(task, observations, name):
+    """A marker that is held out is moved by 5 mm: so is its error, and no prediction changes."""
+    fold = Fold(ONE, "marker 4", (3,))
+    settings = {"degree": 1} if name != "gp" else {}
+    settings |= {"weights": "precision", "choose": "left-out"} if name == "fem-asm" else {}
+    own = replace(task, entry=entry(name, **settings), folds=[fold])
+    moved = observations.displacements.copy()
+    moved[3] += [5.0, -5.0]
+    other = replace(observations, displacements=moved)
+    before = judged(own)[0]
+    after = judged(replace(own, observations=[[other, other]], folder=task.folder / "moved"))[0]
+    change = np.zeros((9, 2))
+    change[3] = [-5.0, 5.0]
+    np.testing.assert_allclose(np.array(after.errors) - before.errors, change, atol=1e-12)
+    assert after.fields == before.fields
+
+
+# What a fold is worth
+
+
+@pytest.mark.parametrize("name", ["gp", "fem-asm", "fem-id", "statfem"])
+def test_a_fold_is_the_solver_s_own_solution_without_what_is_held_out(
+    task, coarse_mesh, observations, truth, name
+):
+    """By `solve`, with what the command shares between folds left aside; errors and distances by hand."""
+    held = (1, 3)
+    settings = {"degree": 1} if name != "gp" else {}
+    folds = [Fold(ALL, "all", ()), Fold(RANDOM, "draw 1", held)]  # the second one finds shared work
+    _, outcome = judged(replace(task, entry=entry(name, **settings), folds=folds))
+    visible = ~np.isin(np.arange(9), held)
+    problem = Problem(coarse_mesh, observations=replace(observations, visible=visible))
+    solution = make_solver(name, **settings).solve(problem)
+    disc = misfit_of(Problem(coarse_mesh, observations=observations))
+    points, means = disc.sampling()
+    np.testing.assert_allclose(
+        outcome.errors, means @ solution.displacement(points) - observations.displacements, atol=1e-7
+    )
+    rule = body_quadrature(coarse_mesh)
+    mine, true = (each.displacement(rule.location) for each in (solution, truth))
+    squares = [(rule.weights[:, None] * values**2).sum() for values in (mine - true, true)]
+    assert outcome.fields["displacement"] == pytest.approx(np.sqrt(squares[0] / squares[1]), rel=1e-6)
+    mine, true = (each.state(rule.location).von_mises for each in (solution, truth))
+    squares = [(rule.weights * values**2).sum() for values in (mine - true, true)]
+    assert outcome.fields["von_mises"] == pytest.approx(np.sqrt(squares[0] / squares[1]), rel=1e-6)
+    if name in ("gp", "statfem"):
+        spread = solution.field.standard_deviation(coarse_mesh.locate(observations.points))
+        np.testing.assert_allclose(outcome.deviations, np.hypot(spread, NOISE), rtol=1e-5)
+    else:
+        assert outcome.deviations is None
+
+
+@pytest.mark.parametrize("name", ["gp", "fem-asm", "fem-id", "statfem"])
+def test_what_was_learnt_is_carried_to_half_the_load(task, name):
+    """All of it is linear, and so is this truth: half the load has half the errors."""
+    settings = {"degree": 1} if name != "gp" else {}
+    outcomes = judged(replace(task, entry=entry(name, **settings)))
+    np.testing.assert_allclose(outcomes[2].errors, 0.5 * np.array(outcomes[0].errors), atol=1e-6)
+    assert outcomes[2].held == list(range(9))
+    assert len(outcomes[2].in_sample) == 0
+    assert outcomes[2].fields["displacement"] == pytest.approx(outcomes[0].fields["displacement"], rel=1e-5)
+
+
+def test_a_solver_that_is_given_nothing_has_nothing_in_sample(task):
+    outcomes = judged(replace(task, entry=entry("fem", degree=1, estimate=False)))
+    assert [len(outcome.in_sample) for outcome in outcomes] == [0, 0, 0]
+    assert [len(outcome.held_out) for outcome in outcomes] == [0, 1, 9]
+    assert outcomes[0].errors == outcomes[1].errors
+
+
+def test_finished_folds_are_kept_and_those_of_other_settings_are_not(task, monkeypatch):
+    first = judged(task)
+
+    def again(*_: object) -> None:
+        raise RuntimeError("solved again")
+
+    monkeypatch.setattr("compare.crossval_run.refitter", again)
+    assert [outcome.errors for outcome in judged(task)] == [outcome.errors for outcome in first]
+    with pytest.raises(RuntimeError, match="solved again"):
+        judged(replace(task, entry=entry("gp", clamp=True)))
+
+
+# Scores
+
+
+def outcome_of(scheme: str, held: tuple[int, ...], errors: object, **more: object) -> Outcome:
+    return Outcome(Fold(scheme, str(held), held), np.array(errors, dtype=float).tolist(), **more)
+
+
+def test_scores_by_hand():
+    seeds = [
+        [
+            outcome_of(
+                ONE,
+                (0,),
+                [[a, -2.0], [0.1, 0.3]],
+                deviations=[[2.0, 0.5], [1.0, 1.0]],
+                fields={"displacement": a / 10, "von_mises": 0.2},
+            ),
+            outcome_of(
+                ONE,
+                (1,),
+                [[0.2, -0.1], [0.5, 4.0]],
+                deviations=[[1.0, 1.0], [1.0, 1.0]],
+                fields={"displacement": 0.3, "von_mises": 0.2},
+            ),
+        ]
+        for a in (1.0, 2.0)
+    ]
+    found = score(seeds)
+    # Held out: u of 1 or 2 and 0.5, v of 2 and 4.
+    low, high = 0.75 + 3.0, 1.25 + 3.0
+    mean = (low + high) / 2
+    half = t.ppf(0.975, 1) * np.std([low, high], ddof=1) / np.sqrt(2)
+    interval = found.held_out["mae_sum"]
+    assert (interval.mean, interval.low, interval.high) == pytest.approx((mean, mean - half, mean + half))
+    assert found.held_out["mae_rss"].mean == pytest.approx((np.hypot(0.75, 3) + np.hypot(1.25, 3)) / 2)
+    assert found.in_sample["mae_u"].mean == pytest.approx(0.15)
+    assert found.in_sample["mae_v"].mean == pytest.approx(0.2)
+    assert found.fields["displacement"].mean == pytest.approx((0.2 + 0.25) / 2)
+    assert found.coverage == 0.5  # 1 / 2 and 2 / 2 and both 0.5 / 1 are within 1.96, 2 / 0.5 and 4 / 1 not
+    assert found.per_marker == pytest.approx([3.5, 4.5])
+    assert np.isnan(Interval.of([1.0]).low)
+
+
+def test_a_difference_is_paired_by_fold():
+    """Folds differ by more than solvers do, and yet the solvers are told apart."""
+    hard = np.array([[1.0, 5.0, 9.0, 20.0]])
+    better = Difference.of((hard - 0.1) - hard)
+    assert (better.mean, better.verdict) == (pytest.approx(-0.1), "better")
+    assert Difference.of(np.array([[0.1, 0.2], [0.3, 0.1]])).verdict == "worse"
+    assert Difference.of(np.array([[1.0, -1.2, 0.9, -0.8]])).verdict == "not told apart"
+
+
+def test_the_bootstrap_is_about_as_wide_as_the_mean_is_uncertain():
+    """Against the normal theory of a mean of 40 independent values."""
+    values = np.random.default_rng(3).normal(size=(1, 40))
+    found = Difference.of(values)
+    expected = 2 * 1.96 * values.std(ddof=1) / np.sqrt(40)
+    assert found.high - found.low == pytest.approx(expected, rel=0.1)
+
+
+def test_differences_are_of_the_same_folds():
+    own = [[outcome_of(ONE, (0,), [[1.0, 0.0], [0.0, 0.0]])]]
+    other = [[outcome_of(ONE, (0,), [[3.0, 1.0], [0.0, 0.0]])]]
+    assert difference(own, other, "mae_sum").mean == -3.0
+    assert difference(own, other, "von_mises") is None
+    assert of_scheme(own, TIP) == [[]]
+
+
+# The command
+
+
+@pytest.fixture
+def in_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tasks one after the other in this process."""
+
+    def inline(work: object, tasks: Mapping[str, object], **_: object) -> Generator:
+        for name, each in tasks.items():
+            yield name, work(each, silent)
+
+    monkeypatch.setattr("compare.staged_processes.in_processes", inline)
+
+
+def run(line: str, out: Path) -> int:
+    return main([*shlex.split(f"crossval {line} --mesh-size 1"), "--out", str(out)])
+
+
+def test_the_command_writes_what_the_guide_says_and_goes_on(tmp_path, capsys, in_line, monkeypatch):
+    line = "--solvers fem,gp,fem-asm --schemes tip-out --solver-set fem-asm.choose=given"
+    assert run(f"{line} --seeds 1", tmp_path / "out") == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "tip-out: the third of the markers nearest the tip held out together; mm" in said
+    content = json.loads((tmp_path / "out" / "crossval.json").read_text())
+    assert list(content["solvers"]) == ["fem", "gp", "fem-asm"]
+    assert content["solvers"]["fem"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["low"] is None
+    before = content["solvers"]["gp"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["mean"]
+    assert "simulated by fem-nonlinear" in content["measurements"]["description"]
+    assert any("von Mises stress" in sentence for sentence in content["answers"])
+
+    assert run(f"{line} --seeds 2", tmp_path / "out") == 0
+    content = json.loads((tmp_path / "out" / "crossval.json").read_text())
+    against = content["solvers"]["fem-asm"]["against"]["fem"]["tip-out"]
+    assert against["mae_sum"]["verdict"] == "better"
+    assert against["von_mises"]["verdict"] == "worse"
+    with (tmp_path / "out" / "held_out.csv").open() as file:
+        rows = {(row["solver"], row["scheme"]): row for row in csv.DictReader(file)}
+    mean = content["solvers"]["gp"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["mean"]
+    assert float(rows["gp", "tip-out"]["held_out_mae_sum_mm"]) == mean
+    assert mean != before
+    assert rows["fem", "all"]["in_sample_mae_sum_mm"] == ""
+
+    assert run(f"{line} --seeds 1 --noise 0.02", tmp_path / "out") == 2
+    assert "holds a cross-validation with other settings (noise_mm)" in capsys.readouterr().err
+
+
+def test_measured_markers_have_no_truth(tmp_path, capsys, in_line, observations):
+    from vision.measurements import write_measurements
+
+    seen = np.arange(9) != 4
+    measured = replace(observations, simulated=False, visible=seen)
+    write_measurements(tmp_path / "markers.csv", measured)
+    line = f"--measurements {tmp_path / 'markers.csv'} --solvers fem,gp --schemes one-out,load-out --seeds 1"
+    assert run(line, tmp_path / "out") == 0
+    assert "load-out needs a truth at other loads, and is left out" in capsys.readouterr().err
+    content = json.loads((tmp_path / "out" / "crossval.json").read_text())
+    assert list(content["schemes"]) == ["all", "one-out"]
+    assert len(content["solvers"]["gp"]["schemes"]["one-out"]["per_marker"]) == 8
+    assert content["solvers"]["gp"]["schemes"]["one-out"]["fields"] == {}
+    assert not (tmp_path / "out" / "fields.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("--seeds 0", "--seeds 0: give a whole number from 1"),
+        ("--noise -1", "--noise -1: give a standard deviation of zero or more"),
+        ("--schemes tip", "there is no scheme 'tip'; there are one-out, tip-out, random, load-out"),
+        ("--load patch --solvers fem,gp", "load-out presses elsewhere on the same mesh"),
+        ("--solvers fem,fem", "a solver is named twice: fem, fem"),
+        ("--measurements nowhere.csv", "there is no file nowhere.csv"),
+    ],
+)
+def test_bad_input_is_one_line(tmp_path, capsys, line, said):
+    assert run(line, tmp_path / "out") == 2
+    (error,) = [text for text in capsys.readouterr().err.splitlines() if text.startswith("error")]
+    assert said in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_solver_that_chooses_its_weights_is_there_in_three_ways():
+    from compare.crossval_options import read_entries
+    from compare.options import SolverOptions
+
+    entries = read_entries(SolverOptions(), "fem,fem-asm")
+    assert [entry.label for entry in entries] == ["fem", "fem-asm", "fem-asm left-out", "fem-asm evidence"]
+    assert [entry.settings.get("choose") for entry in entries] == [None, "given", "left-out", "evidence"]
+    fixed = SolverOptions(solver_set=("fem-asm.choose=left-out",))
+    assert [entry.label for entry in read_entries(fixed, "fem-asm")] == ["fem-asm"]
+
+
+def test_pictures_show_every_solver(pages, tmp_path):
+    values = {f"solver {number}": [0.1 * number + 0.01, 1.0, 2.0] for number in range(9)}
+    draw_held_out(tmp_path / "held.png", errors=values, simulated=True)
+    fields = {"displacement": 0.2, "strain": 0.3, "von_mises": 2.0}
+    one = score([[outcome_of(ONE, (0,), [[1.0, 1.0]], fields=fields)]])
+    scores = {label: {ALL: one, ONE: one} for label in values}
+    assert draw_fields(tmp_path / "fields.png", scores=scores, schemes=[ALL, ONE])
+    for name in ("held.png", "fields.png"):
+        page = pages[tmp_path / name]
+        assert page.cut_off() == []
+        assert all(label in page.text for label in values)
+    bare = {"gp": {ALL: score([[outcome_of(ALL, (0,), [[1.0, 1.0]])]])}}
+    assert not draw_fields(tmp_path / "none.png", scores=bare, schemes=[ALL])
