@@ -20,7 +20,7 @@ from solvers.problem import Material, Problem
 from solvers.refitting import Carrying, refitter
 from solvers.registry import make_solver
 from solvers.solution import Solution
-from solvers.solver import Progress, Solver, silent, with_law
+from solvers.solver import Progress, Solver, UnfitError, silent, with_law
 
 
 @dataclass(frozen=True)
@@ -256,7 +256,7 @@ class _Judge:
             try:
                 solution = solver.solve(self._at(condition))
                 self._priors[condition] = self._sampler.of_solution(solution, self._problem.mesh)
-            except UserError:
+            except UnfitError:
                 self._priors[condition] = None
         return self._priors[condition]
 
