@@ -82,6 +82,32 @@ def reference_differences(evaluation: Evaluation, reference: Evaluation) -> Refe
     )
 
 
+class TruthDifferences(NamedTuple):
+    """A solver against the fields of the virtual experiment, on the shared mesh.
+
+    Attributes:
+        displacement: Of the displacement vector, mm.
+        strain: Of the strain tensor, each with the strain of its own law.
+        von_mises: Of the von Mises stress, MPa.
+    """
+
+    displacement: FieldDifference
+    strain: FieldDifference
+    von_mises: FieldDifference
+
+
+def truth_differences(evaluation: Evaluation, truth: Evaluation) -> TruthDifferences:
+    """Differences from what is true where the markers are simulated."""
+
+    def differ(name: str) -> FieldDifference:
+        values, true = (
+            np.reshape(getattr(each, name), (len(truth.weights), -1)) for each in (evaluation, truth)
+        )
+        return field_difference(values, true, truth.weights)
+
+    return TruthDifferences(*map(differ, TruthDifferences._fields))
+
+
 def pick_reference(evaluations: Sequence[Evaluation], wanted: str | None = None) -> Evaluation:
     """The evaluation called `wanted`, else `fem`, else the first."""
     named = {evaluation.solver: evaluation for evaluation in evaluations}

@@ -22,10 +22,11 @@ from compare.provenance import file_digest, machine, package_versions, sources_d
 from compare.report import ReportContent, write_report
 from compare.results import metrics
 from compare.stages import Stages
+from compare.table_one import write_table_one
 from compare.tables import write_markers, write_summary
 from compare.uncertainty import evaluated
 from compare.verdict import certified
-from compare.virtual_experiment import virtual_experiment
+from compare.virtual_experiment import simulated
 from geometry.atomic import write_json
 from geometry.design import Design
 from geometry.errors import OutsideBodyError, UserError
@@ -84,6 +85,7 @@ class Outcome:
         observations: What they were compared with.
         reference: One of the evaluations.
         adaptation: How the mesh was refined, if that was asked for.
+        truth: The fields of the virtual experiment, if the markers are simulated.
         remarks: Which solvers were left out and why, and what tracking a film had to say.
     """
 
@@ -92,6 +94,7 @@ class Outcome:
     observations: Observations
     reference: Evaluation
     adaptation: Adaptation | None = None
+    truth: Evaluation | None = None
     remarks: Sequence[str] = ()
 
 
@@ -131,7 +134,7 @@ def run(job: Job, stages: Stages) -> Outcome:
             write_rounds(folder / "adapt.csv", adaptation)
         problem = Problem(mesh, job.material, job.load)
         with stages.stage("measurements") as progress:
-            observations = given or virtual_experiment(problem, progress)
+            observations, truth = (given, None) if given else simulated(problem, progress)
             write_measurements(folder / "observations.csv", observations)
         evaluations: list[Evaluation] = []
         for solver in chosen:
@@ -160,11 +163,13 @@ def run(job: Job, stages: Stages) -> Outcome:
             for evaluation in evaluations:
                 write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", mesh, evaluation)
             write_markers(folder / "markers.csv", evaluations=evaluations, observations=observations)
+            write_table_one(folder / "table1.csv", evaluations=evaluations, observations=observations)
             write_summary(
                 folder / "summary.csv",
                 evaluations=evaluations,
                 observations=observations,
                 reference=reference,
+                truth=truth,
             )
             if curves := force_curves(evaluations, job.load):
                 write_force_displacement(
@@ -177,6 +182,7 @@ def run(job: Job, stages: Stages) -> Outcome:
                 observations=observations,
                 evaluations=evaluations,
                 reference=reference,
+                truth=truth,
             )
             write_json(folder / "metrics.json", numbers)
             provenance = {
@@ -218,11 +224,12 @@ def run(job: Job, stages: Stages) -> Outcome:
                     provenance=provenance,
                     adaptation=adaptation,
                     left_out=left_out_remarks(left_out),
+                    truth=truth,
                 ),
             )
             write_run(folder, provenance)
     remarks = [*left_out_remarks(left_out), *remarks]
-    return Outcome(numbers, evaluations, observations, reference, adaptation, remarks)
+    return Outcome(numbers, evaluations, observations, reference, adaptation, truth, remarks)
 
 
 def _check(job: Job) -> None:

@@ -13,9 +13,11 @@ from compare.differences import ReferenceDifferences
 from compare.evaluation import Evaluation
 from compare.figures import Figure
 from compare.figures.labels import solver_label
-from compare.metrics import MarkerErrors, held_out_errors, marker_errors, reference_differences
+from compare.metrics import TruthDifferences, reference_differences, truth_differences
 from compare.regions import NEAR
+from compare.table_one import PRINTED, millimetres, table_one
 from compare.tables import seconds
+from compare.truth_text import truth_sentences
 from compare.uncertainty import indistinct
 from geometry.atomic import atomic_path
 from geometry.mesh import TriangleMesh
@@ -41,6 +43,7 @@ class ReportContent:
         provenance: What to state of the run (seed, versions, hashes, times); a mapping becomes a group.
         adaptation: How the mesh was refined, if that was asked for.
         left_out: Which solvers cannot do the job, and why.
+        truth: The fields of the virtual experiment; None where markers were measured.
     """
 
     design: Parameters
@@ -54,6 +57,7 @@ class ReportContent:
     provenance: Mapping[str, object]
     adaptation: Adaptation | None = None
     left_out: Sequence[str] = ()
+    truth: Evaluation | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +67,7 @@ class SolverEntry:
     label: str
     is_reference: bool
     evaluation: Evaluation
-    errors: MarkerErrors
-    left_out: MarkerErrors | None
+    to_truth: TruthDifferences | None
     differences: ReferenceDifferences
     indistinct: str
     reaction: tuple[float, float]
@@ -90,6 +93,7 @@ def render(content: ReportContent) -> str:
         lstrip_blocks=True,
     )
     environment.filters |= {
+        "millimetres": millimetres,
         "number": text.number,
         "distance": text.distance,
         "percent": text.percent,
@@ -106,6 +110,9 @@ def render(content: ReportContent) -> str:
         own=content.reference.uncertainty,
         own_error=text.own_error_sentence(solver_label(content.reference), content.reference),
         beside=text.beside,
+        table_one=table_one(content.evaluations, content.observations),
+        printed=PRINTED,
+        truth_sentences=truth_sentences(content.evaluations, content.reference, content.truth),
         entries=[_entry(evaluation, content) for evaluation in content.evaluations],
         design_rows=text.design_rows(content.design),
         paper_rows=[(symbol, value) for _, symbol, value in text.design_rows(content.design) if symbol],
@@ -125,8 +132,7 @@ def _entry(evaluation: Evaluation, content: ReportContent) -> SolverEntry:
         label=solver_label(evaluation),
         is_reference=evaluation is content.reference,
         evaluation=evaluation,
-        errors=marker_errors(evaluation, content.observations),
-        left_out=held_out_errors(evaluation, content.observations) if evaluation.in_sample else None,
+        to_truth=None if content.truth is None else truth_differences(evaluation, content.truth),
         differences=differences,
         indistinct=text.indistinct_sentence(
             solver_label(evaluation),

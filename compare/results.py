@@ -6,7 +6,13 @@ from typing import Any
 
 from compare.differences import FieldDifference, ReferenceDifferences
 from compare.evaluation import Evaluation
-from compare.metrics import MarkerErrors, held_out_errors, marker_errors, reference_differences
+from compare.metrics import (
+    MarkerErrors,
+    held_out_errors,
+    marker_errors,
+    reference_differences,
+    truth_differences,
+)
 from geometry.design import Design
 from geometry.observations import Observations
 from solvers.problem import Load, Material
@@ -23,12 +29,14 @@ def metrics(
     observations: Observations,
     evaluations: Sequence[Evaluation],
     reference: Evaluation,
+    truth: Evaluation | None = None,
 ) -> dict[str, Any]:
     """Everything that `metrics.json` holds.
 
     `markers` compares with every marker that was seen. `held_out` compares with markers that the solver was
     not given: those same markers for a solver that was given none; each marker left out in its turn for one
     that assimilated them, null if it does not tell. Markers that were not seen are NaN.
+    `to_truth` is null where the markers were measured, since nobody knows the fields of a real finger.
     """
     return {
         "schema": SCHEMA,
@@ -42,12 +50,15 @@ def metrics(
         },
         "reference": reference.solver,
         "solvers": {
-            evaluation.solver: _solver(evaluation, observations, reference) for evaluation in evaluations
+            evaluation.solver: _solver(evaluation, observations, reference, truth)
+            for evaluation in evaluations
         },
     }
 
 
-def _solver(evaluation: Evaluation, observations: Observations, reference: Evaluation) -> dict[str, Any]:
+def _solver(
+    evaluation: Evaluation, observations: Observations, reference: Evaluation, truth: Evaluation | None
+) -> dict[str, Any]:
     errors, held_out = marker_errors(evaluation, observations), held_out_errors(evaluation, observations)
     differences = reference_differences(evaluation, reference)
     return {
@@ -69,6 +80,7 @@ def _solver(evaluation: Evaluation, observations: Observations, reference: Evalu
         "uncertainty": _own_uncertainty(evaluation),
         "to_reference": _differences(differences)
         | {"reference_uncertainty": reference.uncertainty and _differences(reference.uncertainty)},
+        "to_truth": None if truth is None else _by_component(truth_differences(evaluation, truth)._asdict()),
     }
 
 

@@ -1,22 +1,21 @@
-"""The numbers of a comparison as CSV files and as a table for the terminal."""
+"""The numbers of a comparison as CSV files."""
 
 import csv
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
-
 from compare.certificate import Certificate
 from compare.differences import ReferenceDifferences
 from compare.evaluation import Evaluation
-from compare.figures.labels import IN_SAMPLE, significant, solver_at_markers, solver_label
-from compare.metrics import MarkerErrors, held_out_errors, marker_errors, reference_differences
+from compare.metrics import (
+    TruthDifferences,
+    held_out_errors,
+    marker_errors,
+    reference_differences,
+    truth_differences,
+)
 from geometry.atomic import atomic_path
 from geometry.observations import Observations
-
-LEFT_OUT = "  each left out"
-"""Says of a row that each marker was left out in its turn."""
 
 Cell = str | int | float | bool
 
@@ -49,10 +48,15 @@ def write_markers(path: Path, *, evaluations: Sequence[Evaluation], observations
 
 
 def write_summary(
-    path: Path, *, evaluations: Sequence[Evaluation], observations: Observations, reference: Evaluation
+    path: Path,
+    *,
+    evaluations: Sequence[Evaluation],
+    observations: Observations,
+    reference: Evaluation,
+    truth: Evaluation | None = None,
 ) -> None:
-    """Write a row a solver: errors at the markers, distance from the reference, energy, reaction, status."""
-    write_csv(path, [_summary(evaluation, observations, reference) for evaluation in evaluations])
+    """Write a row a solver: errors at the markers, distances over the body, energy, reaction, status."""
+    write_csv(path, [_summary(evaluation, observations, reference, truth) for evaluation in evaluations])
 
 
 def write_csv(path: Path, rows: Sequence[dict[str, Cell]]) -> None:
@@ -63,70 +67,6 @@ def write_csv(path: Path, rows: Sequence[dict[str, Cell]]) -> None:
         writer.writerows(rows)
 
 
-def mae_table(evaluations: Sequence[Evaluation], observations: Observations, reference: Evaluation) -> Table:
-    """Mean absolute errors at the markers and the distance from the reference, for the terminal."""
-    seen, count = int(observations.visible.sum()), len(observations.visible)
-    markers = f"{count} marker{'s' * (count > 1)}" if seen == count else f"{seen} of {count} markers"
-    table = Table(
-        title=f"Mean absolute error at {markers}, mm ({observations.label} displacements)",
-        caption=(
-            "sum: mean of |Δu| + |Δv| (the paper's text); rss: √(u² + v²) of the two means (its Table I).\n"
-            f"L²: relative difference of the displacement from the reference, {solver_label(reference)}.\n"
-            f"{_own_error(reference) if len(evaluations) > 1 else ''}"
-            "above fem: energy of the displacement on fem's elements above the least there."
-            f"{_in_sample(evaluations)}"
-        ),
-        box=SIMPLE_HEAD,
-        collapse_padding=True,
-        title_justify="left",
-        caption_justify="left",
-    )
-    table.add_column("solver", no_wrap=True)
-    for heading in ("u", "v", "sum", "rss", "L²\n%", "energy\nN mm/mm", "above\nfem, %", "time\ns"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    for evaluation in evaluations:
-        errors = marker_errors(evaluation, observations)
-        distance = reference_differences(evaluation, reference).displacement.rel_l2
-        table.add_row(
-            solver_at_markers(evaluation).replace(" (", "\n("),
-            *_three_digits(errors),
-            "–" if evaluation is reference else _with_own_error(distance, reference),
-            f"{evaluation.energy:.4g}",
-            above_fem(evaluation),
-            seconds(evaluation),
-            style=None if evaluation.converged else "yellow",
-        )
-        if evaluation.left_out is not None:
-            left_out = held_out_errors(evaluation, observations)
-            table.add_row(LEFT_OUT, *(_three_digits(left_out) if left_out else ()))
-    return table
-
-
-def _three_digits(errors: MarkerErrors) -> list[str]:
-    return [f"{value:.3f}" for value in (errors.mae_u, errors.mae_v, errors.mae_sum, errors.mae_rss)]
-
-
-def _in_sample(evaluations: Sequence[Evaluation]) -> str:
-    """What the mark beside a solver's name means, if there is one."""
-    return f"\n{IN_SAMPLE}." if any(evaluation.in_sample for evaluation in evaluations) else ""
-
-
-def _own_error(reference: Evaluation) -> str:
-    """What ± stands for, if it appears."""
-    if reference.uncertainty is None:
-        return ""
-    return f"±: error of {solver_label(reference)} itself, estimated; a smaller difference says nothing.\n"
-
-
-def _with_own_error(distance: float, reference: Evaluation) -> str:
-    """The relative difference in %, and that of the reference from the exact solution."""
-    own = reference.uncertainty
-    if own is None:
-        return significant(100 * distance, 3)
-    percent = f"{100 * distance:.0f}" if distance >= 1 else f"{100 * distance:.2g}"
-    return f"{percent}±{100 * own.displacement.rel_l2:.1g}"
-
-
 def seconds(evaluation: Evaluation) -> str:
     """How long the solver took, s, or a dash if it does not say."""
     value = evaluation.stats.get("seconds")
@@ -135,16 +75,9 @@ def seconds(evaluation: Evaluation) -> str:
     return f"{value:.{2 if value < 10 else 1 if value < 100 else 0}f}"
 
 
-def above_fem(evaluation: Evaluation) -> str:
-    """By how much the energy is above the least of finite elements, %; a dash where that is no measure."""
-    certificate = evaluation.certificate
-    if certificate is None:
-        return "–"
-    percent = 100 * certificate.rel_excess if certificate.has_excess else 0.0
-    return f"{percent:.1f}" if percent >= 1 else f"{percent:.1g}"
-
-
-def _summary(evaluation: Evaluation, observations: Observations, reference: Evaluation) -> dict[str, Cell]:
+def _summary(
+    evaluation: Evaluation, observations: Observations, reference: Evaluation, truth: Evaluation | None
+) -> dict[str, Cell]:
     errors, to = marker_errors(evaluation, observations), reference_differences(evaluation, reference)
     row: dict[str, Cell] = {"solver": evaluation.solver, "converged": int(evaluation.converged)}
     row |= {"in_sample": int(evaluation.in_sample)}
@@ -158,10 +91,19 @@ def _summary(evaluation: Evaluation, observations: Observations, reference: Eval
     empty = dict.fromkeys(_differences("reference_uncertainty", to), "")
     own = reference.uncertainty
     row |= _differences("reference_uncertainty", own) if own else empty
+    row |= _to_truth(None if truth is None else truth_differences(evaluation, truth))
     row |= {"energy_N_mm_per_mm": evaluation.energy}
     row |= _certificate(evaluation.certificate)
     row |= {f"reaction_{axis}_N_per_mm": float(evaluation.reaction[n]) for n, axis in enumerate("uv")}
     row |= {"seconds_s": evaluation.stats.get("seconds", ""), "status": evaluation.message}
+    return row
+
+
+def _to_truth(differences: TruthDifferences | None) -> dict[str, Cell]:
+    """The distances from the virtual experiment's fields, which are empty where markers were measured."""
+    row: dict[str, Cell] = {f"to_truth_{name}_rel_l2": "" for name in TruthDifferences._fields}
+    if differences is not None:
+        row |= {f"to_truth_{name}_rel_l2": each.rel_l2 for name, each in differences._asdict().items()}
     return row
 
 

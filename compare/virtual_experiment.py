@@ -8,11 +8,12 @@ simulation and experiment.
 import hashlib
 import json
 from contextlib import suppress
+from zipfile import BadZipFile
 
 import numpy as np
 
+from compare.evaluation import Evaluation
 from compare.provenance import package_versions, sources_digest
-from geometry.atomic import atomic_path
 from geometry.cache import cache_folder
 from geometry.errors import UserError
 from geometry.observations import Observations
@@ -20,7 +21,6 @@ from solvers.problem import Load, Problem
 from solvers.registry import make_solver
 from solvers.solution import Solution
 from solvers.solver import Progress, Solver, silent
-from vision.measurements import read_measurements, write_measurements
 
 SOURCE = (
     "simulated by fem-nonlinear (neo-Hookean, finite strain, plane strain, contact patch that is "
@@ -28,7 +28,14 @@ SOURCE = (
 )
 """What is said of the numbers wherever they appear; the number is -v of the indenter."""
 
-SOURCES = ("geometry", "solvers.elasticity", "solvers.fem", "solvers.problem", "solvers.solution")
+SOURCES = (
+    "compare.evaluation",
+    "geometry",
+    "solvers.elasticity",
+    "solvers.fem",
+    "solvers.problem",
+    "solvers.solution",
+)
 """Modules whose change makes a new simulation."""
 
 
@@ -38,29 +45,44 @@ def virtual_experiment(problem: Problem, progress: Progress = silent) -> Observa
     Raises:
         UserError: If the simulation cannot be run or does not reach the full load.
     """
-    try:
-        solver, richer = _richer(problem)
-        entry = cache_folder() / f"experiment-{_key(solver, richer)}.csv"
-        if entry.exists():
-            with suppress(UserError):  # a damaged file is made again
-                observations = read_measurements(entry)
-                progress(1.0, "from the cache")
-                return observations
-        solution = _solved(solver, richer, progress)
-    except UserError as error:
-        raise UserError(f"{error}; or give --measurements FILE.csv") from None
+    return simulated(problem, progress)[0]
+
+
+def simulated(problem: Problem, progress: Progress = silent) -> tuple[Observations, Evaluation]:
+    """The virtual experiment: what a camera would have measured, and the true fields on the problem's mesh.
+
+    Raises:
+        UserError: If the simulation cannot be run or does not reach the full load.
+    """
+    truth = _truth(problem, progress)
     markers = problem.mesh.markers
     observations = Observations(
         points=markers,
-        displacements=solution.displacement(markers),
+        displacements=truth.marker_displacement,
         standard_deviations=np.zeros_like(markers),
         visible=np.ones(len(markers), dtype=bool),
         source=said_of(problem),
         simulated=True,
     )
-    with atomic_path(entry) as partial:
-        write_measurements(partial, observations)
-    return observations
+    return observations, truth
+
+
+def _truth(problem: Problem, progress: Progress) -> Evaluation:
+    """The true fields; kept in the cache folder."""
+    try:
+        solver, richer = _richer(problem)
+        key = _key(solver, richer)
+        entry = cache_folder() / f"experiment-{key}.npz"
+        with suppress(OSError, ValueError, EOFError, LookupError, BadZipFile):  # damaged: made again
+            if (kept := Evaluation.load(entry, key)) is not None:
+                progress(1.0, "from the cache")
+                return kept
+        solution = _solved(solver, richer, progress)
+    except UserError as error:
+        raise UserError(f"{error}; or give --measurements FILE.csv") from None
+    evaluation = Evaluation.of(solution, problem.mesh)
+    evaluation.save(entry, key)
+    return evaluation
 
 
 def simulation(problem: Problem, progress: Progress = silent) -> Solution:

@@ -65,7 +65,7 @@ def compare(
     from compare.pipeline import Job, run
     from compare.preset_jobs import job_defaults
     from compare.stages import Stages
-    from compare.tables import mae_table
+    from compare.terminal import body_table, marker_table
 
     design, mesh = finger.read(options.preset)
     material, load = physics.read(options.preset)
@@ -97,7 +97,9 @@ def compare(
         print((job.out / "metrics.json").read_text(encoding="utf-8"), end="")
     elif not quiet:
         console = Console()
-        console.print(mae_table(outcome.evaluations, outcome.observations, outcome.reference))
+        console.print(marker_table(outcome.evaluations, outcome.observations))
+        console.print()
+        console.print(body_table(outcome.evaluations, outcome.reference, outcome.truth))
         console.print(f"report: {job.out / 'report.html'}", soft_wrap=True, highlight=False)
     unconverged = [evaluation for evaluation in outcome.evaluations if not evaluation.converged]
     for evaluation in unconverged:

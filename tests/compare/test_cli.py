@@ -150,7 +150,10 @@ BAD = [
     ("compare --reference fem-id --load patch", "fem-id takes the loads mean, point, not 'patch'"),
     ("compare --solver-set fem-id.prior=2 --load patch", "fem-id takes the loads mean, point, not 'patch'"),
     ("compare --load cylinder --plane stress", "statfem takes the loads mean"),  # none can
-    ("compare --solvers gp --mesh-size 1 --quiet --measurements good.csv", "gp .* needs more than 3 .*, not 1"),
+    (
+        "compare --solvers gp --mesh-size 1 --quiet --measurements good.csv",
+        "gp .* needs more than 3 .*, not 1",
+    ),
     # measurements
     ("compare --measurements absent.csv", "there is no file absent.csv"),
     ("compare --measurements foreign", "foreign holds no picture"),  # a folder
@@ -236,7 +239,7 @@ def test_the_table_and_the_report_are_named(folder, capsys, without_pictures):
     assert "Mean absolute error at" in output.out
     assert "measured" in output.out
     mae = json.loads(Path("out/default/metrics.json").read_text())["solvers"]["fem"]["markers"]["mae_u"]
-    (row,) = [line for line in output.out.splitlines() if line.startswith("  fem ")]
+    row, _ = [line for line in output.out.splitlines() if line.startswith("  fem ")]
     assert f"{mae:.3f}" in row
     assert output.out.splitlines()[-1] == "report: out/default/report.html"
     assert Path("out/default/report.html").is_file()

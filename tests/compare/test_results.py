@@ -52,6 +52,7 @@ SOLVER = {
     "markers": {"in_sample": bool, "ae_u": list, "ae_v": list, **ERRORS},
     "held_out": ERRORS,
     "uncertainty": UNCERTAINTY,
+    "to_truth": (dict, type(None)),
     "to_reference": {**DIFFERENCES, "reference_uncertainty": DIFFERENCES},
 }
 SCHEMA = {

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.virtual_experiment import virtual_experiment
+from compare.virtual_experiment import simulated, virtual_experiment
 from geometry.errors import UserError
 from geometry.mesh import TriangleMesh
 from solvers.fem.nonlinear import FemNonlinearSolver
@@ -121,7 +121,7 @@ def test_another_version_of_a_package_or_of_our_sources_is_simulated_again(probl
     assert len(solutions) == 3
 
 
-@pytest.mark.parametrize("content", [b"", b"# simulated\nx_mm,y_mm,u_mm,v_mm\n", b"\xff\x00"])
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"\xff\x00"])
 def test_a_damaged_file_in_the_cache_is_made_again(problem, solutions, cache, content):
     virtual_experiment(problem)
     (entry,) = cache.iterdir()
@@ -130,6 +130,16 @@ def test_a_damaged_file_in_the_cache_is_made_again(problem, solutions, cache, co
     assert len(solutions) == 2
     assert virtual_experiment(problem).simulated
     assert len(solutions) == 2
+
+
+def test_the_truth_is_the_simulated_field_on_the_mesh(problem, solutions):
+    """Also when it comes from the cache."""
+    for _ in range(2):
+        observations, truth = simulated(problem)
+        np.testing.assert_array_equal(truth.node_displacement, solutions[0].displacement(problem.mesh.points))
+        np.testing.assert_array_equal(truth.marker_displacement, observations.displacements)
+        assert truth.law == "neo-hookean"
+    assert len(solutions) == 1
 
 
 def test_an_experiment_that_stops_halfway_is_refused_and_not_kept(problem, cache, monkeypatch):

@@ -1,0 +1,38 @@
+"""Table I of the paper, and the same of a run."""
+
+import csv
+from dataclasses import replace
+from math import hypot
+from pathlib import Path
+
+import pytest
+
+from compare.evaluation import Evaluation
+from compare.table_one import PRINTED, table_one, write_table_one
+from geometry.observations import Observations
+
+
+def test_disp_of_the_paper_is_the_root_of_the_sum_of_squares():
+    for row in PRINTED:
+        (means,) = [means for means in (row.given, row.held_out) if means is not None]
+        assert hypot(means.u, means.v) == pytest.approx(means.rss, abs=5e-4)
+
+
+def test_a_solver_that_does_not_tell_what_it_leaves_out_has_no_held_out_error(
+    pinn: Evaluation, observations: Observations
+):
+    (row,) = table_one([replace(pinn, in_sample=True)], observations)
+    assert row.given is not None
+    assert row.held_out is None
+
+
+def test_the_file_has_this_run_and_the_paper(
+    fem: Evaluation, pinn: Evaluation, observations: Observations, tmp_path: Path
+):
+    given = replace(pinn, in_sample=True, left_out=observations.displacements + 0.125)
+    write_table_one(tmp_path / "t.csv", evaluations=[fem, given], observations=observations)
+    with (tmp_path / "t.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["observations"] for row in rows] == ["simulated"] * 2 + ["paper"] * 3
+    assert [row["held_out_mae_v_mm"][:5] for row in rows] == ["0.400", "0.125", "0.39", "0.48", ""]
+    assert [bool(row["in_sample_mae_v_mm"]) for row in rows] == [False, True, False, False, True]
