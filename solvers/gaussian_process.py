@@ -8,13 +8,15 @@ Source: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learn
 
 import time
 import warnings
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.locate import Location
+from geometry.observations import Observations
 from geometry.quadrature import body_quadrature
 from solvers.assimilation import Misfit, misfit_of, standard_deviations, without_each
 from solvers.elasticity import linear_energy_density
@@ -63,15 +65,8 @@ class GaussianProcessSolver:
         """
         check_problem(self, problem)
         started = time.perf_counter()
-        misfit = misfit_of(problem, marker_radius=0.0)
-        count = 0 if misfit is None else len(misfit.points)
-        if misfit is None or problem.observations is None or count <= FEWEST:
-            raise UnfitError(
-                f"gp goes through markers: it needs more than {FEWEST} that were seen, not {count}"
-            )
-        base = self._base(problem)
-        deviations = standard_deviations(problem.observations)
-        field = _fit(misfit, deviations, base)
+        solution, misfit, deviations = self._through(problem)
+        base, count = self._base(problem), len(misfit.points)
         missed, spread = np.zeros((2, count, 2))
         for marker in range(count):
             progress(marker / count, "leaving each marker out")
@@ -79,11 +74,31 @@ class GaussianProcessSolver:
             there = problem.mesh.locate(misfit.points[[marker]])
             missed[marker] = misfit.observed[marker] - others.displacement(there)[0]
             spread[marker] = np.hypot(others.standard_deviation(there)[0], deviations[marker])
+        within = float((np.abs(missed) < 2 * spread).mean())
+        seconds = time.perf_counter() - started
+        stats = {**solution.stats, "seconds": seconds, "left_out_within_2sd": within}
+        return replace(solution, stats=stats, left_out=without_each(problem, missed))
+
+    def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
+        """What fits other observations, without leaving any out; see `Refitting`."""
+        return lambda observations: self._through(replace(problem, observations=observations))[0]
+
+    def _through(self, problem: Problem) -> tuple[Solution, Misfit, FloatArray]:
+        """The processes through the markers that were seen; these; standard deviations (m, 2), mm."""
+        started = time.perf_counter()
+        misfit = misfit_of(problem, marker_radius=0.0)
+        count = 0 if misfit is None else len(misfit.points)
+        if misfit is None or problem.observations is None or count <= FEWEST:
+            raise UnfitError(
+                f"gp goes through markers: it needs more than {FEWEST} that were seen, not {count}"
+            )
+        deviations = standard_deviations(problem.observations)
+        field = _fit(misfit, deviations, self._base(problem))
         rule = body_quadrature(problem.mesh, 4)
         gradient = field.gradient(rule.location)
         density = linear_energy_density(gradient, problem.material.lame)
         lengths = field.mean.lengths
-        return Solution(
+        solution = Solution(
             solver=self.name,
             problem=problem,
             field=field,
@@ -98,10 +113,9 @@ class GaussianProcessSolver:
                 "seconds": time.perf_counter() - started,
                 "length_u": float(lengths[0]),
                 "length_v": float(lengths[1]),
-                "left_out_within_2sd": float((np.abs(missed) < 2 * spread).mean()),
             },
-            left_out=without_each(problem, missed),
         )
+        return solution, misfit, deviations
 
     def _base(self, problem: Problem) -> FloatArray:
         """Points that are known to be at rest, shape (b, 2), mm."""

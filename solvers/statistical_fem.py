@@ -18,14 +18,17 @@ here it is the prescribed displacement.
 """
 
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
+from geometry.arrays import FloatArray
 from geometry.errors import UserError
+from geometry.observations import Observations
 from geometry.quadrature import body_quadrature
-from solvers.assimilation import misfit_of, standard_deviations, without_each
+from solvers.assimilation import standard_deviations, without_each
 from solvers.elasticity import linear_energy_density
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
@@ -66,35 +69,54 @@ class StatFemSolver:
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Condition on the problem's observations; see `Solver`. Without any it is `fem`."""
         check_problem(self, problem)
-        fem = FemSolver(degree=self.degree, estimate=False)
-        misfit = misfit_of(problem, marker_radius=0.0)
-        if misfit is None or problem.observations is None:
-            plain = fem.solve(problem, progress)
+        if problem.observations is None:
+            plain = FemSolver(degree=self.degree, estimate=False).solve(problem, progress)
             return replace(plain, solver=self.name, status=Status(True, "without markers this is fem"))
         started = time.perf_counter()
+        shapes = self._shapes(problem, progress)
+        data = self._data(problem, problem.observations, shapes)
+        solution = self._conditioned(problem, data, shapes)
+        missed, spread = _without_each(data, progress)
+        within = float((np.abs(missed) < 2 * spread).mean())
+        seconds = time.perf_counter() - started
+        stats = {**solution.stats, "seconds": seconds, "left_out_within_2sd": within}
+        return replace(solution, stats=stats, left_out=without_each(problem, missed))
+
+    def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
+        """What solves for other observations, by the same finite elements; see `Refitting`."""
+        shapes = self._shapes(problem, silent)
+
+        def refit(observations: Observations) -> Solution:
+            data = self._data(problem, observations, shapes)
+            return self._conditioned(replace(problem, observations=observations), data, shapes)
+
+        return refit
+
+    def _data(self, problem: Problem, observations: Observations, shapes: Sequence[Solution]) -> Data:
+        points = observations.points[observations.visible]
+        return Data(
+            points=points,
+            observed=observations.displacements[observations.visible],
+            deviations=standard_deviations(observations),
+            shapes=np.stack([shape.displacement(points) for shape in shapes]),
+            load=problem.load.values,
+            load_deviation=self.stroke_deviation,
+        )
+
+    def _shapes(self, problem: Problem, progress: Progress) -> list[Solution]:
+        """Finite elements for a unit displacement of each prescribed component of the contact."""
+        fem = FemSolver(degree=self.degree, estimate=False)
         shapes = []
         for axis in problem.load.prescribed:
             unit = [None if value is None else 0.0 for value in problem.load.displacement]
             unit[axis] = 1.0
             load = problem.load.model_copy(update={"displacement": tuple(unit)})
             shapes.append(fem.solve(replace(problem, load=load, observations=None), progress))
-        data = Data(
-            points=misfit.points,
-            observed=misfit.observed,
-            deviations=standard_deviations(problem.observations),
-            shapes=np.stack([shape.displacement(misfit.points) for shape in shapes]),
-            load=problem.load.values,
-            load_deviation=self.stroke_deviation,
-        )
-        every = np.arange(len(data.points))
-        posterior = Posterior.of(data, every)
-        missed, spread = np.zeros((2, len(every), 2))
-        for marker in every:
-            progress(0.5 + marker / len(every) / 2, "leaving each marker out")
-            others = Posterior.of(data, np.delete(every, marker))
-            mean, covariance = others.at(data.points[[marker]], data.shapes[:, [marker]])
-            missed[marker] = data.observed[marker] - mean[0]
-            spread[marker] = np.sqrt(covariance[0] + data.deviations[marker] ** 2)
+        return shapes
+
+    def _conditioned(self, problem: Problem, data: Data, shapes: Sequence[Solution]) -> Solution:
+        started = time.perf_counter()
+        posterior = Posterior.of(data, np.arange(len(data.points)))
         field = StatFemField(posterior, tuple(shape.field for shape in shapes))
         rule = body_quadrature(problem.mesh, 4)
         gradient = field.gradient(rule.location)
@@ -122,11 +144,22 @@ class StatFemSolver:
                 "discrepancy_v": float(discrepancy[1]),
                 "length": constants.length,
                 "deviation_at_markers": float(np.sqrt(variances.max())),
-                "left_out_within_2sd": float((np.abs(missed) < 2 * spread).mean()),
             }
             | {
                 f"load_{'uv'[axis]}": float(value)
                 for axis, value in zip(problem.load.prescribed, posterior.load, strict=True)
             },
-            left_out=without_each(problem, missed),
         )
+
+
+def _without_each(data: Data, progress: Progress) -> tuple[FloatArray, FloatArray]:
+    """What each marker is missed by without it, and the standard deviation of that, each (m, 2), mm."""
+    every = np.arange(len(data.points))
+    missed, spread = np.zeros((2, len(every), 2))
+    for marker in every:
+        progress(0.5 + marker / len(every) / 2, "leaving each marker out")
+        others = Posterior.of(data, np.delete(every, marker))
+        mean, covariance = others.at(data.points[[marker]], data.shapes[:, [marker]])
+        missed[marker] = data.observed[marker] - mean[0]
+        spread[marker] = np.sqrt(covariance[0] + data.deviations[marker] ** 2)
+    return missed, spread

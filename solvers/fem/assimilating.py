@@ -1,12 +1,14 @@
 """`fem-asm`: the displacement of least energy plus misfit to the markers, exactly, on the shared mesh."""
 
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from geometry.errors import UserError
+from geometry.observations import Observations
 from solvers.assimilation import (
     MARKER_RADIUS,
     Misfit,
@@ -93,6 +95,30 @@ class FemAsmSolver:
             raise UserError(
                 "fem-asm: every point of a patch moves as prescribed; contact_deviation must be 0"
             )
+        misfit = self._misfit(problem)
+        slack = self.contact_deviation**2 / self.scale
+        return MarkerCompliance.of(problem, self.degree, misfit, slack), misfit
+
+    def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
+        """What solves for other observations of the same markers, by one factorisation; see `Refitting`."""
+        whole: list[tuple[MarkerCompliance, Misfit]] = []
+
+        def refit(observations: Observations) -> Solution:
+            own, every = (
+                replace(problem, observations=replace(observations, visible=seen))
+                for seen in (observations.visible, np.ones_like(observations.visible))
+            )
+            misfit = self._misfit(own)
+            if not whole:
+                whole.append(self.prepare(every))
+            finger, markers = whole[0]
+            if misfit.radius != markers.radius or not np.array_equal(markers.points, observations.points):
+                return self.solve(own)
+            return self._fitted(own, finger.of_markers(observations.visible), misfit)
+
+        return refit
+
+    def _misfit(self, problem: Problem) -> Misfit:
         misfit = misfit_of(
             problem,
             weights=self.weights,
@@ -102,20 +128,24 @@ class FemAsmSolver:
         )
         if misfit is None:
             raise UserError("fem-asm was given no markers to assimilate")
-        slack = self.contact_deviation**2 / self.scale
-        return MarkerCompliance.of(problem, self.degree, misfit, slack), misfit
+        return misfit
 
     def _solve(self, problem: Problem, progress: Progress) -> Solution:
         started = time.perf_counter()
         finger, misfit = self.prepare(problem)
         progress(0.9, "solved for the forces at the markers")
+        solution = self._fitted(problem, finger, misfit)
+        finger.least.factors.destroy()
+        return replace(solution, stats={**solution.stats, "seconds": time.perf_counter() - started})
+
+    def _fitted(self, problem: Problem, finger: MarkerCompliance, misfit: Misfit) -> Solution:
+        started = time.perf_counter()
         forces = finger.forces(misfit)
         factor = self.choice.factor(forces)
         fit = forces.fit(factor)
         nodal, system = finger.under(fit.forces), finger.least.system
         space = system.distributed.space
         residual = system.residual(nodal)
-        finger.least.factors.destroy()
         return Solution(
             solver=self.name,
             problem=problem,

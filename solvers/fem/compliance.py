@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from geometry.arrays import FloatArray
+from geometry.arrays import BoolArray, FloatArray
 from solvers.assimilation import Misfit
 from solvers.fem.lagrange import LagrangeSpace
 from solvers.fem.least_energy import LeastEnergy, LinearSystem
@@ -46,6 +46,11 @@ class MarkerCompliance:
         forces = np.kron(sampling, np.eye(2)).reshape(-1, *least.held.shape)
         responses = np.array([least.unbalanced(force)[1] for force in forces]).reshape(forces.shape)
         return cls(least, least.solution(), sampling, responses)
+
+    def of_markers(self, chosen: BoolArray) -> "MarkerCompliance":
+        """The same for those markers only that a mask of shape (m,) chooses."""
+        both = np.repeat(chosen, 2)
+        return replace(self, sampling=self.sampling[chosen], responses=self.responses[both])
 
     def forces(self, misfit: Misfit) -> MarkerForces:
         """The minimisers of energy plus misfit, in terms of the forces at the markers."""

@@ -1,6 +1,7 @@
 """`fem-id`: the parameters of a finger for which finite elements move its markers as they were observed."""
 
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import ClassVar, Literal, get_args
 
@@ -98,6 +99,14 @@ class FemIdSolver:
         said = f"without markers, this is {self.model}: {plain.status.message}"
         return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
 
+    def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
+        """What finds the parameters for other observations, by one factorisation; see `Refitting`."""
+        space = LagrangeSpace(problem.mesh, self.degree)
+        finger = self._finger(problem, space, parse_parameters(self.name, self.parameters))
+        return lambda observations: self._found(
+            replace(problem, observations=observations), observations, space, finger, silent
+        )
+
     def carried(self, solution: Solution, problem: Problem, other: Problem) -> Solution:
         """The solution of another problem with the parameters that were found for the first one.
 
@@ -130,11 +139,23 @@ class FemIdSolver:
         return (LinearFinger if self.model == "fem" else NonlinearFinger)(problem, space, names)
 
     def _solve(self, problem: Problem, observations: Observations, progress: Progress) -> Solution:
+        space = LagrangeSpace(problem.mesh, self.degree)
+        finger = self._finger(problem, space, parse_parameters(self.name, self.parameters))
+        solution = self._found(problem, observations, space, finger, progress)
+        finger.close()
+        return solution
+
+    def _found(
+        self,
+        problem: Problem,
+        observations: Observations,
+        space: LagrangeSpace,
+        finger: LinearFinger | NonlinearFinger,
+        progress: Progress,
+    ) -> Solution:
         started = time.perf_counter()
         names = parse_parameters(self.name, self.parameters)
         unknowns = unknowns_of(problem, names, self.prior)
-        space = LagrangeSpace(problem.mesh, self.degree)
-        finger = self._finger(problem, space, names)
         observer = Observer.of(problem, space, observations, self.marker_radius)
         if self.reaction is not None:
             observer = observer.with_reaction(
@@ -148,7 +169,6 @@ class FemIdSolver:
         found = estimate(model, observer.observed, observer.deviations, unknowns)
         response = finger.response(found.values)
         own = problem_with(problem, dict(zip(names, found.values.tolist(), strict=True)))
-        finger.close()
         missed = observer.missed(found)
         return Solution(
             solver=self.name,

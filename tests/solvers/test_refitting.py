@@ -1,0 +1,85 @@
+"""Solving again for other observations, with work shared, is solving again."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.mesh import TriangleMesh
+from geometry.observations import Observations
+from geometry.quadrature import body_quadrature
+from solvers.fem.linear import FemSolver
+from solvers.problem import Load, Problem
+from solvers.refitting import Refitting, refitter
+from solvers.registry import make_solver
+
+SOLVERS = {
+    "fem-asm": {"degree": 1},
+    "fem-asm, weights chosen": {"degree": 1, "weights": "precision", "choose": "left-out"},
+    "fem-asm, a soft contact": {"degree": 1, "weights": "precision", "contact_deviation": 1.0},
+    "fem-id": {"degree": 1},
+    "gp": {},
+    "statfem": {"degree": 1},
+}
+
+
+@pytest.fixture(scope="module")
+def observed(coarse_mesh: TriangleMesh) -> list[Observations]:
+    """Of markers of a finger that is pressed otherwise: all; seven with noise; six others."""
+    other = Problem(coarse_mesh, load=Load(displacement=(-1.0, -9.0)))
+    points = coarse_mesh.markers
+    true = FemSolver(degree=1, estimate=False).solve(other).displacement(points)
+    noise = np.random.default_rng(1).normal(0, 0.05, true.shape)
+    every = Observations(points, true, np.full_like(true, 0.05), np.ones(9, dtype=bool), "a test", True)
+    return [
+        every,
+        replace(every, displacements=true + noise, visible=~np.isin(np.arange(9), (2, 5))),
+        replace(every, visible=~np.isin(np.arange(9), (6, 7, 8))),
+    ]
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_a_refit_is_a_solution(coarse_mesh, observed, name):
+    solver = make_solver(name.split(",")[0], **SOLVERS[name])
+    assert isinstance(solver, Refitting)
+    problem = Problem(coarse_mesh)
+    refit = refitter(solver, problem)
+    inside = body_quadrature(coarse_mesh).location
+    for observations in observed:
+        expected = solver.solve(replace(problem, observations=observations))
+        found = refit(observations)
+        np.testing.assert_allclose(found.displacement(inside), expected.displacement(inside), atol=1e-6)
+        np.testing.assert_allclose(found.gradient(inside), expected.gradient(inside), atol=1e-6)
+        assert found.energy == pytest.approx(expected.energy, rel=1e-5)
+        np.testing.assert_allclose(found.reaction, expected.reaction, rtol=1e-5, atol=1e-8)
+
+
+def test_markers_elsewhere_are_solved_afresh(coarse_mesh, observed):
+    solver = make_solver("fem-asm", degree=1, marker_radius=0.3)
+    refit = refitter(solver, Problem(coarse_mesh))
+    refit(observed[0])
+    moved = replace(observed[0], points=observed[0].points + [0.5, 0.1])
+    expected = solver.solve(Problem(coarse_mesh, observations=moved))
+    np.testing.assert_allclose(refit(moved).displacement(moved.points), expected.displacement(moved.points))
+
+
+def test_another_solver_is_just_asked_again(coarse_mesh, observed):
+    class Plain:
+        def solve(self, problem):
+            return problem.observations
+
+    assert refitter(Plain(), Problem(coarse_mesh))(observed[1]) is observed[1]
+
+
+def test_parameters_are_carried_to_another_load(coarse_mesh, observed):
+    """The truth is off by (-1, 1) of 10 mm: at 5 mm and 4 mm nearer to the tip by half of it there."""
+    solver = make_solver("fem-id", degree=1)
+    problem = Problem(coarse_mesh, observations=observed[0])
+    solution = solver.solve(problem)
+    other = Problem(coarse_mesh, load=Load(displacement=(0.0, -5.0), position=39.0))
+    carried = solver.carried(solution, problem, other)
+    assert carried.problem.load.displacement == pytest.approx((-0.5, -4.5), abs=0.01)
+    assert carried.problem.load.position == pytest.approx(39.0, abs=0.1)
+    again = FemSolver(degree=1, estimate=False).solve(replace(carried.problem, observations=None))
+    np.testing.assert_allclose(carried.field.values, again.field.values, atol=1e-7)
+    np.testing.assert_allclose(carried.reaction, again.reaction, rtol=1e-6)
