@@ -58,7 +58,7 @@ def test_markers_elsewhere_are_solved_afresh(coarse_mesh, observed):
     solver = make_solver("fem-asm", degree=1, marker_radius=0.3)
     refit = refitter(solver, Problem(coarse_mesh))
     refit(observed[0])
-    moved = replace(observed[0], points=observed[0].points + [0.5, 0.1])
+    moved = replace(observed[0], points=observed[0].points + np.array([0.5, 0.1]))
     expected = solver.solve(Problem(coarse_mesh, observations=moved))
     np.testing.assert_allclose(refit(moved).displacement(moved.points), expected.displacement(moved.points))
 
