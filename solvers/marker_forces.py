@@ -41,11 +41,7 @@ class Fit(NamedTuple):
     @property
     def phrase(self) -> str:
         """How far the markers are missed, in words."""
-        return (
-            "root mean square of what the markers are missed by: "
-            f"{root_mean_square(self.residual):.2g} mm in the fit, "
-            f"{root_mean_square(self.left_out):.2g} mm when they are left out"
-        )
+        return missed_phrase(self.residual, self.left_out)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +96,15 @@ class MarkerForces:
         values, _ = self._modes
         spread = 1 + factor * values
         return -0.5 * float((self._in_modes**2 / spread).sum() / scale + np.log(spread).sum())
+
+
+def missed_phrase(residual: FloatArray, left_out: FloatArray) -> str:
+    """How far markers are missed in a fit, and where they are left out of it, mm, in words."""
+    return (
+        "root mean square of what the markers are missed by: "
+        f"{root_mean_square(residual):.2g} mm in the fit, "
+        f"{root_mean_square(left_out):.2g} mm when they are left out"
+    )
 
 
 def root_mean_square(values: FloatArray) -> float:

@@ -1,4 +1,7 @@
-"""`fem-asm`: the displacement of least energy plus misfit to the markers, exactly, on the shared mesh."""
+"""`fem-asm`: the displacement of least energy plus misfit to the markers, exactly, on the shared mesh.
+
+Here for the linear law; `assimilated` does it at finite strain.
+"""
 
 import time
 from collections.abc import Callable
@@ -17,10 +20,12 @@ from solvers.assimilation import (
     misfit_of,
     without_each,
 )
+from solvers.fem.assimilating_nonlinear import assimilated
 from solvers.fem.compliance import MarkerCompliance
 from solvers.fem.conditions import reaction_by_residual_work
 from solvers.fem.lagrange import LagrangeField
 from solvers.fem.linear import FemSolver
+from solvers.fem.nonlinear import FemNonlinearSolver
 from solvers.fem.ranks import on_all_ranks
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
@@ -32,6 +37,8 @@ from solvers.weight_choice import Choice, WeightChoice
 class FemAsmSolver:
     """`fem` that is pulled toward the markers: one factorisation, and a solve for each component of a marker.
 
+    With a law of finite strain it is `fem-nonlinear` that is pulled, and markers are left out by solving on.
+
     Attributes:
         degree: Degree of the elements, 1 or 2.
         weights: Of the markers, see `misfit_of`: "paper" or "precision".
@@ -42,7 +49,7 @@ class FemAsmSolver:
             where the prior is exp(-E / scale): a spring of the stiffness scale / contact_deviation² between
             contact and indenter. Zero: the contact moves as prescribed, as it does for other solvers.
         choose: "given": the weights as they are; "left-out" or "evidence": times a factor, see
-            `WeightChoice`.
+            `WeightChoice`; for the linear law.
     """
 
     degree: int = 2
@@ -53,7 +60,7 @@ class FemAsmSolver:
     contact_deviation: float = 0.0
     choose: Choice = "given"
     name: ClassVar[str] = "fem-asm"
-    laws: ClassVar[tuple[str, ...]] = FemSolver.laws
+    laws: ClassVar[tuple[str, ...]] = FemSolver.laws + FemNonlinearSolver.laws
     loads: ClassVar[tuple[str, ...]] = FemSolver.loads
     assimilates: ClassVar[bool] = True
 
@@ -72,13 +79,24 @@ class FemAsmSolver:
         return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
-        """Solve for the minimiser; see `Solver`. Without observations it is that of `fem`."""
+        """Solve for the minimiser; see `Solver`. Without observations it is that of the law's own solver.
+
+        Raises:
+            UserError: If weights are to be chosen at finite strain, or a patch is to have a deviation.
+        """
         check_problem(self, problem)
+        linear = problem.material.law in FemSolver.laws
+        if not linear and self.choose != "given":
+            raise UserError(f"fem-asm: choose={self.choose} is for the linear law; take given")
         if problem.observations is not None and self.asm_weight * self.scale:
-            return on_all_ranks(self._solve, problem, progress)
-        plain = FemSolver(degree=self.degree, estimate=False).solve(problem, progress)
-        status = Status(True, "without markers, or with weights of zero, this is fem")
-        return replace(plain, solver=self.name, status=status)
+            return on_all_ranks(self._solve if linear else self._solve_nonlinear, problem, progress)
+        if linear:
+            plain = FemSolver(degree=self.degree, estimate=False).solve(problem, progress)
+            status = Status(True, "without markers, or with weights of zero, this is fem")
+            return replace(plain, solver=self.name, status=status)
+        stiff = FemNonlinearSolver(degree=self.degree).solve(problem, progress)
+        said = f"without markers, or with weights of zero, this is fem-nonlinear: {stiff.status.message}"
+        return replace(stiff, solver=self.name, status=replace(stiff.status, message=said))
 
     @property
     def choice(self) -> WeightChoice:
@@ -91,34 +109,24 @@ class FemAsmSolver:
         Raises:
             UserError: If the problem has no observations, or a patch is to have a deviation.
         """
+        misfit = self.misfit(problem)
+        return MarkerCompliance.of(problem, self.degree, misfit, self.slack), misfit
+
+    @property
+    def slack(self) -> float:
+        """Compliance of the springs between contact and indenter, mm per N/mm."""
+        return self.contact_deviation**2 / self.scale
+
+    def misfit(self, problem: Problem) -> Misfit:
+        """The misfit to the problem's observations.
+
+        Raises:
+            UserError: If there are none, or a patch is to have a deviation.
+        """
         if self.contact_deviation and problem.load.kind == "patch":
             raise UserError(
                 "fem-asm: every point of a patch moves as prescribed; contact_deviation must be 0"
             )
-        misfit = self._misfit(problem)
-        slack = self.contact_deviation**2 / self.scale
-        return MarkerCompliance.of(problem, self.degree, misfit, slack), misfit
-
-    def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
-        """What solves for other observations of the same markers, by one factorisation; see `Refitting`."""
-        whole: list[tuple[MarkerCompliance, Misfit]] = []
-
-        def refit(observations: Observations) -> Solution:
-            own, every = (
-                replace(problem, observations=replace(observations, visible=seen))
-                for seen in (observations.visible, np.ones_like(observations.visible))
-            )
-            misfit = self._misfit(own)
-            if not whole:
-                whole.append(self.prepare(every))
-            finger, markers = whole[0]
-            if misfit.radius != markers.radius or not np.array_equal(markers.points, observations.points):
-                return self.solve(own)
-            return self._fitted(own, finger.of_markers(observations.visible), misfit)
-
-        return refit
-
-    def _misfit(self, problem: Problem) -> Misfit:
         misfit = misfit_of(
             problem,
             weights=self.weights,
@@ -129,6 +137,37 @@ class FemAsmSolver:
         if misfit is None:
             raise UserError("fem-asm was given no markers to assimilate")
         return misfit
+
+    def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
+        """What solves for other observations of the same markers, by one factorisation if the law is linear."""
+        whole: list[tuple[MarkerCompliance, Misfit]] = []
+
+        def refit(observations: Observations) -> Solution:
+            own, every = (
+                replace(problem, observations=replace(observations, visible=seen))
+                for seen in (observations.visible, np.ones_like(observations.visible))
+            )
+            if problem.material.law not in FemSolver.laws:
+                return self.solve(own)
+            misfit = self.misfit(own)
+            if not whole:
+                whole.append(self.prepare(every))
+            finger, markers = whole[0]
+            if misfit.radius != markers.radius or not np.array_equal(markers.points, observations.points):
+                return self.solve(own)
+            return self._fitted(own, finger.of_markers(observations.visible), misfit)
+
+        return refit
+
+    def _solve_nonlinear(self, problem: Problem, progress: Progress) -> Solution:
+        return assimilated(
+            self.name,
+            problem,
+            degree=self.degree,
+            misfit=self.misfit(problem),
+            slack=self.slack,
+            progress=progress,
+        )
 
     def _solve(self, problem: Problem, progress: Progress) -> Solution:
         started = time.perf_counter()

@@ -1,9 +1,9 @@
 """The finite-strain problem at one stage of its load: potential, forces, tangent and constraints.
 
-With displacements c, multipliers f of the constraints b_k . c = d_k, and the potential Π of the elastic
-energy and, for a cylinder, of contact, equilibrium is
+With displacements c, multipliers f of the constraints, which may be springs of the compliance s_k, and the
+potential Π of the elastic energy and, for a cylinder, of contact, equilibrium is
 
-    dΠ/dc - f_k b_k = 0        b_k . c = d_k
+    dΠ/dc - f_k b_k = 0        b_k . c + s_k f_k = d_k
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,8 @@ from geometry.arrays import BoolArray, FloatArray
 from geometry.quadrature import body_quadrature
 from solvers.elasticity import Lame, deformation_jacobian, energy_density_of
 from solvers.fem.bridge import DistributedSpace, Factorisation
-from solvers.fem.conditions import held_components, load_functionals, patch_displacement
+from solvers.fem.conditions import held_components, patch_displacement
+from solvers.fem.constraints import Constraints
 from solvers.fem.contact import CylinderContact
 from solvers.fem.lagrange import LagrangeSpace
 from solvers.problem import Problem
@@ -47,20 +48,19 @@ class Equilibrium:
         distributed: The elements in DOLFINx.
         clamped: Components that a Dirichlet condition holds, mask of shape (N, 2).
         held: Their displacement under the full load, shape (N, 2), mm.
-        functionals: The constraints b_k, shape (k, N, 2).
-        targets: Their values d_k under the full load, shape (k,), mm.
+        constraints: What holds functionals of the displacements.
         contact: The cylinder, if there is one.
     """
 
-    def __init__(self, problem: Problem, space: LagrangeSpace) -> None:
-        """Compile the forms."""
+    def __init__(
+        self, problem: Problem, space: LagrangeSpace, constraints: Constraints | None = None
+    ) -> None:
+        """Compile the forms; the constraints are the load's unless others are given."""
         kind, shape = problem.load.kind, (len(space.nodes), 2)
-        constrained = kind in ("mean", "point")
         self.distributed = DistributedSpace(space)
         self.clamped: BoolArray = held_components(problem, space)
         self.held = patch_displacement(problem, space) if kind == "patch" else np.zeros(shape)
-        self.functionals = load_functionals(problem, space) if constrained else np.zeros((0, *shape))
-        self.targets = problem.load.values if constrained else np.zeros(0)
+        self.constraints = constraints or Constraints.of(problem, space)
         self.contact = CylinderContact.of(problem, space) if kind == "cylinder" else None
         self._derivatives = space.shape_gradients(body_quadrature(problem.mesh, QUADRATURE_DEGREE).location)
         lame = problem.material.lame
@@ -83,8 +83,7 @@ class Equilibrium:
 
     def become(self, problem: Problem) -> None:
         """Take another `mean` or `point` load, with the same components prescribed, and other moduli."""
-        self.functionals = load_functionals(problem, self.distributed.space)
-        self.targets = problem.load.values
+        self.constraints = Constraints.of(problem, self.distributed.space)
         self._set_moduli(problem.material.lame)
 
     def force_slope(self, nodal: FloatArray, moduli: Lame, slopes: Lame) -> FloatArray:
@@ -123,14 +122,10 @@ class Equilibrium:
             stage: Of the load.
         """
         internal = self.internal_force(nodal)
-        balance = internal - np.einsum("k,knx->nx", forces, self.functionals)
+        balance = internal - self.constraints.at_nodes(forces)
         if self.contact is not None:
             balance[self.contact.nodes] += self.contact.gradient(nodal, stage.fraction, stage.multipliers)
         return np.where(self.clamped, 0.0, balance), float(np.abs(internal).max())
-
-    def missing(self, nodal: FloatArray, stage: Stage) -> FloatArray:
-        """By how much the constraints are missed, shape (k,), mm."""
-        return np.asarray(stage.fraction * self.targets - np.einsum("knx,nx->k", self.functionals, nodal))
 
     def factorise(self, nodal: FloatArray, stage: Stage) -> None:
         """Factorise the tangent at displacements of shape (N, 2), mm."""
@@ -150,8 +145,12 @@ class Equilibrium:
             force: Shape (N, 2), N/mm.
         """
         nodal = self.factors.solve(force)
-        values = np.einsum("knx,nx->k", self.functionals, nodal)
-        return self._constrained(nodal, self.functionals, -values)[0]
+        return self.constraints.held(nodal, -self.constraints.values(nodal), self.responses())[0]
+
+    def responses(self) -> FloatArray:
+        """Displacements under the constraints' unit forces, by the tangent that is factorised, (k, N, 2)."""
+        functionals = self.constraints.functionals
+        return np.array([self.factors.solve(one) for one in functionals]).reshape(functionals.shape)
 
     def possible(self, nodal: FloatArray) -> bool:
         """Whether the deformation turns no quadrature point inside out."""
@@ -174,8 +173,8 @@ class Equilibrium:
             nodal = nodal + self.factors.solve(-fraction * stiffness)
         if self.contact is not None:
             return self._pressed_at_one_node(self.contact, fraction)
-        nodal, forces = self._constrained(nodal, self.functionals, fraction * self.targets)
-        return nodal, forces, np.zeros(0)
+        missing = fraction * self.constraints.targets - self.constraints.values(nodal)
+        return *self.constraints.held(nodal, missing, self.responses()), np.zeros(0)
 
     def _pressed_at_one_node(
         self, contact: CylinderContact, fraction: float
@@ -185,18 +184,8 @@ class Equilibrium:
         nearest = gap.argmin()
         functional = rest.copy()
         functional[contact.nodes[nearest]] = normal[nearest]
-        nodal, force = self._constrained(rest, functional[None], np.maximum(-gap[[nearest]], 0.0))
+        pressing = Constraints(functional[None], np.maximum(-gap[[nearest]], 0.0), np.zeros(1))
+        nodal, force = pressing.held(rest, pressing.targets, self.factors.solve(functional)[None])
         pressed = np.zeros(len(gap))
         pressed[nearest] = force[0]
         return nodal, np.zeros(0), pressed
-
-    def _constrained(
-        self, nodal: FloatArray, functionals: FloatArray, values: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Displacements, shape (N, 2), mm, with values (k,) of functionals (k, N, 2); their forces, (k,)."""
-        if not len(values):
-            return nodal, values
-        responses = np.array([self.factors.solve(functional) for functional in functionals])
-        compliance = np.einsum("inx,jnx->ij", functionals, responses)
-        forces = np.linalg.solve(compliance, values)
-        return nodal + np.einsum("k,knx->nx", forces, responses), forces

@@ -2,11 +2,13 @@
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from geometry.arrays import FloatArray
+from geometry.arrays import BoolArray, FloatArray
 from solvers.fem.conditions import reaction_by_residual_work
+from solvers.fem.constraints import Constraints
 from solvers.fem.contact import ContactRegion
 from solvers.fem.equilibrium import Equilibrium, Stage
 from solvers.fem.lagrange import LagrangeSpace
@@ -70,21 +72,33 @@ class LoadPath:
         *,
         tolerance: float,
         max_iterations: int,
+        constraints: Constraints | None = None,
     ) -> None:
-        """Prepare the path; the tolerance and the number of iterations are those of `BorderedNewton`."""
+        """Prepare the path.
+
+        Args:
+            problem: With the full load.
+            space: The elements.
+            steps: Fractions of the load.
+            tolerance: Of `BorderedNewton`.
+            max_iterations: Of `BorderedNewton`.
+            constraints: The load's, and others whose targets grow with it; the load's if None.
+        """
         self._steps, self._space = steps, space
-        self.equilibrium = Equilibrium(problem, space)
-        self._newton = BorderedNewton(
+        self.equilibrium = Equilibrium(problem, space, constraints)
+        self._begin = partial(
+            BorderedNewton,
             self.equilibrium,
             scale=problem.material.young,
             tolerance=tolerance,
             max_iterations=max_iterations,
         )
+        self._newton = self._begin()
         contact = self.equilibrium.contact
         self._longest = steps.longest if contact is None else min(steps.longest, contact.longest_step)
         pressed = np.zeros(0 if contact is None else len(contact.nodes))
         rest = np.zeros((len(space.nodes), 2))
-        self.points = [PathPoint(0.0, rest, np.zeros(len(self.equilibrium.targets)), pressed)]
+        self.points = [PathPoint(0.0, rest, np.zeros(len(self.equilibrium.constraints.targets)), pressed)]
         self.halved = self.iterations = 0
         self.reason = ""
 
@@ -124,6 +138,17 @@ class LoadPath:
         if not balance.converged:
             return None
         return PathPoint(1.0, balance.nodal, balance.forces, np.zeros(0))
+
+    def relaxed(self, kept: BoolArray) -> PathPoint | None:
+        """Equilibrium at the full load near the last one, under the constraints of a mask alone, if any."""
+        last, constraints = self.points[-1], self.equilibrium.constraints
+        self.equilibrium.constraints = constraints.only(kept)
+        newton = self._begin()
+        balance = newton.solve(last.nodal, last.forces[kept], Stage(1.0, last.contact))
+        newton.close()
+        self.equilibrium.constraints = constraints
+        self.iterations += balance.iterations
+        return PathPoint(1.0, balance.nodal, balance.forces, last.contact) if balance.converged else None
 
     def _step(self, fraction: float) -> tuple[PathPoint | None, int]:
         """Equilibrium at a fraction of the load, None if there is none; iterations of the hardest solve."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
+from solvers.fem.constraints import Constraints
 from solvers.fem.contact import ContactRegion
 from solvers.fem.equilibrium import Stage
 from solvers.fem.error_estimate import ErrorEstimator
@@ -63,16 +64,23 @@ class FemNonlinearSolver:
         check_problem(self, problem)
         return on_all_ranks(self._solve, problem, progress)
 
-    def _solve(self, problem: Problem, progress: Progress) -> Solution:
-        started = time.perf_counter()
-        space = LagrangeSpace(problem.mesh, self.degree)
-        path = LoadPath(
+    def path(
+        self, problem: Problem, space: LagrangeSpace, constraints: Constraints | None = None
+    ) -> LoadPath:
+        """The load path that is to be followed, with constraints as `LoadPath` has them."""
+        return LoadPath(
             problem,
             space,
             Steps(self.first_step, self.max_step, self.min_step),
             tolerance=self.tolerance,
             max_iterations=self.max_iterations,
+            constraints=constraints,
         )
+
+    def _solve(self, problem: Problem, progress: Progress) -> Solution:
+        started = time.perf_counter()
+        space = LagrangeSpace(problem.mesh, self.degree)
+        path = self.path(problem, space)
         path.follow(progress)
         points, energies = path.points, [path.equilibrium.energy(point.nodal) for point in path.points]
         reactions = np.array([path.reaction(point) for point in points])

@@ -92,7 +92,7 @@ class NonlinearFinger:
             raise RuntimeError("there is no path to an equilibrium yet")
         equilibrium, nodal, shape = path.equilibrium, point.nodal, point.nodal.shape
         equilibrium.factorise(nodal, Stage(1.0, np.zeros(0)))
-        functionals = equilibrium.functionals.reshape(len(point.forces), -1)
+        functionals = equilibrium.constraints.functionals.reshape(len(point.forces), -1)
         bordered = Bordered.of(
             lambda right: equilibrium.factors.solve(right.reshape(shape)).ravel(), functionals
         )

@@ -37,12 +37,12 @@ class Balance:
 class BorderedNewton:
     """SNES on the unknowns [c; f] of an `Equilibrium`.
 
-        R(c, f) = [dΠ/dc - f_k b_k;  s (d - b_k . c)]      J = [K, -b;  -s b^T, 0]
+        R(c, f) = [dΠ/dc - f_k b_k;  s (d_k - b_k . c - s_k f_k)]      J = [K, -b;  -s b^T, -s diag(s_k)]
 
     The factor s, Young's modulus, makes forces of the constraints. J y = R is solved by elimination: with K
     factorised, a = K^-1 R_c and x_k = K^-1 b_k,
 
-        (b_i . x_j) y_f = -R_f / s - b . a        y_c = a + x_k y_fk
+        (b_i . x_j + s_i δ_ij) y_f = -R_f / s - b . a        y_c = a + x_k y_fk
 
     A step that would turn an element inside out is halved before the line search begins, which looks at the
     size of R.
@@ -67,7 +67,7 @@ class BorderedNewton:
         comm = equilibrium.distributed.comm
         self._last = comm.size - 1
         own = self._part.getLocalSize()
-        border = len(equilibrium.targets) if comm.rank == self._last else 0
+        border = len(equilibrium.constraints.targets) if comm.rank == self._last else 0
         self._unknown = PETSc.Vec().createMPI((own + border, PETSc.DETERMINE), comm=comm)
         self._residual = self._unknown.duplicate()
         sizes = self._unknown.getSizes()
@@ -109,35 +109,32 @@ class BorderedNewton:
         """J^-1, as PETSc calls it."""
         balance, missed = self._split(right)
         nodal = self._equilibrium.factors.solve(balance)
-        functionals, responses = self._equilibrium.functionals, self._responses
-        values = np.einsum("knx,nx->k", functionals, nodal)
-        compliance = np.einsum("inx,jnx->ij", functionals, responses)
-        forces = np.linalg.solve(compliance, -missed / self._scale - values)
-        self._join(nodal + np.einsum("k,knx->nx", forces, responses), forces, step)
+        constraints = self._equilibrium.constraints
+        missing = -missed / self._scale - constraints.values(nodal)
+        self._join(*constraints.held(nodal, missing, self._responses), step)
 
     def mult(self, matrix: PETSc.Mat, step: PETSc.Vec, product: PETSc.Vec) -> None:
         """J times a step, as the line search calls it."""
         nodal, forces = self._split(step)
-        distributed, functionals = self._equilibrium.distributed, self._equilibrium.functionals
+        distributed, constraints = self._equilibrium.distributed, self._equilibrium.constraints
         distributed.distribute(nodal, self._part)
         force = self._part.duplicate()
         self._equilibrium.matrix.mult(self._part, force)
-        balance = distributed.gather(force) - np.einsum("k,knx->nx", forces, functionals)
+        balance = distributed.gather(force) - constraints.at_nodes(forces)
         force.destroy()
-        missed = -self._scale * np.einsum("knx,nx->k", functionals, nodal)
+        missed = self._scale * constraints.missing(nodal, forces, 0.0)
         self._join(np.where(self._equilibrium.clamped, 0.0, balance), missed, product)
 
     def _evaluate(self, snes: PETSc.SNES, unknown: PETSc.Vec, residual: PETSc.Vec) -> None:
         nodal, forces = self._split(unknown)
         balance, self._size = self._equilibrium.unbalanced(nodal, forces, self._stage)
-        self._join(balance, self._scale * self._equilibrium.missing(nodal, self._stage), residual)
+        missed = self._equilibrium.constraints.missing(nodal, forces, self._stage.fraction)
+        self._join(balance, self._scale * missed, residual)
 
     def _factorise(self, snes: PETSc.SNES, unknown: PETSc.Vec, jacobian: PETSc.Mat, other: PETSc.Mat) -> None:
         nodal, _ = self._split(unknown)
         self._equilibrium.factorise(nodal, self._stage)
-        functionals = self._equilibrium.functionals
-        responses = np.array([self._equilibrium.factors.solve(functional) for functional in functionals])
-        self._responses = responses.reshape(functionals.shape)
+        self._responses = self._equilibrium.responses()
 
     def _shorten(self, unknown: PETSc.Vec, step: PETSc.Vec) -> bool:
         """Halve the step, which will be subtracted, until no element is turned inside out."""

@@ -102,7 +102,7 @@ def test_newton_meets_constraints_and_balance_and_converges_quadratically():
     assert balance.iterations <= 5
     left, size = problem.unbalanced(balance.nodal, balance.forces, Stage(1.0, np.zeros(0)))
     assert np.abs(left).max() < 1e-8 * size
-    np.testing.assert_allclose(problem.missing(balance.nodal, Stage(1.0, np.zeros(0))), 0, atol=1e-10)
+    np.testing.assert_allclose(problem.constraints.missing(balance.nodal, balance.forces, 1.0), 0, atol=1e-10)
 
 
 def test_newton_says_that_it_takes_too_long():

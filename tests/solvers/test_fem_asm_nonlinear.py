@@ -1,0 +1,238 @@
+"""`fem-asm` at finite strain: limits, Taylor tests, refits, the work of the indenter and a twin."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.errors import UserError
+from geometry.observations import Observations
+from geometry.quadrature import body_quadrature
+from solvers.assimilation import misfit_of
+from solvers.fem.assimilating import FemAsmSolver
+from solvers.fem.constraints import Constraints
+from solvers.fem.equilibrium import Equilibrium, Stage
+from solvers.fem.lagrange import LagrangeSpace
+from solvers.fem.load_path import LoadPath
+from solvers.fem.nonlinear import FemNonlinearSolver
+from solvers.problem import Load, Material, Problem, contact_functional
+from tests.solvers.conftest import bar_mesh
+
+LAWS = ("neo-hookean", "st-venant-kirchhoff")
+MESH = bar_mesh(20.0, 2.0, 20, 2, contact=(16.0, 20.0))
+MARKERS = np.array([[4.0, -1.0], [9.0, -0.9], [13.0, -1.1], [18.0, -1.0]])
+SOFT = FemAsmSolver(weights="precision", scale=0.05)
+"""Neither the cantilever nor the markers have it their own way."""
+
+
+def pulled(load, *, law="neo-hookean", hidden=(), size=0.3) -> Problem:
+    """A cantilever whose markers are a part of a millimetre from where `fem-nonlinear` has them."""
+    random = np.random.default_rng(3)
+    problem = Problem(MESH, Material(law=law), load)
+    moved = FemNonlinearSolver().solve(problem).displacement(MARKERS)
+    visible = ~np.isin(np.arange(len(MARKERS)), hidden)
+    observations = Observations(
+        MARKERS,
+        moved + size * random.normal(size=MARKERS.shape),
+        random.uniform(0.02, 0.2, MARKERS.shape),
+        visible,
+        "by a test",
+        True,
+    )
+    return replace(problem, observations=observations)
+
+
+BENT = Load(displacement=(None, -6.0))
+
+
+@pytest.fixture(scope="module")
+def bent() -> Problem:
+    return pulled(BENT)
+
+
+@pytest.mark.parametrize(
+    ("kind", "law"),
+    [("mean", "neo-hookean"), ("point", "st-venant-kirchhoff"), ("patch", "neo-hookean")],
+)
+def test_weak_weights_give_fem_nonlinear(kind, law):
+    problem = pulled(Load(kind=kind, displacement=(None, -3.0)), law=law)
+    plain = FemNonlinearSolver().solve(replace(problem, observations=None))
+    weak = FemAsmSolver(asm_weight=1e-12).solve(problem)
+    assert weak.status.converged
+    np.testing.assert_allclose(weak.field.values, plain.field.values, atol=1e-6)
+    assert weak.energy == pytest.approx(plain.energy, rel=1e-6)
+    np.testing.assert_allclose(weak.reaction, plain.reaction, atol=1e-6 * np.abs(plain.reaction).max())
+
+
+@pytest.mark.parametrize("kind", ["mean", "patch"])
+def test_small_displacements_give_the_linear_minimiser(kind):
+    """The relative distance from it falls with the size of the displacements."""
+    problem = pulled(Load(kind=kind, displacement=(0.1, -1.0)))
+    distances = []
+    for size in (0.02, 0.01):
+        own = replace(
+            problem,
+            load=Load(kind=kind, displacement=(0.1 * size, -size)),
+            observations=replace(
+                problem.observations, displacements=size * problem.observations.displacements
+            ),
+        )
+        stiff = SOFT.solve(own).field.values
+        linear = SOFT.solve(replace(own, material=Material())).field.values
+        distances.append(np.linalg.norm(stiff - linear) / np.linalg.norm(linear))
+    assert distances[1] < 0.02
+    assert np.log2(distances[0] / distances[1]) == pytest.approx(1.0, abs=0.1)
+
+
+def functional(problem, space, slack):
+    """The misfit's constraints and J of nodal displacements, without any multipliers."""
+    constraints = Constraints.of(problem, space, slack)
+    misfit = misfit_of(problem, weights="precision", scale=SOFT.scale)
+    constraints = constraints.joined(Constraints.springs(misfit, space))
+    equilibrium = Equilibrium(problem, space, constraints)
+    points, weights = misfit.sampling()
+    sampling = weights @ space.shape_functions(problem.mesh.locate(points)).toarray()
+    contact, average = contact_functional(problem)
+    row = average @ space.shape_functions(problem.mesh.locate(contact)).toarray()
+
+    def total(nodal):
+        missed = problem.load.values - (row @ nodal)[problem.load.prescribed]
+        spring = 0.5 * float((missed**2).sum()) / slack
+        return equilibrium.energy(nodal) + misfit.value(sampling @ nodal) + spring
+
+    return equilibrium, total
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_energy_plus_misfit_has_balance_and_tangent_as_derivatives(law):
+    """Taylor, at random displacements, with a spring at the contact as well."""
+    problem = replace(pulled(BENT), material=Material(law=law))
+    space = LagrangeSpace(MESH, 2)
+    equilibrium, total = functional(problem, space, slack=0.5)
+    constraints = equilibrium.constraints
+    random = np.random.default_rng(0)
+    start, direction = (
+        np.where(equilibrium.clamped, 0.0, 0.02 * random.normal(size=equilibrium.clamped.shape))
+        for _ in range(2)
+    )
+
+    def gradient(nodal):
+        forces = constraints.missing(nodal, np.zeros(len(constraints.targets)), 1.0) / constraints.slacks
+        return equilibrium.unbalanced(nodal, forces, Stage(1.0, np.zeros(0)))[0]
+
+    steps = 0.02 * 0.5 ** np.arange(4)
+    first = (gradient(start) * direction).sum()
+    equilibrium.factorise(start, Stage(1.0, np.zeros(0)))
+    vector, product = equilibrium.matrix.createVecs()
+    equilibrium.distributed.distribute(direction, vector)
+    equilibrium.matrix.mult(vector, product)
+    second = (direction * equilibrium.distributed.gather(product)).sum()
+    second += (constraints.values(direction) ** 2 / constraints.slacks).sum()
+    changes = np.array([total(start + t * direction) - total(start) for t in steps])
+    for order, left in ((2, changes - steps * first), (3, changes - steps * first - 0.5 * steps**2 * second)):
+        np.testing.assert_allclose(np.log2(np.abs(left[:-1] / left[1:])), order, atol=0.1)
+
+
+def test_it_is_stationary_and_a_minimum_nearby(bent):
+    solver = replace(SOFT, contact_deviation=0.5)
+    solution = solver.solve(bent)
+    space = solution.field.space
+    equilibrium, total = functional(bent, space, slack=solver.slack)
+    least, random = total(solution.field.values), np.random.default_rng(1)
+    for _ in range(3):
+        step = np.where(equilibrium.clamped, 0.0, 1e-3 * random.normal(size=space.nodes.shape))
+        up, down = (total(solution.field.values + sign * step) - least for sign in (1, -1))
+        assert min(up, down) > 0
+        assert abs(up - down) < 1e-2 * up
+
+
+def test_the_indenter_s_force_is_the_slope_of_energy_plus_misfit(bent):
+    """Of its least value over the load, while the observations stay."""
+    totals = [
+        (solution := SOFT.solve(replace(bent, load=Load(displacement=(None, stroke))))).energy
+        + solution.stats["misfit"]
+        for stroke in (-6.01, -5.99)
+    ]
+    assert SOFT.solve(bent).reaction[1] == pytest.approx((totals[1] - totals[0]) / 0.02, rel=1e-4)
+
+
+def test_a_contact_that_is_not_certain_is_one_on_springs(bent):
+    solver = replace(SOFT, contact_deviation=0.5)
+    solution = solver.solve(bent)
+    contact, weights = contact_functional(bent)
+    moved = weights @ solution.displacement(contact)
+    assert abs(moved[1] + 6.0) > 0.01
+    assert solution.reaction[1] == pytest.approx((-6.0 - moved[1]) / solver.slack, rel=1e-6)
+
+
+@pytest.mark.parametrize("relaxed", [True, False])
+def test_leaving_a_marker_out_is_solving_without_it(relaxed, monkeypatch):
+    """Whether Newton's method can go on from the solution or has to start from rest."""
+    problem = pulled(BENT, hidden=(1,))
+    if not relaxed:
+        monkeypatch.setattr(LoadPath, "relaxed", lambda path, kept: None)
+    solution = SOFT.solve(problem)
+    observations = problem.observations
+    assert np.isnan(solution.left_out[1]).all()
+    marker = 2
+    visible = observations.visible & (np.arange(len(MARKERS)) != marker)
+    without = SOFT.solve(replace(problem, observations=replace(observations, visible=visible)))
+    disc = replace(misfit_of(problem), points=MARKERS[[marker]])
+    points, weights = replace(disc, observed=disc.observed[:1], weights=disc.weights[:1]).sampling()
+    expected = weights @ without.displacement(points)
+    np.testing.assert_allclose(solution.left_out[[marker]], expected, atol=1e-6)
+    assert np.abs(expected - solution.displacement(MARKERS[[marker]])).max() > 0.05
+
+
+def test_a_twin_is_met_in_displacement_and_in_stress():
+    """With the errors of a camera; a linear model that meets the markers must strain to follow them."""
+    stiff = Problem(MESH, Material(law="neo-hookean"), BENT)
+    truth = FemNonlinearSolver().solve(stiff)
+    errors = 0.01 * np.random.default_rng(2).normal(size=MARKERS.shape)
+    observations = Observations(
+        MARKERS,
+        truth.displacement(MARKERS) + errors,
+        np.full_like(MARKERS, 0.01),
+        np.ones(len(MARKERS), dtype=bool),
+        "by a twin",
+        True,
+    )
+    twin = replace(stiff, observations=observations)
+    solver = FemAsmSolver(weights="precision", scale=0.001)
+    rule = body_quadrature(MESH)
+
+    def distance(solution):
+        got, expected = (each.state(rule.location).von_mises for each in (solution, truth))
+        return np.linalg.norm(got - expected) / np.linalg.norm(expected)
+
+    solution = solver.solve(twin)
+    np.testing.assert_allclose(solution.displacement(MARKERS), truth.displacement(MARKERS), atol=0.04)
+    print(distance(solution), distance(solver.solve(replace(twin, material=Material()))), distance(FemNonlinearSolver().solve(Problem(MESH, Material(law="neo-hookean"), Load(displacement=(None,-5.9))))))
+    assert distance(solution) < 0.1
+    assert distance(solver.solve(replace(twin, material=Material()))) > 1
+
+
+def test_a_load_that_is_not_reached_is_said():
+    """Two markers are to change places, which would turn the cantilever inside out."""
+    problem = pulled(BENT, hidden=(0, 3))
+    crossed = problem.observations.displacements + np.array([[0.0, 0], [8, 0], [-8, 0], [0, 0]])
+    observations = replace(problem.observations, displacements=crossed)
+    solution = FemAsmSolver(degree=1).solve(replace(problem, observations=observations))
+    assert not solution.status.converged
+    assert solution.status.message.startswith("stopped at ")
+    assert solution.left_out is None
+
+
+def test_without_markers_it_is_fem_nonlinear(bent):
+    alone = replace(bent, observations=None)
+    solution = FemAsmSolver().solve(alone)
+    np.testing.assert_array_equal(solution.field.values, FemNonlinearSolver().solve(alone).field.values)
+    assert solution.solver == "fem-asm"
+    assert "this is fem-nonlinear: all of the load" in solution.status.message
+
+
+def test_what_is_for_the_linear_law_is_refused(bent):
+    with pytest.raises(UserError, match="choose=left-out is for the linear law; take given"):
+        replace(SOFT, choose="left-out").solve(bent)
+    with pytest.raises(UserError, match="every point of a patch moves as prescribed"):
+        replace(SOFT, contact_deviation=1.0).solve(replace(bent, load=Load(kind="patch")))
