@@ -139,7 +139,7 @@ class FemAsmSolver:
         return misfit
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
-        """What solves for other observations of the same markers, by one factorisation if the law is linear."""
+        """What solves for other observations of these markers, by one factorisation if the law is linear."""
         whole: list[tuple[MarkerCompliance, Misfit]] = []
 
         def refit(observations: Observations) -> Solution:
