@@ -53,10 +53,13 @@ def follows_load(evaluation: Evaluation) -> bool:
 
 
 def force_curves(evaluations: Sequence[Evaluation], load: Load) -> list[ForceCurve]:
-    """A curve for each solver; none if no solver follows the load, as all would be straight."""
+    """A curve for each solver; none if no solver follows the load, as all would be straight.
+
+    A solver that was given markers has none: they hold at the end of the load, and pull as well.
+    """
     if not any(map(follows_load, evaluations)):
         return []
-    return [ForceCurve.of(evaluation, load) for evaluation in evaluations]
+    return [ForceCurve.of(evaluation, load) for evaluation in evaluations if not evaluation.in_sample]
 
 
 def write_force_displacement(path: Path, curves: Sequence[ForceCurve], load: Load, *, depth: float) -> None:

@@ -22,7 +22,8 @@ def marker_table(evaluations: Sequence[Evaluation], observations: Observations) 
     table = _table(
         f"Mean absolute error at {markers}, mm ({observations.label} displacements)",
         "given: at markers that the solver was given, a training error.\n"
-        "held out: at markers that it was not given, each predicted from all others.\n"
+        "held out: at markers that it was not given; one that is given markers has\n"
+        "all but the one that it predicts.\n"
         "sum: mean of |Δu| + |Δv| (the paper's text); rss: √(u² + v²) (its Table I).\n"
         "paper: as it prints them, of its own experiment and not of this run.",
     )

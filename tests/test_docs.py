@@ -101,13 +101,13 @@ def assert_same(documented: list[str], actual: list[str]) -> None:
 
 @pytest.fixture(scope="module")
 def run_folder(tmp_path_factory) -> Path:
-    """The output of a small comparison, of a solver that follows the load too."""
+    """The output of a small comparison, of a solver that follows the load and one that is trained too."""
     from compare.cli import compare_main
 
     out = tmp_path_factory.mktemp("docs") / "run"
     options = (
-        "--solvers fem,fem-nonlinear,pinn-std --mesh-size 1 --adapt 0.008 "
-        "--solver-set pinn-std.corner_spacing=0.2 --quiet"
+        "--solvers fem,fem-nonlinear,pinn-std --mesh-size 1 --adapt 0.008 --solver-set pinn-std.preset=paper "
+        "--solver-set pinn-std.epochs=2 --solver-set pinn-std.width=4 --quiet"
     )
     assert compare_main([*options.split(), "--out", str(out)]) in (
         0,

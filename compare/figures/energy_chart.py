@@ -70,7 +70,7 @@ def draw_energy(path: Path, *, evaluations: Sequence[Evaluation], reference: Eva
     with figure(path, HEAD + sum(heights) + len(groups) * (HEIGHT + FOOT)) as drawn:
         heading(drawn, "Energy on the way to the solution")
         for row, (group, members) in enumerate(groups.items()):
-            others = [evaluation for evaluation in members if evaluation is not reference]
+            others = [each for each in members if each is not reference and not each.in_sample]
             compared = others if approaches_reference(group) else []
             columns = 2 if compared else 1
             width = (WIDTH - LEFT - 0.15 - (columns - 1) * GAP) / columns
@@ -132,4 +132,5 @@ def wants_log(values: FloatArray) -> bool:
 
 def readable(name: str) -> str:
     """A column's name for an axis: with its unit where it has one, without underscores."""
-    return {"seconds": "time, s", ENERGY: "energy, N mm/mm"}.get(name, name.replace("_", " "))
+    names = {"seconds": "time, s", ENERGY: "energy, N mm/mm", "curve_energy": "energy added, N mm/mm"}
+    return names.get(name, name.replace("_", " "))

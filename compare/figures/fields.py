@@ -86,11 +86,16 @@ def field_scale(quantity: Quantity, mesh: TriangleMesh, reference: Evaluation) -
 def difference_scale(
     quantity: Quantity, mesh: TriangleMesh, evaluations: Sequence[Evaluation], reference: Evaluation
 ) -> Scale:
-    """The scale of every difference: it covers the percentile in each solver that converged (or in all)."""
+    """The scale of every difference: it covers the percentile in each solver that converged (or in all).
+
+    It ends at most where that of the field does, lest one solver that is far away takes all colours.
+    """
     others = [evaluation for evaluation in evaluations if evaluation is not reference]
     chosen = [evaluation for evaluation in others if evaluation.converged] or others
     base = triangle_values(quantity, reference)
-    return symmetric([triangle_values(quantity, evaluation) - base for evaluation in chosen], mesh.areas)
+    found = symmetric([triangle_values(quantity, evaluation) - base for evaluation in chosen], mesh.areas)
+    limit = min(found.high, field_scale(quantity, mesh, reference).high)
+    return found._replace(low=-limit, high=limit)
 
 
 def draw_field(
@@ -156,8 +161,9 @@ def _explain(drawn: MplFigure, box: tuple[float, float, float, float], reference
     axes.set_axis_off()
     text = (
         f"Reference: {solver_label(reference)}\n"
-        f"Scales end at the {PERCENT:g} % point of the area\n(left: of the reference; right: of the\n"
-        "differences). Values beyond take the end\ncolours. Largest: of the means over a triangle."
+        f"Scales end at the {PERCENT:g} % point of the area\n"
+        "(left: of the reference; right: of differences,\nat most as left). Values beyond take the end\n"
+        "colours. Largest: of the means over a triangle."
     )
     axes.text(0.02, 0.95, text, va="top", size=7, color=MUTED, linespacing=1.35, transform=axes.transAxes)
 

@@ -15,6 +15,7 @@ from compare.figures.excess import DECADES, draw_excess
 from compare.figures.fields import QUANTITIES, Quantity, draw_field, field_extent
 from compare.figures.force_chart import draw_force_displacement
 from compare.figures.labels import IN_SAMPLE, solver_label
+from compare.figures.loss_chart import draw_losses
 from compare.figures.marker_chart import draw_marker_errors
 from compare.figures.mesh_drawing import draw_mesh, mesh_numbers
 from compare.figures.overlay import draw_overlay
@@ -51,6 +52,7 @@ class Gallery:
             ("chart of force over displacement", self.force_displacement),
             ("picture of the excess energy", self.excess),
             ("chart of the energy", self.energy),
+            ("chart of the losses", self.losses),
             ("drawing of the design", self.drawing),
             ("picture of the mesh", self.mesh_picture),
         ]
@@ -80,7 +82,7 @@ class Gallery:
         draw_marker_errors(path, evaluations=self.evaluations, observations=self.observations)
         hidden = int((~self.observations.visible).sum())
         unseen = (
-            f" {hidden} of {len(self.observations.visible)} markers were not seen and count nowhere."
+            f" {hidden} of {len(self.observations.visible)} markers (×) were not seen and count nowhere."
             if hidden
             else ""
         )
@@ -88,7 +90,9 @@ class Gallery:
             path,
             "Errors at the markers",
             f"Absolute difference between each solver’s displacement and the {self.observations.label} one, "
-            f"for both components; markers are numbered from base to tip.{unseen} {self._given()}"
+            f"for both components, on one scale, which a solver that did not converge may exceed; markers "
+            f"are numbered from base to tip. Full bars: at a marker that the solver was not given, predicted "
+            f"from all others if it was given those. Hollow bars: training errors.{unseen} {self._given()}"
             f"{self._simulated()}",
         )
 
@@ -111,7 +115,8 @@ class Gallery:
         )
         beside = (
             f" Right: the field minus that of {solver_label(self.reference)}, point by point; the scale ends "
-            f"at the same share of the area of the solver that is farthest from it."
+            f"at the same share of the area of the solver that is farthest from it, but not beyond the scale "
+            f"of the field itself: what is off by more takes the end colours."
             if len(self.evaluations) > 1
             else ""
         )
@@ -136,7 +141,8 @@ class Gallery:
             "Force over displacement",
             f"Force of the indenter along its travel: per mm of depth (left), and for the finger’s "
             f"{self.design.depth:g} mm (right). A point is an equilibrium that a solver found as the load "
-            f"grew; a linear solver’s line (dashed) is straight by its law.",
+            f"grew; a linear solver’s line (dashed) is straight by its law. Solvers that were given the "
+            f"markers are left out: the markers pull too.",
         )
 
     def excess(self) -> Figure | None:
@@ -166,7 +172,23 @@ class Gallery:
             "Energy",
             f"Elastic energy per unit depth as each solver went on and, beside it, its relative distance "
             f"from that of {solver_label(self.reference)} (dashed line). A solver that solves directly "
-            f"keeps no record.",
+            f"keeps no record. One that was given the markers pays energy for them: assimilation never "
+            f"lowers the least energy. Over factors of the markers’ weight: the energy that they add.",
+        )
+
+    def losses(self) -> Figure | None:
+        """The terms of the loss of every network that is trained by gradients."""
+        path = self.folder / "losses.png"
+        if not draw_losses(path, evaluations=self.evaluations):
+            return None
+        return Figure(
+            path,
+            "Losses",
+            f"The paper’s Fig. 7, for all terms of the loss. L_PDE is the mean energy density: its least "
+            f"value is not zero, and where the conditions are met, every further one raises it. So markers "
+            f"cannot lower it at convergence. A network with the lower L_PDE at some epoch has come farther "
+            f"in its training or misses its conditions by more, which L_BC tells; it is no more accurate for "
+            f"it. A curve that still falls is a training that has not ended. {self._given()}",
         )
 
     def drawing(self) -> Figure:

@@ -1,77 +1,110 @@
-"""Bars of the errors at the markers."""
+"""Errors at the markers, a row a solver."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure as MplFigure
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from compare.evaluation import Evaluation
 from compare.figures.labels import solver_at_markers
-from compare.figures.style import (
-    MUTED,
-    WIDTH,
-    axes_at,
-    figure,
-    heading,
-    legend_above,
-    legend_height,
-    solver_colour,
-)
-from compare.metrics import marker_errors
-from geometry.arrays import BoolArray, FloatArray
+from compare.figures.style import MUTED, WIDTH, axes_at, figure, heading, solver_colour
+from compare.metrics import MarkerErrors, held_out_errors, marker_errors
+from geometry.arrays import BoolArray
 from geometry.observations import Observations
 
-HEAD, HEIGHT, FOOT, LEFT = 0.32, 1.45, 0.42, 0.72
-"""Heights and the left margin, inches."""
+HEAD, TITLE, HEIGHT, GAP, FOOT = 0.62, 0.19, 0.42, 0.09, 0.4
+"""Heights in inches: heading and legend; a solver's name; its bars; the space below; the lowest axis."""
+LEFT, MEANS = 0.48, 0.72
+"""Widths in inches beside the bars: their scale; their means."""
 
 
 def draw_marker_errors(path: Path, *, evaluations: Sequence[Evaluation], observations: Observations) -> None:
-    """Bars of |du| and |dv| at every marker, grouped by marker, one colour a solver (Fig. 6 of the paper)."""
-    errors = [marker_errors(evaluation, observations) for evaluation in evaluations]
-    names = [solver_at_markers(evaluation) for evaluation in evaluations]
-    charts = {
-        "u": ([error.ae_u for error in errors], [error.mae_u for error in errors]),
-        "v": ([error.ae_v for error in errors], [error.mae_v for error in errors]),
-    }
-    legends = {
-        symbol: [f"{name}, mean {mean:.3g} mm" for name, mean in zip(names, means, strict=True)]
-        for symbol, (_, means) in charts.items()
-    }
-    heights = [legend_height(labels) for labels in legends.values()]
-    with figure(path, HEAD + sum(heights) + 2 * (HEIGHT + FOOT)) as drawn:
+    """Bars of |du| and |dv| at every marker (Fig. 6 of the paper), all on one scale.
+
+    Full bars: at markers that the solver was not given. Hollow ones: at markers that it was given.
+    """
+    width = WIDTH / 2 - LEFT - MEANS
+    step = TITLE + HEIGHT + GAP
+    ceiling = _ceiling(evaluations, observations)
+    with figure(path, HEAD + len(evaluations) * step + FOOT) as drawn:
         heading(drawn, f"Absolute error at the markers, against {observations.label} displacements")
-        for row, (symbol, (columns, _)) in enumerate(charts.items()):
-            top = HEAD + sum(heights[: row + 1]) + row * (HEIGHT + FOOT)
-            axes = axes_at(drawn, (LEFT, top, WIDTH - LEFT - 0.1, HEIGHT))
-            _bars(axes, columns, legends[symbol], observations.visible)
-            axes.set_ylabel(rf"$|\Delta {symbol}|$, mm")
-        axes.set_xlabel("marker (1 is nearest the base)")
+        _legend(drawn)
+        for row, evaluation in enumerate(evaluations):
+            held_out = held_out_errors(evaluation, observations)
+            given = marker_errors(evaluation, observations) if evaluation.in_sample else None
+            for column, symbol in enumerate("uv"):
+                box = (LEFT + column * WIDTH / 2, HEAD + TITLE + row * step, width, HEIGHT)
+                axes = axes_at(drawn, box)
+                _bars(axes, symbol, held_out, given, solver_colour(row))
+                _scales(axes, observations.visible, ceiling)
+                axes.set_ylabel(rf"$|\Delta {symbol}|$, mm", size=7)
+                if column == 0:
+                    axes.set_title(solver_at_markers(evaluation), size=8.5, pad=2, weight="bold")
+                if row == len(evaluations) - 1:
+                    axes.set_xlabel("marker (1 is nearest the base)")
+                else:
+                    axes.tick_params(labelbottom=False)
 
 
-def _bars(axes: Axes, columns: Sequence[FloatArray], labels: Sequence[str], visible: BoolArray) -> None:
+def _ceiling(evaluations: Sequence[Evaluation], observations: Observations) -> float:
+    """The largest error of a solver that converged (or of any), mm."""
+    chosen = [evaluation for evaluation in evaluations if evaluation.converged] or evaluations
+    errors = [
+        error(evaluation, observations) for evaluation in chosen for error in (marker_errors, held_out_errors)
+    ]
+    found = [np.nanmax([error.ae_u, error.ae_v]) for error in errors if error is not None]
+    return float(max(found)) or 1.0
+
+
+def _bars(
+    axes: Axes, symbol: str, held_out: MarkerErrors | None, given: MarkerErrors | None, colour: str
+) -> None:
+    """The bars of one solver and component, and their means beside."""
+    width = 0.8 if held_out is None or given is None else 0.4
+    words = []
+    for errors, shift, hollow in ((held_out, -0.5, False), (given, 0.5, True)):
+        if errors is None:
+            continue
+        values = getattr(errors, f"ae_{symbol}")
+        marker = np.arange(1, len(values) + 1)
+        x = marker + (shift * width if width < 0.5 else 0.0)
+        seen = np.isfinite(values)
+        face = "white" if hollow else colour
+        axes.bar(x[seen], values[seen], 0.9 * width, color=face, edgecolor=colour, linewidth=0.6)
+        words.append(f"{'given' if hollow else 'mean'} {getattr(errors, f'mae_{symbol}'):.3f}")
+    axes.text(1.03, 0.5, "\n".join(words), size=7, va="center", color=MUTED, transform=axes.transAxes)
+
+
+def _scales(axes: Axes, visible: BoolArray, ceiling: float) -> None:
     count = len(visible)
-    width = 0.8 / len(columns)
-    for number, (values, label) in enumerate(zip(columns, labels, strict=True)):
-        x = np.arange(1, count + 1) + (number - (len(columns) - 1) / 2) * width
-        axes.bar(x[visible], values[visible], width * 0.94, color=solver_colour(number), label=label)
     for marker in np.flatnonzero(~visible) + 1:
-        axes.text(
-            marker,
-            0.02,
-            "not seen",
-            rotation=90,
-            size=7,
-            color=MUTED,
-            ha="center",
-            va="bottom",
-            transform=axes.get_xaxis_transform(),
-        )
-    axes.set_xticks(range(1, count + 1) if count <= 20 else range(1, count + 1, 5))
+        axes.text(marker, 0.04, "×", size=7, color=MUTED, ha="center", transform=axes.get_xaxis_transform())
+    axes.set_xticks(range(1, count + 1) if count <= 12 else range(1, count + 1, 5))
     axes.set_xlim(0.4, count + 0.6)
+    axes.set_ylim(0, 1.04 * ceiling)
+    axes.yaxis.set_major_locator(MaxNLocator(2))
     axes.yaxis.set_major_formatter("{x:g}")
+    axes.tick_params(labelsize=7)
     axes.grid(axis="y", color="#dddddd", linewidth=0.5)
     axes.set_axisbelow(True)
-    ceiling = max(float(np.nanmax(values)) for values in columns) or 1.0
-    axes.set_ylim(0, 1.04 * ceiling)
-    legend_above(axes)
+
+
+def _legend(drawn: MplFigure) -> None:
+    handles = [
+        Patch(facecolor=MUTED, edgecolor=MUTED, label="at a marker that the solver was not given"),
+        Patch(facecolor="white", edgecolor=MUTED, label="at one that it was given"),
+    ]
+    drawn.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(0.0, 1 - 0.24 / drawn.get_figheight()),
+        ncols=2,
+        columnspacing=1.2,
+        handletextpad=0.5,
+        borderaxespad=0.1,
+        handlelength=1.4,
+    )

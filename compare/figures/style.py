@@ -30,8 +30,8 @@ MEASURED = "#d1006c"
 HALO = [patheffects.withStroke(linewidth=2.5, foreground="white")]
 """Keeps type and lines legible on anything."""
 
-SOLVER_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#56b4e9", "#d55e00", "#000000", "#8c6bb1")
-"""Okabe and Ito's palette, safe for colour-blind readers, without its pink (see `MEASURED`)."""
+SOLVER_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#56b4e9", "#d55e00", "#000000", "#8c6bb1", "#999933")
+"""Okabe and Ito's palette, safe for colour-blind readers, without its pink (see `MEASURED`), and two more."""
 
 _RC: "dict[RcKeyType, Any]" = {
     "font.family": "DejaVu Sans",

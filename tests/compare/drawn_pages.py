@@ -18,6 +18,7 @@ MODULES = (
     "marker_chart",
     "fields",
     "energy_chart",
+    "loss_chart",
     "force_chart",
     "excess",
     "design_drawing",

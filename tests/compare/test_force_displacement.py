@@ -50,6 +50,11 @@ def test_without_a_solver_that_follows_the_load_there_is_no_curve(fem: Evaluatio
     assert force_curves([fem, pinn], Load()) == []
 
 
+def test_a_solver_that_was_given_markers_has_no_curve(followed: Evaluation, fem: Evaluation) -> None:
+    curves = force_curves([replace(fem, in_sample=True), followed], Load())
+    assert [curve.evaluation.solver for curve in curves] == ["fem-nonlinear"]
+
+
 def test_file_has_the_force_per_depth_and_for_the_depth(followed: Evaluation, tmp_path: Path) -> None:
     load = Load(kind="patch", displacement=(None, -4.0))
     path = tmp_path / "force_displacement.csv"
