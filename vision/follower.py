@@ -25,6 +25,8 @@ LIVE_PERIOD = 5
 """Frames between two looks at the fiducials, which do not move, where there is no time for more."""
 SAME_SIZE = 1.3
 """Ratio of the radii of a disc and of a marker beyond which the disc is no marker."""
+SAME_CONTRAST = 5.0
+"""Ratio of the contrasts, which uneven light explains; a disc of the other sign is no marker either."""
 
 
 class Sighting(NamedTuple):
@@ -52,8 +54,7 @@ def _plane_of(setup: Setup, image: Image) -> tuple[Plane, Fiducials]:
     except UnseenError:
         if not setup.alone:
             raise
-        nothing = Spots(np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0))
-        return setup.find_alone(image), Fiducials(np.empty(0, dtype=np.int64), nothing)
+        return setup.find_alone(image), Fiducials(np.empty(0, dtype=np.int64), Spots.none())
 
 
 class Follower:
@@ -78,9 +79,12 @@ class Follower:
         self._rest = self._places = marker_positions(setup.design)
         self._step = np.zeros_like(self._rest)
         self._steps = moved(self._rest)
-        self._size = 1.0
+        self._size, self._contrast = 1.0, np.nan
         spots = self._search(image)
         names = self._named(spots, self._rest, placed(self._rest))
+        if (names >= 0).any():
+            self._contrast = float(np.median(spots.contrasts[names[names >= 0]]))
+            names = self._named(spots, self._rest, placed(self._rest))
         seen = names >= 0
         if seen.sum() < (least := min(FEWEST, len(names))):
             raise UserError(
@@ -118,7 +122,10 @@ class Follower:
 
     def _named(self, spots: Spots, places: FloatArray, fields: FloatArray) -> IntArray:
         """The number of its disc for every marker that was at `places`, shape (m,); -1 if it has none."""
-        return identify(self.plane.points(spots.centres), places, fields)
+        ratio = spots.contrasts / self._contrast
+        alike = np.nonzero(~((ratio < 1 / SAME_CONTRAST) | (ratio > SAME_CONTRAST)))[0]  # nan is not known
+        names = identify(self.plane.points(spots.centres[alike]), places, fields)
+        return np.where(names >= 0, np.append(alike, -1)[names], -1)
 
     def _radii(self, places: FloatArray) -> FloatArray:
         """Of the pictures of markers, shape (m,), pixels."""

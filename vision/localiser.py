@@ -24,23 +24,38 @@ REACH = 0.8
 
 
 class Spots(NamedTuple):
-    """Discs: centres, shape (n, 2), covariances, (n, 2, 2), and radii, (n,), pixels."""
+    """Discs.
+
+    Attributes:
+        centres: Shape (n, 2), pixels.
+        covariances: Of the centres, shape (n, 2, 2), pixels².
+        radii: Shape (n,), pixels.
+        contrasts: How much darker than their surroundings, shape (n,), grey levels; nan for circles.
+    """
 
     centres: FloatArray
     covariances: FloatArray
     radii: FloatArray
+    contrasts: FloatArray
 
-    def where(self, kept: BoolArray) -> "Spots":
+    @staticmethod
+    def none() -> "Spots":
+        """No disc."""
+        return Spots(np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0), np.empty(0))
+
+    def where(self, kept: BoolArray | IntArray) -> "Spots":
         """Some of them."""
-        return Spots(self.centres[kept], self.covariances[kept], self.radii[kept])
+        return Spots(*(part[kept] for part in self))
 
     def numbered(self, discs: IntArray) -> "Spots":
         """The disc with each of the numbers `discs`; nan for the number -1."""
         known = np.where(discs >= 0, 1.0, np.nan)
         if not len(self.radii):
-            return Spots(np.full((len(discs), 2), np.nan), np.full((len(discs), 2, 2), np.nan), known)
-        centres, covariances, radii = (part[discs] for part in self)
-        return Spots(centres * known[:, None], covariances * known[:, None, None], radii * known)
+            return Spots(np.full((len(discs), 2), np.nan), np.full((len(discs), 2, 2), np.nan), known, known)
+        centres, covariances, radii, contrasts = (part[discs] for part in self)
+        return Spots(
+            centres * known[:, None], covariances * known[:, None, None], radii * known, contrasts * known
+        )
 
     def together(self, others: "Spots") -> "Spots":
         """These, and those of the others that are not among them."""
@@ -60,7 +75,7 @@ def look(
 def follow(image: Image, colour: Colour, guesses: FloatArray, radii: FloatArray, method: Method) -> Spots:
     """The discs with known radii, shape (n,), that are near guesses, shape (n, 2), pixels; perhaps fewer."""
     if not len(guesses):
-        return _circles(np.empty((0, 3)))
+        return Spots.none()
     if method == "precise":
         return _fitted(image, np.column_stack([guesses, radii]), radii)
     low = np.floor(guesses.min(axis=0) - 2.5 * radii.max()).astype(int)
@@ -83,10 +98,10 @@ def _fitted(image: Image, circles: FloatArray, radii: FloatArray | None) -> Spot
     apart = np.linalg.norm(discs.centres[:, None] - discs.centres, axis=2)
     for number in np.nonzero(kept)[0]:
         kept[number + 1 :] &= ~(apart[number, number + 1 :] < circles[number, 2])
-    return Spots(discs.centres[kept], discs.covariances[kept], discs.radii[kept])
+    return Spots(discs.centres, discs.covariances, discs.radii, discs.contrast).where(kept)
 
 
 def _circles(circles: FloatArray) -> Spots:
     """Circles as they are: their error is not seen from one frame."""
     covariances = np.repeat(FLOOR["hough"] ** 2 * np.eye(2)[None], len(circles), axis=0)
-    return Spots(circles[:, :2], covariances, circles[:, 2])
+    return Spots(circles[:, :2], covariances, circles[:, 2], np.full(len(circles), np.nan))

@@ -90,7 +90,7 @@ class Plane:
         x, y = np.moveaxis(seen - self.pixels(centres)[:, None], 2, 0)
         turns = x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)
         middle = [((of + np.roll(of, -1, axis=1)) * turns).sum(axis=1) for of in (x, y)]
-        return np.stack(middle, axis=1) / (3 * turns.sum(axis=1)[:, None])
+        return np.asarray(np.stack(middle, axis=1) / (3 * turns.sum(axis=1)[:, None]))
 
     def scales(self, points: FloatArray) -> FloatArray:
         """Pixels per mm at points of the plane, shape (n,): the root of the ratio of areas."""

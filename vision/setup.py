@@ -64,7 +64,7 @@ class Setup:
     def plane(self, fiducials: Fiducials) -> Plane:
         """The markers' plane from fiducials, as exact as the method and what is known allow."""
         points = self.workspace.points[fiducials.numbers]
-        centres, covariances, _ = fiducials.spots
+        centres, covariances = fiducials.spots[:2]
         if self.method == "hough":
             return similarity_plane(points, centres, covariances)
         radius = self.workspace.fiducial_diameter / 2

@@ -13,6 +13,7 @@ from vision.localiser import FLOOR, Spots
 from vision.markers_alone import symmetric
 from vision.rest import find_rest
 from vision.setup import Fiducials, Setup, check_size
+from vision.shake import Shake, find_shake
 from vision.tracking import Tracking, mean_spots, placed
 
 FAR = 0.5
@@ -29,8 +30,9 @@ def track(frames: Frames, setup: Setup, watch: Callable[[Frame, Sighting], None]
     """Track the markers through a video.
 
     The plane comes from the fiducials in all frames at rest; the displacements are those of the markers'
-    means over the frames at rest, from before to after the motion. What has no end of its own, a camera or a
-    pipe, is ended by an interrupt from the keyboard.
+    means over the frames at rest, from before to after the motion; if the camera moved between them, the
+    fiducials undo it. What has no end of its own, a camera or a pipe, is ended by an interrupt from the
+    keyboard.
 
     Args:
         frames: From the finger at rest until it is held.
@@ -71,7 +73,11 @@ def track(frames: Frames, setup: Setup, watch: Callable[[Frame, Sighting], None]
     if alone:
         plane = setup.alone_plane(initial.centres, initial.covariances)
     else:
-        plane = setup.plane(Fiducials(numbers, anchors[2].numbered(numbers)))
+        shake = find_shake(setup, anchors[0], anchors[1])
+        plane = (
+            shake.planes[0] if shake.planes else setup.plane(Fiducials(numbers, anchors[2].where(numbers)))
+        )
+        final = shake.undone(final)
     tracking = Tracking(
         design=setup.design,
         expected=marker_positions(setup.design),
@@ -86,7 +92,7 @@ def track(frames: Frames, setup: Setup, watch: Callable[[Frame, Sighting], None]
     )
     if alone:
         return _by_the_motion(setup, tracking)
-    return replace(tracking, warnings=tuple(_remarks(setup, tracking, anchors[0], anchors[1])))
+    return replace(tracking, warnings=tuple(_remarks(setup, tracking, anchors[1], shake)))
 
 
 def _by_the_motion(setup: Setup, tracking: Tracking) -> Tracking:
@@ -129,8 +135,8 @@ def _pressed(tracking: Tracking) -> float:
     return float(np.nanmean((after - before)[:, 1]))
 
 
-def _remarks(setup: Setup, tracking: Tracking, before: Spots, after: Spots) -> Iterator[str]:
-    """What a person should know; `before` and `after` are the fiducials."""
+def _remarks(setup: Setup, tracking: Tracking, after: Spots, shake: Shake) -> Iterator[str]:
+    """What a person should know; `after` are the fiducials."""
     residual = tracking.plane.residual
     if setup.camera is None and setup.method == "precise":
         yield f"no camera: its lens is not undone; the fiducials are {residual:.3f} mm (rms) off their places"
@@ -140,10 +146,12 @@ def _remarks(setup: Setup, tracking: Tracking, before: Spots, after: Spots) -> I
         yield "the camera file has no covariance, so the standard deviations leave the camera's errors out"
     if (hidden := int(np.isnan(after.radii).sum())) > 0:
         yield f"{hidden} of {len(after.radii)} fiducials were not seen"
-    both = np.isfinite(before.radii + after.radii)
-    shake = np.linalg.norm((after.centres - before.centres)[both], axis=1)
-    if both.any() and (shake := np.median(shake)) > SHAKE:
-        yield f"the fiducials moved by {shake:.2f} pixels between start and end: the camera was not at rest"
+    if shake.way > SHAKE:
+        known = "which they undo" if shake.planes else "and too few of them are seen to undo it"
+        yield (
+            f"the fiducials moved by {shake.way:.2f} pixels between start and end: the camera was not at "
+            f"rest, {known}"
+        )
     far = float(np.sqrt(np.nanmean((tracking.offsets**2).sum(axis=1))))
     if far > FAR:
         yield f"at rest the markers are {far:.2f} mm (rms) from where the design has them"

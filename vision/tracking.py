@@ -118,23 +118,24 @@ def mean_spots(frames: Sequence[Spots], method: Method) -> Spots:
     over independent frames reduces; what others have beyond is misfit, of the wall beside a disc for one, and
     common to all frames, as is `FLOOR`.
     """
-    centres, covariances, radii = (np.stack(parts) for parts in zip(*frames, strict=True))
+    centres, covariances, radii, contrasts = (np.stack(parts) for parts in zip(*frames, strict=True))
     seen = np.isfinite(radii)
     count = seen.sum(axis=0)
     known = count >= max(1.0, LEAST_SHARE * len(frames))
-    mean, radius = np.full(centres.shape[1:], np.nan), np.full(len(known), np.nan)
+    mean, radius, contrast = (np.full(part.shape[1:], np.nan) for part in (centres, radii, contrasts))
     covariance = np.full(covariances.shape[1:], np.nan)
     if not known.any():
-        return Spots(mean, covariance, radius)
+        return Spots(mean, covariance, radius, contrast)
     weights = np.zeros_like(covariances)
     weights[seen] = np.linalg.inv(covariances[seen])
     total = np.linalg.inv(weights.sum(axis=0)[known])
     centres = np.where(seen[:, :, None], centres, 0.0)
     mean[known] = np.einsum("mij,fmjk,fmk->mi", total, weights[:, known], centres[:, known])
     radius[known] = np.nanmean(radii[:, known], axis=0)
+    contrast[known] = np.where(seen, contrasts, 0.0).sum(axis=0)[known] / count[known]
     usual = np.nanmean(covariances[:, known], axis=0)
     size = np.trace(usual, axis1=1, axis2=2)
     noise = np.minimum(np.percentile(size, 25) / size, 1.0)
     share = 1 - noise + noise / count[known]
     covariance[known] = share[:, None, None] * usual + FLOOR[method] ** 2 * np.eye(2)
-    return Spots(mean, covariance, radius)
+    return Spots(mean, covariance, radius, contrast)

@@ -155,7 +155,7 @@ def test_a_lens_moves_the_middles_of_discs_which_is_undone():
 
 def test_the_plane_of_fiducials_is_that_of_their_discs():
     setup = Setup(Parameters(), default_workspace(Parameters()), CAMERA)
-    spots = Spots(pictured(FIDUCIALS, 2.0, CAMERA), noise(7), np.full(7, 16.0))
+    spots = Spots(pictured(FIDUCIALS, 2.0, CAMERA), noise(7), np.full(7, 16.0), np.full(7, 180.0))
     plane = setup.plane(Fiducials(np.arange(7), spots))
     assert plane.residual < 1e-4
     np.testing.assert_allclose(

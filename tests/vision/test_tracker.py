@@ -74,6 +74,38 @@ def test_a_marker_behind_a_cable_is_missing_and_no_other_takes_its_name():
     assert any("reported missing: marker 5" in warning for warning in tracking.warnings)
 
 
+def shifted(image, x, y):
+    """What a camera sees that was turned a little."""
+    return np.roll(image, (y, x), axis=(0, 1))
+
+
+@pytest.mark.parametrize("camera", [CAMERA, None])
+def test_a_camera_that_moves_between_start_and_end_is_undone_by_the_fiducials(camera):
+    still = tracked(images(), camera=camera).observations("rig")
+    moved = tracked([*images()[:3], *(shifted(image, 3, 2) for image in images()[3:])], camera=camera)
+    observations = moved.observations("rig")
+    np.testing.assert_allclose(observations.displacements, still.displacements, rtol=0, atol=0.01)  # of 0.38
+    assert any("moved by 3.6" in warning and "they undo" in warning for warning in moved.warnings)
+
+
+def test_a_camera_that_loses_all_fiducials_is_refused():
+    with pytest.raises(UserError, match="no fiducial is seen in the end where it was"):
+        tracked([*images()[:3], *(shifted(image, 25, 0) for image in images()[3:])])
+
+
+@pytest.mark.parametrize("levels", [12, -12])  # of the wall less those of the patch
+def test_a_patch_of_nearly_the_walls_colour_is_no_marker(levels):
+    _, truth = recording().frame(0)
+    x, y = np.rint(truth.pixels[4]).astype(int)
+    patched = [image.copy() for image in images()]
+    for image in patched[:3]:
+        wall = image[y, x - 12].astype(float)
+        cv2.circle(image, (int(x), int(y)), 9, (wall - levels).tolist(), -1, cv2.LINE_AA)
+    observations = tracked(patched).observations("rig")
+    np.testing.assert_array_equal(np.nonzero(~observations.visible)[0], [4])
+    assert error_of(observations) < 0.015
+
+
 @pytest.mark.parametrize("turns", [1, 2, 3])
 def test_a_camera_may_be_turned_if_the_fiducials_are_seen(turns):
     tracking = tracked([np.rot90(image, turns) for image in images()], camera=None)
