@@ -89,7 +89,7 @@ class Follower:
         if seen.sum() < (least := min(FEWEST, len(names))):
             raise UserError(
                 f"{seen.sum()} of {len(names)} markers are where the design has them, and {least} must be; "
-                "show the finger before it is pressed, and give its design and its markers' colour"
+                "show the finger before it is pressed, and give its design, workspace and markers' colour"
             )
         self._size = float(np.median(spots.radii[names[seen]] / self._radii(self._rest)[seen]))
         self._lost = 0

@@ -231,7 +231,7 @@ def camera_plane(
         with suppress(UserError):  # behind the camera
             fits.append(_refined(view, np.ravel(start), points, pixels, covariances))
     if not fits:
-        raise UserError(f"{UNDETERMINED}; give the camera of the video")
+        raise UserError(f"{UNDETERMINED}; give the design or workspace, and the camera, of the video")
     # A plane that is seen obliquely looks almost like another one; the better of both is kept.
     pose, squares = min(fits, key=lambda fit: fit[1])
     slopes = view.slopes(points, pose).parameters.reshape(2 * len(points), -1)
