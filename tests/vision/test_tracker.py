@@ -93,16 +93,15 @@ def test_a_camera_that_loses_all_fiducials_is_refused():
         tracked([*images()[:3], *(shifted(image, 25, 0) for image in images()[3:])])
 
 
-@pytest.mark.parametrize("levels", [12, -12])  # of the wall less those of the patch
-def test_a_patch_of_nearly_the_walls_colour_is_no_marker(levels):
+def test_a_patch_a_little_lighter_than_the_wall_is_no_marker():
     _, truth = recording().frame(0)
-    x, y = np.rint(truth.pixels[4]).astype(int)
+    x, y = truth.pixels[4]
     patched = [image.copy() for image in images()]
     for image in patched[:3]:
-        wall = image[y, x - 12].astype(float)
-        cv2.circle(image, (int(x), int(y)), 9, (wall - levels).tolist(), -1, cv2.LINE_AA)
+        lighter = image[round(y), round(x) - 13] + 10.0
+        cv2.circle(image, (round(16 * x), round(16 * y)), 9 * 16, lighter.tolist(), -1, cv2.LINE_AA, shift=4)
     observations = tracked(patched).observations("rig")
-    np.testing.assert_array_equal(np.nonzero(~observations.visible)[0], [4])
+    np.testing.assert_array_equal(np.nonzero(~observations.visible)[0], [4])  # its fit is 0.25 mm off
     assert error_of(observations) < 0.015
 
 
