@@ -23,6 +23,8 @@ from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Progress
 
+MIN_STEP = 0.01
+"""Fraction of the load below which the path is given up: what pulls so hard tears elements."""
 PATH_SHARE = 0.5
 """Of the progress that the load path is; the markers that are left out are the rest."""
 
@@ -43,9 +45,7 @@ def assimilated(
     started = time.perf_counter()
     space = LagrangeSpace(problem.mesh, degree)
     springs = Constraints.springs(misfit, space)
-    path = FemNonlinearSolver(degree=degree).path(
-        problem, space, Constraints.of(problem, space, slack).joined(springs)
-    )
+    path = _path(problem, space, Constraints.of(problem, space, slack).joined(springs))
     path.follow(lambda done, text: progress(PATH_SHARE * done, text))
     steps, iterations, last = len(path.points) - 1, path.iterations, path.points[-1]
     forces = last.forces[-len(springs.targets) :]
@@ -81,6 +81,10 @@ def assimilated(
     )
 
 
+def _path(problem: Problem, space: LagrangeSpace, constraints: Constraints) -> LoadPath:
+    return FemNonlinearSolver(degree=space.degree, min_step=MIN_STEP).path(problem, space, constraints)
+
+
 def _left_out(path: LoadPath, problem: Problem, springs: Constraints, progress: Progress) -> FloatArray:
     """What each marker is missed by without it, shape (m, 2), mm; NaN where there is no equilibrium."""
     count = len(springs.targets) // 2
@@ -99,10 +103,8 @@ def _left_out(path: LoadPath, problem: Problem, springs: Constraints, progress: 
 
 def _from_rest(path: LoadPath, problem: Problem, kept: BoolArray) -> PathPoint | None:
     """Equilibrium at the full load under some of a path's constraints; None if there is none."""
-    distributed = path.equilibrium.distributed
-    again = FemNonlinearSolver(degree=distributed.space.degree).path(
-        problem, distributed.space, path.equilibrium.constraints.only(kept)
-    )
+    equilibrium = path.equilibrium
+    again = _path(problem, equilibrium.distributed.space, equilibrium.constraints.only(kept))
     again.follow(lambda done, text: None)
     again.close()
     return again.points[-1] if again.points[-1].fraction == 1 else None
@@ -115,7 +117,8 @@ def _status(
         return Status(
             False,
             f"stopped at {path.points[-1].fraction:.1%} of the load: Newton's method fails beyond "
-            f"({path.reason}); take smaller weights, a contact_deviation or a finer mesh",
+            f"({path.reason}): load and markers contradict each other; let the contact slide, give it a "
+            "contact_deviation or take smaller weights",
         )
     said = (
         f"energy plus misfit is stationary: all of the load applied in {steps} steps, {iterations} Newton "
