@@ -17,6 +17,7 @@ BENCHMARKS = {
     "recipes": "pinn_recipes",
     "epochs": "deepxde_epochs",
     "scenes": "tracker_scenes",
+    "stress": "tracker_stress",
     "live": "live_tracking",
     "localisation": "localisation",
 }

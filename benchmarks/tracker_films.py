@@ -19,6 +19,9 @@ from vision.tracking import Tracking
 ELEMENT = 1.0
 """Size of the elements whose displacements are filmed, mm; with 0.5 they move the markers by 0.0003 mm."""
 
+HIDDEN = 0.02
+"""Share of a marker's picture below which it is wholly hidden."""
+
 
 @dataclass(frozen=True)
 class Finger:
@@ -41,25 +44,28 @@ class Score:
     """What was measured of the m markers of a film, and what is true.
 
     Attributes:
-        expected: Where they were, shape (m, 2), mm.
         true: How their discs moved, shape (m, 2), mm.
         centres: How the points in the middle of the discs before loading moved, shape (m, 2), mm.
         measured: What the tracker says, shape (m, 2), mm; nan for those that it reports missing.
         covariances: Of every marker's displacement, as the tracker has it, shape (m, 2, 2), mm².
+        swapped: How many markers were, in some frame, nearer to another one's place than to their own.
+        invented: How many were reported in a frame in which they were wholly hidden.
         overall: Mean of the squares over all displacements, weighted by the inverse of their covariance; 1 if
             that is right.
     """
 
-    expected: FloatArray
     true: FloatArray
     centres: FloatArray
     measured: FloatArray
     covariances: FloatArray
+    swapped: int
+    invented: int
     overall: float
 
     @classmethod
-    def of(cls, tracking: Tracking, first: Truth, last: Truth) -> "Score":
-        """Compare what was tracked in a film with the truth of its first and last frame."""
+    def of(cls, tracking: Tracking, truths: Sequence[Truth]) -> "Score":
+        """Compare what was tracked in a film with the truth of its frames."""
+        first, last = truths[0], truths[-1]
         seen = tracking.visible
         covariance = tracking.displacement_covariance
         count = int(seen.sum())
@@ -70,12 +76,18 @@ class Score:
         measured = np.where(seen[:, None], observations.displacements, np.nan)
         true = last.discs - first.discs
         missed = (measured - true)[seen].ravel()
+        positions, places = tracking.positions, np.stack([truth.discs for truth in truths])
+        found = np.isfinite(positions[..., 0])
+        away = np.linalg.norm(positions[:, :, None] - places[:, None], axis=3)
+        nearest = np.where(found, np.where(found[..., None], away, 0.0).argmin(axis=2), np.arange(len(seen)))
+        hidden = np.stack([truth.seen for truth in truths]) < HIDDEN
         return cls(
-            expected=first.discs,
             true=true,
             centres=(last.world - first.world)[:, :2],
             measured=measured,
             covariances=covariances,
+            swapped=int((nearest != np.arange(len(seen))).any(axis=0).sum()),
+            invented=int((found & hidden).any(axis=0).sum()),
             overall=float(missed @ np.linalg.solve(covariance, missed)) / len(missed),
         )
 
@@ -95,10 +107,14 @@ class Score:
         return np.asarray(np.abs(self.missed)[self.seen].sum(axis=1))
 
     @property
+    def deviations(self) -> FloatArray:
+        """Standard deviations of the seen markers, shape (s, 2), mm."""
+        return np.sqrt(np.diagonal(self.covariances[self.seen], axis1=1, axis2=2))
+
+    @property
     def ratios(self) -> FloatArray:
         """Errors of the seen markers over their standard deviations, shape (s, 2)."""
-        deviations = np.sqrt(np.diagonal(self.covariances, axis1=1, axis2=2))
-        return np.asarray((self.missed / deviations)[self.seen])
+        return np.asarray(self.missed[self.seen] / self.deviations)
 
     @property
     def squares(self) -> FloatArray:
@@ -106,13 +122,6 @@ class Score:
         missed = self.missed[self.seen]
         solved = np.linalg.solve(self.covariances[self.seen], missed[:, :, None])[:, :, 0]
         return np.asarray((missed * solved).sum(axis=1))
-
-    @property
-    def swapped(self) -> int:
-        """How many markers were found nearer to where another one is than to where they are."""
-        places = self.expected + self.true
-        away = np.linalg.norm((self.expected + self.measured)[self.seen, None] - places, axis=2)
-        return int((away.argmin(axis=1) != np.nonzero(self.seen)[0]).sum())
 
 
 def coverage(ratios: FloatArray) -> tuple[float, float]:

@@ -128,7 +128,7 @@ def scored(recording: Recording, camera: Camera) -> Score:
     bench = recording.bench
     setup = Setup(bench.parameters, bench.workspace, camera)
     pictures, truths = zip(*recording.frames(), strict=True)
-    return Score.of(track(film_of(pictures), setup), truths[0], truths[-1])
+    return Score.of(track(film_of(pictures), setup), truths)
 
 
 def _alone() -> None:
@@ -182,7 +182,7 @@ def _table(results: list[list[Scored]], seconds: float) -> Table:
 def _row(scenes: list[Scored]) -> list[str]:
     scores = [scene.score for scene in scenes]
     lengths = [score.lengths for score in scores]
-    deviations = np.concatenate([np.diagonal(s.covariances[s.seen], axis1=1, axis2=2) for s in scores]) ** 0.5
+    deviations = np.concatenate([score.deviations for score in scores])
     one, two = coverage(np.concatenate([score.ratios for score in scores]))
     return [
         f"{np.concatenate(lengths).mean():.4f}",

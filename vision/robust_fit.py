@@ -188,7 +188,8 @@ def correlation(window: Window, adjusted: Adjusted, chosen: BoolArray, near: Boo
     """Variance of means over neighbours times their number, over the variance of the noise; at least 1.
 
     It is 1 for noise that differs from pixel to pixel. Cameras and codecs that smooth, or quantise in blocks,
-    leave noise that does not, and more of it near edges. Taken over all discs together.
+    leave noise that does not, and more of it near edges. The median over the discs: what only some of them
+    show is no noise, but a picture that is not quite the model's.
 
     Args:
         window: The pixels.
@@ -199,5 +200,7 @@ def correlation(window: Window, adjusted: Adjusted, chosen: BoolArray, near: Boo
     inner = window.smoothed(chosen.astype(np.float32), NEIGHBOURS) > 1 - 1e-3
     inner &= near
     noise = adjusted.fit.variance[:, None] ** 0.5
-    means = window.smoothed(adjusted.residuals / noise.astype(np.float32), NEIGHBOURS)[inner]
-    return max(1.0, float(NEIGHBOURS**2 * (means**2).mean())) if means.size else 1.0
+    means = window.smoothed(adjusted.residuals / noise.astype(np.float32), NEIGHBOURS)
+    count = inner.sum(axis=1)
+    squares = NEIGHBOURS**2 * ((means * inner) ** 2).sum(axis=1)[count > 0] / count[count > 0]
+    return max(1.0, float(np.median(squares))) if squares.size else 1.0

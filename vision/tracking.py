@@ -16,6 +16,8 @@ from vision.rest import Rest
 
 LEAST_SHARE = 0.2
 """Of the frames at rest; a marker that is seen in fewer counts as not visible."""
+TRUST = 8
+"""In the fit's covariances, against what the frames' scatter says: as if of so many squares."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +118,9 @@ def mean_spots(frames: Sequence[Spots], method: Method) -> Spots:
 
     Weights are inverse covariances. Those of the best fitted quarter of the discs are noise, which a mean
     over independent frames reduces; what others have beyond is misfit, of the wall beside a disc for one, and
-    common to all frames, as is `FLOOR`.
+    common to all frames, as is `FLOOR`. A disc that is not quite the model's scatters more than its
+    covariances say; they grow with the mean square (R. T. Birge, "The calculation of errors by the method of
+    least squares", Physical Review 40, 1932).
     """
     centres, covariances, radii, contrasts = (np.stack(parts) for parts in zip(*frames, strict=True))
     seen = np.isfinite(radii)
@@ -137,5 +141,8 @@ def mean_spots(frames: Sequence[Spots], method: Method) -> Spots:
     size = np.trace(usual, axis1=1, axis2=2)
     noise = np.minimum(np.percentile(size, 25) / size, 1.0)
     share = 1 - noise + noise / count[known]
+    away = np.where(seen[:, known, None], centres[:, known] - mean[known], 0.0)
+    squares = np.einsum("fmi,fmij,fmj->m", away, weights[:, known], away)
+    share *= np.maximum(1.0, (TRUST + squares) / (TRUST + 2 * (count[known] - 1)))
     covariance[known] = share[:, None, None] * usual + FLOOR[method] ** 2 * np.eye(2)
     return Spots(mean, covariance, radius, contrast)
