@@ -16,6 +16,8 @@ from vision.rest import Rest
 
 LEAST_SHARE = 0.2
 """Of the frames at rest; a marker that is seen in fewer counts as not visible."""
+USUAL = 1.3
+"""Variance over the discs' median up to which it is taken for noise, which differs a little by itself."""
 TRUST = 8
 """In the fit's covariances, against what the frames' scatter says: as if of so many squares."""
 
@@ -116,9 +118,9 @@ def placed(plane: Plane, pixels: FloatArray, design: Parameters) -> FloatArray:
 def mean_spots(frames: Sequence[Spots], method: Method) -> Spots:
     """Every disc's mean over frames; nan for those hardly seen.
 
-    Weights are inverse covariances. Those of the best fitted quarter of the discs are noise, which a mean
-    over independent frames reduces; what others have beyond is misfit, of the wall beside a disc for one, and
-    common to all frames, as is `FLOOR`. A disc that is not quite the model's scatters more than its
+    Weights are inverse covariances. Those of most discs are noise, which a mean over independent frames
+    reduces; what others have beyond is misfit, of the wall beside a disc for one, and common to all frames,
+    as is `FLOOR`. A disc that is not quite the model's scatters more than its
     covariances say; they grow with the mean square (R. T. Birge, "The calculation of errors by the method of
     least squares", Physical Review 40, 1932).
     """
@@ -139,7 +141,7 @@ def mean_spots(frames: Sequence[Spots], method: Method) -> Spots:
     contrast[known] = np.where(seen, contrasts, 0.0).sum(axis=0)[known] / count[known]
     usual = np.nanmean(covariances[:, known], axis=0)
     size = np.trace(usual, axis1=1, axis2=2)
-    noise = np.minimum(np.percentile(size, 25) / size, 1.0)
+    noise = np.minimum(USUAL * np.median(size) / size, 1.0)
     share = 1 - noise + noise / count[known]
     away = np.where(seen[:, known, None], centres[:, known] - mean[known], 0.0)
     squares = np.einsum("fmi,fmij,fmj->m", away, weights[:, known], away)

@@ -103,8 +103,9 @@ def share_seen(shape: Shape, occluders: Sequence[Shape], camera: Camera, pose: P
     whole = abs(area(edges))
     rows, columns, left = coverage(edges, size)
     for occluder in occluders:
-        hidden = np.zeros(size[::-1])
-        where = coverage(seen_edges(occluder, camera, pose) + 0.5, size)
+        hidden = np.zeros_like(left)
+        beside = seen_edges(occluder, camera, pose) + 0.5 - (columns.start, rows.start)
+        where = coverage(beside, hidden.shape[::-1])
         hidden[where.rows, where.columns] = where.share
-        left = left * (1 - hidden[rows, columns])
+        left = left * (1 - hidden)
     return float(left.sum() / whole)
