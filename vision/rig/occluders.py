@@ -105,7 +105,7 @@ def share_seen(shape: Shape, occluders: Sequence[Shape], camera: Camera, pose: P
     for occluder in occluders:
         hidden = np.zeros_like(left)
         beside = seen_edges(occluder, camera, pose) + 0.5 - (columns.start, rows.start)
-        where = coverage(beside, hidden.shape[::-1])
+        where = coverage(beside, (hidden.shape[1], hidden.shape[0]))
         hidden[where.rows, where.columns] = where.share
         left = left * (1 - hidden)
     return float(left.sum() / whole)
