@@ -40,11 +40,13 @@ LAWS = {
 
 
 def material_rows(material: Material, laws: Mapping[str, str]) -> list[tuple[str, str]]:
-    """The material in words, and the law of each solver where they differ."""
+    """The material in words, and the solvers of each law where they differ."""
     constants = f"plane {material.plane}; E = {material.young:g} MPa, Poisson’s ratio {material.poisson:g}"
     if len(set(laws.values())) == 1:
         return [("Material", f"{LAWS[next(iter(laws.values()))]}; {constants}")]
-    return [("Material", constants), *((f"Law of {solver}", LAWS[law]) for solver, law in laws.items())]
+    having = {law: [solver for solver in laws if laws[solver] == law] for law in laws.values()}
+    rows = [(f"Law of {', '.join(solvers)}", LAWS[law]) for law, solvers in having.items()]
+    return [("Material", constants), *rows]
 
 
 def load_sentence(load: Load, design: Parameters) -> str:

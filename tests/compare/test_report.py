@@ -156,7 +156,7 @@ def test_errors_on_assimilated_markers_are_training_errors(content: ReportConten
 
 def test_the_papers_own_numbers_are_said_to_be_of_another_experiment(content: ReportContent) -> None:
     text = Page(render(content)).text
-    assert "PINN-Ray std, as the paper prints – – – – 1.37 0.48 – 1.452" in text
+    assert "paper: PINN-Ray std – – – – 1.37 0.48 – 1.452" in text
     assert "of its own experiment" in text
 
 
