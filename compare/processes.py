@@ -1,5 +1,6 @@
 """Tasks in processes of their own, some at a time, that end with the program that started them."""
 
+import os
 import signal
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
@@ -86,6 +87,8 @@ def in_processes(
 def _child(work: Callable[[Task, Progress], Answer], task: Task, connection: Connection) -> None:
     """Do a task and send the answer; Ctrl-C on a terminal reaches this process by way of its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # PETSc would end the process, with a page of text, when nobody listens.
+    os.environ["PETSC_OPTIONS"] = f"{os.environ.get('PETSC_OPTIONS', '')} -no_signal_handler"
 
     def report(fraction: float, text: str) -> None:
         try:

@@ -40,6 +40,14 @@ def endless(folder: Path, progress: Progress) -> None:
         raise
 
 
+def endless_with_petsc(folder: Path, progress: Progress) -> None:
+    """The same where PETSc, which has a mind of its own about broken pipes, is loaded."""
+    from petsc4py import PETSc
+
+    PETSc.Vec().createSeq(1).destroy()
+    endless(folder, progress)
+
+
 def until(condition: Callable[[], bool]) -> None:
     limit = time.monotonic() + 20
     while not condition() and time.monotonic() < limit:
@@ -64,7 +72,8 @@ def test_a_process_that_ends_without_an_answer_does_not_stop_the_others(capfd):
     assert "ZeroDivisionError" in capfd.readouterr().err  # whose fault it is can be read
 
 
-def test_an_interruption_lets_every_process_save_its_state(tmp_path):
+@pytest.mark.parametrize("work", [endless, endless_with_petsc])
+def test_an_interruption_lets_every_process_save_its_state(tmp_path, work):
     heard = set()
 
     def report(name: str, fraction: float, note: str) -> None:
@@ -75,7 +84,7 @@ def test_an_interruption_lets_every_process_save_its_state(tmp_path):
     tasks = {"a": tmp_path, "b": tmp_path, "c": tmp_path}
     with (
         pytest.raises(KeyboardInterrupt),
-        closing(in_processes(endless, tasks, processes=2, report=report)) as answers,
+        closing(in_processes(work, tasks, processes=2, report=report)) as answers,
     ):
         next(answers)
     assert {path.name for path in tmp_path.iterdir()} == heard  # and the third never started
