@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from compare.crossval_curve import CURVED, weigh
 from compare.crossval_folds import LOAD, SCHEMES, Condition, Fold, conditions_of, folds_of
 from compare.crossval_run import Entry, Failed, Outcome, Task, judge
 from compare.crossval_scores import COMPARED, LEVEL, Difference, Score, difference, of_scheme, score
@@ -146,6 +147,7 @@ def crossval(study: Study, stages: Stages) -> Result:
             for entry in study.entries
         }
         outcomes, failed = _judged(study, tasks, stages)
+        curve = _curve(tasks, outcomes, stages) if truths else {}
         result = _result(study, observations[0][0], folds, outcomes, failed)
         provenance = {
             "started": started.isoformat(timespec="seconds"),
@@ -154,7 +156,7 @@ def crossval(study: Study, stages: Stages) -> Result:
             "machine": machine(),
         }
         with stages.stage("report"):
-            write_results(study.out, result, outcomes, {**definition, **provenance})
+            write_results(study.out, result, outcomes, curve, {**definition, **provenance})
     return result
 
 
@@ -289,6 +291,19 @@ def _judged(
     if not outcomes:
         raise UserError("; ".join(f"{name}: {message}" for name, message in failed.items()))
     return {name: outcomes[name] for name in tasks if name in outcomes}, failed
+
+
+def _curve(
+    tasks: Mapping[str, Task], outcomes: Mapping[str, list[list[Outcome]]], stages: Stages
+) -> dict[str, list[float]]:
+    """What more weight of the markers does to `fem-asm`, if it is there; see `weigh`."""
+    wanted = {"weights": tasks[CURVED]} if CURVED in outcomes else {}
+    curve: dict[str, list[float]] = {}
+    for _, answer in in_stages(
+        weigh, wanted, processes=1, stages=stages, kind="curves", note=lambda *_: "weighed"
+    ):
+        curve = {} if isinstance(answer, ProcessFailed) else answer
+    return curve
 
 
 def _result(

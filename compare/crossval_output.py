@@ -10,17 +10,19 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from compare.crossval import Result, content_of
 from compare.crossval_run import Outcome
 from compare.crossval_tables import answers, grids, per_marker, write_tables
-from compare.figures.crossval_chart import draw_fields, draw_held_out
+from compare.figures.crossval_chart import draw_curve, draw_fields, draw_held_out
 from compare.provenance import file_digest
+from compare.tables import write_csv
 from geometry.atomic import atomic_path, write_json
 
-HELD_OUT, FIELDS = "held_out.png", "fields.png"
+HELD_OUT, FIELDS, CURVE = "held_out.png", "fields.png", "l_curve.png"
 
 
 def write_results(
     out: Path,
     result: Result,
     outcomes: Mapping[str, Sequence[Sequence[Outcome]]],
+    curve: Mapping[str, Sequence[float]],
     provenance: Mapping[str, Any],
 ) -> None:
     """Write everything; `crossval.json` last, with the SHA-256 of the other files."""
@@ -31,8 +33,13 @@ def write_results(
         pictures.append(HELD_OUT)
     if draw_fields(out / FIELDS, scores=result.scores, schemes=result.schemes):
         pictures.append(FIELDS)
-    else:
-        (out / FIELDS).unlink(missing_ok=True)
+    if curve:
+        rows = [dict(zip(curve, values, strict=True)) for values in zip(*curve.values(), strict=True)]
+        write_csv(out / "l_curve.csv", rows)
+        draw_curve(out / CURVE, curve=curve)
+        pictures.append(CURVE)
+    for name in {HELD_OUT, FIELDS, CURVE} - set(pictures):  # of an earlier study with more
+        (out / name).unlink(missing_ok=True)
     _write_report(out / "report.html", result, [out / name for name in pictures])
     written = [path for path in sorted(out.glob("*.*")) if path.suffix in (".csv", ".png", ".html")]
     write_json(

@@ -84,9 +84,9 @@ class Sampler:
         if solution.problem.mesh is not mesh:  # a location belongs to its mesh
             inside, discs = (solution.problem.mesh.locate(place.points) for place in (inside, discs))
         return Sampled(
-            markers=self.means @ solution.displacement(discs),
-            displacement=solution.displacement(inside),
-            gradient=solution.gradient(inside),
+            markers=self.means @ solution.field.displacement(discs),
+            displacement=solution.field.displacement(inside),
+            gradient=solution.field.gradient(inside),
         )
 
 

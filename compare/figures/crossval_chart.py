@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 
 from compare.crossval_scores import Score
 from compare.figures.style import (
+    LEGEND_LINE,
     SOLVER_COLOURS,
     WIDTH,
     axes_at,
@@ -17,7 +18,7 @@ from compare.figures.style import (
     solver_colour,
 )
 
-HEAD, HEIGHT, FOOT, LEFT, GAP = 0.5, 2.2, 0.5, 0.72, 0.45
+HEAD, HEIGHT, FOOT, LEFT, GAP = 0.5, 2.2, 0.5, 0.72, 0.5
 """Heights, the left margin and the gap between charts, inches."""
 
 SHAPES = "os^Dv"
@@ -25,6 +26,9 @@ SHAPES = "os^Dv"
 
 SHIFT = 0.03
 """Of a solver's marks from those of the one before, so that none hides another."""
+
+SMALLEST = 1e-4
+"""Misfit below which nothing is drawn, mm: no camera knows it."""
 
 PANELS = {"displacement": "displacement", "strain": "strain", "von_mises": "von Mises stress"}
 
@@ -75,6 +79,39 @@ def draw_fields(path: Path, *, scores: Mapping[str, Mapping[str, Score]], scheme
             axes.set_xlabel(title)
         drawn.axes[0].set_ylabel("%")
     return True
+
+
+def draw_curve(path: Path, *, curve: Mapping[str, Sequence[float]]) -> None:
+    """Draw what more weight of the markers does to `fem-asm`: to the markers, and to the fields.
+
+    Args:
+        path: The picture.
+        curve: Columns of `compare.crossval_curve.weigh`.
+    """
+    panels: dict[str, dict[str, str]] = {
+        "root mean square, mm": {"in_sample_mm": "markers given", "left_out_mm": "each left out"},
+        "distance from the truth, %": PANELS,
+    }
+    between, legend = LEFT, len(PANELS) * LEGEND_LINE
+    width = (WIDTH - LEFT - 0.1 - between) / 2
+    with figure(path, HEAD + legend + HEIGHT + FOOT) as drawn:
+        heading(
+            drawn,
+            "What more weight of the markers does to fem-asm",
+            "All markers given, first seed. Factors of the weight that it has.",
+        )
+        for column, (label, lines) in enumerate(panels.items()):
+            axes = axes_at(drawn, (LEFT + column * (width + between), HEAD + legend, width, HEIGHT))
+            for number, (name, title) in enumerate(lines.items()):
+                values = [100 * value if column else value for value in curve[name]]
+                axes.plot(curve["factor"], values, color=solver_colour(number), linewidth=1.2, label=title)
+            axes.set_xscale("log")
+            axes.set_xlabel("factor of the weight")
+            axes.set_ylabel(label)
+            _finish(axes, legend=False)
+            axes.legend(loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0, labelspacing=0.2)
+        drawn.axes[0].set_ylim(bottom=SMALLEST)
+        drawn.axes[0].yaxis.set_major_formatter("{x:g}")
 
 
 def _line(axes: Axes, x: Sequence[float], values: Sequence[float], number: int, label: str) -> None:

@@ -12,6 +12,7 @@ import pytest
 from scipy.stats import t
 
 from compare.cli import main
+from compare.crossval_curve import weigh
 from compare.crossval_folds import (
     ALL,
     DRAWS,
@@ -28,7 +29,7 @@ from compare.crossval_folds import (
 from compare.crossval_run import Entry, Outcome, Task, judge
 from compare.crossval_scores import Difference, Interval, difference, of_scheme, score
 from compare.crossval_truth import Sampler, Truth
-from compare.figures.crossval_chart import draw_fields, draw_held_out
+from compare.figures.crossval_chart import draw_curve, draw_fields, draw_held_out
 from geometry.mesh import TriangleMesh
 from geometry.observations import Observations
 from geometry.quadrature import body_quadrature
@@ -216,6 +217,21 @@ def test_finished_folds_are_kept_and_those_of_other_settings_are_not(task, monke
         judged(replace(task, entry=entry("gp", clamp=True)))
 
 
+def test_the_curve_of_weights_is_what_solving_again_with_them_gives(task, coarse_mesh, observations):
+    own = replace(task, entry=entry("fem-asm", degree=1))
+    curve = weigh(own)
+    number = 24
+    assert curve["factor"][number] == pytest.approx(1e-3)
+    (outcome,) = judged(
+        replace(own, entry=entry("fem-asm", degree=1, asm_weight=1.0), folds=[Fold(ALL, "all", ())])
+    )
+    missed = np.sqrt((np.array(outcome.errors) ** 2).mean())
+    assert curve["in_sample_mm"][number] == pytest.approx(missed, rel=1e-6)
+    assert {name: curve[name][number] for name in outcome.fields} == pytest.approx(
+        outcome.fields, nan_ok=True
+    )
+
+
 # Scores
 
 
@@ -382,6 +398,10 @@ def test_pictures_show_every_solver(pages, tmp_path):
     one = score([[outcome_of(ONE, (0,), [[1.0, 1.0]], fields=fields)]])
     scores = {label: {ALL: one, ONE: one} for label in values}
     assert draw_fields(tmp_path / "fields.png", scores=scores, schemes=[ALL, ONE])
+    columns = ("factor", "in_sample_mm", "left_out_mm", *fields)
+    draw_curve(tmp_path / "curve.png", curve={name: [1e-6, 1e-3, 1.0] for name in columns})
+    page = pages[tmp_path / "curve.png"]
+    assert (page.cut_off(), page.overlaps()) == ([], [])
     for name in ("held.png", "fields.png"):
         page = pages[tmp_path / name]
         assert page.cut_off() == []
