@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from geometry.atomic import write_json
@@ -13,6 +12,7 @@ from geometry.errors import UserError
 from vision.camera import Pose
 from vision.camera_file import save_camera
 from vision.measurements import write_measurements
+from vision.pictures import write_picture
 from vision.rig.exposure import Image
 from vision.rig.recording import Recording, Truth
 from vision.rig.render import render
@@ -115,12 +115,6 @@ def _writer(recording: Recording, place: Path, stack: ExitStack) -> Callable[[Im
     place.mkdir()
     names = (place / f"{number:06d}.png" for number in range(len(recording.motion)))
     return lambda image: write_picture(next(names), image)
-
-
-def write_picture(path: Path, image: Image) -> None:
-    """Write a picture as PNG; OpenCV says only by False that it could not."""
-    if not cv2.imwrite(str(path), image):
-        raise UserError(f"cannot write the picture {path}; is the disk full?")
 
 
 def _rows(number: int, time: float, truth: Truth) -> Iterator[tuple[float, ...]]:
