@@ -72,7 +72,7 @@ BAD = [
     ("compare --frobnicate", "Unknown option: --frobnicate"),
     (
         "frobnicate",
-        "Unknown command .* commands: compare, design, mesh, solve, gridsearch, solvers, calibrate",
+        "Unknown command .* commands: compare, design, mesh, solve, gridsearch, crossval, solvers",
     ),
     ("compare slender", "'slender' belongs to no option"),  # forgot --design
     ("compare --seed", "--seed requires an argument"),
