@@ -244,9 +244,7 @@ def _summary(outcomes: Sequence[Outcome], method: Method) -> list[str]:
     """Error, worst, missed, swapped, invented, deviation, coverage; in a refused film all are missed."""
     scores = [outcome.scores[method] for outcome in outcomes]
     known = [score for score in scores if isinstance(score, Score)]
-    refused = sum(
-        outcome.count for outcome, score in zip(outcomes, scores, strict=True) if score not in known
-    )
+    refused = sum(outcome.count for outcome in outcomes if isinstance(outcome.scores[method], str))
     if not known:
         return ["refused", "", str(refused), *5 * [""]]
     lengths = np.concatenate([score.lengths for score in known])

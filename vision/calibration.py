@@ -6,6 +6,7 @@ flatter it, so `held_out` repeats it without some of the photographs and asks ho
 there. Units: pixels, mm.
 """
 
+import math
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -151,7 +152,8 @@ def _warn(calibration: Calibration) -> None:
             )
     if calibration.coverage < LEAST_COVERAGE:
         warnings.warn(
-            f"the boards cover {calibration.coverage:.0%} of the image, less than {LEAST_COVERAGE:.0%}: "
-            "beyond them the distortion is a guess; add photographs with the board near edges and corners",
+            f"the boards cover {math.floor(100 * calibration.coverage)}% of the image, less than "
+            f"{LEAST_COVERAGE:.0%}: beyond them the distortion is a guess; add photographs with the board "
+            "near edges and corners",
             stacklevel=3,
         )

@@ -19,10 +19,9 @@ FEWEST = 3
 """Markers without which a finger is not known."""
 AROUND = 15.0
 """How far around the markers a lost one is looked for, mm."""
-PATIENCE = 5
-"""Frames between two searches for markers that stay lost."""
 LIVE_PERIOD = 5
-"""Frames between two looks at the fiducials, which do not move, where there is no time for more."""
+"""Frames between two searches for markers that stay lost, and between two looks at the fiducials, which do
+not move, where there is no time for more."""
 SAME_SIZE = 1.3
 """Ratio of the radii of a disc and of a marker beyond which the disc is no marker."""
 SAME_CONTRAST = 5.0
@@ -63,7 +62,8 @@ class Follower:
     Args:
         setup: What the frames show.
         image: The first of them.
-        live: Whether time matters: the fiducials are then looked at in every fifth frame only.
+        live: Whether time matters: the fiducials, and markers that stay lost, are then looked for in every
+            fifth frame only.
 
     Attributes:
         plane: Of the markers, as the first frame shows it.
@@ -80,51 +80,73 @@ class Follower:
         self._step = np.zeros_like(self._rest)
         self._steps = moved(self._rest)
         self._size, self._contrast = 1.0, np.nan
-        spots = self._search(image)
-        names = self._named(spots, self._rest, placed(self._rest))
-        if (names >= 0).any():
-            self._contrast = float(np.median(spots.contrasts[names[names >= 0]]))
-            names = self._named(spots, self._rest, placed(self._rest))
-        seen = names >= 0
-        if seen.sum() < (least := min(FEWEST, len(names))):
+        spots = self._search(image, sized=False)
+        fields = placed(self._rest)
+        names = self._named(spots, fields)
+        if (seen := names >= 0).any():
+            self._contrast = float(np.median(spots.contrasts[names[seen]]))
+            self._size = float(np.median(spots.radii[names[seen]] / self._radii(self._rest)[seen]))
+            spots, names = self._sought(spots, names, fields, image)
+        count, least = int((names >= 0).sum()), min(FEWEST, len(names))
+        if count < least:
             raise UserError(
-                f"{seen.sum()} of {len(names)} markers are where the design has them, and {least} must be; "
+                f"{count} of {len(names)} markers are where the design has them, and {least} must be; "
                 "show the finger before it is pressed, and give its design, workspace and markers' colour"
             )
-        self._size = float(np.median(spots.radii[names[seen]] / self._radii(self._rest)[seen]))
         self._lost = 0
         self.first = self._sighting(spots, names, image)
         self._step = np.zeros_like(self._rest)
 
     def see(self, image: Image) -> Sighting:
         """What the next frame shows."""
-        setup, expected = self._setup, self._places + self._step
-        radii = self._radii(expected)
-        spots = follow(image, setup.colour, self.plane.pixels(expected), radii, setup.method)
-        names = self._named(spots, self._places, self._steps)
+        spots = self._follow(image, self._places + self._step)
+        names = self._named(spots, self._steps)
         missing = int((names < 0).sum())
-        if missing > self._missing or (missing and self._lost >= PATIENCE):
+        if missing > self._missing or (missing and self._lost >= self._period):
             self._lost = 0
-            spots = spots.together(self._search(image))
-            names = self._named(spots, self._places, self._steps)
+            spots, names = self._sought(spots, names, self._steps, image)
         self._lost += 1
         return self._sighting(spots, names, image)
 
-    def _search(self, image: Image) -> Spots:
-        """Discs of the markers' size in the part of the image that the finger can reach."""
+    def _follow(self, image: Image, places: FloatArray) -> Spots:
+        """Discs near places, shape (m, 2), mm."""
+        setup = self._setup
+        return follow(image, setup.colour, self.plane.pixels(places), self._radii(places), setup.method)
+
+    def _sought(
+        self, spots: Spots, names: IntArray, fields: FloatArray, image: Image
+    ) -> tuple[Spots, IntArray]:
+        """Discs and names with those that a search finds, and those that are where the others say."""
+        spots = spots.together(self._search(image))
+        names = self._named(spots, fields)
+        if 0 < (names < 0).sum() < len(names):
+            spots = spots.together(self._follow(image, self._places + self._moved(spots.numbered(names))))
+            names = self._named(spots, fields)
+        return spots, names
+
+    def _moved(self, markers: Spots) -> FloatArray:
+        """Steps of the markers from their places, likely ones for those not seen, shape (m, 2), mm."""
+        known = np.isfinite(markers.radii)
+        step = np.full_like(self._places, np.nan)
+        step[known] = self.plane.points(markers.centres[known]) - self._places[known]
+        return filled(self._rest, step)
+
+    def _search(self, image: Image, *, sized: bool = True) -> Spots:
+        """Discs of the markers' size, perhaps known, in the part of the image that the finger can reach."""
         (x0, y0), (x1, y1) = self._places.min(axis=0) - AROUND, self._places.max(axis=0) + AROUND
         corners = self.plane.pixels(np.array([(x0, y0), (x0, y1), (x1, y0), (x1, y1)]))
         low, high = np.floor(corners.min(axis=0)).astype(int), np.ceil(corners.max(axis=0)).astype(int) + 1
         radii = self._radii(self._places)
         limits = (radii.min() / SAME_SIZE, radii.max() * SAME_SIZE)
         window = (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
-        return look(image, self._setup.colour, limits, self._setup.method, window)
+        known = (lambda pixels: self._radii(self.plane.points(pixels))) if sized else None
+        return look(image, self._setup.colour, limits, self._setup.method, window, known)
 
-    def _named(self, spots: Spots, places: FloatArray, fields: FloatArray) -> IntArray:
-        """The number of its disc for every marker that was at `places`, shape (m,); -1 if it has none."""
+    def _named(self, spots: Spots, fields: FloatArray) -> IntArray:
+        """The number of its disc for every marker, shape (m,); -1 if it has none."""
         ratio = spots.contrasts / self._contrast
         alike = np.nonzero(~((ratio < 1 / SAME_CONTRAST) | (ratio > SAME_CONTRAST)))[0]  # nan is not known
-        names = identify(self.plane.points(spots.centres[alike]), places, fields)
+        names = identify(self.plane.points(spots.centres[alike]), self._places, fields)
         return np.where(names >= 0, np.append(alike, -1)[names], -1)
 
     def _radii(self, places: FloatArray) -> FloatArray:
@@ -134,11 +156,8 @@ class Follower:
     def _sighting(self, spots: Spots, names: IntArray, image: Image) -> Sighting:
         """Put in order what was found, and remember it."""
         markers = spots.numbered(names)
-        known = self.plane.points(markers.centres[names >= 0])
-        step = np.full_like(self._places, np.nan)
-        step[names >= 0] = known - self._places[names >= 0]
         self._missing = int((names < 0).sum())
-        self._step = filled(self._rest, step)
+        self._step = self._moved(markers)
         self._places = self._places + self._step
         places = self._places
         return Sighting(markers, self._fixed(image), places, self.plane.pixels(places))

@@ -1,5 +1,6 @@
 """Where discs are in an image: by the fit of their edge, or by the circles of the paper's pipeline alone."""
 
+from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 import cv2
@@ -66,11 +67,22 @@ class Spots(NamedTuple):
 
 
 def look(
-    image: Image, colour: Colour, radii: tuple[float, float], method: Method, window: Window | None = None
+    image: Image,
+    colour: Colour,
+    limits: tuple[float, float],
+    method: Method,
+    window: Window | None = None,
+    radii: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Spots:
-    """All discs of a colour whose radii, pixels, lie between two limits."""
-    circles = propose(image, colour, radii=radii, window=window)
-    return _circles(circles) if method == "hough" else _fitted(image, circles, None)
+    """All discs of a colour whose radii, pixels, lie between two limits.
+
+    If it is known which radii, shape (n,), discs at points of the image, shape (n, 2), have, those that are
+    partly hidden are found too.
+    """
+    circles = propose(image, colour, radii=limits, window=window)
+    if method == "hough":
+        return _circles(circles)
+    return _fitted(image, circles, radii(circles[:, :2]) if radii else None)
 
 
 def follow(image: Image, colour: Colour, guesses: FloatArray, radii: FloatArray, method: Method) -> Spots:

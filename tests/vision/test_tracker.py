@@ -11,6 +11,8 @@ from geometry.design import Design
 from geometry.errors import UserError
 from geometry.markers import marker_positions
 from vision.camera import Camera
+from vision.rig.motion import Motion
+from vision.rig.occluders import cables
 from vision.setup import Setup
 from vision.tracker import track
 from vision.workspace import Workspace
@@ -72,6 +74,29 @@ def test_a_marker_behind_a_cable_is_missing_and_no_other_takes_its_name():
     assert error_of(observations) < 0.015
     np.testing.assert_array_equal(observations.points[4], MARKERS[4])
     assert any("reported missing: marker 5" in warning for warning in tracking.warnings)
+
+
+def test_markers_that_were_lost_are_found_in_the_next_frame_that_shows_them():
+    blurred = [cv2.blur(image, (200, 200)) for image in images()[:3]]
+    tracking = tracked([*images()[:3], *blurred, *images()[3:]])
+    assert np.isnan(tracking.pixels[3:6]).all()
+    assert np.isfinite(tracking.pixels[6:]).all()
+    assert error_of(tracking.observations("rig")) < 0.01
+
+
+def test_a_marker_that_jumps_partly_behind_a_cable_is_found():
+    film = recording()
+    film = replace(
+        film,
+        motion=Motion(rest=1, moving=0, held=1),
+        occluders=cables(film.bench, film.displacement, film.motion, {5: 0.35}),
+    )
+    observations = tracked([image for image, _ in film.frames()]).observations("rig")
+    assert observations.visible.all()
+    others = np.delete(np.abs(observations.displacements - TRUE).sum(axis=1), 4)
+    assert others.max() < 0.015
+    assert np.abs(observations.displacements - TRUE)[4].sum() < 0.1
+    assert observations.standard_deviations[4].max() > 2 * observations.standard_deviations.mean()
 
 
 def shifted(image, x, y):
