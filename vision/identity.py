@@ -16,7 +16,7 @@ SURE = 0.999
 """Posterior probability from which a marker is named; below it counts as missing."""
 SEEN = 0.9
 """Prior probability that a marker is among the detections."""
-FALSE_DENSITY = 1e-3
+FALSE_DENSITY = 1e-4
 """Of detections that are no marker, 1/mm²."""
 GATE = 5.0
 """Standard deviations beyond which a detection is not a marker."""

@@ -29,7 +29,7 @@ def a_jump(generator, layout):
     return MARKERS[layout] + before, step + generator.normal(0, 0.01, step.shape)
 
 
-@pytest.mark.parametrize(("layout", "least"), [("front", 0.97), ("joints", 0.75)])
+@pytest.mark.parametrize(("layout", "least"), [("front", 0.98), ("joints", 0.94)])
 def test_no_jump_swaps_or_invents_markers(layout, least):
     generator = np.random.default_rng(1)
     named = shown = 0
@@ -47,7 +47,7 @@ def test_no_jump_swaps_or_invents_markers(layout, least):
     assert named >= least * shown
 
 
-def test_what_a_jump_leaves_uncertain_is_mostly_certain_in_the_next_frame():
+def test_markers_that_were_hidden_in_a_jump_are_mostly_named_in_the_next_frame():
     generator = np.random.default_rng(2)
     before = after = 0
     for case in range(100):
@@ -59,8 +59,8 @@ def test_what_a_jump_leaves_uncertain_is_mostly_certain_in_the_next_frame():
         names = names_after(start + step - expected, layout="joints", start=expected, seed=case)
         assert ((names == np.arange(9)) | (names == -1)).all()
         before, after = before + (first >= 0).sum(), after + (names >= 0).sum()
-    assert before < 0.55 * 900  # of 0.67 that are shown
-    assert after > 0.78 * 900  # of all, for nothing is hidden any more
+    assert 0.6 * 900 < before  # of 0.67 that are shown
+    assert after > 0.87 * 900  # of all, for nothing is hidden any more
 
 
 @pytest.mark.parametrize("first", range(7))
