@@ -258,11 +258,12 @@ def similarity_plane(points: FloatArray, pixels: FloatArray, covariances: FloatA
 def _flat_plane(
     view: View, start: FloatArray, points: FloatArray, pixels: FloatArray, covariances: FloatArray
 ) -> Plane:
+    """The fit of a view that knows no lens; what that leaves is no noise, so it does not shrink in a mean."""
     parameters, squares = _refined(view, start, points, pixels, covariances)
     slopes = view.slopes(points, parameters).parameters.reshape(2 * len(points), -1)
-    excess = max(1.0, squares / max(2 * len(points) - len(parameters), 1))
+    excess = max(0.0, squares / max(2 * len(points) - len(parameters), 1) - 1)
     residual = _rms(view.points(pixels, parameters) - points)
-    return Plane(view, parameters, _gain(slopes, covariances)[1] * excess, residual)
+    return Plane(view, parameters, _gain(slopes, covariances)[1] * (1 + len(points) * excess), residual)
 
 
 def _refined(
