@@ -8,8 +8,9 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from compare.crossval import Result, content_of
+from compare.crossval_answers import answers
 from compare.crossval_run import Outcome
-from compare.crossval_tables import answers, grids, per_marker, write_tables
+from compare.crossval_tables import grids, per_marker, write_tables
 from compare.figures.crossval_chart import draw_curve, draw_fields, draw_held_out
 from compare.provenance import file_digest
 from compare.tables import write_csv

@@ -1,4 +1,4 @@
-"""A cross-validation as tables for the terminal, the report and CSV files, and its answers in words."""
+"""A cross-validation as tables for the terminal, the report and CSV files."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,15 +14,6 @@ from compare.crossval_run import Outcome
 from compare.crossval_scores import FIELDS, LEVEL, MARKERS, Difference, Interval, Score
 from compare.figures.labels import significant
 from compare.tables import Cell, write_csv
-from solvers.assimilation import assimilates
-
-NAMES = {
-    "displacement": "displacement",
-    "strain": "strain",
-    "von_mises": "von Mises stress",
-    "von_mises_finite": "von Mises stress by the truth's law",
-}
-"""Of the fields, for people."""
 
 NONE = "–"
 SHORT = {"not told apart": "≈"}
@@ -66,7 +57,7 @@ def grids(result: Result) -> list[Grid]:
         )
         for scheme in held
     ]
-    return [*found, *([_fields(result)] if _has_fields(result) else [])]
+    return [*found, *([_fields(result)] if has_fields(result) else [])]
 
 
 def tables(result: Result) -> list[Table]:
@@ -74,30 +65,10 @@ def tables(result: Result) -> list[Table]:
     return [_rich(grid) for grid in grids(result)]
 
 
-def answers(result: Result) -> list[str]:
-    """Is the stress better after assimilation? For each solver that was given all markers, in numbers."""
-    if not _has_fields(result) or "fem" not in result.scores:
-        return []
-    plain = result.scores["fem"][ALL].fields
-    given = {entry.label for entry in result.study.entries if assimilates(entry.make(0))}
-    sentences = []
-    for label in (label for label in result.scores if label in given):
-        own = result.scores[label][ALL].fields
-        parts = []
-        for name in ("displacement", "strain", "von_mises"):
-            verdict = result.differences[label]["fem"][ALL].get(name)
-            words = verdict.verdict if verdict else "not told apart"
-            parts.append(
-                f"{NAMES[name]} {percent(plain[name].mean)} % to {percent(own[name].mean)} % ({words})"
-            )
-        sentences.append(f"{label}, given every marker, against fem: {', '.join(parts)} away from the truth.")
-    return sentences
-
-
 def write_tables(out: Path, result: Result, outcomes: Mapping[str, Sequence[Sequence[Outcome]]]) -> None:
     """Write the CSV files: markers and fields by scheme, and every error of every fold."""
     write_csv(out / "held_out.csv", list(_markers_csv(result)))
-    if _has_fields(result):
+    if has_fields(result):
         write_csv(out / "fields.csv", list(_fields_csv(result)))
     write_csv(out / "folds.csv", list(_folds_csv(outcomes)))
 
@@ -158,7 +129,8 @@ def _half(interval: Interval | None) -> str:
     return significant(interval.high - interval.mean, 1)
 
 
-def _has_fields(result: Result) -> bool:
+def has_fields(result: Result) -> bool:
+    """Whether there is a truth to compare fields with."""
     return any(score.fields for each in result.scores.values() for score in each.values())
 
 

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import shlex
 from collections.abc import Generator, Mapping
 from dataclasses import replace
@@ -328,7 +329,9 @@ def test_the_command_writes_what_the_guide_says_and_goes_on(tmp_path, capsys, in
     assert content["solvers"]["fem"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["low"] is None
     before = content["solvers"]["gp"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["mean"]
     assert "simulated by fem-nonlinear" in content["measurements"]["description"]
-    assert any("von Mises stress" in sentence for sentence in content["answers"])
+    predictions, stresses = content["answers"].values()
+    assert any(re.match("fem-asm against gp: .* in tip-out", sentence) for sentence in predictions)
+    assert any("von Mises stress" in sentence for sentence in stresses)
 
     assert run(f"{line} --seeds 2", tmp_path / "out") == 0
     content = json.loads((tmp_path / "out" / "crossval.json").read_text())
