@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
-from compare.crossval import Result
 from compare.crossval_folds import ALL
+from compare.crossval_result import Result
 from compare.crossval_tables import has_fields, percent
 from solvers.assimilation import assimilates
 

@@ -7,8 +7,8 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from compare.crossval import Result, content_of
 from compare.crossval_answers import answers
+from compare.crossval_result import Result
 from compare.crossval_run import Outcome
 from compare.crossval_tables import grids, per_marker, write_tables
 from compare.figures.crossval_chart import draw_curve, draw_fields, draw_held_out
@@ -47,7 +47,7 @@ def write_results(
         out / "crossval.json",
         {
             **provenance,
-            **content_of(result),
+            **result.content(),
             "answers": answers(result),
             "files_sha256": {path.name: file_digest(path) for path in written},
         },

@@ -8,8 +8,8 @@ from pathlib import Path
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from compare.crossval import BASELINES, Result
 from compare.crossval_folds import ALL, ONE, SCHEMES
+from compare.crossval_result import BASELINES, Result
 from compare.crossval_run import Outcome
 from compare.crossval_scores import FIELDS, LEVEL, MARKERS, Difference, Interval, Score
 from compare.figures.labels import significant

@@ -44,10 +44,10 @@ def crossval(
     noise. Elements of 0.5 mm, not 0.25, unless --mesh-size is given. Finished folds are kept: the same
     command again goes on where it was stopped.
     """
-    from compare.crossval import Study
     from compare.crossval import crossval as judged
     from compare.crossval_folds import LOAD
     from compare.crossval_options import check_draws, read_entries, read_finger, read_schemes
+    from compare.crossval_study import Study
     from compare.crossval_tables import tables
     from compare.gridsearch_options import read_processes
     from compare.provenance import machine
