@@ -13,7 +13,11 @@ from compare.options import OUTPUT, FingerOptions
 
 def track(
     source: Annotated[
-        str, Parameter(help="Video, folder or glob of pictures, number of a camera, or - for a pipe.")
+        str,
+        Parameter(
+            allow_leading_hyphen=True,
+            help="Video, folder or glob of pictures, number of a camera, or - for a pipe.",
+        ),
     ],
     finger: FingerOptions = FingerOptions(),
     options: FilmOptions = FilmOptions(),

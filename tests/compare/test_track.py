@@ -3,6 +3,7 @@
 import csv
 import json
 
+import cv2
 import numpy as np
 import pytest
 
@@ -39,6 +40,20 @@ def test_a_video_becomes_measurements_within_hundredths_of_a_millimetre(film, tr
     assert np.abs(found.displacements - true.displacements).sum(axis=1).mean() < 0.02
     np.testing.assert_allclose(found.points, true.points, rtol=0, atol=0.02)
     assert "means of 3 and 3 frames at rest, standard deviations" in found.source
+
+
+def test_the_same_frames_come_through_a_pipe(film, tracked, tmp_path, monkeypatch, capsys):
+    with open_frames(film / "video.mkv") as frames:
+        pictures = [cv2.imencode(".png", frame.image)[1].tobytes() for frame in frames]
+    (tmp_path / "pictures").write_bytes(b"".join(pictures))
+    files = ["--camera", str(film / "camera.json"), "--workspace", str(film / "workspace.json")]
+    with (tmp_path / "pictures").open() as pipe:
+        monkeypatch.setattr("sys.stdin", pipe)
+        assert main(["track", "-", *files, "--live", "--out", str(tmp_path / "out")]) == 0
+    found, before = (
+        read_measurements(folder / "observations.csv").displacements for folder in (tmp_path / "out", tracked)
+    )
+    np.testing.assert_allclose(found, before, rtol=0, atol=0.001)  # live looks at fewer fiducials
 
 
 def test_its_files_are_whole(tracked):
