@@ -1,16 +1,20 @@
 """`pinn-asm` and `pinn-local-asm`: the networks of `pinn-std` and `pinn-local`, given the markers."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
+from geometry.observations import Observations
 from solvers.pinn.local import PinnLocalSolver
+from solvers.pinn.local_refit import network_refitter
 from solvers.pinn.observing import Assimilating, ChoosingWeights
 from solvers.pinn.paper import PaperPinnSolver
 from solvers.pinn.pieces import pool
 from solvers.pinn.standard import PinnStdSolver
 from solvers.problem import Problem
+from solvers.solution import Solution
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,12 +23,20 @@ class PinnAsmSolver(ChoosingWeights, PinnStdSolver):
 
     name: ClassVar[str] = "pinn-asm"
 
+    def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
+        """See `Refitting`."""
+        return network_refitter(self, problem)
+
 
 @dataclass(frozen=True, kw_only=True)
 class PinnLocalAsmSolver(ChoosingWeights, PinnLocalSolver):
     """The network of `PinnLocalSolver`, given the markers."""
 
     name: ClassVar[str] = "pinn-local-asm"
+
+    def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
+        """See `Refitting`."""
+        return network_refitter(self, problem)
 
 
 @dataclass(frozen=True, kw_only=True)

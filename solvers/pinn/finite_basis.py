@@ -2,6 +2,7 @@
 
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import ClassVar
 
@@ -28,6 +29,9 @@ from solvers.pinn.windows import Windows
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, check_problem, silent
+
+Train = Callable[[float, LocalField | None, Progress], tuple[Level, Path]]
+"""What gives a level of a scale of spacings, trained, from the field of the one before."""
 
 ORDER = 2
 """In the spacing, of the displacement's error: what the levels' change is taken to mean. It falls faster."""
@@ -98,10 +102,16 @@ class FiniteBasisSolver(Observing, ABC):
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Train the network; see `Solver`."""
         check_problem(self, problem)
-        with pool():
-            return self._solve(problem, progress)
 
-    def _solve(self, problem: Problem, progress: Progress) -> Solution:
+        def train(scale: float, coarse: LocalField | None, progress: Progress) -> tuple[Level, Path]:
+            level = self.level(problem, scale)
+            return level, _train(level, coarse, progress)
+
+        with pool():
+            return self.trained(problem, train, progress)
+
+    def trained(self, problem: Problem, train: Train, progress: Progress) -> Solution:
+        """The solution by levels that are trained one after the other until two agree."""
         started = time.perf_counter()
         rule = body_quadrature(problem.mesh, 1)
         before = np.zeros_like(rule.location.points)
@@ -109,8 +119,7 @@ class FiniteBasisSolver(Observing, ABC):
         coarse: LocalField | None = None
         scales = (self.coarser, 1.0, FINEST)
         for number, scale in enumerate(scales):
-            level = self.level(problem, scale)
-            path = _train(level, coarse, _part(progress, number / len(scales), 1 / len(scales)))
+            level, path = train(scale, coarse, _part(progress, number / len(scales), 1 / len(scales)))
             field = coarse = level.field(path.state.output)
             displacement = field.displacement(rule.location)
             change = _relative(displacement - before, displacement, rule.weights)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from geometry.arrays import FloatArray
+from geometry.arrays import FloatArray, IntArray
 from solvers.marker_forces import MarkerForces
 from solvers.pinn.conditions import load_conditions
 from solvers.pinn.local_energy import LocalEnergy
@@ -35,6 +35,20 @@ class Equilibrium(NamedTuple):
     change: float
     markers: MarkerForces | None = None
     factor: float = 1.0
+
+
+class Responses(NamedTuple):
+    """How a network answers, with the second derivative of its energy at some output layer.
+
+    Attributes:
+        residual: First derivative of the energy there, shape (U,), N/mm.
+        free: Newton's step without springs, shape (U,), mm.
+        unit: Steps by unit forces of the springs, shape (n, U), mm per N/mm.
+    """
+
+    residual: FloatArray
+    free: FloatArray
+    unit: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,23 +145,33 @@ class Level:
         Returns:
             None if a point of the quadrature is inside out.
         """
+        found = self.respond(output)
+        return None if found is None else self.balance(output, found, fraction)
+
+    def respond(self, output: torch.Tensor) -> Responses | None:
+        """One factorisation, and a solution for every spring; None as in `step`."""
         slope, hessian = self.energy.derivatives(output)
         if not torch.isfinite(slope).all():
             return None
         residual = slope.numpy().ravel()
-        free, *responses = hessian.solve(
+        free, *unit = hessian.solve(
             np.concatenate([-residual[None], self.functionals]),
             REGULARISATION,
             definite=self.energy.material.law == "linear",
         )
+        return Responses(residual, free, np.array(unit))
+
+    def balance(self, output: torch.Tensor, found: Responses, fraction: float = 1.0) -> Equilibrium:
+        """The step by the forces of the springs that close their gaps."""
+        residual, free, unit = found
         gap = fraction * self.values - self.functionals @ (output.numpy().ravel() + free)
-        given = self.functionals @ np.transpose(responses)
+        given = self.functionals @ unit.T
         given[: self.held, : self.held] += np.diag(self.compliance[: self.held])
         markers = self._markers(given, gap)
         factor = self.choice.factor(markers) if self.choice and markers else 1.0
         given[self.held :, self.held :] += np.diag(self.compliance[self.held :]) / factor
         forces = np.linalg.solve(given, gap)
-        change = free + forces @ np.array(responses)
+        change = free + forces @ unit
         decrement = (forces @ self.functionals - residual) @ change
         return Equilibrium(
             output + torch.from_numpy(change).view_as(output),
@@ -155,6 +179,17 @@ class Level:
             float(abs(decrement / (fraction * self.values @ forces))),
             markers,
             factor,
+        )
+
+    def told(self, given: Given, rows: IntArray) -> "Level":
+        """The level with some of its springs, all of the load's among them, the others as they are given."""
+        held, misfit = self.held, given.misfit
+        return replace(
+            self,
+            functionals=self.functionals[rows],
+            values=np.concatenate([self.values[:held], misfit.observed.ravel()]),
+            compliance=np.concatenate([self.compliance[:held], 1 / misfit.weights.ravel()]),
+            choice=given.choice,
         )
 
     def _markers(self, given: FloatArray, gap: FloatArray) -> MarkerForces | None:

