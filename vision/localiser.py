@@ -16,7 +16,7 @@ from vision.proposal import Window, propose
 Method = Literal["precise", "hough"]
 METHODS: tuple[Method, ...] = ("precise", "hough")
 
-FLOOR = {"precise": 0.0009, "hough": 0.45}
+FLOOR = {"precise": 0.0005, "hough": 0.45}
 """Standard deviation of what a mean over frames keeps of the error of a coordinate, pixels. Fits: as seen on
 the virtual rig at discs that stay ellipses; beside the indenter it is more, which the frames' scatter shows.
 Hough circles sit on a lattice."""

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import chdtri
 
 from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
@@ -120,9 +121,10 @@ def mean_spots(frames: Sequence[Spots], method: Method) -> Spots:
 
     Weights are inverse covariances. Those of most discs are noise, which a mean over independent frames
     reduces; what others have beyond is misfit, of the wall beside a disc for one, and common to all frames,
-    as is `FLOOR`. A disc that is not quite the model's scatters more than its
-    covariances say; they grow with the mean square (R. T. Birge, "The calculation of errors by the method of
-    least squares", Physical Review 40, 1932).
+    as is `FLOOR`. Frames of lossy films repeat each other: what the discs scatter less than their covariances
+    say is common too, and what follows the frame before counts for so many fewer frames. A disc that is not
+    quite the model's scatters more than its covariances say; they grow with the mean square (R. T. Birge,
+    "The calculation of errors by the method of least squares", Physical Review 40, 1932).
     """
     centres, covariances, radii, contrasts = (np.stack(parts) for parts in zip(*frames, strict=True))
     seen = np.isfinite(radii)
@@ -142,9 +144,44 @@ def mean_spots(frames: Sequence[Spots], method: Method) -> Spots:
     usual = np.nanmean(covariances[:, known], axis=0)
     size = np.trace(usual, axis1=1, axis2=2)
     noise = np.minimum(USUAL * np.median(size) / size, 1.0)
-    share = 1 - noise + noise / count[known]
-    away = np.where(seen[:, known, None], centres[:, known] - mean[known], 0.0)
-    squares = np.einsum("fmi,fmij,fmj->m", away, weights[:, known], away)
-    share *= np.maximum(1.0, (TRUST + squares) / (TRUST + 2 * (count[known] - 1)))
+    away = np.where(seen[:, known, None], centres[:, known] - mean[known], np.nan)
+    squares, steps = (
+        _squares(offset, weights[-len(offset) :, known]) for offset in (away, np.diff(away, axis=0))
+    )
+    freedom = 2 * (count[known] - 1)
+    scatter, follows = _scatter(squares / noise, steps / noise, freedom)
+    independent = np.maximum((1 - follows) / (1 + follows) * count[known], 1.0)
+    share = 1 - noise * scatter * (1 - 1 / independent)
+    share *= np.maximum(1.0, (TRUST + squares) / (TRUST + freedom))
     covariance[known] = share[:, None, None] * usual + FLOOR[method] ** 2 * np.eye(2)
     return Spots(mean, covariance, radius, contrast)
+
+
+def _squares(offsets: FloatArray, weights: FloatArray) -> FloatArray:
+    """Sums of the weighted squares over frames, shape (m,), of offsets (f, m, 2), nan where unknown."""
+    known = np.nan_to_num(offsets)
+    return np.asarray(np.einsum("fmi,fmij,fmj->m", known, weights, known))
+
+
+def _scatter(squares: FloatArray, steps: FloatArray, freedom: FloatArray) -> tuple[float, float]:
+    """How much discs scatter, of what their covariances say, and how much of it follows the frame before.
+
+    Both are between 0 and 1, medians over the discs less what may be chance; independent frames have 1 and 0.
+    For these, half the mean square of the steps from frame to frame is the variance (J. von Neumann,
+    "Distribution of the ratio of the mean square successive difference to the variance", Annals of
+    Mathematical Statistics 12, 1941).
+
+    Args:
+        squares: Of what the frames miss the mean by, in standard deviations, shape (m,).
+        steps: Of the steps from frame to frame, shape (m,).
+        freedom: Degrees of freedom of the squares, shape (m,).
+    """
+    moving = (freedom > 0) & (squares > 0)
+    if not moving.any():
+        return (0.0 if freedom.any() else 1.0), 0.0
+    several = freedom > 0
+    usual = chdtri(freedom[several], 0.5)  # the median of chi squared
+    chance = np.sqrt(np.pi / 2 / freedom[several].sum())  # standard deviation of a median, by that of a mean
+    scatter = np.median(squares[several] / usual) + np.sqrt(2) * chance
+    follows = 1 - np.median(steps[moving] / (2 * squares[moving])) - chance
+    return min(1.0, float(scatter)), max(0.0, float(follows))
