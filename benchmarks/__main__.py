@@ -16,6 +16,7 @@ BENCHMARKS = {
     "deepxde": "deepxde_against_ours",
     "recipes": "pinn_recipes",
     "epochs": "deepxde_epochs",
+    "kernels": "kernels",
     "scenes": "tracker_scenes",
     "stress": "tracker_stress",
     "live": "live_tracking",

@@ -20,7 +20,7 @@ from geometry.observations import Observations
 from geometry.quadrature import body_quadrature
 from solvers.assimilation import Misfit, misfit_of, standard_deviations, without_each
 from solvers.elasticity import linear_energy_density
-from solvers.kernel_field import KernelField
+from solvers.kernel_field import SMOOTHNESS, Kernel, KernelField
 from solvers.problem import Problem
 from solvers.section_force import section_force
 from solvers.solution import Solution, Status
@@ -37,7 +37,7 @@ START_LENGTH, START_VARIANCE = 30.0, 10.0
 
 @dataclass(frozen=True)
 class GaussianProcessSolver:
-    """u and v as independent processes of mean zero with a squared exponential kernel.
+    """u and v as independent processes of mean zero with one of Matérn's kernels.
 
     Length and variance of each kernel have the largest marginal likelihood. A marker that is left out is left
     out of that choice too.
@@ -45,16 +45,18 @@ class GaussianProcessSolver:
     Attributes:
         clamp: Whether the process is told that the base is at rest, which makes it a stronger null model. By
             default it is told the markers only.
+        kernel: How smooth the processes are: "matern32", "matern52" or "gaussian" (squared exponential).
     """
 
     clamp: bool = False
+    kernel: Kernel = "matern52"
     name: ClassVar[str] = "gp"
     laws: ClassVar[tuple[str, ...]] = ("linear",)
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
     assimilates: ClassVar[bool] = True
 
     def settings(self) -> dict[str, object]:
-        """Whether the base is known to be at rest."""
+        """Whether the base is known to be at rest, and the kernel."""
         return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
@@ -70,7 +72,7 @@ class GaussianProcessSolver:
         missed, spread = np.zeros((2, count, 2))
         for marker in range(count):
             progress(marker / count, "leaving each marker out")
-            others = _fit(misfit.without(marker), np.delete(deviations, marker, axis=0), base)
+            others = _fit(misfit.without(marker), np.delete(deviations, marker, axis=0), base, self.kernel)
             there = problem.mesh.locate(misfit.points[[marker]])
             missed[marker] = misfit.observed[marker] - others.displacement(there)[0]
             spread[marker] = np.hypot(others.standard_deviation(there)[0], deviations[marker])
@@ -93,7 +95,7 @@ class GaussianProcessSolver:
                 f"gp goes through markers: it needs more than {FEWEST} that were seen, not {count}"
             )
         deviations = standard_deviations(problem.observations)
-        field = _fit(misfit, deviations, self._base(problem))
+        field = _fit(misfit, deviations, self._base(problem), self.kernel)
         rule = body_quadrature(problem.mesh, 4)
         gradient = field.gradient(rule.location)
         density = linear_energy_density(gradient, problem.material.lame)
@@ -113,6 +115,9 @@ class GaussianProcessSolver:
                 "seconds": time.perf_counter() - started,
                 "length_u": float(lengths[0]),
                 "length_v": float(lengths[1]),
+                "log_evidence": sum(
+                    float(process.log_marginal_likelihood_value_) for process in field.processes
+                ),
             },
         )
         return solution, misfit, deviations
@@ -153,23 +158,24 @@ class GaussianProcessField:
         )
 
 
-def _fit(misfit: Misfit, deviations: FloatArray, base: FloatArray) -> GaussianProcessField:
+def _fit(misfit: Misfit, deviations: FloatArray, base: FloatArray, kernel: Kernel) -> GaussianProcessField:
     """The processes through markers with standard deviations (m, 2), mm, and through points at rest."""
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel
+    from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
     points = np.concatenate([misfit.points, base])
     observed = np.concatenate([misfit.observed, np.zeros_like(base)])
     deviations = np.concatenate([deviations, np.full_like(base, deviations.min())])
-    kernel = ConstantKernel(START_VARIANCE, VARIANCES) * RBF(START_LENGTH, LENGTHS)
+    covariance = ConstantKernel(START_VARIANCE, VARIANCES) * Matern(START_LENGTH, LENGTHS, SMOOTHNESS[kernel])
     processes = []
     for axis in (0, 1):
-        process = GaussianProcessRegressor(kernel, alpha=deviations[:, axis] ** 2)
+        process = GaussianProcessRegressor(covariance, alpha=deviations[:, axis] ** 2)
         with warnings.catch_warnings():
             # An end of the range is a fair answer: constant over the finger, or nothing but the markers.
             warnings.simplefilter("ignore", ConvergenceWarning)
             processes.append(process.fit(points, observed[:, axis]))
     variances, lengths = np.exp([process.kernel_.theta for process in processes]).T
     coefficients = variances * np.stack([process.alpha_ for process in processes], axis=1)
-    return GaussianProcessField(KernelField(points, coefficients, lengths), (processes[0], processes[1]))
+    mean = KernelField(points, coefficients, lengths, kernel)
+    return GaussianProcessField(mean, (processes[0], processes[1]))

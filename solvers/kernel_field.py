@@ -1,43 +1,70 @@
-"""Smooth displacement fields of the squared exponential kernel, as Gaussian processes make them."""
+"""Displacement fields of Matérn's kernels, as Gaussian processes make them.
+
+Source: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006, equations
+4.9, 4.16 and 4.17.
+"""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.locate import Location
 
+Kernel = Literal["matern32", "matern52", "gaussian"]
+SMOOTHNESS: dict[Kernel, float] = {"matern32": 1.5, "matern52": 2.5, "gaussian": np.inf}
+"""ν: a process has as many derivatives as there are whole numbers below it."""
+
 
 @dataclass(frozen=True, eq=False)
 class KernelField:
-    """Σ_i c_i exp(-|x - x_i|² / (2 l²)), each component with coefficients and a length of its own.
+    """Σ_i c_i k(|x - x_i|), each component with coefficients and a length of its own.
 
     Attributes:
         centres: x_i, shape (m, 2), mm.
         coefficients: c_i, shape (m, 2), mm.
-        lengths: l for u and v, shape (2,), mm.
+        lengths: Of k for u and v, shape (2,), mm.
+        kernel: k.
     """
 
     centres: FloatArray
     coefficients: FloatArray
     lengths: FloatArray
+    kernel: Kernel
 
     def displacement(self, location: Location) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
-        return np.asarray((self._kernels(location.points) * self.coefficients).sum(axis=1))
+        kernels = [correlation(location.points, self.centres, length, self.kernel) for length in self.lengths]
+        return np.asarray((np.stack(kernels, axis=-1) * self.coefficients).sum(axis=1))
 
     def gradient(self, location: Location) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
-        weighted = self._kernels(location.points) * self.coefficients / self.lengths**2
+        slopes = [_slope(location.points, self.centres, length, self.kernel) for length in self.lengths]
+        weighted = np.stack(slopes, axis=-1) * self.coefficients
         offset = self.centres - location.points[:, None]
         return np.asarray(np.einsum("nmc,nmx->ncx", weighted, offset))
 
-    def _kernels(self, points: FloatArray) -> FloatArray:
-        """Shape (n, m, 2)."""
-        return np.stack([squared_exponential(points, self.centres, length) for length in self.lengths], -1)
+
+def correlation(points: FloatArray, others: FloatArray, length: float, kernel: Kernel) -> FloatArray:
+    """The kernel between points (n, 2) and others (m, 2), mm: shape (n, m); 1 at distance zero."""
+    distance = _distance(points, others, length, kernel)
+    if kernel == "gaussian":
+        return np.asarray(np.exp(-(distance**2) / 2))
+    series = 1 + distance if kernel == "matern32" else 1 + distance + distance**2 / 3
+    return np.asarray(series * np.exp(-distance))
 
 
-def squared_exponential(points: FloatArray, others: FloatArray, length: float) -> FloatArray:
-    """exp(-|x - x'|² / (2 l²)) between points (n, 2) and others (m, 2), mm: shape (n, m)."""
-    squares = ((points[:, None] - others) ** 2).sum(axis=2)
-    return np.asarray(np.exp(-squares / (2 * length**2)))
+def _slope(points: FloatArray, others: FloatArray, length: float, kernel: Kernel) -> FloatArray:
+    """What others minus points have to be multiplied by for the gradient of k at the points, 1/mm²."""
+    distance = _distance(points, others, length, kernel)
+    if kernel == "gaussian":
+        return np.asarray(np.exp(-(distance**2) / 2) / length**2)
+    series = 3 if kernel == "matern32" else 5 / 3 * (1 + distance)
+    return np.asarray(series * np.exp(-distance) / length**2)
+
+
+def _distance(points: FloatArray, others: FloatArray, length: float, kernel: Kernel) -> FloatArray:
+    """√(2 ν) |x - x'| / length, and |x - x'| / length for the limit of large ν: shape (n, m)."""
+    scale = 1.0 if kernel == "gaussian" else np.sqrt(2 * SMOOTHNESS[kernel])
+    return np.asarray(np.linalg.norm(points[:, None] - others, axis=2) * scale / length)

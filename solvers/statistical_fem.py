@@ -5,7 +5,7 @@ discrepancy δ and the error e of the observations. Random are, and normal a pri
 
 - the prescribed displacement of the contact, about its nominal value, each component with the standard
   deviation `stroke_deviation`; as the problem is linear, u is a sum of one field for each component;
-- δ, a process of mean zero with a squared exponential kernel, one length, an amplitude each for u and v;
+- δ, a process of mean zero with one of Matérn's kernels, one length, an amplitude each for u and v;
 - e, with the observations' standard deviations.
 
 ρ, the amplitudes and the length have the largest marginal likelihood. The displacement that is returned is
@@ -31,6 +31,7 @@ from geometry.quadrature import body_quadrature
 from solvers.assimilation import standard_deviations, without_each
 from solvers.elasticity import linear_energy_density
 from solvers.fem.linear import FemSolver
+from solvers.kernel_field import Kernel
 from solvers.problem import Problem
 from solvers.section_force import section_force
 from solvers.solution import Solution, Status
@@ -45,10 +46,12 @@ class StatFemSolver:
     Attributes:
         degree: Degree of the elements, 1 or 2.
         stroke_deviation: Standard deviation of each component of the prescribed displacement, mm.
+        kernel: How smooth the discrepancy is: "matern32", "matern52" or "gaussian" (squared exponential).
     """
 
     degree: int = 2
     stroke_deviation: float = 0.5
+    kernel: Kernel = "matern52"
     name: ClassVar[str] = "statfem"
     laws: ClassVar[tuple[str, ...]] = FemSolver.laws
     loads: ClassVar[tuple[str, ...]] = FemSolver.loads
@@ -63,7 +66,7 @@ class StatFemSolver:
             )
 
     def settings(self) -> dict[str, object]:
-        """The element degree and the spread of the load."""
+        """The element degree, the spread of the load, and the kernel."""
         return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
@@ -101,6 +104,7 @@ class StatFemSolver:
             shapes=np.stack([shape.displacement(points) for shape in shapes]),
             load=problem.load.values,
             load_deviation=self.stroke_deviation,
+            kernel=self.kernel,
         )
 
     def _shapes(self, problem: Problem, progress: Progress) -> list[Solution]:
@@ -143,6 +147,7 @@ class StatFemSolver:
                 "discrepancy_u": float(discrepancy[0]),
                 "discrepancy_v": float(discrepancy[1]),
                 "length": constants.length,
+                "log_evidence": posterior.log_evidence,
                 "deviation_at_markers": float(np.sqrt(variances.max())),
             }
             | {

@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 
 from geometry.arrays import FloatArray, IntArray
 from geometry.locate import Location
-from solvers.kernel_field import KernelField, squared_exponential
+from solvers.kernel_field import Kernel, KernelField, correlation
 from solvers.solution import DisplacementField
 
 SPREADS, LENGTHS, FACTORS = (1e-4, 100.0), (2.0, 500.0), (0.2, 5.0)
@@ -32,6 +32,7 @@ class Data:
             (k, m, 2).
         load: Nominal displacements of the contact, shape (k,), mm.
         load_deviation: Their standard deviation, mm.
+        kernel: Of δ.
     """
 
     points: FloatArray
@@ -40,6 +41,7 @@ class Data:
     shapes: FloatArray
     load: FloatArray
     load_deviation: float
+    kernel: Kernel
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +69,7 @@ class Posterior:
         constants: Those of the largest marginal likelihood.
         pulls: Inverse covariance of d times what the prior mean misses d by, shape (g, 2), 1/mm.
         factors: Cholesky's, of that covariance, shape (2 g, 2 g).
+        log_evidence: Logarithm of the marginal likelihood of d.
     """
 
     data: Data
@@ -74,6 +77,7 @@ class Posterior:
     constants: Constants
     pulls: FloatArray
     factors: FloatArray
+    log_evidence: float
 
     @classmethod
     def of(cls, data: Data, given: IntArray) -> "Posterior":
@@ -88,9 +92,11 @@ class Posterior:
             minimize(minus_log_likelihood, np.log(values), method="L-BFGS-B", bounds=bounds)
             for values in START
         ]
-        constants = Constants.of(min(found, key=lambda result: result.fun).x)
+        best = min(found, key=lambda result: result.fun)
+        constants = Constants.of(best.x)
         factors, _, pulls = _condition(data, given, constants)
-        return cls(data, given, constants, pulls.reshape(-1, 2), factors)
+        log_evidence = -float(best.fun) - len(given) * np.log(2 * np.pi)
+        return cls(data, given, constants, pulls.reshape(-1, 2), factors, log_evidence)
 
     @property
     def load(self) -> FloatArray:
@@ -102,7 +108,8 @@ class Posterior:
     def discrepancy(self) -> KernelField:
         """Posterior mean of δ."""
         coefficients = self.constants.spreads**2 * self.pulls
-        return KernelField(self.data.points[self.given], coefficients, np.full(2, self.constants.length))
+        centres, lengths = self.data.points[self.given], np.full(2, self.constants.length)
+        return KernelField(centres, coefficients, lengths, self.data.kernel)
 
     def at(self, points: FloatArray, shapes: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean, mm, and variance, mm², at points (n, 2) where `shapes` is of shape (k, n, 2): each (n, 2)."""
@@ -170,6 +177,6 @@ def _covariance(
 ) -> FloatArray:
     """Prior covariance of ρ u + δ between n points and g others, mm²: shape (2 n, 2 g), u and v by turns."""
     by_load = np.einsum("knc,kgd->ncgd", shapes, other_shapes) * (constants.factor * data.load_deviation) ** 2
-    kernel = squared_exponential(points, others, constants.length)
+    kernel = correlation(points, others, constants.length, data.kernel)
     lacking = np.einsum("ng,cd->ncgd", kernel, np.diag(constants.spreads**2))
     return np.asarray((by_load + lacking).reshape(2 * len(points), 2 * len(others)))

@@ -4,11 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.gaussian_process import GaussianProcessSolver
 from solvers.problem import Load, Problem
+from solvers.registry import make_solver
+from tests.solvers.kernels import matern
 
 
 def observed(mesh, displacement, *, deviation=0.01, hidden=()):
@@ -42,7 +45,7 @@ def conditioned(solution, points, given, *, axis):
     variance, length = np.exp(solution.field.processes[axis].kernel_.theta)
 
     def kernel(first, second):
-        return variance * np.exp(-0.5 * ((first[:, None] - second) ** 2).sum(axis=2) / length**2)
+        return variance * matern(first, second, length)
 
     inverse = np.linalg.inv(
         kernel(known, known) + np.diag(observations.standard_deviations[given, axis] ** 2)
@@ -124,3 +127,22 @@ def test_it_needs_markers(coarse_mesh):
     few = observed(coarse_mesh, bump, hidden=(0, 1, 2, 3, 4, 5))
     with pytest.raises(UserError, match="more than 3 that were seen, not 3"):
         GaussianProcessSolver().solve(Problem(coarse_mesh, observations=few))
+
+
+@pytest.mark.parametrize("kernel", ["matern32", "gaussian"])
+def test_the_evidence_is_that_of_the_normal_distribution(problem, kernel):
+    solution = GaussianProcessSolver(kernel=kernel).solve(problem)
+    observations = problem.observations
+    seen, smoothness = observations.visible, {"matern32": 1.5, "gaussian": np.inf}[kernel]
+    points, expected = observations.points[seen], 0.0
+    for axis, process in enumerate(solution.field.processes):
+        variance, length = np.exp(process.kernel_.theta)
+        covariance = variance * matern(points, points, length, smoothness)
+        covariance += np.diag(observations.standard_deviations[seen, axis] ** 2)
+        expected += multivariate_normal.logpdf(observations.displacements[seen, axis], cov=covariance)
+    assert solution.stats["log_evidence"] == pytest.approx(expected, abs=1e-4)
+
+
+def test_an_unknown_kernel_is_refused():
+    with pytest.raises(UserError, match=r"kernel.*matern32"):
+        make_solver("gp", kernel="cubic")

@@ -10,6 +10,7 @@ from geometry.observations import Observations
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Problem
 from solvers.statistical_fem import StatFemSolver
+from tests.solvers.kernels import matern
 
 
 @pytest.fixture(scope="module")
@@ -55,9 +56,8 @@ def by_hand(solution, units, points):
     everywhere = np.concatenate([problem.observations.points[seen], points])
     spreads = np.array([stats["discrepancy_u"], stats["discrepancy_v"]])
     shapes = np.stack([unit.displacement(everywhere).ravel() for unit in units], axis=1) * stats["factor"]
-    squares = ((everywhere[:, None] - everywhere) ** 2).sum(axis=2)
     prior = SOLVER.stroke_deviation**2 * shapes @ shapes.T
-    prior = prior + np.kron(np.exp(-0.5 * squares / stats["length"] ** 2), np.diag(spreads**2))
+    prior = prior + np.kron(matern(everywhere, everywhere, stats["length"]), np.diag(spreads**2))
     mean = shapes @ problem.load.values
     given = 2 * seen.sum()
     noise = np.diag(problem.observations.standard_deviations[seen].ravel() ** 2)
@@ -92,18 +92,18 @@ def test_no_other_constants_are_more_likely(solution, units):
     problem, stats = solution.problem, solution.stats
     seen = problem.observations.visible
     points = problem.observations.points[seen]
-    squares = ((points[:, None] - points) ** 2).sum(axis=2)
     noise = problem.observations.standard_deviations[seen].ravel() ** 2
     shapes = np.stack([unit.displacement(points).ravel() for unit in units], axis=1)
 
     def log_likelihood(factor, u, v, length):
         covariance = (factor * SOLVER.stroke_deviation) ** 2 * shapes @ shapes.T + np.diag(noise)
-        covariance += np.kron(np.exp(-0.5 * squares / length**2), np.diag([u**2, v**2]))
+        covariance += np.kron(matern(points, points, length), np.diag([u**2, v**2]))
         mean = factor * shapes @ problem.load.values
         return multivariate_normal.logpdf(problem.observations.displacements[seen].ravel(), mean, covariance)
 
     found = np.array([stats[name] for name in ("factor", "discrepancy_u", "discrepancy_v", "length")])
     best = log_likelihood(*found)
+    assert stats["log_evidence"] == pytest.approx(best, abs=1e-6)
     for change in 1 + 0.05 * np.concatenate([np.eye(4), -np.eye(4)]):
         assert log_likelihood(*(found * change)) < best
 

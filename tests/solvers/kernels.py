@@ -1,0 +1,15 @@
+"""Matérn's kernels by Bessel functions, for any smoothness."""
+
+import numpy as np
+from scipy.special import gamma, kv
+
+from geometry.arrays import FloatArray
+
+
+def matern(first: FloatArray, second: FloatArray, length: float, smoothness: float = 2.5) -> FloatArray:
+    """Equation 4.14 of Rasmussen and Williams, and its limit; points (n, 2) and (m, 2): shape (n, m)."""
+    distance = np.sqrt(((first[:, None] - second) ** 2).sum(axis=2))
+    if np.isinf(smoothness):
+        return np.asarray(np.exp(-0.5 * (distance / length) ** 2))
+    x = np.maximum(np.sqrt(2 * smoothness) * distance / length, 1e-8)
+    return np.asarray(2 ** (1 - smoothness) / gamma(smoothness) * x**smoothness * kv(smoothness, x))
