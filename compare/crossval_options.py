@@ -8,6 +8,8 @@ from compare.options import FingerOptions, SolverOptions
 from geometry.design import Design
 from geometry.errors import UserError
 from geometry.settings import MeshSettings
+from solvers.problem import Material
+from solvers.solver import with_law
 
 SIZE = 0.5
 """Of elements unless something else is asked for, mm.
@@ -20,18 +22,19 @@ CHOICES |= {"evidence": {"weights": "precision", "choose": "evidence"}}
 """Variants of a solver that can choose the weights of the markers, beside the paper's weight as it is."""
 
 
-def read_entries(options: SolverOptions, names: str) -> list[Entry]:
+def read_entries(options: SolverOptions, names: str, material: Material) -> list[Entry]:
     """The solvers, and those that can choose their weights once more for each way of choosing.
 
-    The choice is made inside a fold, by the markers that are given. Where --solver-set says how to choose,
-    there is that one only.
+    The choice is made inside a fold, by the markers that are given. Where --solver-set says how to choose, or
+    the law is not linear, there is that one only.
     """
     told = {text.partition("=")[0] for text in options.solver_set}
     entries = []
     for solver in options.read(names):
         settings = solver.settings()
         entries.append(Entry(solver.name, solver.name, settings))
-        if "choose" in settings and not told & {f"{solver.name}.choose", f"{solver.name}.weights"}:
+        chosen = told & {f"{solver.name}.choose", f"{solver.name}.weights"}
+        if "choose" in settings and not chosen and with_law(material, solver).law == "linear":
             entries += [
                 Entry(f"{solver.name} {choice}", solver.name, {**settings, **changes})
                 for choice, changes in CHOICES.items()

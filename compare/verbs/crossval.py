@@ -62,7 +62,7 @@ def crossval(
         mesh=mesh,
         material=material,
         load=load,
-        entries=read_entries(options, solvers),
+        entries=read_entries(options, solvers, material),
         schemes=read_schemes(schemes),
         seeds=seeds,
         noise=noise,

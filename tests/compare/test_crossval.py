@@ -387,11 +387,13 @@ def test_a_solver_that_chooses_its_weights_is_there_in_three_ways():
     from compare.crossval_options import read_entries
     from compare.options import SolverOptions
 
-    entries = read_entries(SolverOptions(), "fem,fem-asm")
+    entries = read_entries(SolverOptions(), "fem,fem-asm", Material())
     assert [entry.label for entry in entries] == ["fem", "fem-asm", "fem-asm left-out", "fem-asm evidence"]
     assert [entry.settings.get("choose") for entry in entries] == [None, "given", "left-out", "evidence"]
     fixed = SolverOptions(solver_set=("fem-asm.choose=left-out",))
-    assert [entry.label for entry in read_entries(fixed, "fem-asm")] == ["fem-asm"]
+    assert [entry.label for entry in read_entries(fixed, "fem-asm", Material())] == ["fem-asm"]
+    stiff = Material(law="neo-hookean")  # for which there is nothing to choose
+    assert [entry.label for entry in read_entries(SolverOptions(), "fem-asm", stiff)] == ["fem-asm"]
 
 
 def test_pictures_show_every_solver(pages, tmp_path):
