@@ -115,7 +115,7 @@ def _panel(
     axes.plot(*computed.T, "x", ms=4, color=INK, mew=0.9, zorder=5)
     errors = marker_errors(evaluation, observations)
     axes.set_title(solver_at_markers(evaluation), size=9, pad=3, weight="bold")
-    note = f"MAE{', given' * evaluation.in_sample}  u {errors.mae_u:.3g} mm,  v {errors.mae_v:.3g} mm"
+    note = f"MAE{', given' * evaluation.in_sample}  u {errors.mae_u:.3f} mm,  v {errors.mae_v:.3f} mm"
     axes.text(0.01, 0.01, note, size=7.5, color=MUTED, transform=axes.transAxes)
 
 
