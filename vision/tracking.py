@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri
 
-from geometry.arrays import BoolArray, FloatArray
+from geometry.arrays import BoolArray, FloatArray, IntArray
 from geometry.errors import UserError
 from geometry.observations import Observations
 from geometry.parameters import Parameters
@@ -145,16 +145,26 @@ def mean_spots(frames: Sequence[Spots], method: Method) -> Spots:
     size = np.trace(usual, axis1=1, axis2=2)
     noise = np.minimum(USUAL * np.median(size) / size, 1.0)
     away = np.where(seen[:, known, None], centres[:, known] - mean[known], np.nan)
-    squares, steps = (
-        _squares(offset, weights[-len(offset) :, known]) for offset in (away, np.diff(away, axis=0))
-    )
-    freedom = 2 * (count[known] - 1)
-    scatter, follows = _scatter(squares / noise, steps / noise, freedom)
-    independent = np.maximum((1 - follows) / (1 + follows) * count[known], 1.0)
-    share = 1 - noise * scatter * (1 - 1 / independent)
-    share *= np.maximum(1.0, (TRUST + squares) / (TRUST + freedom))
+    share = _kept(away, weights[:, known], count[known], noise)
     covariance[known] = share[:, None, None] * usual + FLOOR[method] ** 2 * np.eye(2)
     return Spots(mean, covariance, radius, contrast)
+
+
+def _kept(away: FloatArray, weights: FloatArray, count: IntArray, noise: FloatArray) -> FloatArray:
+    """What share of a frame's covariance the mean over frames keeps, shape (m,).
+
+    Args:
+        away: Of the frames' discs from the means, shape (f, m, 2), pixels; nan where one was not seen.
+        weights: Inverse covariances, shape (f, m, 2, 2), 1/pixels².
+        count: Of the frames in which a disc was seen, shape (m,).
+        noise: Share of the covariance that is noise, shape (m,).
+    """
+    squares, steps = _squares(away, weights), _squares(np.diff(away, axis=0), weights[1:])
+    freedom = 2 * (count - 1)
+    scatter, follows = _scatter(squares / noise, steps / noise, freedom)
+    independent = np.maximum((1 - follows) / (1 + follows) * count, 1.0)
+    excess = np.maximum(1.0, (TRUST + squares) / (TRUST + freedom))
+    return np.asarray(excess * (1 - noise * scatter * (1 - 1 / independent)))
 
 
 def _squares(offsets: FloatArray, weights: FloatArray) -> FloatArray:
@@ -163,7 +173,7 @@ def _squares(offsets: FloatArray, weights: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("fmi,fmij,fmj->m", known, weights, known))
 
 
-def _scatter(squares: FloatArray, steps: FloatArray, freedom: FloatArray) -> tuple[float, float]:
+def _scatter(squares: FloatArray, steps: FloatArray, freedom: IntArray) -> tuple[float, float]:
     """How much discs scatter, of what their covariances say, and how much of it follows the frame before.
 
     Both are between 0 and 1, medians over the discs less what may be chance; independent frames have 1 and 0.
@@ -176,10 +186,10 @@ def _scatter(squares: FloatArray, steps: FloatArray, freedom: FloatArray) -> tup
         steps: Of the steps from frame to frame, shape (m,).
         freedom: Degrees of freedom of the squares, shape (m,).
     """
-    moving = (freedom > 0) & (squares > 0)
-    if not moving.any():
-        return (0.0 if freedom.any() else 1.0), 0.0
     several = freedom > 0
+    moving = several & (squares > 0)
+    if not moving.any():
+        return (0.0 if several.any() else 1.0), 0.0
     usual = chdtri(freedom[several], 0.5)  # the median of chi squared
     chance = np.sqrt(np.pi / 2 / freedom[several].sum())  # standard deviation of a median, by that of a mean
     scatter = np.median(squares[several] / usual) + np.sqrt(2) * chance
