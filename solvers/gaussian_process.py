@@ -67,7 +67,7 @@ class GaussianProcessSolver:
         """
         check_problem(self, problem)
         started = time.perf_counter()
-        solution, misfit, deviations = self._through(problem)
+        solution, misfit, deviations = self._through(problem, FEWEST + 1)
         base, count = self._base(problem), len(misfit.points)
         missed, spread = np.zeros((2, count, 2))
         for marker in range(count):
@@ -83,17 +83,15 @@ class GaussianProcessSolver:
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
         """What fits other observations, without leaving any out; see `Refitting`."""
-        return lambda observations: self._through(replace(problem, observations=observations))[0]
+        return lambda observations: self._through(replace(problem, observations=observations), FEWEST)[0]
 
-    def _through(self, problem: Problem) -> tuple[Solution, Misfit, FloatArray]:
+    def _through(self, problem: Problem, least: int) -> tuple[Solution, Misfit, FloatArray]:
         """The processes through the markers that were seen; these; standard deviations (m, 2), mm."""
         started = time.perf_counter()
         misfit = misfit_of(problem, marker_radius=0.0)
         count = 0 if misfit is None else len(misfit.points)
-        if misfit is None or problem.observations is None or count <= FEWEST:
-            raise UnfitError(
-                f"gp goes through markers: it needs more than {FEWEST} that were seen, not {count}"
-            )
+        if misfit is None or problem.observations is None or count < least:
+            raise UnfitError(f"gp goes through markers: it needs {least} that were seen, not {count}")
         deviations = standard_deviations(problem.observations)
         field = _fit(misfit, deviations, self._base(problem), self.kernel)
         rule = body_quadrature(problem.mesh, 4)

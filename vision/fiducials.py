@@ -65,7 +65,8 @@ def identify_fiducials(pixels: FloatArray, radii: FloatArray, workspace: Workspa
     if straight.found < least:
         raise UnseenError(
             f"the workspace's {wanted} fiducials cannot be made out among {len(pixels)} discs: at "
-            f"best {straight.found} fit, and {least} must; show them all, or name the right workspace"
+            f"best {straight.found} fit, and {least} must; show them all, sharp and "
+            "without much noise, or name the right workspace"
         )
     return straight.discs
 

@@ -50,7 +50,8 @@ def read_measurements(path: Path) -> Observations:
     `# source: TEXT` says where the numbers come from and `# simulated` that no camera was involved.
 
     Raises:
-        UserError: If the file cannot be read, a column is missing or a value is no number; it names the line.
+        UserError: If the file cannot be read, a column is missing, a value is no number
+            or a marker is there twice; it names the line.
     """
     comments, table = _lines(path)
     header = table[0][1] if table else []
@@ -65,14 +66,18 @@ def read_measurements(path: Path) -> Observations:
             raise UserError(f"{path} has the column {name} twice; keep one")
     if len(table) == 1:
         raise UserError(f"{path} has a header but no marker")
-    markers = []
+    markers: list[dict[str, float]] = []
     for number, cells in table[1:]:
         if len(cells) != len(header):
             raise UserError(
                 f"{path}, line {number}: the header names {len(header)} columns, this line has {len(cells)}; "
                 "separate them with commas, and write decimals with a point"
             )
-        markers.append(_marker(dict(zip(header, cells, strict=True)), f"{path}, line {number}"))
+        marker = _marker(dict(zip(header, cells, strict=True)), f"{path}, line {number}")
+        if any(other["x_mm"] == marker["x_mm"] and other["y_mm"] == marker["y_mm"] for other in markers):
+            place = f"({marker['x_mm']:g}, {marker['y_mm']:g}) mm"
+            raise UserError(f"{path}, line {number}: there is already a marker at {place}; keep one")
+        markers.append(marker)
     columns = {name: np.array([marker[name] for marker in markers]) for name in (*REQUIRED, *OPTIONAL)}
     sources = [found[1] for comment in comments if (found := re.match(r"#\s*source:\s*(.*)", comment, re.I))]
     try:

@@ -159,9 +159,13 @@ def _kept(away: FloatArray, weights: FloatArray, count: IntArray, noise: FloatAr
         count: Of the frames in which a disc was seen, shape (m,).
         noise: Share of the covariance that is noise, shape (m,).
     """
-    squares, steps = _squares(away, weights), _squares(np.diff(away, axis=0), weights[1:])
-    freedom = 2 * (count - 1)
-    scatter, follows = _scatter(squares / noise, steps / noise, freedom)
+    squares, steps = _squares(away, weights), np.diff(away, axis=0)
+    freedom, pairs = 2 * (count - 1), np.isfinite(steps[..., 0]).sum(axis=0)
+    turns = np.where(pairs > 0, 0.0, np.nan)  # of copies
+    moving = (squares > 0) & (pairs > 0)
+    half = _squares(steps, weights[1:])[moving] / (2 * pairs[moving])
+    turns[moving] = half / (squares[moving] / (count[moving] - 1))
+    scatter, follows = _scatter(squares / noise, turns, freedom)
     independent = np.maximum((1 - follows) / (1 + follows) * count, 1.0)
     excess = np.maximum(1.0, (TRUST + squares) / (TRUST + freedom))
     return np.asarray(excess * (1 - noise * scatter * (1 - 1 / independent)))
@@ -173,25 +177,24 @@ def _squares(offsets: FloatArray, weights: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("fmi,fmij,fmj->m", known, weights, known))
 
 
-def _scatter(squares: FloatArray, steps: FloatArray, freedom: IntArray) -> tuple[float, float]:
+def _scatter(squares: FloatArray, turns: FloatArray, freedom: IntArray) -> tuple[float, float]:
     """How much discs scatter, of what their covariances say, and how much of it follows the frame before.
 
-    Both are between 0 and 1, medians over the discs less what may be chance; independent frames have 1 and 0.
-    For these, half the mean square of the steps from frame to frame is the variance (J. von Neumann,
-    "Distribution of the ratio of the mean square successive difference to the variance", Annals of
-    Mathematical Statistics 12, 1941).
+    Both are between 0 and 1, medians over the discs; independent frames have 1 and 0, and what is within a
+    standard deviation of that counts as that.
 
     Args:
         squares: Of what the frames miss the mean by, in standard deviations, shape (m,).
-        steps: Of the steps from frame to frame, shape (m,).
+        turns: Half the mean square of the steps from frame to frame over the variance, shape (m,): 1 for
+            independent frames (J. von Neumann, "Distribution of the ratio of the mean square successive
+            difference to the variance", Annals of Mathematical Statistics 12, 1941); nan if unknown.
         freedom: Degrees of freedom of the squares, shape (m,).
     """
     several = freedom > 0
-    moving = several & (squares > 0)
-    if not moving.any():
-        return (0.0 if several.any() else 1.0), 0.0
+    if not several.any():
+        return 1.0, 0.0
     usual = chdtri(freedom[several], 0.5)  # the median of chi squared
     chance = np.sqrt(np.pi / 2 / freedom[several].sum())  # standard deviation of a median, by that of a mean
     scatter = np.median(squares[several] / usual) + np.sqrt(2) * chance
-    follows = 1 - np.median(steps[moving] / (2 * squares[moving])) - chance
+    follows = 1 - np.nanmedian(turns) - chance if np.isfinite(turns).any() else 0.0
     return min(1.0, float(scatter)), max(0.0, float(follows))

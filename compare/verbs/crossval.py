@@ -16,7 +16,10 @@ def crossval(
     options: SolverOptions = SolverOptions(),
     *,
     solvers: Annotated[
-        str, Parameter(help="Names with commas; one that can choose its weights is there in three ways.")
+        str,
+        Parameter(
+            help="Names with commas; one that can choose its weights is there in three ways (linear law)."
+        ),
     ] = "fem,fem-nonlinear,fem-asm,fem-id,gp,statfem",
     schemes: Annotated[
         str, Parameter(help="What is held out: one-out, tip-out, random, load-out, with commas.")
@@ -83,7 +86,8 @@ def crossval(
     for table in tables(result):
         console.print(table)
     for name in ("crossval.json", "report.html", "held_out.csv", "fields.csv"):
-        print(study.out / name)
+        if (study.out / name).exists():
+            print(study.out / name)
     for name, message in result.failed.items():
         say(f"error: {name} failed, and is tried again by the same command: {message}")
     converged = all(score.converged == 1 for each in result.scores.values() for score in each.values())

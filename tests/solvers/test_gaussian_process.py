@@ -122,11 +122,13 @@ def test_load_and_material_do_not_matter(problem, solution):
 
 
 def test_it_needs_markers(coarse_mesh):
-    with pytest.raises(UserError, match="more than 3 that were seen, not 0"):
+    with pytest.raises(UserError, match="needs 4 that were seen, not 0"):
         GaussianProcessSolver().solve(Problem(coarse_mesh))
     few = observed(coarse_mesh, bump, hidden=(0, 1, 2, 3, 4, 5))
-    with pytest.raises(UserError, match="more than 3 that were seen, not 3"):
+    with pytest.raises(UserError, match="needs 4 that were seen, not 3"):
         GaussianProcessSolver().solve(Problem(coarse_mesh, observations=few))
+    again = GaussianProcessSolver().refitter(Problem(coarse_mesh))(few)  # leaves none out: three will do
+    assert again.left_out is None
 
 
 @pytest.mark.parametrize("kernel", ["matern32", "gaussian"])

@@ -128,6 +128,7 @@ def test_a_spreadsheet_may_save_the_file(tmp_path):
         ("9,-1,0,0\n", "has no column x_mm"),  # no header
         (f"{HEADER}\n", "has a header but no marker"),
         (f"{HEADER},u_mm\n1,2,3,4,5\n", "has the column u_mm twice"),
+        (f"{HEADER}\n1,2,3,4\n5,6,7,8\n1,2.0,3,4\n", r"line 4: there is already a marker at \(1, 2\) mm"),
         (f"# c\n{HEADER}\n1,2,3,4\n1,2,three,4\n", "line 4: u_mm is 'three', which is not a number"),
         (f"{HEADER}\n1,2,nan,4\n", "line 2: u_mm is 'nan', which is not a number"),
         (f"{HEADER}\n1,2,3,inf\n", "line 2: v_mm is 'inf'"),

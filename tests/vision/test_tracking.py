@@ -19,7 +19,7 @@ def squares(errors):
         Spots(
             centres=100 + DEVIATION * frame,
             covariances=np.repeat(DEVIATION**2 * np.eye(2)[None], len(frame), axis=0),
-            radii=np.full(len(frame), 8.0),
+            radii=8.0 + 0 * frame[:, 0],
             contrasts=np.full(len(frame), 100.0),
         )
         for frame in errors
@@ -64,6 +64,18 @@ def test_what_all_frames_share_stays(frames, share):
         return np.sqrt(share) * common + np.sqrt(1 - share) * own
 
     assert 0.65 < mean_square(frames, errors) < 2  # as independent frames it would be at least 2.2 and 9.7
+
+
+@pytest.mark.parametrize("every", [2, 3])
+def test_frames_in_which_no_disc_was_seen_say_nothing(every):
+    """Of those that are left none follows another, or every second one does; nothing is correlated."""
+
+    def errors(rng, count):
+        values = rng.normal(size=(count, DISCS, 2))
+        values[::every] = np.nan
+        return values
+
+    assert 0.6 < mean_square(30, errors) < 1.1
 
 
 @pytest.mark.parametrize("correlation", [0.5, 0.9])
