@@ -15,7 +15,8 @@ from vision.fiducials import identify_fiducials
 from vision.frames import Image
 from vision.localiser import Method, Spots, look
 from vision.markers_alone import find_markers
-from vision.plane import CameraView, Plane, camera_plane, homography_plane, similarity_plane
+from vision.plane import CameraView, Plane
+from vision.plane_fit import camera_plane, homography_plane, similarity_plane
 from vision.workspace import Workspace
 
 SMALLEST_VIEW = 0.25

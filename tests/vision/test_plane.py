@@ -11,7 +11,7 @@ from test_fiducials import pose_of
 from geometry.parameters import Parameters
 from vision.camera import Camera
 from vision.localiser import Spots
-from vision.plane import camera_plane, homography_plane, similarity_plane
+from vision.plane_fit import camera_plane, homography_plane, similarity_plane
 from vision.rig.shapes import centroid, circle, closed
 from vision.setup import Fiducials, Setup
 from vision.workspace import default_workspace
