@@ -338,6 +338,14 @@ def test_the_command_writes_what_the_guide_says_and_goes_on(tmp_path, capsys, in
     against = content["solvers"]["fem-asm"]["against"]["fem"]["tip-out"]
     assert against["mae_sum"]["verdict"] == "better"
     assert against["von_mises"]["verdict"] == "worse"
+    predictions, _ = content["answers"].values()
+    verdicts = {
+        f"{label} against {baseline}": schemes["tip-out"]["mae_sum"]["verdict"]
+        for label in ("gp", "fem-asm")
+        for baseline, schemes in content["solvers"][label]["against"].items()
+    }
+    assert predictions == [f"{pair}: {verdict} in tip-out." for pair, verdict in verdicts.items()]
+    assert set(verdicts.values()) > {"better"}
     with (tmp_path / "out" / "held_out.csv").open() as file:
         rows = {(row["solver"], row["scheme"]): row for row in csv.DictReader(file)}
     mean = content["solvers"]["gp"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["mean"]
@@ -357,7 +365,10 @@ def test_measured_markers_have_no_truth(tmp_path, capsys, in_line, observations)
     write_measurements(tmp_path / "markers.csv", measured)
     line = f"--measurements {tmp_path / 'markers.csv'} --solvers fem,gp --schemes one-out,load-out --seeds 1"
     assert run(line, tmp_path / "out") == 0
-    assert "load-out needs a truth at other loads, and is left out" in capsys.readouterr().err
+    printed = capsys.readouterr()
+    assert "load-out needs a truth at other loads, and is left out" in printed.err
+    assert str(tmp_path / "out" / "held_out.csv") in printed.out
+    assert "fields.csv" not in printed.out
     content = json.loads((tmp_path / "out" / "crossval.json").read_text())
     assert list(content["schemes"]) == ["all", "one-out"]
     assert len(content["solvers"]["gp"]["schemes"]["one-out"]["per_marker"]) == 8

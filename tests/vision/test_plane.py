@@ -61,6 +61,21 @@ def test_a_homography_tells_by_its_residual_that_there_is_a_lens():
     assert homography_plane(FIDUCIALS, seen(FIDUCIALS), noise(7)).residual > 0.05
 
 
+@pytest.mark.parametrize("fit", [homography_plane, similarity_plane])
+def test_what_a_fit_without_a_lens_leaves_does_not_shrink_with_the_noise(fit):
+    pixels = projected(CAMERA, np.column_stack([FIDUCIALS, np.zeros(7)]), FLAT)
+    before, after = (projected(CAMERA, np.column_stack([at, np.zeros(9)]), FLAT) for at in (BEFORE, AFTER))
+    deviations = []
+    for scale in (0.1, 0.01):  # of noise, far below what the lens does
+        plane = fit(FIDUCIALS, pixels, scale**2 * noise(7))
+        initial, final = plane.points(before), plane.points(after)
+        covariance = plane.displacement_covariance(initial, final, 0 * noise(9), 0 * noise(9))
+        deviations.append(np.sqrt(np.trace(covariance) / 18))
+    assert deviations[1] == pytest.approx(deviations[0], rel=0.1)
+    missed = np.sqrt(np.mean((final - initial - (AFTER - BEFORE)) ** 2))
+    assert 0.3 < missed / deviations[1] < 3
+
+
 def test_a_similarity_is_exact_for_a_camera_that_looks_straight_down():
     pixels = projected(PINHOLE, np.column_stack([BEFORE, np.zeros(9)]), FLAT)
     square = replace(PINHOLE, fy=PINHOLE.fx)
