@@ -18,12 +18,13 @@ test: setup ## run the tests
 	$(BIN)/pytest $(ARGS)
 
 verification: setup ## measure fem against known answers, write docs/verification.md
-	$(BIN)/python -m tests.verification
+	$(BIN)/python -m benchmarks.verification
 
-lint: setup ## check style, format and types
+lint: setup ## check style, format, types and the order of the packages
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	$(BIN)/lint-imports
 
 bench: setup ## speed and accuracy against peers
 	$(BIN)/python -m benchmarks $(ARGS)

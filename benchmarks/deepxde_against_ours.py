@@ -16,10 +16,10 @@ from rich.table import Table
 from benchmarks import deepxde_finger
 from benchmarks.judge import Judge, Judged, Watch
 from geometry.cache import finger_mesh
-from geometry.design import Design
-from geometry.settings import MeshSettings
-from solvers.pinn.local import PinnLocalSolver
-from solvers.pinn.standard import PinnStdSolver
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from solvers.pinn.finite_basis.local import PinnLocalSolver
+from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.problem import Load, Problem
 from solvers.solver import Solver
 

@@ -17,11 +17,11 @@ from rich.table import Table
 
 from benchmarks.deepxde_finger import energy_residuals
 from geometry.cache import finger_mesh
-from geometry.design import Design
-from geometry.settings import MeshSettings
-from solvers.pinn.collocation import base_points
-from solvers.pinn.paper import PaperPinnSolver
-from solvers.pinn.pieces import pool
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from solvers.pinn.paper.collocation import base_points
+from solvers.pinn.paper.solver import PaperPinnSolver
+from solvers.pinn.threading import pool
 from solvers.problem import Load, Problem, contact_functional
 from tests.solvers.autograd_reference import PlainMlp, PlainPinn
 

@@ -23,10 +23,10 @@ import numpy as np
 import torch
 
 from geometry.arrays import FloatArray
-from geometry.locate import Location
-from geometry.quadrature import body_quadrature
+from geometry.mesh.point_location import Location
+from geometry.mesh.quadrature import body_quadrature
 from solvers.elasticity import Lame
-from solvers.pinn.base_factor import BaseFactor
+from solvers.pinn.finite_basis.hard_constraint import BaseFactor
 from solvers.problem import Problem, contact_functional
 
 os.environ.setdefault("DDE_BACKEND", "pytorch")  # read when DeepXDE is imported

@@ -11,12 +11,12 @@ from rich.table import Table
 from skfem.models.elasticity import linear_elasticity
 
 from geometry.cache import finger_mesh
-from geometry.design import Design
-from geometry.settings import MeshSettings
-from solvers.fem.bridge import Factorisation
-from solvers.fem.lagrange import LagrangeSpace
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from solvers.fem.dolfinx_compat import Factorisation
 from solvers.fem.least_energy import LeastEnergy, LinearSystem
 from solvers.fem.linear import FemSolver, Prepared
+from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Problem, contact_functional
 
 REPEATS = 3

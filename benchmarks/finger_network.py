@@ -12,12 +12,12 @@ import numpy as np
 import torch
 
 from geometry.arrays import FloatArray
-from geometry.locate import Location
-from geometry.quadrature import body_quadrature
-from solvers.pinn.base_factor import BaseFactor
-from solvers.pinn.losses import stiffness_matrix
-from solvers.pinn.modified_mlp import ModifiedMlp
-from solvers.pinn.pieces import cut, in_threads
+from geometry.mesh.point_location import Location
+from geometry.mesh.quadrature import body_quadrature
+from solvers.pinn.finite_basis.hard_constraint import BaseFactor
+from solvers.pinn.paper.losses import stiffness_matrix
+from solvers.pinn.paper.modified_mlp import ModifiedMlp
+from solvers.pinn.threading import cut, in_threads
 from solvers.problem import Problem, contact_functional
 
 BASE_LENGTH = 5.0

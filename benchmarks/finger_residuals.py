@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import torch
 
 from benchmarks.finger_network import PIECE, FingerNetwork
-from solvers.pinn.pieces import cut, in_threads
+from solvers.pinn.threading import cut, in_threads
 
 
 @dataclass(frozen=True, eq=False)

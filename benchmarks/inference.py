@@ -10,12 +10,12 @@ import numpy as np
 from rich.table import Table
 
 from geometry.cache import finger_mesh
-from geometry.design import Design
-from geometry.locate import Location
+from geometry.finger.design import Design
+from geometry.mesh.point_location import Location
 from solvers.fem.linear import FemSolver
-from solvers.pinn.local import PinnLocalSolver
-from solvers.pinn.paper import PaperPinnSolver
-from solvers.pinn.standard import PinnStdSolver
+from solvers.pinn.finite_basis.local import PinnLocalSolver
+from solvers.pinn.finite_basis.standard import PinnStdSolver
+from solvers.pinn.paper.solver import PaperPinnSolver
 from solvers.problem import Problem
 from solvers.solver import Solver
 

@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compare.differences import field_difference
-from compare.evaluation import Evaluation
+from compare.evaluation.differences import field_difference
+from compare.evaluation.evaluation import Evaluation
 from geometry.cache import finger_mesh
-from geometry.design import Design
-from geometry.mesh import TriangleMesh
-from geometry.quadrature import body_quadrature
-from geometry.settings import MeshSettings
+from geometry.finger.design import Design
+from geometry.mesh.quadrature import body_quadrature
+from geometry.mesh.settings import MeshSettings
+from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Problem
 from solvers.solution import DisplacementField, State

@@ -11,15 +11,15 @@ from itertools import product
 import numpy as np
 from rich.table import Table
 
-from compare.virtual_experiment import virtual_experiment
+from compare.evaluation.virtual_experiment import virtual_experiment
 from geometry.cache import finger_mesh
-from geometry.presets import load_design, preset_names
-from geometry.settings import MeshSettings
-from solvers.gaussian_process import GaussianProcessSolver
-from solvers.kernel_field import SMOOTHNESS
+from geometry.finger.presets import load_design, preset_names
+from geometry.mesh.settings import MeshSettings
 from solvers.problem import Problem
 from solvers.solution import Solution
-from solvers.statistical_fem import StatFemSolver
+from solvers.statistics.gaussian_process import GaussianProcessSolver
+from solvers.statistics.kernel_field import SMOOTHNESS
+from solvers.statistics.statistical_fem import StatFemSolver
 
 LAYOUTS = ("front", "joints")
 ELEMENT = 0.7

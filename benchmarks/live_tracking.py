@@ -16,19 +16,19 @@ import numpy as np
 from rich.table import Table
 
 from geometry.cache import finger_mesh
-from geometry.design import Design
-from geometry.settings import MeshSettings
-from vision.follower import Follower
-from vision.frames import Image
-from vision.localiser import METHODS
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from vision.discs.disc_detector import METHODS
+from vision.frames.frame import Image
+from vision.frames.video import VideoWriter, open_frames
 from vision.rig.bench import Bench
 from vision.rig.exposure import Exposure
 from vision.rig.motion import Motion
 from vision.rig.recording import Recording
 from vision.rig.view import default_camera, view
-from vision.setup import Setup
-from vision.video import VideoWriter, open_frames
-from vision.workspace import default_workspace
+from vision.tracking.frame_tracker import Follower
+from vision.tracking.scene import Setup
+from vision.tracking.workspace import default_workspace
 
 FRAMES = 240
 

@@ -19,9 +19,9 @@ from rich.table import Table
 
 from geometry.arrays import FloatArray
 from tests.vision.disc_images import DiscImage, Edge
-from vision.board import GreyImage
-from vision.disc_edge import KNOWN_RADIUS, Discs, fit_discs
-from vision.proposal import propose
+from vision.discs.circle_proposals import propose
+from vision.discs.sub_pixel import KNOWN_RADIUS, Discs, fit_discs
+from vision.frames.frame import GreyImage
 
 REPORT = Path("benchmarks/localisation.md")
 SEED = 1

@@ -17,9 +17,9 @@ import numpy as np
 from rich.table import Table
 
 from geometry.cache import finger_mesh
-from geometry.design import Design
-from geometry.mesh import TriangleMesh
-from geometry.settings import MeshSettings
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.worker import child_environment
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem

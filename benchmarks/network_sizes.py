@@ -11,15 +11,15 @@ import matplotlib as mpl
 import numpy as np
 from rich.table import Table
 
-from compare.evaluation import Evaluation
-from compare.metrics import reference_differences
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.metrics import reference_differences
 from geometry.cache import finger_mesh
-from geometry.design import Design
-from geometry.settings import MeshSettings
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
-from solvers.pinn.finite_basis import FiniteBasisSolver
-from solvers.pinn.local import PinnLocalSolver
-from solvers.pinn.standard import PinnStdSolver
+from solvers.pinn.finite_basis.local import PinnLocalSolver
+from solvers.pinn.finite_basis.solver import FiniteBasisSolver
+from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.problem import Problem
 
 PICTURE = Path("out/benchmarks/sizes.png")

@@ -6,13 +6,13 @@ there. "Own estimate" is the error that a network states itself. Allow ten minut
 
 from rich.table import Table
 
-from compare.evaluation import Evaluation
-from compare.metrics import reference_differences
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.metrics import reference_differences
 from geometry.cache import finger_mesh
-from geometry.settings import MeshSettings
+from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
-from solvers.pinn.local import PinnLocalSolver
-from solvers.pinn.standard import PinnStdSolver
+from solvers.pinn.finite_basis.local import PinnLocalSolver
+from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.problem import Problem
 from tests.geometry.test_mesher import random_design
 

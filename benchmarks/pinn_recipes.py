@@ -18,18 +18,18 @@ from rich.table import Table
 from benchmarks.finger_network import FingerNetwork
 from benchmarks.finger_residuals import everywhere, random_samples
 from benchmarks.judge import Judge, Judged, Watch
+from benchmarks.optimisers.levenberg_marquardt import levenberg_marquardt
+from benchmarks.optimisers.self_scaled_broyden import self_scaled_broyden
+from benchmarks.optimisers.soap import Soap
+from benchmarks.optimisers.spring import spring
 from benchmarks.random_gates import random_gates
 from benchmarks.trained_ridges import trained_ridges
 from geometry.cache import finger_mesh
-from geometry.design import Design
-from geometry.settings import MeshSettings
-from solvers.optimisers.levenberg_marquardt import levenberg_marquardt
-from solvers.optimisers.self_scaled_broyden import self_scaled_broyden
-from solvers.optimisers.soap import Soap
-from solvers.optimisers.spring import spring
-from solvers.pinn.local import PinnLocalSolver
-from solvers.pinn.modified_mlp import ModifiedMlp
-from solvers.pinn.standard import PinnStdSolver
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from solvers.pinn.finite_basis.local import PinnLocalSolver
+from solvers.pinn.finite_basis.standard import PinnStdSolver
+from solvers.pinn.paper.modified_mlp import ModifiedMlp
 from solvers.problem import Problem
 from solvers.solution import DisplacementField
 from solvers.solver import Solver

@@ -5,16 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.virtual_experiment import simulation
+from compare.evaluation.virtual_experiment import simulation
 from geometry.arrays import BoolArray, FloatArray
 from geometry.cache import finger_mesh
-from geometry.mesh import TriangleMesh
-from geometry.parameters import Parameters
-from geometry.settings import MeshSettings
+from geometry.finger.parameters import Parameters
+from geometry.mesh.settings import MeshSettings
+from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.problem import Problem
-from vision.frames import Frames, Image, Shot
+from vision.frames.frame import Frames, Image, Shot
 from vision.rig.recording import Truth
-from vision.tracking import Tracking
+from vision.tracking.trajectories import Tracking
 
 ELEMENT = 1.0
 """Size of the elements whose displacements are filmed, mm; with 0.5 they move the markers by 0.0003 mm."""

@@ -22,11 +22,11 @@ import numpy as np
 from rich.table import Table
 
 from benchmarks.tracker_films import Finger, Score, coverage, film_of
-from geometry.design import Design
-from vision.board import Board
-from vision.calibration import calibrate
-from vision.camera import Camera
-from vision.localiser import grey_of
+from geometry.finger.design import Design
+from vision.calibration.camera import Camera
+from vision.calibration.camera_calibration import calibrate
+from vision.calibration.chessboard import Board
+from vision.discs.disc_detector import grey_of
 from vision.rig.bench import Bench
 from vision.rig.boards import board_poses, board_scene
 from vision.rig.exposure import Exposure
@@ -34,9 +34,9 @@ from vision.rig.motion import Motion
 from vision.rig.recording import Recording
 from vision.rig.render import render
 from vision.rig.view import default_camera, view
-from vision.setup import Setup
-from vision.tracker import track
-from vision.workspace import default_workspace
+from vision.tracking.scene import Setup
+from vision.tracking.tracker import track
+from vision.tracking.workspace import default_workspace
 
 SCENES, CAMERAS, PHOTOGRAPHS = 200, 10, 20
 BOARD = Board(9, 6, 8.0)

@@ -24,12 +24,13 @@ import numpy as np
 from rich.table import Table
 
 from benchmarks.tracker_films import HIDDEN, Finger, Score, coverage, film_of
-from geometry.design import Design
 from geometry.errors import UserError
-from vision.colour import DARK
-from vision.frames import Frames
-from vision.localiser import METHODS, Method
-from vision.picker import pick_colour
+from geometry.finger.design import Design
+from vision.discs.colour import DARK
+from vision.discs.colour_picker import pick_colour
+from vision.discs.disc_detector import METHODS, Method
+from vision.frames.frame import Frames
+from vision.frames.video import open_frames
 from vision.rig.bench import BENCH, Bench
 from vision.rig.exposure import Exposure
 from vision.rig.motion import Motion
@@ -38,10 +39,9 @@ from vision.rig.recorder import FILES, record
 from vision.rig.recording import Recording, Truth
 from vision.rig.shapes import Shape, rectangle
 from vision.rig.view import default_camera, view
-from vision.setup import Setup
-from vision.tracker import track
-from vision.video import open_frames
-from vision.workspace import default_workspace
+from vision.tracking.scene import Setup
+from vision.tracking.tracker import track
+from vision.tracking.workspace import default_workspace
 
 REPORT = Path("benchmarks/tracker_stress.md")
 FILMS = 2

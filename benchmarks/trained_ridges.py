@@ -9,11 +9,11 @@ from dataclasses import replace
 
 import torch
 
-from solvers.pinn.conditions import load_conditions
-from solvers.pinn.local_level import Level
-from solvers.pinn.local_units import LocalField
-from solvers.pinn.patches import boxes_around
-from solvers.pinn.standard import PinnStdSolver
+from solvers.pinn.finite_basis.equilibrium import Level
+from solvers.pinn.finite_basis.load_conditions import load_conditions
+from solvers.pinn.finite_basis.network import LocalField
+from solvers.pinn.finite_basis.patches import boxes_around
+from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.problem import Problem
 from solvers.tangent import energy_density
 

@@ -4,19 +4,19 @@ import sys
 
 from cyclopts import App
 
-from compare.exits import EXIT_CODES
-from compare.launch import launched
-from compare.verbs.calibrate import calibrate
-from compare.verbs.compare import compare
-from compare.verbs.crossval import crossval
-from compare.verbs.design import design
-from compare.verbs.gridsearch import gridsearch
-from compare.verbs.mesh import mesh
-from compare.verbs.pick import pick
-from compare.verbs.rig import rig
-from compare.verbs.solve import solve
-from compare.verbs.solvers import solvers
-from compare.verbs.track import track
+from compare.commands.calibrate import calibrate
+from compare.commands.compare import compare
+from compare.commands.crossval import crossval
+from compare.commands.design import design
+from compare.commands.gridsearch import gridsearch
+from compare.commands.mesh import mesh
+from compare.commands.pick import pick
+from compare.commands.rig import rig
+from compare.commands.solve import solve
+from compare.commands.solvers import solvers
+from compare.commands.track import track
+from compare.runtime.exits import EXIT_CODES
+from compare.runtime.launch import launched
 
 pinnray = App(
     name="pinnray",

@@ -9,32 +9,38 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from compare.adaptation import shared_mesh, write_rounds
-from compare.choice import able, left_out_remarks
-from compare.evaluation import Evaluation
-from compare.fields import write_vtu
+from compare.camera.film import Film
+from compare.evaluation.convergence import certified
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.force_displacement import force_curves, write_force_displacement
+from compare.evaluation.metrics import pick_reference
+from compare.evaluation.shared_mesh import check_inside, shared_mesh, write_rounds
+from compare.evaluation.solver_selection import able, left_out_remarks
+from compare.evaluation.uncertainty import evaluated
+from compare.evaluation.virtual_experiment import simulated
 from compare.figures import Figure, draw_all
-from compare.film import Film
-from compare.force_displacement import force_curves, write_force_displacement
-from compare.metrics import pick_reference
-from compare.output_folder import SOLUTIONS, TRAINING, check_output, replaced_folder, take_training, write_run
-from compare.provenance import file_digest, machine, package_versions, sources_digest
-from compare.report import ReportContent, write_report
-from compare.results import metrics
-from compare.stages import Stages
-from compare.table_one import write_table_one
-from compare.tables import write_markers, write_summary
-from compare.uncertainty import evaluated
-from compare.verdict import certified
-from compare.virtual_experiment import simulated
+from compare.report.html_report import ReportContent, write_report
+from compare.report.metrics_json import metrics
+from compare.report.table_one import write_table_one
+from compare.report.tables import write_markers, write_summary
+from compare.report.vtu_file import write_vtu
+from compare.runtime.output_folder import (
+    SOLUTIONS,
+    TRAINING,
+    check_output,
+    replaced_folder,
+    take_training,
+    write_run,
+)
+from compare.runtime.provenance import file_digest, machine, package_versions, sources_digest
+from compare.runtime.stages import Stages
 from geometry.atomic import write_json
-from geometry.design import Design
-from geometry.errors import OutsideBodyError, UserError
-from geometry.mesh import TriangleMesh
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
-from geometry.settings import MeshSettings
 from solvers.adaptation import Adaptation, check_adaptable
-from solvers.assimilation import assimilates
+from solvers.assimilation.misfit import assimilates
 from solvers.problem import Load, Material, Problem
 from solvers.solver import Solver, UnfitError, with_law
 from solvers.training import TrainedSolver, TrainingContext
@@ -112,7 +118,7 @@ def run(job: Job, stages: Stages) -> Outcome:
     remarks: Sequence[str] = ()
     with replaced_folder(job.out, keep=_names(job) if job.resume else ()) as folder:
         if isinstance(job.measurements, Film):
-            from compare.tracked import track_figures, track_film  # needs OpenCV
+            from compare.camera.track_film import track_figures, track_film  # needs OpenCV
 
             with stages.stage("track") as progress:
                 (folder / TRACK).mkdir()
@@ -304,18 +310,7 @@ def _key(solver: Solver, problem: Problem, observations: Observations) -> str:
         solver.name,
         solver.settings(),
         package_versions(),
-        sources_digest(["compare.evaluation", "geometry", "solvers", package]),
+        sources_digest(["compare.evaluation.evaluation", "geometry", "solvers", package]),
     ]
     text = json.dumps(parts, sort_keys=True, default=str)
     return sha256((text + problem.digest).encode() + observations.points.tobytes()).hexdigest()
-
-
-def check_inside(observations: Observations, mesh: TriangleMesh) -> None:
-    """Raise a `UserError` if a marker is not on the body."""
-    try:
-        mesh.locate(observations.points)
-    except OutsideBodyError as error:
-        raise UserError(
-            f"the measurements are not of this finger: {error}; "
-            "positions are those before loading, in the finger's frame"
-        ) from None

@@ -7,50 +7,50 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from geometry.across import elements_across as elements_across
-    from geometry.admissible import admissible_range as admissible_range
     from geometry.cache import cad_files as cad_files
     from geometry.cache import finger_mesh as finger_mesh
-    from geometry.design import Design as Design
     from geometry.errors import OutsideBodyError as OutsideBodyError
     from geometry.errors import ShapeError as ShapeError
     from geometry.errors import UserError as UserError
-    from geometry.locate import Location as Location
-    from geometry.markers import marker_positions as marker_positions
-    from geometry.mesh import TriangleMesh as TriangleMesh
+    from geometry.finger.design import Design as Design
+    from geometry.finger.markers import marker_positions as marker_positions
+    from geometry.finger.presets import load_design as load_design
+    from geometry.finger.presets import parse_overrides as parse_overrides
+    from geometry.finger.presets import preset_names as preset_names
+    from geometry.finger.section import Section as Section
+    from geometry.finger.section import finger_section as finger_section
+    from geometry.finger.validation import admissible_range as admissible_range
+    from geometry.mesh.elements_across import elements_across as elements_across
+    from geometry.mesh.point_location import Location as Location
+    from geometry.mesh.quadrature import Quadrature as Quadrature
+    from geometry.mesh.quadrature import body_quadrature as body_quadrature
+    from geometry.mesh.quadrature import edge_quadrature as edge_quadrature
+    from geometry.mesh.settings import MeshSettings as MeshSettings
+    from geometry.mesh.triangle_mesh import TriangleMesh as TriangleMesh
     from geometry.observations import Observations as Observations
-    from geometry.presets import load_design as load_design
-    from geometry.presets import parse_overrides as parse_overrides
-    from geometry.presets import preset_names as preset_names
-    from geometry.quadrature import Quadrature as Quadrature
-    from geometry.quadrature import body_quadrature as body_quadrature
-    from geometry.quadrature import edge_quadrature as edge_quadrature
-    from geometry.section import Section as Section
-    from geometry.section import finger_section as finger_section
-    from geometry.settings import MeshSettings as MeshSettings
 
 _HOME = {
-    "Design": "design",
-    "Location": "locate",
-    "MeshSettings": "settings",
+    "Design": "finger.design",
+    "Location": "mesh.point_location",
+    "MeshSettings": "mesh.settings",
     "Observations": "observations",
     "OutsideBodyError": "errors",
-    "Quadrature": "quadrature",
-    "Section": "section",
+    "Quadrature": "mesh.quadrature",
+    "Section": "finger.section",
     "ShapeError": "errors",
-    "TriangleMesh": "mesh",
+    "TriangleMesh": "mesh.triangle_mesh",
     "UserError": "errors",
-    "admissible_range": "admissible",
-    "body_quadrature": "quadrature",
+    "admissible_range": "finger.validation",
+    "body_quadrature": "mesh.quadrature",
     "cad_files": "cache",
-    "edge_quadrature": "quadrature",
-    "elements_across": "across",
+    "edge_quadrature": "mesh.quadrature",
+    "elements_across": "mesh.elements_across",
     "finger_mesh": "cache",
-    "finger_section": "section",
-    "load_design": "presets",
-    "marker_positions": "markers",
-    "parse_overrides": "presets",
-    "preset_names": "presets",
+    "finger_section": "finger.section",
+    "load_design": "finger.presets",
+    "marker_positions": "finger.markers",
+    "parse_overrides": "finger.presets",
+    "preset_names": "finger.presets",
 }
 
 __all__ = sorted(_HOME)

@@ -11,10 +11,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from geometry.design import Design
 from geometry.errors import UserError
-from geometry.mesh import TriangleMesh
-from geometry.settings import MeshSettings
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.worker import run_task
 
 FORMAT = 1
@@ -101,7 +101,7 @@ def cache_folder() -> Path:
 
 def cache_key(design: Design, task: dict[str, object]) -> str:
     """SHA-256 over design, task, package versions and this package's own sources, in hexadecimal."""
-    sources = sorted(Path(__file__).parent.glob("*.py"))
+    sources = sorted(Path(__file__).parent.rglob("*.py"))
     parts = {
         "format": FORMAT,
         "design": design.digest,

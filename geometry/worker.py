@@ -72,17 +72,17 @@ def perform(task: Mapping[str, Any]) -> None:
         task: `kind` ("mesh" or "cad"), `design` as a dictionary and `output` as a path; for a mesh also
             `settings` as a dictionary, for CAD `formats`.
     """
-    from geometry.design import Design
+    from geometry.finger.design import Design
 
     design = Design(**task["design"])
     output = Path(task["output"])
     if task["kind"] == "mesh":
-        from geometry.mesher import build_mesh
-        from geometry.settings import MeshSettings
+        from geometry.mesh.mesher import build_mesh
+        from geometry.mesh.settings import MeshSettings
 
         build_mesh(design, MeshSettings(**task["settings"])).save(output)
     elif task["kind"] == "cad":
-        from geometry.cad import write_archive
+        from geometry.cad.model import write_archive
 
         write_archive(design, task["formats"], output)
     else:

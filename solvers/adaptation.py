@@ -5,7 +5,7 @@ from math import inf
 from typing import NamedTuple
 
 from geometry.errors import UserError
-from geometry.mesh import TriangleMesh
+from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.problem import Load
 
 

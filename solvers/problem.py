@@ -12,9 +12,9 @@ from scipy.sparse.csgraph import connected_components
 
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
-from geometry.mesh import TriangleMesh
+from geometry.mesh.quadrature import segment_quadrature
+from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
-from geometry.quadrature import segment_quadrature
 from solvers.elasticity import Lame, LawName, lame_constants
 
 

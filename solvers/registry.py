@@ -17,8 +17,8 @@ GROUP = "pinnray.solvers"
 
 PRESETS = {
     "pinn-std": {
-        "fast": "solvers.pinn.standard:PinnStdSolver",
-        "paper": "solvers.pinn.paper:PaperPinnSolver",
+        "fast": "solvers.pinn.finite_basis.standard:PinnStdSolver",
+        "paper": "solvers.pinn.paper.solver:PaperPinnSolver",
     },
     "pinn-asm": {
         "fast": "solvers.pinn.assimilating:PinnAsmSolver",
@@ -29,13 +29,13 @@ PRESETS = {
 
 BUILT_IN = {
     "fem": "solvers.fem.linear:FemSolver",
-    "fem-nonlinear": "solvers.fem.nonlinear:FemNonlinearSolver",
-    "fem-id": "solvers.fem.identification:FemIdSolver",
+    "fem-nonlinear": "solvers.fem.finite_strain.solver:FemNonlinearSolver",
+    "fem-id": "solvers.fem.identification.solver:FemIdSolver",
     "fem-asm": "solvers.fem.assimilating:FemAsmSolver",
-    "gp": "solvers.gaussian_process:GaussianProcessSolver",
-    "statfem": "solvers.statistical_fem:StatFemSolver",
+    "gp": "solvers.statistics.gaussian_process:GaussianProcessSolver",
+    "statfem": "solvers.statistics.statistical_fem:StatFemSolver",
     "pinn-std": PRESETS["pinn-std"]["fast"],
-    "pinn-local": "solvers.pinn.local:PinnLocalSolver",
+    "pinn-local": "solvers.pinn.finite_basis.local:PinnLocalSolver",
     "pinn-asm": PRESETS["pinn-asm"]["fast"],
     "pinn-local-asm": "solvers.pinn.assimilating:PinnLocalAsmSolver",
 }

@@ -3,7 +3,7 @@
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.quadrature import Quadrature
+from geometry.mesh.quadrature import Quadrature
 from solvers.elasticity import linear_stress
 from solvers.problem import Problem, contact_ends
 

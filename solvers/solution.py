@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.arrays import FloatArray
-from geometry.locate import Location
+from geometry.mesh.point_location import Location
 from solvers.elasticity import Plane, energy_density_of, strain_of, stress_of, von_mises
 from solvers.problem import Problem
 

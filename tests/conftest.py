@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from geometry.cache import finger_mesh
-from geometry.design import Design
-from geometry.mesh import TriangleMesh
-from geometry.settings import MeshSettings
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.worker import child_environment
 
 PLUGIN = Path(__file__).parent / "solvers" / "plugin"

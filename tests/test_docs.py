@@ -14,10 +14,10 @@ import pytest
 from pydantic import BaseModel
 
 from geometry.cache import CAD_FORMATS
-from geometry.markers import marker_positions
-from geometry.parameters import Parameters, fact
-from geometry.presets import FOLDER, load_design, preset_names
-from geometry.settings import MeshSettings
+from geometry.finger.markers import marker_positions
+from geometry.finger.parameters import Parameters, fact
+from geometry.finger.presets import FOLDER, load_design, preset_names
+from geometry.mesh.settings import MeshSettings
 from solvers.solver import Solver
 
 ROOT = Path(__file__).parent.parent
@@ -312,7 +312,7 @@ def test_the_guide_has_the_settings_of_assimilation_as_they_are(name, settings):
 
 
 def test_the_guide_has_every_parameter_that_can_be_found():
-    from solvers.fem.unknowns import MEANINGS
+    from solvers.fem.identification.parameters import MEANINGS
 
     assert names(table(GUIDE, "parameter that can be found")) == list(MEANINGS)
 
@@ -330,7 +330,7 @@ def test_the_guide_has_every_setting_of_the_other_presets_as_it_is():
 
 
 def test_the_guide_has_the_limits_of_the_certificate():
-    from compare.certificate import CONDITION_LIMIT, ENERGY_LIMIT, INTERPOLANT_LIMIT
+    from compare.evaluation.certificate import CONDITION_LIMIT, ENERGY_LIMIT, INTERPOLANT_LIMIT
 
     said = [float(row[1].split(" %")[0]) / 100 for row in table(GUIDE, "fault")]
     assert said == [ENERGY_LIMIT, CONDITION_LIMIT, INTERPOLANT_LIMIT]
@@ -368,7 +368,7 @@ def test_the_measurements_in_the_guide_can_be_read(tmp_path):
 
 
 def test_the_guide_has_every_exit_code():
-    from compare import exits
+    from compare.runtime import exits
 
     codes = {int(name) for name in names(table(GUIDE, "code"))}
     assert codes == {0, 1, exits.BAD_INPUT, exits.NOT_CONVERGED, exits.INTERRUPTED}
@@ -414,7 +414,7 @@ def test_the_guide_has_every_file_of_a_cross_validation(tmp_path):
 
 
 def test_the_guide_has_every_scheme():
-    from compare.crossval_folds import ALL, SCHEMES
+    from compare.crossval.folds import ALL, SCHEMES
 
     assert names(table(GUIDE, "scheme")) == [scheme for scheme in SCHEMES if scheme != ALL]
 

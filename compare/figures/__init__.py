@@ -8,10 +8,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from compare.evaluation import Evaluation
-from geometry.mesh import TriangleMesh
+from compare.evaluation.evaluation import Evaluation
+from geometry.finger.parameters import Parameters
+from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
-from geometry.parameters import Parameters
 from solvers.problem import Load
 
 

@@ -8,7 +8,7 @@ from compare.figures.canvas import Extent, Pixels
 from compare.figures.colours import Scale
 from compare.figures.style import HALO, INK, MUTED
 from geometry.arrays import FloatArray, IntArray
-from geometry.mesh import TriangleMesh
+from geometry.mesh.triangle_mesh import TriangleMesh
 
 PIXELS = 1800
 """Pixels across a picture of the body; a printed panel has fewer, which smooths its edges."""

@@ -18,7 +18,7 @@ import pyvista
 from vtkmodules.vtkCommonCore import vtkLogger
 
 from geometry.arrays import FloatArray
-from geometry.mesh import TriangleMesh
+from geometry.mesh.triangle_mesh import TriangleMesh
 
 Pixels = NDArray[np.uint8]
 

@@ -10,7 +10,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize
 from numpy.typing import NDArray
 
-from compare.differences import weighted_percentile
+from compare.evaluation.differences import weighted_percentile
 from geometry.arrays import FloatArray
 
 PERCENT = 99.5

@@ -13,10 +13,10 @@ from compare.figures.canvas import Extent
 from compare.figures.dimensions import Draughtsman
 from compare.figures.style import BODY, INK, MEASURED, WIDTH, axes_at, figure, heading
 from geometry.arrays import FloatArray
-from geometry.markers import marker_positions
-from geometry.outline import fillet_points
-from geometry.parameters import Parameters
-from geometry.section import Section, corner_angles, finger_section, rib_direction, rib_pitch
+from geometry.finger.markers import marker_positions
+from geometry.finger.parameters import Parameters
+from geometry.finger.rounded_corners import fillet_points
+from geometry.finger.section import Section, corner_angles, finger_section, rib_direction, rib_pitch
 
 CONTACT = "#d55e00"
 POINT = 8.5 / 72 / WIDTH

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from compare.evaluation import Evaluation
-from compare.figures.labels import solver_label
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.labels import solver_label
 from compare.figures.style import (
     INK,
     WIDTH,

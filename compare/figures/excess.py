@@ -6,16 +6,16 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 
-from compare.certificate import Certificate
-from compare.differences import weighted_percentile
-from compare.evaluation import Evaluation
+from compare.evaluation.certificate import Certificate
+from compare.evaluation.differences import weighted_percentile
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.labels import significant, solver_label
 from compare.figures import body
 from compare.figures.canvas import Canvas
 from compare.figures.colours import PERCENT, Scale
-from compare.figures.labels import significant, solver_label
 from compare.figures.style import MUTED, WIDTH, axes_at, figure, heading
 from geometry.arrays import FloatArray
-from geometry.mesh import TriangleMesh
+from geometry.mesh.triangle_mesh import TriangleMesh
 
 MARGIN = 0.1
 HEAD, PANEL_TITLE, FOOT = 0.3, 0.2, 0.55

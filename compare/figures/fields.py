@@ -8,16 +8,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as MplFigure
 
-from compare.differences import field_difference
-from compare.evaluation import Evaluation
+from compare.evaluation.differences import field_difference
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.labels import significant, solver_label
+from compare.evaluation.metrics import COMPONENTS
 from compare.figures import body
 from compare.figures.canvas import Canvas, Extent
 from compare.figures.colours import PERCENT, Scale, sequential, symmetric
-from compare.figures.labels import significant, solver_label
 from compare.figures.style import MUTED, WIDTH, axes_at, figure, heading
-from compare.metrics import COMPONENTS
 from geometry.arrays import FloatArray
-from geometry.mesh import TriangleMesh
+from geometry.mesh.triangle_mesh import TriangleMesh
 
 MARGIN = 0.1
 HEAD, PANEL_TITLE, FOOT = 0.3, 0.2, 0.55

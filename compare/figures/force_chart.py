@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from compare.figures.labels import solver_label
+from compare.evaluation.force_displacement import ForceCurve, follows_load
+from compare.evaluation.labels import solver_label
 from compare.figures.style import (
     INK,
     WIDTH,
@@ -16,7 +17,6 @@ from compare.figures.style import (
     legend_height,
     solver_colour,
 )
-from compare.force_displacement import ForceCurve, follows_load
 
 HEAD, HEIGHT, FOOT, LEFT, RIGHT = 0.3, 2.4, 0.45, 0.75, 0.65
 """Heights and the margins, inches."""

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from compare.evaluation import Evaluation
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.force_displacement import force_curves
+from compare.evaluation.labels import IN_SAMPLE, solver_label
 from compare.figures import Figure, body
 from compare.figures.canvas import Canvas
 from compare.figures.colours import PERCENT
@@ -14,15 +16,13 @@ from compare.figures.energy_chart import draw_energy
 from compare.figures.excess import DECADES, draw_excess
 from compare.figures.fields import QUANTITIES, Quantity, draw_field, field_extent
 from compare.figures.force_chart import draw_force_displacement
-from compare.figures.labels import IN_SAMPLE, solver_label
 from compare.figures.loss_chart import draw_losses
 from compare.figures.marker_chart import draw_marker_errors
 from compare.figures.mesh_drawing import draw_mesh, mesh_numbers
 from compare.figures.overlay import draw_overlay
-from compare.force_displacement import force_curves
-from geometry.mesh import TriangleMesh
+from geometry.finger.parameters import Parameters
+from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
-from geometry.parameters import Parameters
 from solvers.problem import Load
 
 Task = tuple[str, Callable[[], Figure | None]]

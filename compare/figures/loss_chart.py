@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from compare.evaluation import Evaluation
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.labels import solver_at_markers
 from compare.figures.energy_chart import wants_log
-from compare.figures.labels import solver_at_markers
 from compare.figures.style import (
     WIDTH,
     axes_at,

@@ -9,10 +9,10 @@ from matplotlib.figure import Figure as MplFigure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from compare.evaluation import Evaluation
-from compare.figures.labels import solver_at_markers
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.labels import solver_at_markers
+from compare.evaluation.metrics import MarkerErrors, held_out_errors, marker_errors
 from compare.figures.style import MUTED, WIDTH, axes_at, figure, heading, solver_colour
-from compare.metrics import MarkerErrors, held_out_errors, marker_errors
 from geometry.arrays import BoolArray
 from geometry.observations import Observations
 

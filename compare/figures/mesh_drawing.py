@@ -12,7 +12,7 @@ from compare.figures import body
 from compare.figures.canvas import Extent
 from compare.figures.style import INK, MEASURED, WIDTH, axes_at, figure, heading
 from geometry.arrays import FloatArray
-from geometry.mesh import TriangleMesh
+from geometry.mesh.triangle_mesh import TriangleMesh
 
 MARGIN = 0.1
 HEAD, INSET_TITLE = 0.48, 0.24

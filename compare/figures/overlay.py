@@ -10,15 +10,15 @@ from matplotlib.figure import Figure as MplFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
-from compare.evaluation import Evaluation
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.labels import markers_label, solver_at_markers
+from compare.evaluation.metrics import marker_errors
 from compare.figures import body
 from compare.figures.canvas import Canvas, Extent
 from compare.figures.colours import Scale
-from compare.figures.labels import markers_label, solver_at_markers
 from compare.figures.style import INK, MEASURED, MUTED, WIDTH, axes_at, figure, heading
-from compare.metrics import marker_errors
 from geometry.arrays import FloatArray, IntArray
-from geometry.mesh import TriangleMesh
+from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Load
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.assimilation import (
+from solvers.assimilation.marker_weight import Choice, WeightChoice
+from solvers.assimilation.misfit import (
     MARKER_RADIUS,
     Misfit,
     Weighting,
@@ -20,17 +21,16 @@ from solvers.assimilation import (
     misfit_of,
     without_each,
 )
-from solvers.fem.assimilating_nonlinear import assimilated
 from solvers.fem.compliance import MarkerCompliance
 from solvers.fem.conditions import reaction_by_residual_work
-from solvers.fem.lagrange import LagrangeField
+from solvers.fem.finite_strain.assimilation import assimilated
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
-from solvers.fem.nonlinear import FemNonlinearSolver
 from solvers.fem.ranks import on_all_ranks
+from solvers.lagrange import LagrangeField
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, check_problem, silent
-from solvers.weight_choice import Choice, WeightChoice
 
 
 @dataclass(frozen=True)

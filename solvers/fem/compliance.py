@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
-from solvers.assimilation import Misfit
-from solvers.fem.lagrange import LagrangeSpace
+from solvers.assimilation.marker_forces import MarkerForces
+from solvers.assimilation.misfit import Misfit
 from solvers.fem.least_energy import LeastEnergy, LinearSystem
-from solvers.marker_forces import MarkerForces
+from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
-from solvers.fem.lagrange import LagrangeSpace
+from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem, contact_functional
 
 

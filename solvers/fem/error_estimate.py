@@ -24,11 +24,11 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from geometry.arrays import FloatArray
-from geometry.locate import Location
-from geometry.quadrature import Quadrature, body_quadrature
+from geometry.mesh.point_location import Location
+from geometry.mesh.quadrature import Quadrature, body_quadrature
 from solvers.elasticity import deformation_jacobian
-from solvers.fem.lagrange import LagrangeField, LagrangeSpace
 from solvers.fem.recovery import GradientRecovery
+from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import ErrorEstimate, State
 

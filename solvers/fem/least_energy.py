@@ -10,10 +10,10 @@ from petsc4py import PETSc
 
 from geometry.arrays import BoolArray, FloatArray
 from solvers.elasticity import Lame, linear_energy_density
-from solvers.fem.bridge import DistributedSpace, Factorisation
 from solvers.fem.conditions import held_components, load_functionals, patch_displacement
-from solvers.fem.lagrange import LagrangeSpace
+from solvers.fem.dolfinx_compat import DistributedSpace, Factorisation
 from solvers.fem.multigrid import Multigrid
+from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 
 LinearSolver = Literal["auto", "direct", "iterative"]

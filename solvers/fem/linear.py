@@ -8,10 +8,10 @@ from typing import ClassVar, get_args
 from geometry.errors import UserError
 from solvers.fem.conditions import reaction_by_residual_work
 from solvers.fem.error_estimate import ErrorEstimator
-from solvers.fem.lagrange import LagrangeField, LagrangeSpace
 from solvers.fem.least_energy import LeastEnergy, LinearSolver, LinearSystem
 from solvers.fem.locking import locking_advice
 from solvers.fem.ranks import on_all_ranks
+from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Problem
 from solvers.solution import ErrorEstimate, Solution, Status
 from solvers.solver import Progress, check_problem, silent

@@ -5,7 +5,7 @@ from petsc4py import PETSc
 
 from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
-from solvers.fem.bridge import DistributedSpace
+from solvers.fem.dolfinx_compat import DistributedSpace
 
 TOLERANCE = 1e-10
 """Residual force over the right-hand side at which the iteration ends."""

@@ -18,9 +18,9 @@ import numpy as np
 from scipy.sparse import csr_matrix, diags, vstack
 
 from geometry.arrays import FloatArray, IntArray
-from geometry.mesh import TriangleMesh
-from geometry.quadrature import triangle_rule
-from solvers.fem.lagrange import LagrangeSpace
+from geometry.mesh.quadrature import triangle_rule
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.lagrange import LagrangeSpace
 
 FEWEST = 4
 """Triangles that a patch has at least."""

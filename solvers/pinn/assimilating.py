@@ -7,12 +7,12 @@ from typing import ClassVar
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.pinn.local import PinnLocalSolver
-from solvers.pinn.local_refit import network_refitter
-from solvers.pinn.observing import Assimilating, ChoosingWeights
-from solvers.pinn.paper import PaperPinnSolver
-from solvers.pinn.pieces import pool
-from solvers.pinn.standard import PinnStdSolver
+from solvers.pinn.finite_basis.local import PinnLocalSolver
+from solvers.pinn.finite_basis.refit import network_refitter
+from solvers.pinn.finite_basis.standard import PinnStdSolver
+from solvers.pinn.marker_terms import Assimilating, ChoosingWeights
+from solvers.pinn.paper.solver import PaperPinnSolver
+from solvers.pinn.threading import pool
 from solvers.problem import Problem
 from solvers.solution import Solution
 

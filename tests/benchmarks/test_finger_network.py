@@ -6,9 +6,9 @@ from benchmarks.finger_network import FingerNetwork
 from benchmarks.finger_residuals import FingerResiduals, everywhere
 from benchmarks.pinn_recipes import through_points, with_exact_output
 from geometry.cache import finger_mesh
-from geometry.design import Design
-from geometry.settings import MeshSettings
-from solvers.pinn.modified_mlp import ModifiedMlp
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from solvers.pinn.paper.modified_mlp import ModifiedMlp
 from solvers.problem import Load, Problem, contact_functional
 
 STEP = 1e-5

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from benchmarks.trained_ridges import lagrangian_gradient, with_ridges
-from solvers.pinn.standard import PinnStdSolver
+from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.problem import Problem
 
 

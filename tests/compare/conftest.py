@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from drawn_pages import Page, watching
 
-from compare.evaluation import Evaluation
-from compare.uncertainty import evaluated
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.uncertainty import evaluated
 from geometry.arrays import FloatArray
-from geometry.locate import Location
-from geometry.mesh import TriangleMesh
+from geometry.mesh.point_location import Location
+from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Problem
 from solvers.solution import ErrorEstimate, Solution, Status

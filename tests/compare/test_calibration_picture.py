@@ -4,10 +4,10 @@ import cv2
 import numpy as np
 from drawn_pages import Page
 
-from compare.figures.calibration_picture import draw_calibration, undistorted
-from vision.board import Board
-from vision.calibration import Calibration
-from vision.camera import Camera
+from compare.camera.calibration_chart import draw_calibration, undistorted
+from vision.calibration.camera import Camera
+from vision.calibration.camera_calibration import Calibration
+from vision.calibration.chessboard import Board
 
 CAMERA = Camera(320, 240, 250.0, 250.0, 160.0, 120.0, distortion=(-0.3, 0.1, 0.0, 0.0, 0.0))
 CORNERS = Board(5, 4, 30.0).corners[:, :2] + (90, 70)

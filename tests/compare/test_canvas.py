@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from compare.figures.canvas import Canvas, Extent
-from geometry.mesh import TriangleMesh
+from geometry.mesh.triangle_mesh import TriangleMesh
 
 RED, BLUE = (200, 10, 20), (10, 20, 200)
 

@@ -8,22 +8,22 @@ import skfem
 from scipy.sparse import csr_matrix
 from skfem.models.elasticity import linear_elasticity
 
-from compare.certificate import CONDITION_LIMIT, ENERGY_LIMIT, INTERPOLANT_LIMIT, Certificate
-from compare.certificate_text import certificate_sentences
-from compare.certifier import Certifier
-from compare.evaluation import Evaluation
-from compare.metrics import reference_differences
-from compare.regions import REGIONS, body_regions
-from compare.verdict import certified, judged
+from compare.evaluation.certificate import CONDITION_LIMIT, ENERGY_LIMIT, INTERPOLANT_LIMIT, Certificate
+from compare.evaluation.certification import Certifier
+from compare.evaluation.convergence import certified, judged
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.metrics import reference_differences
+from compare.evaluation.regions import REGIONS, body_regions
+from compare.report.certificate_text import certificate_sentences
 from geometry.arrays import FloatArray, IntArray
 from geometry.cache import finger_mesh
-from geometry.design import Design
-from geometry.mesh import TriangleMesh
-from geometry.settings import MeshSettings
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.fem.conditions import load_functionals
-from solvers.fem.lagrange import LagrangeField, LagrangeSpace
 from solvers.fem.least_energy import LeastEnergy
 from solvers.fem.linear import FemSolver
+from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, Status
 

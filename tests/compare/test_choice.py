@@ -3,7 +3,7 @@ from typing import ClassVar
 
 import pytest
 
-from compare.choice import able, left_out_remarks
+from compare.evaluation.solver_selection import able, left_out_remarks
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution
 from solvers.solver import Progress, UnfitError, silent

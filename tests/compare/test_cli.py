@@ -16,15 +16,15 @@ import pytest
 import pyvista
 
 from compare.cli import compare_main, main
-from compare.exits import BAD_INPUT, INTERRUPTED, NOT_CONVERGED
-from compare.options import FingerOptions, PhysicsOptions, SolverOptions
-from compare.preset_jobs import JOBS, JobDefaults, job_defaults
+from compare.commands.options import FingerOptions, PhysicsOptions, SolverOptions
+from compare.commands.preset_jobs import JOBS, JobDefaults, job_defaults
+from compare.runtime.exits import BAD_INPUT, INTERRUPTED, NOT_CONVERGED
 from geometry.cache import finger_mesh
-from geometry.mesh import TriangleMesh
-from geometry.presets import preset_names
-from solvers.fem import adapt
+from geometry.finger.presets import preset_names
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.fem import adaptive_refinement as adapt
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
-from solvers.fem.nonlinear import FemNonlinearSolver
 from solvers.registry import PRESETS, solver_names
 from solvers.solution import Solution, Status
 
@@ -448,7 +448,7 @@ def test_a_full_disk_is_one_line(folder, capsys, monkeypatch, without_pictures):
 
 
 def test_a_missing_library_is_one_line(folder, capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "solvers.pinn.standard", None)
+    monkeypatch.setitem(sys.modules, "solvers.pinn.finite_basis.standard", None)
     assert main(["compare", "--solvers", "pinn-std"]) == BAD_INPUT
     assert capsys.readouterr().err.startswith("error: solver 'pinn-std' cannot be loaded: ")
 

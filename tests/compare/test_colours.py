@@ -4,10 +4,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.evaluation import Evaluation
+from compare.evaluation.evaluation import Evaluation
 from compare.figures.colours import Scale, diverging, sequential, symmetric
 from compare.figures.fields import QUANTITIES, difference_scale, field_scale, max_principal
-from geometry.mesh import TriangleMesh
+from geometry.mesh.triangle_mesh import TriangleMesh
 
 VON_MISES, XY = QUANTITIES[0], QUANTITIES[-1]
 

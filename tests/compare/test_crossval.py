@@ -13,8 +13,8 @@ import pytest
 from scipy.stats import t
 
 from compare.cli import main
-from compare.crossval_curve import weigh
-from compare.crossval_folds import (
+from compare.crossval.chart import draw_curve, draw_fields, draw_held_out
+from compare.crossval.folds import (
     ALL,
     DRAWS,
     LOAD,
@@ -27,14 +27,14 @@ from compare.crossval_folds import (
     folds_of,
     training,
 )
-from compare.crossval_run import Entry, Outcome, Task, judge
-from compare.crossval_scores import Difference, Interval, difference, of_scheme, score
-from compare.crossval_truth import Sampler, Truth
-from compare.figures.crossval_chart import draw_curve, draw_fields, draw_held_out
-from geometry.mesh import TriangleMesh
+from compare.crossval.l_curve import weigh
+from compare.crossval.predictions import Entry, Outcome, Task, judge
+from compare.crossval.scores import Difference, Interval, difference, of_scheme, score
+from compare.crossval.truth import Sampler, Truth
+from geometry.mesh.quadrature import body_quadrature
+from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
-from geometry.quadrature import body_quadrature
-from solvers.assimilation import misfit_of
+from solvers.assimilation.misfit import misfit_of
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
@@ -212,7 +212,7 @@ def test_finished_folds_are_kept_and_those_of_other_settings_are_not(task, monke
     def again(*_: object) -> None:
         raise RuntimeError("solved again")
 
-    monkeypatch.setattr("compare.crossval_run.refitter", again)
+    monkeypatch.setattr("compare.crossval.predictions.refitter", again)
     assert [outcome.errors for outcome in judged(task)] == [outcome.errors for outcome in first]
     with pytest.raises(RuntimeError, match="solved again"):
         judged(replace(task, entry=entry("gp", clamp=True)))
@@ -312,7 +312,7 @@ def in_line(monkeypatch: pytest.MonkeyPatch) -> None:
         for name, each in tasks.items():
             yield name, work(each, silent)
 
-    monkeypatch.setattr("compare.staged_processes.in_processes", inline)
+    monkeypatch.setattr("compare.runtime.staged_processes.in_processes", inline)
 
 
 def run(line: str, out: Path) -> int:
@@ -395,8 +395,8 @@ def test_bad_input_is_one_line(tmp_path, capsys, line, said):
 
 
 def test_a_solver_that_chooses_its_weights_is_there_in_three_ways():
-    from compare.crossval_options import read_entries
-    from compare.options import SolverOptions
+    from compare.commands.crossval_options import read_entries
+    from compare.commands.options import SolverOptions
 
     entries = read_entries(SolverOptions(), "fem,fem-asm", Material())
     assert [entry.label for entry in entries] == ["fem", "fem-asm", "fem-asm left-out", "fem-asm evidence"]

@@ -4,9 +4,9 @@ import pytest
 from drawn_pages import Page
 
 from compare.figures.design_drawing import draw_design
-from geometry.design import Design
-from geometry.parameters import Parameters
-from geometry.presets import load_design, preset_names
+from geometry.finger.design import Design
+from geometry.finger.parameters import Parameters
+from geometry.finger.presets import load_design, preset_names
 
 DESIGNS = {
     **{name: load_design(name) for name in preset_names()},

@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.evaluation import Evaluation
+from compare.evaluation.evaluation import Evaluation
 from compare.figures.energy_chart import approaches_reference, draw_energy, readable, recorded, wants_log
 
 

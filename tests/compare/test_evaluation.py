@@ -4,9 +4,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.evaluation import Evaluation
-from geometry.mesh import TriangleMesh
-from solvers.fem.lagrange import LagrangeField, LagrangeSpace
+from compare.evaluation.evaluation import Evaluation
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
 

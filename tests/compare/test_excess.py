@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.certificate import Certificate, Region
-from compare.certificate_text import certificate_sentences
-from compare.evaluation import Evaluation
+from compare.evaluation.certificate import Certificate, Region
+from compare.evaluation.convergence import judged
+from compare.evaluation.evaluation import Evaluation
 from compare.figures.canvas import Canvas
 from compare.figures.excess import DECADES, draw_excess, excess_scale
 from compare.figures.fields import field_extent
-from compare.verdict import judged
-from geometry.mesh import TriangleMesh
+from compare.report.certificate_text import certificate_sentences
+from geometry.mesh.triangle_mesh import TriangleMesh
 
 
 @pytest.fixture

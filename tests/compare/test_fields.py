@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 import pyvista
 
-from compare.evaluation import Evaluation
-from compare.fields import write_mesh, write_vtu
-from geometry.mesh import TriangleMesh
+from compare.evaluation.evaluation import Evaluation
+from compare.report.vtu_file import write_mesh, write_vtu
+from geometry.mesh.triangle_mesh import TriangleMesh
 
 
 @pytest.fixture

@@ -10,7 +10,9 @@ import pytest
 from drawn_pages import Page
 from PIL import Image
 
-from compare.evaluation import Evaluation
+from compare.evaluation.convergence import certified
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.force_displacement import force_curves
 from compare.figures import Figure, draw_all
 from compare.figures.canvas import Canvas
 from compare.figures.energy_chart import draw_energy
@@ -19,10 +21,8 @@ from compare.figures.force_chart import draw_force_displacement
 from compare.figures.gallery import Gallery
 from compare.figures.overlay import overlay_extent
 from compare.figures.style import DPI, WIDTH
-from compare.force_displacement import force_curves
-from compare.verdict import certified
-from geometry.design import Design
-from geometry.mesh import TriangleMesh
+from geometry.finger.design import Design
+from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Load, Problem
 

@@ -5,8 +5,8 @@ from pathlib import Path
 from drawn_pages import Page
 from matplotlib.patches import Rectangle
 
-from compare.figures.grid_chart import draw_grid
-from compare.gridsearch_run import DIVERGED, TRAINED, Measured, Point, Run
+from compare.gridsearch.chart import draw_grid
+from compare.gridsearch.training_run import DIVERGED, TRAINED, Measured, Point, Run
 
 
 def run_of(rate: float, weight: float, distance: float | None) -> Run:

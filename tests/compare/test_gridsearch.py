@@ -14,10 +14,11 @@ import pytest
 from rich.console import Console
 
 from compare.cli import main
-from compare.exits import INTERRUPTED, NOT_CONVERGED
-from compare.gridsearch import Search, search
-from compare.gridsearch_options import read_settings
-from compare.gridsearch_run import (
+from compare.commands.gridsearch_options import read_settings
+from compare.commands.options import SolverOptions
+from compare.gridsearch.run import Search, search
+from compare.gridsearch.tables import best_of
+from compare.gridsearch.training_run import (
     DIVERGED,
     FAILED,
     TRAINED,
@@ -29,16 +30,15 @@ from compare.gridsearch_run import (
     measure,
     train,
 )
-from compare.gridsearch_tables import best_of
-from compare.options import SolverOptions
-from compare.processes import ProcessFailed
-from compare.stages import Stages
+from compare.runtime.exits import INTERRUPTED, NOT_CONVERGED
+from compare.runtime.processes import ProcessFailed
+from compare.runtime.stages import Stages
 from geometry.arrays import FloatArray
 from geometry.cache import finger_mesh
-from geometry.design import Design
 from geometry.errors import UserError
-from geometry.locate import Location
-from geometry.settings import MeshSettings
+from geometry.finger.design import Design
+from geometry.mesh.point_location import Location
+from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 from solvers.solution import DisplacementField, Solution
@@ -127,12 +127,12 @@ def scripted(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Point]]:
             for name, task in tasks.items():
                 yield name, work(task)
 
-        monkeypatch.setattr("compare.staged_processes.in_processes", inline)
+        monkeypatch.setattr("compare.runtime.staged_processes.in_processes", inline)
         return trained
 
     def train_with(task: Task, worth: Measured) -> Run:
         with monkeypatch.context() as patch:
-            patch.setattr("compare.gridsearch_run.measure", lambda *_: worth)
+            patch.setattr("compare.gridsearch.training_run.measure", lambda *_: worth)
             return train(task, silent)
 
     return prepare
@@ -184,7 +184,7 @@ def test_a_run_without_a_solution_says_why(fem, tmp_path, monkeypatch, error, st
     def refused(*_: object) -> Solution:
         raise error
 
-    monkeypatch.setattr("solvers.pinn.paper.PaperPinnSolver.solve", refused)
+    monkeypatch.setattr("solvers.pinn.paper.solver.PaperPinnSolver.solve", refused)
     fem.problem.mesh.save(tmp_path / "mesh.npz")
     point = Point(1e-2, 1.0)
     task = Task(
@@ -301,7 +301,7 @@ def test_another_search_in_the_same_folder_is_refused(wanted, scripted, changes,
 def test_results_of_another_program_are_refused(wanted, scripted, monkeypatch):
     scripted(distance)
     searched(wanted)
-    monkeypatch.setattr("compare.gridsearch.sources_digest", lambda *_: "another")
+    monkeypatch.setattr("compare.gridsearch.run.sources_digest", lambda *_: "another")
     with pytest.raises(UserError, match=r"other settings \(program_sha256\)"):
         searched(wanted)
 

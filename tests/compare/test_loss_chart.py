@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from drawn_pages import Page
 
-from compare.evaluation import Evaluation
+from compare.evaluation.evaluation import Evaluation
 from compare.figures.loss_chart import draw_losses
 
 EPOCHS = np.array([1.0, 2.0, 3.0])

@@ -4,9 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.differences import field_difference, weighted_percentile
-from compare.evaluation import Evaluation
-from compare.metrics import marker_errors, pick_reference, reference_differences
+from compare.evaluation.differences import field_difference, weighted_percentile
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.metrics import marker_errors, pick_reference, reference_differences
 from geometry.observations import Observations
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.output_folder import check_output, replaced_folder, take_training
+from compare.runtime.output_folder import check_output, replaced_folder, take_training
 from geometry.errors import UserError
 
 

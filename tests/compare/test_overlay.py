@@ -9,9 +9,9 @@ from drawn_pages import Page
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
-from compare.evaluation import Evaluation
+from compare.evaluation.evaluation import Evaluation
 from compare.figures.overlay import draw_overlay
-from geometry.mesh import TriangleMesh
+from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Load, Problem
 from solvers.solution import Solution, Status

@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from compare.exits import NOT_CONVERGED
-from compare.gridsearch import Search, search
+from compare.gridsearch.run import Search, search
 from compare.pipeline import Job, run
-from compare.stages import Stages
-from geometry.design import Design
+from compare.runtime.exits import NOT_CONVERGED
+from compare.runtime.stages import Stages
 from geometry.errors import UserError
-from geometry.settings import MeshSettings
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
 from solvers.problem import Load, Material
 from solvers.registry import make_solver
 from solvers.solver import Progress

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from compare.cli import main
-from compare.exits import BAD_INPUT
+from compare.runtime.exits import BAD_INPUT
 
 RED = (40, 40, 200)
 

@@ -15,15 +15,15 @@ import pytest
 import pyvista
 from rich.console import Console
 
-from compare.figures.labels import solver_label
+from compare.evaluation.labels import solver_label
 from compare.pipeline import Job, Outcome, run
-from compare.provenance import package_versions
-from compare.stages import Stages
+from compare.runtime.provenance import package_versions
+from compare.runtime.stages import Stages
 from geometry.cache import finger_mesh
-from geometry.design import Design
 from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
-from geometry.settings import MeshSettings
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, Status

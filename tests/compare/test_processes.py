@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.processes import ProcessFailed, in_processes
+from compare.runtime.processes import ProcessFailed, in_processes
 from solvers.solver import Progress
 
 ROOT = Path(__file__).parent.parent.parent
@@ -95,7 +95,7 @@ def test_processes_end_with_the_program_that_started_them(tmp_path):
         "import sys; sys.path[:0] = sys.argv[1:3]\n"
         "from pathlib import Path\n"
         "from test_processes import endless, silent\n"
-        "from compare.processes import in_processes\n"
+        "from compare.runtime.processes import in_processes\n"
         "def report(name, fraction, note): print(note, flush=True)\n"
         "if __name__ == '__main__':\n"
         "    list(in_processes(endless, {'a': Path(sys.argv[3])}, processes=1, report=report))\n"

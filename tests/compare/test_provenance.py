@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.provenance import PACKAGES, file_digest, machine, package_versions, sources_digest
+from compare.runtime.provenance import PACKAGES, file_digest, machine, package_versions, sources_digest
 
 
 @pytest.fixture
@@ -65,7 +65,7 @@ def test_versions_of_python_and_of_every_package():
 
 
 def test_a_package_that_is_not_there_has_no_version(monkeypatch):
-    monkeypatch.setattr("compare.provenance.PACKAGES", ("no-such-package",))
+    monkeypatch.setattr("compare.runtime.provenance.PACKAGES", ("no-such-package",))
     assert package_versions()["no-such-package"] == "unknown"
 
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from compare.evaluation import Evaluation
+from compare.evaluation.convergence import certified
+from compare.evaluation.evaluation import Evaluation
 from compare.figures import Figure
-from compare.report import ReportContent, render, write_report
-from compare.report_text import distance, number, percent, sentence
-from compare.verdict import certified
-from geometry.design import Design
-from geometry.mesh import TriangleMesh
+from compare.report.html_report import ReportContent, render, write_report
+from compare.report.text import distance, number, percent, sentence
+from geometry.finger.design import Design
+from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.adaptation import Adaptation, Round
 from solvers.problem import Load, Material, Problem

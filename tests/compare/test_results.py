@@ -8,10 +8,10 @@ from numbers import Real
 import numpy as np
 import pytest
 
-from compare.metrics import marker_errors, reference_differences
-from compare.results import metrics
-from compare.verdict import certified
-from geometry.design import Design
+from compare.evaluation.convergence import certified
+from compare.evaluation.metrics import marker_errors, reference_differences
+from compare.report.metrics_json import metrics
+from geometry.finger.design import Design
 from solvers.problem import Load, Material, Problem
 
 ERRORS = {"mae_u": Real, "mae_v": Real, "mae_sum": Real, "mae_rss": Real}

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from compare.cli import main
-from vision.board import Board
+from vision.calibration.chessboard import Board
+from vision.calibration.photographs import photographs
+from vision.frames.video import open_frames
 from vision.measurements import read_measurements
-from vision.photographs import photographs
-from vision.video import open_frames
 
 QUICK = "--mesh-size 1 --size 480x270 --rest 2 --moving 0 --held 2"
 

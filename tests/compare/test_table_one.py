@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from compare.evaluation import Evaluation
-from compare.table_one import PRINTED, table_one, write_table_one
+from compare.evaluation.evaluation import Evaluation
+from compare.report.table_one import PRINTED, table_one, write_table_one
 from geometry.observations import Observations
 
 

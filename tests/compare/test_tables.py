@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.evaluation import Evaluation
-from compare.metrics import marker_errors, reference_differences
-from compare.tables import write_markers, write_summary
-from geometry.mesh import TriangleMesh
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.metrics import marker_errors, reference_differences
+from compare.report.tables import write_markers, write_summary
+from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 
 Rows = list[dict[str, str]]

@@ -7,8 +7,8 @@ import pytest
 from rich.console import Console
 from rich.table import Table
 
-from compare.evaluation import Evaluation
-from compare.terminal import body_table, marker_table
+from compare.evaluation.evaluation import Evaluation
+from compare.report.terminal import body_table, marker_table
 from geometry.observations import Observations
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from compare.cli import main
-from compare.exits import BAD_INPUT
+from compare.runtime.exits import BAD_INPUT
+from vision.frames.pictures import write_picture
+from vision.frames.video import open_frames
 from vision.measurements import read_measurements
-from vision.pictures import write_picture
-from vision.video import open_frames
 
 QUICK = "--mesh-size 1 --rest 3 --moving 0 --held 3 --noise 2 --tilt 4 --seed 1"
 

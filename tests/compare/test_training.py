@@ -9,11 +9,11 @@ from typing import Any, ClassVar
 import pytest
 from rich.console import Console
 
-from compare.evaluation import Evaluation
+from compare.evaluation.evaluation import Evaluation
 from compare.pipeline import Job, run
-from compare.stages import Stages
-from geometry.design import Design
-from geometry.settings import MeshSettings
+from compare.runtime.stages import Stages
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
 from solvers.problem import Material, Problem
 from solvers.solution import Solution

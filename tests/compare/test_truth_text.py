@@ -1,7 +1,7 @@
 from dataclasses import replace
 
-from compare.evaluation import Evaluation
-from compare.truth_text import truth_sentences
+from compare.evaluation.evaluation import Evaluation
+from compare.report.truth_text import truth_sentences
 
 
 def test_what_the_markers_change_is_said_of_displacement_and_stress(fem: Evaluation, pinn: Evaluation):

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.differences import ReferenceDifferences
-from compare.evaluation import Evaluation
-from compare.metrics import reference_differences
-from compare.uncertainty import indistinct
+from compare.evaluation.differences import ReferenceDifferences
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.metrics import reference_differences
+from compare.evaluation.uncertainty import indistinct
 
 
 def test_it_is_the_difference_of_the_improved_solution(estimated: Evaluation) -> None:

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.virtual_experiment import simulated, virtual_experiment
+from compare.evaluation.virtual_experiment import simulated, virtual_experiment
 from geometry.errors import UserError
-from geometry.mesh import TriangleMesh
-from solvers.fem.nonlinear import FemNonlinearSolver
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, Status
 
@@ -114,9 +114,9 @@ def test_what_has_no_part_in_the_experiment_does_not_repeat_it(problem, solution
 
 def test_another_version_of_a_package_or_of_our_sources_is_simulated_again(problem, solutions, monkeypatch):
     virtual_experiment(problem)
-    monkeypatch.setattr("compare.virtual_experiment.package_versions", lambda: {"numpy": "9"})
+    monkeypatch.setattr("compare.evaluation.virtual_experiment.package_versions", lambda: {"numpy": "9"})
     virtual_experiment(problem)
-    monkeypatch.setattr("compare.virtual_experiment.sources_digest", lambda _: "other")
+    monkeypatch.setattr("compare.evaluation.virtual_experiment.sources_digest", lambda _: "other")
     virtual_experiment(problem)
     assert len(solutions) == 3
 
@@ -170,6 +170,6 @@ def test_without_the_finite_element_library_measurements_are_asked_for(problem, 
     def missing(name: str) -> None:
         raise ModuleNotFoundError("No module named 'dolfinx'")
 
-    monkeypatch.setattr("compare.virtual_experiment.make_solver", missing)
+    monkeypatch.setattr("compare.evaluation.virtual_experiment.make_solver", missing)
     with pytest.raises(UserError, match=r"No module named 'dolfinx'; or give --measurements"):
         virtual_experiment(problem)

@@ -23,7 +23,7 @@ CASES: dict[str, Design] = {
 
 @cache
 def coarse_mesh(case: str) -> TriangleMesh:
-    from geometry.mesher import build_mesh
+    from geometry.mesh.mesher import build_mesh
 
     return build_mesh(CASES[case], COARSE)
 

@@ -40,7 +40,7 @@ def test_nothing_but_the_result_is_left_in_the_cache(folder: Path) -> None:
 
 
 def test_worker_gives_the_same_mesh_as_meshing_here(folder: Path) -> None:
-    from geometry.mesher import build_mesh
+    from geometry.mesh.mesher import build_mesh
 
     assert (
         finger_mesh(Design(), settings=COARSE, cache_dir=folder).digest == build_mesh(Design(), COARSE).digest

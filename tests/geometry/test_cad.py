@@ -7,8 +7,9 @@ import ezdxf
 import numpy as np
 import pytest
 
-from geometry import Design, UserError, cad, cad_files, finger_section, marker_positions
-from geometry.svg import section_svg
+from geometry import Design, UserError, cad_files, finger_section, marker_positions
+from geometry.cad import model as cad
+from geometry.cad.svg import section_svg
 
 
 def test_face_has_the_area_and_the_holes_of_the_closed_form(design: Design) -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from geometry import Design, UserError
-from geometry.admissible import RULES, STEP, advice, obeys
-from geometry.parameters import SYMBOLS, Parameters, fact
-from geometry.rules import Finding, Rule
+from geometry.finger.parameters import SYMBOLS, Parameters, fact
+from geometry.finger.rules import Finding, Rule
+from geometry.finger.validation import RULES, STEP, advice, obeys
 
 BAD_DESIGNS = [
     # parameters, parameter that the message must give a range for, what it must say

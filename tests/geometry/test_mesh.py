@@ -137,7 +137,7 @@ def test_points_are_inside_exactly_where_the_section_is() -> None:
 
 def build_default() -> TriangleMesh:
     from geometry import MeshSettings
-    from geometry.mesher import build_mesh
+    from geometry.mesh.mesher import build_mesh
 
     return build_mesh(Design(), MeshSettings(size=1.0, coarsening=2))
 

@@ -7,9 +7,9 @@ import pytest
 
 from geometry import Design, MeshSettings, TriangleMesh, UserError, elements_across, finger_section
 from geometry import marker_positions as positions_of
-from geometry.across import boundary_edges, boundary_loops
-from geometry.mesher import build_mesh
-from geometry.section import corner_angles, corner_area
+from geometry.finger.section import corner_angles, corner_area
+from geometry.mesh.boundary import boundary_edges, boundary_loops
+from geometry.mesh.mesher import build_mesh
 
 
 def polygon_of_loop(mesh: TriangleMesh, loop: np.ndarray) -> float:

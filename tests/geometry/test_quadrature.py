@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geometry import TriangleMesh, UserError, body_quadrature, edge_quadrature
-from geometry.quadrature import triangle_rule
+from geometry.mesh.quadrature import triangle_rule
 
 DEGREES = [1, 2, 3, 4]
 
@@ -40,7 +40,7 @@ def test_weights_over_the_body_sum_to_its_area(mesh: TriangleMesh) -> None:
 
 def test_body_integral_of_a_polynomial_is_that_of_its_boundary(default_mesh: TriangleMesh) -> None:
     # Divergence theorem: the integral of x^3 y over the body is that of x^4 y / 4 n_x over its boundary.
-    from geometry.across import boundary_edges
+    from geometry.mesh.boundary import boundary_edges
 
     rule = body_quadrature(default_mesh, 4)
     x, y = rule.location.points.T

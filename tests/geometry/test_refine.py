@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from geometry import Design, TriangleMesh, finger_section
-from geometry.across import boundary_edges
-from geometry.refine import refined, smallest_angle
+from geometry.mesh.boundary import boundary_edges
+from geometry.mesh.refinement import refined, smallest_angle
 
 
 def some(mesh: TriangleMesh, share: float, seed: int = 0) -> np.ndarray:

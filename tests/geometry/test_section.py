@@ -7,7 +7,7 @@ import pytest
 from shapely.geometry import LineString, Point, Polygon
 
 from geometry import Design, finger_section, marker_positions
-from geometry.section import corner_area, polygon_area, rib_axes
+from geometry.finger.section import corner_area, polygon_area, rib_axes
 
 
 def as_shapely(design: Design) -> Polygon:

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.verification.meshes import mapped_mesh, quadrilateral
 from geometry.cache import finger_mesh
-from geometry.design import Design
-from geometry.mesh import TriangleMesh
-from geometry.settings import MeshSettings
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
-from tests.verification.meshes import mapped_mesh, quadrilateral
 
 
 @pytest.fixture(scope="session")

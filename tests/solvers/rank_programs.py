@@ -12,7 +12,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 from geometry.errors import UserError
-from geometry.mesh import TriangleMesh
+from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.fem.ranks import communicator, lead, on_all_ranks
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver

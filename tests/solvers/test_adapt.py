@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from geometry.cache import finger_mesh
-from geometry.design import Design
 from geometry.errors import UserError
-from geometry.section import finger_section
-from geometry.settings import MeshSettings
-from solvers.fem.adapt import adapted, largest
+from geometry.finger.design import Design
+from geometry.finger.section import finger_section
+from geometry.mesh.settings import MeshSettings
+from solvers.fem.adaptive_refinement import adapted, largest
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Problem
 

@@ -7,7 +7,7 @@ import pytest
 
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.assimilation import SMALLEST_DEVIATION, assimilates, check_weighting, misfit_of
+from solvers.assimilation.misfit import SMALLEST_DEVIATION, assimilates, check_weighting, misfit_of
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
 

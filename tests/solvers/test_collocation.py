@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from solvers.pinn.collocation import base_points, body_sample
+from solvers.pinn.paper.collocation import base_points, body_sample
 
 
 @pytest.mark.parametrize("kind", ["nodes", "elements", "random"])

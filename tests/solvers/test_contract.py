@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import OutsideBodyError, UserError
-from geometry.mesh import TriangleMesh
+from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver, solver_names, usable_solvers
 from solvers.solution import State
@@ -93,7 +93,7 @@ def test_every_load_that_the_solver_has_is_met(solver, coarse_mesh, kind):
 
 
 def test_energy_is_the_integral_of_its_density(solution, coarse_mesh):
-    from geometry.quadrature import body_quadrature
+    from geometry.mesh.quadrature import body_quadrature
 
     rule = body_quadrature(coarse_mesh, 4)
     total = (rule.weights * solution.state(rule.location).energy_density).sum()

@@ -5,10 +5,10 @@ import pytest
 from scipy.integrate import trapezoid
 
 from geometry.errors import UserError
-from solvers.fem.equilibrium import Equilibrium
+from solvers.fem.finite_strain.equilibrium import Equilibrium
+from solvers.fem.finite_strain.load_path import PENETRATION
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
-from solvers.fem.load_path import PENETRATION
-from solvers.fem.nonlinear import FemNonlinearSolver
 from solvers.problem import Load, Material, Problem, contact_ends
 from tests.solvers.conftest import bar_mesh
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from solvers.fem.equilibrium import Equilibrium, Stage
-from solvers.fem.lagrange import LagrangeSpace
-from solvers.fem.snes import Balance, BorderedNewton
+from solvers.fem.finite_strain.equilibrium import Equilibrium, Stage
+from solvers.fem.finite_strain.newton import Balance, BorderedNewton
+from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
 from tests.solvers.conftest import bar_mesh
 

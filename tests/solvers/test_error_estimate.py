@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from geometry.cache import finger_mesh
-from geometry.design import Design
-from geometry.settings import MeshSettings
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
 from solvers.fem.error_estimate import ErrorEstimator
-from solvers.fem.lagrange import LagrangeField, LagrangeSpace
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.least_energy import LeastEnergy, LinearSystem
 from solvers.fem.linear import FemSolver
-from solvers.fem.nonlinear import FemNonlinearSolver
+from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, State
 from tests.solvers.conftest import bar_mesh

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import binom
 
-from solvers.estimation import Unknown, estimate
+from solvers.assimilation.estimation import Unknown, estimate
 
 COUNT = 12
 UNKNOWNS = [Unknown("a", "mm", 1.0, 2.0), Unknown("b", "", -1.0, 0.5), Unknown("c", "", 3.0, 10.0)]

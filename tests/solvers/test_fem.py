@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from geometry.cache import finger_mesh
-from geometry.design import Design
 from geometry.errors import UserError
-from geometry.settings import MeshSettings
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
 from solvers.elasticity import Plane, linear_stress
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem

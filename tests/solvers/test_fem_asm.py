@@ -7,13 +7,13 @@ import pytest
 
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.assimilation import misfit_of
+from solvers.assimilation.marker_weight import FACTORS
+from solvers.assimilation.misfit import misfit_of
 from solvers.fem.assimilating import FemAsmSolver
-from solvers.fem.lagrange import LagrangeSpace
 from solvers.fem.least_energy import LinearSystem
 from solvers.fem.linear import FemSolver
+from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Problem, contact_functional
-from solvers.weight_choice import FACTORS
 
 LOADS = ("mean", "point", "patch")
 
@@ -252,8 +252,8 @@ def test_settings_that_make_no_sense_are_refused(settings, said):
 @pytest.mark.parametrize("deviation", [0.0, 1.0])
 def test_markers_of_a_richer_model_improve_the_displacement_and_not_the_stress(coarse_mesh, deviation):
     """The finger turns by more than the linear law allows for: to meet the markers it must strain."""
-    from geometry.quadrature import body_quadrature
-    from solvers.fem.nonlinear import FemNonlinearSolver
+    from geometry.mesh.quadrature import body_quadrature
+    from solvers.fem.finite_strain.solver import FemNonlinearSolver
     from solvers.problem import Material
 
     pressed = Load(kind="patch", displacement=(None, -10.0))

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
+from geometry.mesh.quadrature import body_quadrature
 from geometry.observations import Observations
-from geometry.quadrature import body_quadrature
-from solvers.assimilation import misfit_of
+from solvers.assimilation.misfit import misfit_of
 from solvers.fem.assimilating import FemAsmSolver
-from solvers.fem.constraints import Constraints
-from solvers.fem.equilibrium import Equilibrium, Stage
-from solvers.fem.lagrange import LagrangeSpace
-from solvers.fem.load_path import LoadPath
-from solvers.fem.nonlinear import FemNonlinearSolver
+from solvers.fem.finite_strain.constraints import Constraints
+from solvers.fem.finite_strain.equilibrium import Equilibrium, Stage
+from solvers.fem.finite_strain.load_path import LoadPath
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
+from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem, contact_functional
 from tests.solvers.conftest import bar_mesh
 

@@ -9,11 +9,11 @@ from scipy.stats import binom
 
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.assimilation import SMALLEST_DEVIATION, misfit_of
-from solvers.fem.identification import FemIdSolver
-from solvers.fem.lagrange import LagrangeField, LagrangeSpace
+from solvers.assimilation.misfit import SMALLEST_DEVIATION, misfit_of
+from solvers.fem.identification.linear_model import LinearFinger
+from solvers.fem.identification.solver import FemIdSolver
 from solvers.fem.linear import FemSolver
-from solvers.fem.parametrised import LinearFinger
+from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Problem
 
 NOISE = 0.01

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
-from solvers.fem.nonlinear import FemNonlinearSolver
 from solvers.problem import Load, Material, Problem
 
 NEO_HOOKEAN = Material(law="neo-hookean")

@@ -6,8 +6,8 @@ import signal
 import numpy as np
 import pytest
 
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
-from solvers.fem.nonlinear import FemNonlinearSolver
 from solvers.problem import Load, Material, Problem
 
 pytestmark = pytest.mark.mpi

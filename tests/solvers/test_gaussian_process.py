@@ -8,9 +8,9 @@ from scipy.stats import multivariate_normal
 
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.gaussian_process import GaussianProcessSolver
 from solvers.problem import Load, Problem
 from solvers.registry import make_solver
+from solvers.statistics.gaussian_process import GaussianProcessSolver
 from tests.solvers.kernels import matern
 
 
@@ -85,7 +85,7 @@ def test_it_goes_through_the_markers_and_knows_least_far_from_them(solution, coa
 
 
 def test_energy_is_the_integral_of_its_density(solution, coarse_mesh):
-    from geometry.quadrature import body_quadrature
+    from geometry.mesh.quadrature import body_quadrature
 
     rule = body_quadrature(coarse_mesh, 2)
     total = (rule.weights * solution.state(rule.location).energy_density).sum()

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from geometry.locate import Location
-from solvers.kernel_field import SMOOTHNESS, KernelField, correlation
+from geometry.mesh.point_location import Location
+from solvers.statistics.kernel_field import SMOOTHNESS, KernelField, correlation
 from tests.solvers.kernels import matern
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from geometry.quadrature import body_quadrature
-from solvers.fem.lagrange import LagrangeField, LagrangeSpace
+from geometry.mesh.quadrature import body_quadrature
+from solvers.lagrange import LagrangeField, LagrangeSpace
 
 
 @pytest.mark.parametrize("degree", [1, 2])

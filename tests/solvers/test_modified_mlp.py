@@ -3,8 +3,8 @@
 import pytest
 import torch
 
-from solvers.pinn.mlp_passes import MlpPass
-from solvers.pinn.modified_mlp import ModifiedMlp
+from solvers.pinn.paper.mlp_passes import MlpPass
+from solvers.pinn.paper.modified_mlp import ModifiedMlp
 
 
 def plain(network: ModifiedMlp, parameters: torch.Tensor, points: torch.Tensor) -> torch.Tensor:

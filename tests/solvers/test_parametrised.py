@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from geometry.quadrature import body_quadrature, edge_quadrature
+from geometry.mesh.quadrature import body_quadrature, edge_quadrature
+from geometry.mesh.walls import walls_and_ribs
 from solvers.elasticity import lame_constants, lame_slopes
-from solvers.fem.lagrange import LagrangeField, LagrangeSpace
+from solvers.fem.identification.linear_model import LinearFinger
+from solvers.fem.identification.parameters import MEANINGS, parse_parameters, problem_with, unknowns_of
 from solvers.fem.linear import FemSolver
-from solvers.fem.parametrised import LinearFinger
-from solvers.fem.unknowns import MEANINGS, parse_parameters, problem_with, unknowns_of
-from solvers.fem.walls import walls_and_ribs
+from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Material, Problem
 from solvers.solution import State
 from tests.solvers.conftest import bar_mesh

@@ -7,13 +7,13 @@ import pytest
 
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.fem import parametrised_nonlinear
-from solvers.fem.identification import FemIdSolver
-from solvers.fem.lagrange import LagrangeSpace
-from solvers.fem.load_path import Steps
-from solvers.fem.nonlinear import FemNonlinearSolver
-from solvers.fem.parametrised_nonlinear import PARAMETERS, NonlinearFinger
-from solvers.fem.unknowns import problem_with, unknowns_of
+from solvers.fem.finite_strain.load_path import Steps
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
+from solvers.fem.identification import finite_strain_model as parametrised_nonlinear
+from solvers.fem.identification.finite_strain_model import PARAMETERS, NonlinearFinger
+from solvers.fem.identification.parameters import problem_with, unknowns_of
+from solvers.fem.identification.solver import FemIdSolver
+from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
 
 PLACE = {"position": 36.1, "stroke_u": -0.6, "stroke_v": -5.5, "poisson": 0.42, "young": 10.0}

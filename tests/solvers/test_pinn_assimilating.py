@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 import torch
 
-from compare.virtual_experiment import virtual_experiment
+from compare.evaluation.virtual_experiment import virtual_experiment
 from geometry.cache import finger_mesh
-from geometry.design import Design
 from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.mesh.quadrature import body_quadrature
 from geometry.observations import Observations
-from geometry.quadrature import body_quadrature
-from solvers.assimilation import assimilates
+from solvers.assimilation.misfit import assimilates
 from solvers.fem.assimilating import FemAsmSolver
 from solvers.pinn.assimilating import PaperPinnAsmSolver, PinnAsmSolver, PinnLocalAsmSolver, l_curve
-from solvers.pinn.local_newton import equilibrium
-from solvers.pinn.mlp_field import MlpField
-from solvers.pinn.standard import PinnStdSolver
+from solvers.pinn.finite_basis.newton import equilibrium
+from solvers.pinn.finite_basis.standard import PinnStdSolver
+from solvers.pinn.paper.mlp_field import MlpField
 from solvers.problem import Load, Material, Problem, contact_functional
 from solvers.registry import make_solver
 from solvers.training import TrainedSolver

@@ -8,30 +8,27 @@ import pytest
 import torch
 
 from geometry.cache import finger_mesh
-from geometry.design import Design
 from geometry.errors import UserError
-from geometry.quadrature import body_quadrature
-from geometry.settings import MeshSettings
+from geometry.finger.design import Design
+from geometry.mesh.boundary import boundary_widths, mean_thickness, re_entrant_points, singular_points
+from geometry.mesh.quadrature import body_quadrature
+from geometry.mesh.settings import MeshSettings
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
-from solvers.fem.nonlinear import FemNonlinearSolver
-from solvers.pinn import local_newton
-from solvers.pinn.base_factor import BaseFactor
-from solvers.pinn.grading import (
+from solvers.pinn.finite_basis import newton as local_newton
+from solvers.pinn.finite_basis.energy import LocalEnergy
+from solvers.pinn.finite_basis.hard_constraint import BaseFactor
+from solvers.pinn.finite_basis.local import PinnLocalSolver
+from solvers.pinn.finite_basis.network import LocalField, LocalUnits
+from solvers.pinn.finite_basis.patches import PATCH, boxes_around, cut_into_patches
+from solvers.pinn.finite_basis.point_spacing import (
     Spacing,
-    boundary_widths,
     graded_quadrature,
     graded_triangles,
-    mean_thickness,
-    re_entrant_points,
-    singular_points,
     spread_points,
 )
-from solvers.pinn.local import PinnLocalSolver
-from solvers.pinn.local_energy import LocalEnergy
-from solvers.pinn.local_units import LocalField, LocalUnits
-from solvers.pinn.patches import PATCH, boxes_around, cut_into_patches
-from solvers.pinn.sparse_cholesky import BlockMatrix
-from solvers.pinn.windows import ShepardWindows
+from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
+from solvers.pinn.finite_basis.windows import ShepardWindows
 from solvers.problem import Load, Material, Problem
 from solvers.solution import State
 from tests.solvers.conftest import bar_mesh

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from solvers.pinn.paper import PaperPinnSolver
-from solvers.pinn.pieces import torch_threads
+from solvers.pinn.paper.solver import PaperPinnSolver
+from solvers.pinn.threading import torch_threads
 from solvers.problem import Load, Material, Problem
 from solvers.training import TrainedSolver
 from tests.solvers.autograd_reference import PlainPinn

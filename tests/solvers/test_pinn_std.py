@@ -5,16 +5,17 @@ import pytest
 import torch
 
 from geometry.cache import finger_mesh
-from geometry.design import Design
 from geometry.errors import UserError
-from geometry.quadrature import body_quadrature
-from geometry.settings import MeshSettings
+from geometry.finger.design import Design
+from geometry.mesh.quadrature import body_quadrature
+from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
-from solvers.pinn import gate_tree, local_energy
-from solvers.pinn.gate_tree import GateTree
-from solvers.pinn.local import PinnLocalSolver
-from solvers.pinn.patches import boxes_around
-from solvers.pinn.standard import PinnStdSolver
+from solvers.pinn.finite_basis import energy as local_energy
+from solvers.pinn.finite_basis import gate_tree
+from solvers.pinn.finite_basis.gate_tree import GateTree
+from solvers.pinn.finite_basis.local import PinnLocalSolver
+from solvers.pinn.finite_basis.patches import boxes_around
+from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.problem import Load, Problem
 from solvers.solution import Solution
 

@@ -12,7 +12,7 @@ import pytest
 import torch
 
 from geometry.errors import UserError
-from solvers.pinn.paper import PaperPinnSolver
+from solvers.pinn.paper.solver import PaperPinnSolver
 from solvers.problem import Load, Problem
 from solvers.solution import Solution
 from solvers.training import TrainingContext, TrainingDiverged

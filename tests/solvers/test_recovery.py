@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from solvers.fem.lagrange import LagrangeField, LagrangeSpace
 from solvers.fem.recovery import GradientRecovery
+from solvers.lagrange import LagrangeField, LagrangeSpace
 from tests.solvers.conftest import bar_mesh
 
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.mesh import TriangleMesh
+from geometry.mesh.quadrature import body_quadrature
+from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
-from geometry.quadrature import body_quadrature
+from solvers.assimilation.refitting import Refitting, refitter
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Problem
-from solvers.refitting import Refitting, refitter
 from solvers.registry import make_solver
 
 QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "ridges": 3, "tolerance": 0.05}

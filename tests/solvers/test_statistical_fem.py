@@ -9,7 +9,7 @@ from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Problem
-from solvers.statistical_fem import StatFemSolver
+from solvers.statistics.statistical_fem import StatFemSolver
 from tests.solvers.kernels import matern
 
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from solvers.pinn.verdict import judge
+from solvers.pinn.paper.convergence import judge
 from solvers.problem import Load, Problem
 
 

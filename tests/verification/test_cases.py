@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from tests.verification.cases import CASES
-from tests.verification.document import PAGE, page
+from benchmarks.verification.cases import CASES
+from benchmarks.verification.document import PAGE, page
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

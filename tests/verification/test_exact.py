@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from benchmarks.verification.cantilever import end_loaded
+from benchmarks.verification.hooke import PlaneLaw
+from benchmarks.verification.hyperelastic import Hyperelastic
+from benchmarks.verification.manufactured import waves
+from benchmarks.verification.plate_with_hole import kirsch
 from solvers.problem import Material
-from tests.verification.cantilever import end_loaded
-from tests.verification.hooke import PlaneLaw
-from tests.verification.hyperelastic import Hyperelastic
-from tests.verification.manufactured import waves
-from tests.verification.plate_with_hole import kirsch
 
 CLOSED_FORMS = {
     "waves": lambda material: waves(PlaneLaw.of(material)),

@@ -3,15 +3,15 @@
 import pytest
 import ufl
 
+from benchmarks.verification.cantilever import CANTILEVER
+from benchmarks.verification.cook import COOK
+from benchmarks.verification.finite_strain import FINITE_STRAIN
+from benchmarks.verification.manufactured import MANUFACTURED
+from benchmarks.verification.plate_with_hole import KIRSCH
 from geometry.errors import UserError
 from solvers import elasticity
 from solvers.fem import least_energy
 from solvers.problem import Material
-from tests.verification.cantilever import CANTILEVER
-from tests.verification.cook import COOK
-from tests.verification.finite_strain import FINITE_STRAIN
-from tests.verification.manufactured import MANUFACTURED
-from tests.verification.plate_with_hole import KIRSCH
 
 
 def passes(rows, **properties):

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from geometry.arrays import FloatArray
-from vision.board import GreyImage
+from vision.frames.frame import GreyImage
 
 CHORDS = 16
 """A pixel of radius."""

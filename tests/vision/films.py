@@ -7,16 +7,16 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.cache import finger_mesh
-from geometry.design import Design
-from geometry.settings import MeshSettings
-from vision.frames import Frames, Image, Shot
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from vision.frames.frame import Frames, Image, Shot
 from vision.rig.bench import Bench
 from vision.rig.exposure import Exposure
 from vision.rig.motion import Motion
 from vision.rig.occluders import cable
 from vision.rig.recording import Recording
 from vision.rig.view import default_camera, view
-from vision.workspace import default_workspace
+from vision.tracking.workspace import default_workspace
 
 DESIGN = Design()
 WORKSPACE = default_workspace(DESIGN)

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from vision.adjustment import Poses, Sightings, adjust
+from vision.calibration.bundle_adjustment import Poses, Sightings, adjust
 
 VIEWS = list(views(6, noise=0.3).values())
 FREE = np.arange(9) < 8

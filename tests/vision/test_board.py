@@ -6,10 +6,10 @@ import pytest
 from chessboards import drawn
 
 from geometry.errors import UserError
-from vision.board import Board
-from vision.boards import read_board
-from vision.charuco import CharucoBoard
-from vision.photographs import photographs
+from vision.calibration.board_names import read_board
+from vision.calibration.charuco import CharucoBoard
+from vision.calibration.chessboard import Board
+from vision.calibration.photographs import photographs
 
 SMALL = Board(5, 4, 10.0)
 TO_PIXELS = np.array([[4.2, 0.7, 90.0], [-0.5, 3.9, 75.0], [1e-3, -6e-4, 1.0]])
@@ -22,7 +22,7 @@ def test_corners_are_found_where_they_are():
     exact = np.column_stack([SMALL.corners[:, :2], np.ones(20)]) @ TO_PIXELS.T
     exact = exact[:, :2] / exact[:, 2:]
     error = min(np.abs(order - exact).max() for order in (found, found[::-1]))  # a board has no up
-    assert error < 0.02  # 0.06 without the fit of `vision.saddle`
+    assert error < 0.02  # 0.06 without the fit of `vision.calibration.corner_refinement`
 
 
 def test_corners_of_a_large_image_are_sought_in_a_smaller_one():

@@ -11,12 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from compare.cli import main
 from geometry.errors import UserError
-from vision.board import Board
-from vision.calibration import better_lens, calibrate, calibrate_views
-from vision.camera import Camera, Pose
-from vision.camera_file import load_camera
-from vision.lens_fit import LensChoice
-from vision.photographs import photographs
+from vision.calibration.camera import Camera, Pose
+from vision.calibration.camera_calibration import better_lens, calibrate, calibrate_views
+from vision.calibration.camera_file import load_camera
+from vision.calibration.chessboard import Board
+from vision.calibration.lens_fit import LensChoice
+from vision.calibration.photographs import photographs
 
 SIZE = (CAMERA.width, CAMERA.height)
 NOISE = 0.05
@@ -231,5 +231,5 @@ def test_the_photographs_of_opencv_give_their_known_camera(model):
     assert found.boardless == ()
     assert 530 < found.camera.fx < 540
     assert abs(found.camera.fy - found.camera.fx) < 3
-    assert found.rms < 0.2  # 0.23 without the fit of `vision.saddle`
+    assert found.rms < 0.2  # 0.23 without the fit of `vision.calibration.corner_refinement`
     assert found.rms < found.held_out < 0.22

@@ -6,9 +6,9 @@ import pytest
 from chessboards import photographed
 from scipy.spatial.transform import Rotation
 
-from vision.board import Board
-from vision.camera import Pose
-from vision.charuco import CharucoBoard
+from vision.calibration.camera import Pose
+from vision.calibration.charuco import CharucoBoard
+from vision.calibration.chessboard import Board
 
 CHARUCO = CharucoBoard(7, 5, 20.0, 15.0, "5X5_100")
 TILTS = [(20, -15, 5), (5, 30, 170)]

@@ -5,7 +5,7 @@ import pytest
 from dots import dots
 
 from geometry.errors import UserError
-from vision.colour import DARK, ColourRange, Darker, read_colour
+from vision.discs.colour import DARK, ColourRange, Darker, read_colour
 
 WHITE = (0.95047, 1.0, 1.08883)
 """XYZ of D65."""

@@ -9,7 +9,7 @@ from disc_images import DiscImage, Edge
 from scipy.stats import chi2
 
 from geometry.errors import ShapeError, UserError
-from vision.disc_edge import Discs, fit_discs
+from vision.discs.sub_pixel import Discs, fit_discs
 
 COUNT = 60
 

@@ -10,10 +10,10 @@ from benchmarks.tracker_films import Finger, Score, coverage
 from benchmarks.tracker_scenes import random_recording, scored
 from benchmarks.tracker_stress import CASES, JUMP, filmed, seen
 from geometry.cache import finger_mesh
-from geometry.settings import MeshSettings
-from vision.board import Board
-from vision.calibration import calibrate_views
-from vision.camera import Camera
+from geometry.mesh.settings import MeshSettings
+from vision.calibration.camera import Camera
+from vision.calibration.camera_calibration import calibrate_views
+from vision.calibration.chessboard import Board
 from vision.rig.boards import board_poses
 
 LENS = Camera(1280, 720, 1350.0, 1348.0, 640.0, 362.0, distortion=(-0.2, 0.03, 4e-4, -3e-4, 0.0))

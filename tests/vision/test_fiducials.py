@@ -6,10 +6,10 @@ from fingers import MARKERS
 from scipy.spatial.transform import Rotation
 
 from geometry.errors import UserError
-from geometry.parameters import Parameters
-from vision.camera import Camera, Pose
-from vision.fiducials import identify_fiducials
-from vision.workspace import Workspace, default_workspace
+from geometry.finger.parameters import Parameters
+from vision.calibration.camera import Camera, Pose
+from vision.tracking.fiducials import identify_fiducials
+from vision.tracking.workspace import Workspace, default_workspace
 
 CAMERA = Camera(1280, 720, 1200.0, 1200.0, 640.0, 360.0)
 WORKSPACE = default_workspace(Parameters())

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fingers import MARKERS, PRESSED, pressed
 
-from vision.identity import NOISE, filled, identify, moved, placed
+from vision.tracking.data_association import NOISE, filled, identify, moved, placed
 
 FRONT = MARKERS["front"]
 

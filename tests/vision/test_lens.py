@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vision.lens import BrownLens, FisheyeLens
+from vision.calibration.lens import BrownLens, FisheyeLens
 
 BROWN = BrownLens(-0.25, 0.08, 1e-3, -5e-4, -0.03)
 FISHEYE = FisheyeLens(0.05, -0.02, 0.004, -0.001)

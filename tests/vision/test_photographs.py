@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from vision.photographs import FRAMES_OF_A_VIDEO, photographs
-from vision.video import VideoWriter
+from vision.calibration.photographs import FRAMES_OF_A_VIDEO, photographs
+from vision.frames.video import VideoWriter
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ import pytest
 from dots import Dots, dots
 
 from geometry.errors import UserError
-from vision.colour import ColourRange, read_colour
-from vision.picker import pick_colour
+from vision.discs.colour import ColourRange, read_colour
+from vision.discs.colour_picker import pick_colour
 
 COLOURS = {
     "black": (45, 45, 45),

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from vision.pictures import Decoder, split
-from vision.video import open_frames
+from vision.frames.pictures import Decoder, split
+from vision.frames.video import open_frames
 
 
 def encoded(

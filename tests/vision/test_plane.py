@@ -8,13 +8,13 @@ from chessboards import projected
 from fingers import MARKERS, PRESSED
 from test_fiducials import pose_of
 
-from geometry.parameters import Parameters
-from vision.camera import Camera
-from vision.localiser import Spots
-from vision.plane_fit import camera_plane, homography_plane, similarity_plane
+from geometry.finger.parameters import Parameters
+from vision.calibration.camera import Camera
+from vision.discs.disc_detector import Spots
 from vision.rig.shapes import centroid, circle, closed
-from vision.setup import Fiducials, Setup
-from vision.workspace import default_workspace
+from vision.tracking.plane_fit import camera_plane, homography_plane, similarity_plane
+from vision.tracking.scene import Fiducials, Setup
+from vision.tracking.workspace import default_workspace
 
 CAMERA = Camera(1280, 720, 1200.0, 1195.0, 652.0, 349.0, distortion=(-0.12, 0.05, 1e-3, -5e-4, 0.0))
 FIDUCIALS = default_workspace(Parameters()).points

@@ -5,15 +5,15 @@ import pytest
 from dots import Dots, dots, draw_disc, exposed, step
 
 from geometry.arrays import FloatArray
-from geometry.design import Design
 from geometry.errors import UserError
-from vision.colour import DARK, ColourRange
-from vision.proposal import highlighted, propose
+from geometry.finger.design import Design
+from vision.discs.circle_proposals import highlighted, propose
+from vision.discs.colour import DARK, ColourRange
 from vision.rig.bench import Bench
 from vision.rig.exposure import Exposure
 from vision.rig.render import render
 from vision.rig.view import default_camera, view
-from vision.workspace import default_workspace
+from vision.tracking.workspace import default_workspace
 
 
 def missed(scene: Dots, found: FloatArray) -> int:

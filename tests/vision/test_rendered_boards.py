@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from vision.board import Board
-from vision.calibration import calibrate
-from vision.charuco import CharucoBoard
+from vision.calibration.camera_calibration import calibrate
+from vision.calibration.charuco import CharucoBoard
+from vision.calibration.chessboard import Board
 from vision.rig.boards import board_poses, board_scene
 from vision.rig.exposure import Exposure
 from vision.rig.render import render

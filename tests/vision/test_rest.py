@@ -5,7 +5,7 @@ import pytest
 from fingers import MARKERS, PRESSED
 
 from geometry.errors import UserError
-from vision.rest import Rest, find_rest
+from vision.tracking.rest_detection import Rest, find_rest
 
 WHOLE = np.array(PRESSED["front"])[0]
 

@@ -6,13 +6,13 @@ import pytest
 from films import CAMERA, DESIGN, WORKSPACE, bent, frames_of, images
 
 from geometry.errors import UserError
-from geometry.markers import marker_positions
-from vision.camera import Pose
-from vision.localiser import Spots
+from geometry.finger.markers import marker_positions
+from vision.calibration.camera import Pose
+from vision.discs.disc_detector import Spots
 from vision.rig.view import view
-from vision.setup import Setup
-from vision.shake import find_shake
-from vision.tracker import track
+from vision.tracking.camera_motion import find_shake
+from vision.tracking.scene import Setup
+from vision.tracking.tracker import track
 
 MARKERS = marker_positions(DESIGN)
 SETUP = Setup(design=DESIGN, workspace=WORKSPACE, camera=CAMERA)

@@ -4,9 +4,9 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 
-from geometry.design import Design
-from vision.sheet import workspace_svg
-from vision.workspace import default_workspace
+from geometry.finger.design import Design
+from vision.tracking.fiducial_sheet import workspace_svg
+from vision.tracking.workspace import default_workspace
 
 SVG = "{http://www.w3.org/2000/svg}"
 

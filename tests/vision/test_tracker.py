@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from films import CAMERA, DESIGN, WORKSPACE, bent, frames_of, images, recording
 
-from geometry.design import Design
 from geometry.errors import UserError
-from geometry.markers import marker_positions
-from vision.camera import Camera
+from geometry.finger.design import Design
+from geometry.finger.markers import marker_positions
+from vision.calibration.camera import Camera
 from vision.rig.motion import Motion
 from vision.rig.occluders import cables
-from vision.setup import Setup
-from vision.tracker import track
-from vision.workspace import Workspace
+from vision.tracking.scene import Setup
+from vision.tracking.tracker import track
+from vision.tracking.workspace import Workspace
 
 MARKERS = marker_positions(DESIGN)
 TRUE = bent(MARKERS)

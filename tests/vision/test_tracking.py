@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from vision.localiser import FLOOR, Spots
-from vision.tracking import mean_spots
+from vision.discs.disc_detector import FLOOR, Spots
+from vision.tracking.trajectories import mean_spots
 
 DISCS, REPEATS = 9, 200
 DEVIATION = 0.01

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import ShapeError, UserError
-from vision.video import VideoWriter, open_frames
+from vision.frames.video import VideoWriter, open_frames
 
 VIDEOS = Path(__file__).parent / "videos"
 SIZE = (64, 48)

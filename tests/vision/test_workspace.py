@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from geometry.design import Design
 from geometry.errors import UserError
-from vision.workspace import Workspace, default_workspace
+from geometry.finger.design import Design
+from vision.tracking.workspace import Workspace, default_workspace
 
 
 def test_the_default_layout_surrounds_the_finger_and_leaves_the_indenter_room():

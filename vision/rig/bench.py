@@ -6,14 +6,14 @@ from functools import cached_property
 
 import numpy as np
 
-from geometry.across import boundary_edges
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import ShapeError
-from geometry.locate import Location
-from geometry.mesh import TriangleMesh
-from geometry.parameters import Parameters
+from geometry.finger.parameters import Parameters
+from geometry.mesh.boundary import boundary_edges
+from geometry.mesh.point_location import Location
+from geometry.mesh.triangle_mesh import TriangleMesh
 from vision.rig.shapes import Colour, Scene, Shape, circle, closed, rectangle
-from vision.workspace import Workspace
+from vision.tracking.workspace import Workspace
 
 PAINTS: dict[str, Colour] = {
     "dark": (0.07, 0.065, 0.06),

@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
-from vision.board import Board
-from vision.camera import Camera, Pose
-from vision.charuco import DICTIONARIES, CharucoBoard
+from vision.calibration.camera import Camera, Pose
+from vision.calibration.charuco import DICTIONARIES, CharucoBoard
+from vision.calibration.chessboard import Board
 from vision.rig.shapes import Scene, Shape, rectangle
 
 PAPER, INK, WALL = (0.90, 0.91, 0.90), (0.06, 0.06, 0.06), (0.35, 0.38, 0.40)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from geometry.errors import UserError
-from geometry.messages import one_line
-from geometry.parameters import bounded
+from geometry.finger.error_messages import one_line
+from geometry.finger.parameters import bounded
 
 LUMA = (0.114, 0.587, 0.299)
 """Weights of blue, green and red (ITU-R BT.601)."""

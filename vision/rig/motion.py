@@ -8,8 +8,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from geometry.messages import one_line
-from geometry.parameters import bounded
+from geometry.finger.error_messages import one_line
+from geometry.finger.parameters import bounded
 
 
 class Motion(BaseModel):

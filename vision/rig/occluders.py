@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from vision.camera import Camera, Pose
+from vision.calibration.camera import Camera, Pose
 from vision.rig.bench import Bench
 from vision.rig.coverage import coverage
 from vision.rig.motion import Motion

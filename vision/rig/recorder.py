@@ -9,16 +9,16 @@ import numpy as np
 
 from geometry.atomic import write_json
 from geometry.errors import UserError
-from vision.camera import Pose
-from vision.camera_file import save_camera
+from vision.calibration.camera import Pose
+from vision.calibration.camera_file import save_camera
+from vision.frames.pictures import write_picture
+from vision.frames.video import CODECS, VideoWriter
 from vision.measurements import write_measurements
-from vision.pictures import write_picture
 from vision.rig.exposure import Image
 from vision.rig.recording import Recording, Truth
 from vision.rig.render import render
 from vision.rig.shapes import Scene
-from vision.sheet import workspace_svg
-from vision.video import CODECS, VideoWriter
+from vision.tracking.fiducial_sheet import workspace_svg
 
 PICTURES = "png"
 FILES = {codec.lower(): f"video{suffix}" for suffix, codec in CODECS.items()} | {PICTURES: "frames"}

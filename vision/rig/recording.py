@@ -10,7 +10,7 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.observations import Observations
-from vision.camera import Camera, Pose
+from vision.calibration.camera import Camera, Pose
 from vision.rig.bench import Bench
 from vision.rig.exposure import Exposure, Image, Light
 from vision.rig.motion import Motion

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from vision.camera import Camera, Pose
+from vision.calibration.camera import Camera, Pose
 from vision.rig.coverage import coverage
 from vision.rig.exposure import Exposure, Image, Light
 from vision.rig.shapes import Scene, seen_edges

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.arrays import FloatArray
-from vision.camera import Camera, Pose
+from vision.calibration.camera import Camera, Pose
 
 CORNERS = 512
 """Of the polygon that stands for a circle: 0.0004 pixels from it at a radius of 20 pixels."""

@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 
 from geometry.arrays import FloatArray
-from vision.camera import Camera, Pose
-from vision.workspace import Workspace
+from vision.calibration.camera import Camera, Pose
+from vision.tracking.workspace import Workspace
 
 RIM = 0.06
 """Free share of the image on either side of the fiducials."""

@@ -6,7 +6,7 @@ import numpy as np
 import skfem
 from skfem.models.elasticity import linear_elasticity
 
-from solvers.fem.lagrange import LagrangeField, LagrangeSpace
+from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import contact_functional
 from solvers.solution import Solution, Status
 from solvers.solver import check_problem, silent

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from geometry.design import Design
 from geometry.errors import ShapeError
+from geometry.finger.design import Design
 from vision.rig.bench import Bench
 from vision.rig.render import light_of
 from vision.rig.shapes import Scene
 from vision.rig.view import default_camera, view
-from vision.workspace import default_workspace
+from vision.tracking.workspace import default_workspace
 
 WORKSPACE = default_workspace(Design())
 CAMERA = default_camera()

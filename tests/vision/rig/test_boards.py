@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from vision.board import Board
-from vision.charuco import CharucoBoard
+from vision.calibration.charuco import CharucoBoard
+from vision.calibration.chessboard import Board
 from vision.rig.boards import INK, PAPER, board_poses, board_scene
 from vision.rig.exposure import Exposure
 from vision.rig.render import light_of, render

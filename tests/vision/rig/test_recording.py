@@ -6,9 +6,10 @@ import json
 import numpy as np
 import pytest
 
-from geometry.design import Design
 from geometry.errors import UserError
-from vision.camera_file import load_camera
+from geometry.finger.design import Design
+from vision.calibration.camera_file import load_camera
+from vision.frames.video import open_frames
 from vision.measurements import read_measurements
 from vision.rig.bench import Bench
 from vision.rig.exposure import Exposure
@@ -18,8 +19,7 @@ from vision.rig.recorder import FILES, record
 from vision.rig.recording import Recording
 from vision.rig.render import render
 from vision.rig.view import default_camera, view
-from vision.video import open_frames
-from vision.workspace import Workspace, default_workspace
+from vision.tracking.workspace import Workspace, default_workspace
 
 WORKSPACE = default_workspace(Design())
 CAMERA = default_camera(320, 180)

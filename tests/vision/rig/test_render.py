@@ -5,7 +5,7 @@ import pytest
 from scipy.special import erf
 
 from geometry.errors import UserError
-from vision.camera import Camera, Pose
+from vision.calibration.camera import Camera, Pose
 from vision.rig.exposure import Exposure
 from vision.rig.render import light_of, noise_of, render
 from vision.rig.shapes import Scene, Shape, circle, closed, rectangle

@@ -1,0 +1,127 @@
+"""`fem-nonlinear` against homogeneous deformations and against the equilibrium of another program."""
+
+import numpy as np
+import skfem
+
+from benchmarks.verification.another_program import basis_of, components, factorised
+from benchmarks.verification.hyperelastic import Hyperelastic
+from benchmarks.verification.meshes import mapped_mesh, quadrilateral
+from benchmarks.verification.record import Case, Row, at_most
+from geometry.arrays import FloatArray
+from geometry.cache import finger_mesh
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
+from solvers.problem import Load, Material, Problem
+from solvers.solution import Solution
+
+LAWS = ("neo-hookean", "st-venant-kirchhoff")
+LENGTH = 5.0
+
+
+def finite_strain() -> tuple[Row, ...]:
+    """Errors of homogeneous deformations, and differences from the other program's equilibrium."""
+    rows = []
+    for law in LAWS:
+        # One row of cells: clamp and patch hold all nodes of P1.
+        sheared = mapped_mesh(quadrilateral([(0, 0), (2, 0), (2.9, LENGTH), (0.7, LENGTH)]), 4, 1)
+        error = homogeneous(sheared, Material(law=law), (0.5, 0.3), degree=1)
+        name = f"error, stretch of 1.3 with shear of 0.5, {law}"
+        rows.append(Row(name, error, at_most(1e-9), 1, "strain"))
+        bar = mapped_mesh(quadrilateral([(0, 0), (2, 0), (2, LENGTH), (0, LENGTH)]), 4, 5)
+        for degree in (1, 2):
+            error = homogeneous(bar, Material(law=law, poisson=0.0), (0.0, 0.3), degree)
+            name = f"error, bar stretched by 1.3, ν = 0, {law}"
+            rows.append(Row(name, error, at_most(1e-9), degree, "strain"))
+    for law in LAWS:
+        moved, energy, force = equilibrium_elsewhere(law)
+        rows += [
+            Row(f"distance from scikit-fem's solution, finger, {law}", moved, at_most(1e-8), 2, "strain"),
+            Row(f"difference of the energy, finger, {law}", energy, at_most(1e-8), 2, "strain"),
+            Row(f"difference of the force, finger, {law}", force, at_most(1e-8), 2, "strain"),
+        ]
+    return tuple(rows)
+
+
+def homogeneous(mesh: TriangleMesh, material: Material, change: tuple[float, float], degree: int) -> float:
+    """The largest relative error where every point moves by `change` times its ordinate."""
+    load = Load(kind="patch", displacement=(change[0] * LENGTH, change[1] * LENGTH))
+    solution = FemNonlinearSolver(degree=degree).solve(Problem(mesh, material, load))
+    law, area = Hyperelastic.of(material), mesh.areas.sum()
+    deformation = np.eye(3)
+    deformation[:2, 1] += change
+    stress, nominal = law.cauchy_stress(deformation), law.nominal_stress(deformation)
+    # The work of the nominal stress on a unit translation of the patch, whose gradient is 1/LENGTH along y.
+    force = nominal[:2, 1] * area / LENGTH
+    state = solution.state(mesh.at_centroids())
+    return float(
+        max(
+            np.abs(solution.gradient(mesh.at_centroids()) + np.eye(2) - deformation[:2, :2]).max(),
+            np.abs(state.stress - stress[:2, :2]).max() / np.abs(stress).max(),
+            np.abs(state.stress_zz - stress[2, 2]).max() / np.abs(stress).max(),
+            np.abs(solution.reaction - force).max() / np.abs(force).max(),
+            abs(solution.energy / (law.energy_density(deformation) * area) - 1),
+        )
+    )
+
+
+def equilibrium_elsewhere(law: str) -> tuple[float, float, float]:
+    """What another program finds missing at the solution for a finger.
+
+    Returns:
+        The largest displacement of its next Newton step and its differences in energy and in force, relative.
+    """
+    mesh = finger_mesh(Design(), settings=MeshSettings(size=1.0))
+    material = Material(law=law)
+    problem = Problem(mesh, material, Load(kind="patch", displacement=(None, -10.0)))
+    solution = FemNonlinearSolver().solve(problem)
+    basis, clamped, pressed = basis_of(mesh, 2)
+    nodal = nodal_values(basis, solution)
+    elastic = Hyperelastic.of(material)
+    # Tensors are scikit-fem's first two axes.
+    gradient = np.moveaxis(basis.interpolate(nodal).grad, (0, 1), (-2, -1))
+    deformation = np.eye(2) + gradient
+    stress = np.moveaxis(elastic.nominal_stress(deformation), (-2, -1), (0, 1))
+    change = elastic.change_of_stress(deformation)
+    tangent = np.array([[change(unit) for unit in row] for row in np.eye(4).reshape(2, 2, 2, 2)])
+    internal = skfem.LinearForm(lambda v, w: np.einsum("ij...,ij...", stress, v.grad)).assemble(basis)
+    stiffness = skfem.BilinearForm(
+        lambda u, v, w: np.einsum("kl...ij,kl...,ij...->...", tangent, u.grad, v.grad)
+    ).assemble(basis)
+    held = pressed.all("u^2")
+    free = np.setdiff1d(np.arange(basis.N), np.union1d(clamped, held))
+    step = factorised(stiffness.tocsc(), free).solve(-internal[free])
+    energy = (elastic.energy_density(deformation) * basis.dx).sum()
+    return (
+        float(np.abs(step).max() / np.abs(nodal).max()),
+        abs(solution.energy / energy - 1),
+        float(abs(solution.reaction[1] / internal[held].sum() - 1)),
+    )
+
+
+def nodal_values(basis: skfem.Basis, solution: Solution) -> FloatArray:
+    """The displacement of a solution in another program's degrees of freedom."""
+    nodal = np.zeros(basis.N)
+    for axis, dofs in enumerate(components(basis)):
+        nodal[dofs] = solution.displacement(basis.doflocs[:, dofs].T)[:, axis]
+    return nodal
+
+
+FINITE_STRAIN = Case(
+    name="finite strain",
+    answer="closed forms; equilibrium in scikit-fem",
+    source="the laws: J. Bonet, R. D. Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd "
+    "edition, Cambridge University Press, 2008, section 6.4",
+    text="""
+`fem-nonlinear` with both of its laws, at ν = 0.45 unless the row says something else. Two homogeneous
+deformations have a closed form: a stretch of 1.3 with a shear of 0.5 of a strip whose nodes are all on clamp
+or patch, and a bar without lateral contraction stretched by 1.3. Compared are the deformation gradient, the
+four components of Cauchy's stress, the force and the energy; the largest relative error is shown. Then the
+default finger with elements of 1 mm under the sliding patch, 10 mm deep: scikit-fem, with the laws written
+once more as tensors, takes the solution, sets up the equilibrium and makes one Newton step. What that step
+moves is the distance from scikit-fem's own solution, relative to the largest displacement. Both programs
+integrate by six points a triangle; 1e-8 is the tolerance of Newton's method.
+""",
+    measure=finite_strain,
+)

@@ -1,0 +1,91 @@
+"""A calibration to check by eye: its residuals, what it covers, and a photograph without its distortion."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import cv2
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Polygon
+from numpy.typing import NDArray
+
+from compare.figures.style import INK, MEASURED, MUTED, WIDTH, axes_at, figure, heading
+from geometry.arrays import FloatArray
+from vision.calibration.camera import Camera
+from vision.calibration.camera_calibration import Calibration
+
+MARGIN, GAP, HEAD, TITLE = 0.12, 0.14, 0.56, 0.2
+LONGEST = 0.05
+"""Length of the 95th percentile of the residuals in the picture, in widths of the image."""
+COVERED = "#56b4e9"
+
+
+def draw_calibration(path: Path, calibration: Calibration, name: str, photograph: NDArray[np.uint8]) -> None:
+    """Draw the residuals of all photographs, and one of them as it was taken and undistorted.
+
+    Args:
+        path: Of the picture.
+        calibration: What was found.
+        name: Of the photograph.
+        photograph: Shape (height, width).
+    """
+    camera = calibration.camera
+    shape = camera.height / camera.width
+    wide, half = WIDTH - 2 * MARGIN, (WIDTH - 2 * MARGIN - GAP) / 2
+    below = HEAD + wide * shape + GAP + TITLE
+    longest = np.nanquantile(np.linalg.norm(_all(calibration.residuals.values()), axis=1), 0.95)
+    factor = _round(LONGEST * camera.width / max(longest, 1e-9))
+    with figure(path, below + half * shape + MARGIN) as drawn:
+        heading(
+            drawn,
+            f"Calibration from {len(calibration.views)} photographs",
+            f"Lines: from every corner to where the fit puts it, {factor:g} times as long; rms "
+            f"{calibration.rms:.3f} px, held out {calibration.held_out:.3f} px.\n"
+            f"Blue: inside a board at least once, {100 * calibration.coverage:.0f} % of the image.",
+        )
+        _residuals(_image(axes_at(drawn, (MARGIN, HEAD, wide, wide * shape)), camera), calibration, factor)
+        seen = calibration.views[name][np.isfinite(calibration.views[name]).all(axis=1)]
+        taken = ("as photographed", photograph, seen)
+        straight = ("undistorted", undistorted(photograph, camera), camera.undistort(seen))
+        for number, (title, image, corners) in enumerate((taken, straight)):
+            axes = axes_at(drawn, (MARGIN + number * (half + GAP), below, half, half * shape))
+            _image(axes, camera).imshow(image, cmap="gray", vmin=0, vmax=255, interpolation="antialiased")
+            axes.plot(*corners.T, ".", ms=1.5, color=MEASURED)
+            axes.set_title(f"{Path(name).name} {title}", size=7.5, color=MUTED, pad=3)
+
+
+def undistorted(image: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:
+    """What a pinhole with the camera's matrix would have taken, to look at, not to measure in."""
+    height, width = image.shape[:2]
+    pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 2)
+    places = camera.distort(pixels).astype(np.float32).reshape(height, width, 2)
+    straight = cv2.remap(image, places, np.empty(0), cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+    return np.asarray(straight, dtype=np.uint8)
+
+
+def _residuals(axes: Axes, calibration: Calibration, factor: float) -> None:
+    for seen in calibration.views.values():
+        corners = seen[np.isfinite(seen).all(axis=1)].astype(np.float32)
+        axes.add_patch(Polygon(cv2.convexHull(corners)[:, 0], fc=COVERED, alpha=0.12, lw=0))
+    corners, residuals = _all(calibration.views.values()), _all(calibration.residuals.values())
+    ends = corners - factor * residuals
+    lines = np.stack([corners, ends, np.full_like(ends, np.nan)], axis=1).reshape(-1, 2)
+    axes.plot(*lines.T, color=INK, lw=0.5)
+    axes.plot(*corners.T, ".", ms=1.2, color=MEASURED)
+
+
+def _image(axes: Axes, camera: Camera) -> Axes:
+    """Axes in pixels, y down, with a frame and nothing else."""
+    axes.set(xlim=(-0.5, camera.width - 0.5), ylim=(camera.height - 0.5, -0.5), xticks=[], yticks=[])
+    axes.spines[:].set_visible(True)
+    return axes
+
+
+def _all(arrays: Iterable[FloatArray]) -> FloatArray:
+    return np.concatenate(list(arrays))
+
+
+def _round(factor: float) -> float:
+    """A number of one digit, 1, 2 or 5, that is no larger."""
+    power = 10.0 ** np.floor(np.log10(factor))
+    return float(power * max(digit for digit in (1, 2, 5) if digit * power <= factor))

@@ -1,0 +1,59 @@
+"""A film to track: its source, its camera, its fiducials and the colour of the markers."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from compare.runtime.provenance import file_digest
+from geometry.finger.parameters import Parameters
+
+if TYPE_CHECKING:  # OpenCV comes with it, and `--help` has to be quick
+    from vision.tracking.scene import Setup
+
+
+@dataclass(frozen=True)
+class Film:
+    """A film.
+
+    Attributes:
+        source: Video, folder or glob of pictures, number of a camera, or "-".
+        camera: Camera file, as `pinnray calibrate` writes it; None if the camera is not calibrated.
+        workspace: JSON file of the fiducials; those around the design if None.
+        colour: Of the markers, as `pinnray pick` prints it.
+        method: How discs are localised; "hough" is the paper's pipeline.
+    """
+
+    source: str
+    camera: Path | None = None
+    workspace: Path | None = None
+    colour: str = "dark"
+    method: Literal["precise", "hough"] = "precise"
+
+    def setup(self, design: Parameters) -> "Setup":
+        """The filmed scene of a finger.
+
+        Raises:
+            UserError: If a file cannot be read.
+        """
+        from vision.calibration.camera_file import load_camera
+        from vision.discs.colour import read_colour
+        from vision.tracking.scene import Setup
+        from vision.tracking.workspace import default_workspace
+        from vision.tracking.workspace_file import load_workspace
+
+        return Setup(
+            design=design,
+            workspace=load_workspace(self.workspace) if self.workspace else default_workspace(design),
+            camera=load_camera(self.camera) if self.camera else None,
+            colour=read_colour(self.colour),
+            method=self.method,
+            alone=self.workspace is None,
+        )
+
+    def provenance(self) -> dict[str, Any]:
+        """Source and settings, with the SHA-256 of every file."""
+        files = {"video": Path(self.source), "camera": self.camera, "workspace": self.workspace}
+        hashes = {
+            f"{name}_sha256": file_digest(path) for name, path in files.items() if path and path.is_file()
+        }
+        return {"source": self.source, "colour": self.colour, "method": self.method, **hashes}

@@ -1,0 +1,52 @@
+"""The displacements that the virtual rig films."""
+
+from collections.abc import Sequence
+
+from compare.evaluation.shared_mesh import shared_mesh
+from compare.evaluation.virtual_experiment import said_of, simulation
+from compare.runtime.stages import Stages
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.problem import Load, Material, Problem
+from solvers.solver import Solver, with_law
+
+
+def filmed(
+    design: Design,
+    settings: MeshSettings,
+    material: Material,
+    load: Load,
+    solvers: Sequence[Solver],
+    stages: Stages,
+) -> tuple[TriangleMesh, FloatArray, str]:
+    """The mesh, its nodes' displacements, shape (n, 2), mm, and one sentence on where they come from.
+
+    Args:
+        design: The finger.
+        settings: Of its mesh.
+        material: Its elastic law, for a solver that has it.
+        load: What moves the finger.
+        solvers: Whose displacements they are; the virtual experiment's if there is none.
+        stages: Told of the progress.
+
+    Raises:
+        UserError: If there are several solvers, or the one does not converge.
+    """
+    if len(solvers) > 1:
+        raise UserError("the rig films one finger; name one --solver")
+    mesh, _ = shared_mesh(design, settings, stages)
+    if not solvers:
+        problem = Problem(mesh, material, load)
+        with stages.stage("virtual experiment") as progress:
+            return mesh, simulation(problem, progress).displacement(mesh.at_nodes()), said_of(problem)
+    (solver,) = solvers
+    problem = Problem(mesh, with_law(material, solver), load)
+    with stages.stage(solver.name) as progress:
+        solution = solver.solve(problem, progress)
+    if not solution.status.converged:
+        raise UserError(f"{solver.name} {solution.status.message}; what it gave is not filmed")
+    source = f"displacements of {solver.name}, rendered by the virtual rig; no camera was involved"
+    return mesh, solution.displacement(mesh.at_nodes()), source

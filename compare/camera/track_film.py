@@ -1,0 +1,173 @@
+"""Track a video and write what came of it: numbers, and pictures to check them by eye."""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from compare.camera.film import Film
+from compare.figures import Figure
+from compare.runtime.csv_files import Cell, write_csv
+from geometry.atomic import write_json
+from geometry.finger.parameters import Parameters
+from geometry.observations import Observations
+from vision.frames.frame import Frame, Image
+from vision.frames.pictures import write_picture
+from vision.frames.video import VideoWriter, open_frames
+from vision.measurements import write_measurements
+from vision.tracking.annotation import annotated
+from vision.tracking.frame_tracker import Sighting
+from vision.tracking.tracker import track
+from vision.tracking.trajectories import Tracking
+
+Report = Callable[[float, str], None]
+Watch = Callable[[Frame, Sighting], None]
+
+
+def track_film(
+    film: Film,
+    design: Parameters,
+    folder: Path,
+    report: Report,
+    *,
+    video: bool = True,
+    watch: Watch | None = None,
+) -> tuple[Tracking, Observations]:
+    """Track a film and write `observations.csv`, `tracks.csv`, `track.json` and pictures into a folder.
+
+    Args:
+        film: What is tracked.
+        design: The finger in it.
+        folder: That exists.
+        report: Is told the share that is done.
+        video: Whether the annotated video is written too.
+        watch: Is told what every frame shows.
+
+    Raises:
+        UserError: If the film does not show what it should.
+    """
+    setup = film.setup(design)
+    kept: dict[str, tuple[Image, Sighting]] = {}
+    with open_frames(film.source) as frames, ExitStack() as stack:
+        writer = None
+        if video:
+            writer = stack.enter_context(VideoWriter(folder / "annotated.mp4", frames.size, frames.rate))
+
+        def see(frame: Frame, sighting: Sighting) -> None:
+            kept.setdefault("initial", (frame.image, sighting))
+            kept["final"] = (frame.image, sighting)
+            seen = int(np.isfinite(sighting.markers.radii).sum())
+            status = f"{seen} of {len(sighting.places)} markers"
+            if writer is not None:
+                lines = [f"frame {frame.number}, {frame.time:.3f} s", status]
+                writer.write(annotated(frame.image, sighting, lines))
+            if watch is not None:
+                watch(frame, sighting)
+            share = (frame.number + 1) / frames.count if frames.count else 0.0
+            report(min(share, 1.0), f"frame {frame.number + 1}, {status}")
+
+        tracking = track(frames, setup, see)
+    observations = tracking.observations(_sentence(film, tracking))
+    for name, end in (("initial", tracking.rest.initial), ("final", tracking.rest.final)):
+        image, sighting = kept[name]
+        ways = list(tracking.pixels.swapaxes(0, 1)) if name == "final" else []
+        lines = [f"{name}: frames {end.start} to {end.stop - 1} are at rest", *tracking.warnings]
+        write_picture(folder / f"{name}.png", annotated(image, sighting, lines, ways=ways))
+    write_measurements(folder / "observations.csv", observations)
+    write_csv(folder / "tracks.csv", track_rows(tracking))
+    write_json(folder / "track.json", track_summary(tracking, observations) | film.provenance())
+    return tracking, observations
+
+
+def _sentence(film: Film, tracking: Tracking) -> str:
+    """Where the numbers come from and how good they are."""
+    initial, final = (len(end) for end in tracking.rest)
+    deviations = np.sqrt(np.diag(tracking.displacement_covariance)) if tracking.visible.any() else np.zeros(1)
+    camera = "a calibrated camera" if film.camera else "no calibrated camera"
+    return (
+        f"measured by pinnray track ({film.method}, {camera}) in {Path(film.source).name}, "
+        f"means of {initial} and {final} frames at rest, standard deviations {deviations.min():.2g} to "
+        f"{deviations.max():.2g} mm"
+    )
+
+
+def track_rows(tracking: Tracking) -> list[dict[str, Cell]]:
+    """A row for every marker in every frame; empty cells where it was not seen."""
+    rows: list[dict[str, Cell]] = []
+    positions = tracking.positions
+    deviations = np.sqrt(np.diagonal(tracking.covariances, axis1=2, axis2=3))
+    for frame, time in enumerate(tracking.times.tolist()):
+        for marker in range(len(tracking.expected)):
+            seen = bool(np.isfinite(tracking.pixels[frame, marker]).all())
+            values = [*tracking.pixels[frame, marker], *deviations[frame, marker], *positions[frame, marker]]
+            names = ("x_px", "y_px", "std_x_px", "std_y_px", "x_mm", "y_mm")
+            row: dict[str, Cell] = {
+                "frame": frame,
+                "time_s": time,
+                "marker": marker + 1,
+                "visible": int(seen),
+            }
+            rows.append(row | {name: float(v) if seen else "" for name, v in zip(names, values, strict=True)})
+    return rows
+
+
+def track_summary(tracking: Tracking, observations: Observations) -> dict[str, Any]:
+    """What was found, as JSON holds it."""
+    initial, final = tracking.rest
+    return {
+        "schema": 1,
+        "frames": len(tracking.times),
+        "rest": {"initial": [initial.start, initial.stop - 1], "final": [final.start, final.stop - 1]},
+        "fiducials_rms_mm": tracking.plane.residual,
+        "markers": len(tracking.visible),
+        "visible": int(tracking.visible.sum()),
+        "offset_rms_mm": float(np.sqrt(np.nanmean((tracking.offsets**2).sum(axis=1)))),
+        "displacement_covariance_mm2": tracking.displacement_covariance.tolist(),
+        "warnings": list(tracking.warnings),
+        "description": observations.source,
+    }
+
+
+def track_table(tracking: Tracking, observations: Observations) -> Table:
+    """The displacements, for the terminal."""
+    table = Table(
+        title="Displacements of the markers, mm",
+        caption="±: one standard deviation; frames: in which the marker was seen",
+        box=SIMPLE_HEAD,
+        title_justify="left",
+        caption_justify="left",
+    )
+    for heading in ("marker", "x", "y", "u", "v", "frames"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    seen = np.isfinite(tracking.pixels[:, :, 0]).sum(axis=0)
+    for number, (x, y) in enumerate(observations.points):
+        cells = ["–", "–"]
+        if observations.visible[number]:
+            pairs = zip(
+                observations.displacements[number], observations.standard_deviations[number], strict=True
+            )
+            cells = [f"{value:.3f} ±{deviation:.3f}" for value, deviation in pairs]
+        table.add_row(str(number + 1), f"{x:.3f}", f"{y:.3f}", *cells, str(seen[number]))
+    return table
+
+
+def track_figures(folder: Path, tracking: Tracking) -> list[Figure]:
+    """The annotated pictures of a track, for a report."""
+    seen, count = int(tracking.visible.sum()), len(tracking.visible)
+    remarks = " ".join(f"{warning[:1].upper()}{warning[1:]}." for warning in tracking.warnings)
+    return [
+        Figure(
+            folder / "initial.png",
+            "The finger at rest, as the camera saw it",
+            "Green: the markers with their numbers; blue: the fiducials that give the plane.",
+        ),
+        Figure(
+            folder / "final.png",
+            "The finger pressed, as the camera saw it",
+            f"Magenta: the way of every marker. {seen} of {count} markers are measured. {remarks}".strip(),
+        ),
+    ]

@@ -1,0 +1,73 @@
+"""Calibrate a camera."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+from rich.console import Console
+
+from compare.commands.options import OUTPUT
+from compare.runtime.exits import say
+from compare.runtime.provenance import package_versions
+from geometry.errors import UserError
+
+VERSIONS = ("python", "pinn-ray", "numpy", "scipy", "opencv-python-headless")
+
+
+def calibrate(
+    *images: Annotated[
+        Path, Parameter(help="Photographs of the board, all of one size: pictures, folders, or a video.")
+    ],
+    board: Annotated[
+        str,
+        Parameter(
+            help="Inner corners of a chessboard along either side, such as 9x6, or squares of a ChArUco "
+            "board, such as charuco:8x6."
+        ),
+    ],
+    square: Annotated[float, Parameter(help="Side of a square, mm.")],
+    marker: Annotated[float | None, Parameter(help="Side of a marker of a ChArUco board, mm.")] = None,
+    dictionary: Annotated[str, Parameter(help="Of the markers of a ChArUco board.")] = "5X5_100",
+    model: Annotated[
+        Literal["brown", "fisheye"],
+        Parameter(help="The lens: brown up to about 100 degrees of view, fisheye beyond."),
+    ] = "brown",
+    k3: Annotated[bool, Parameter(negative="", help="Fit the third radial coefficient too.")] = False,
+    without: Annotated[
+        tuple[str, ...],
+        Parameter(negative="", show_default=False, help="A photograph to leave out; may be repeated."),
+    ] = (),
+    out: Annotated[Path, Parameter(group=OUTPUT, help="The camera, JSON or YAML.")] = Path("out/camera.json"),
+) -> int:
+    """Calibrate a camera from photographs of a chessboard or ChArUco board, and say how well it is known."""
+    from compare.camera.calibration_chart import draw_calibration
+    from compare.camera.calibration_table import calibration_table, view_table
+    from vision.calibration.board_names import read_board
+    from vision.calibration.camera_calibration import better_lens
+    from vision.calibration.camera_calibration import calibrate as calibrated
+    from vision.calibration.camera_file import check_format, save_calibration
+    from vision.calibration.lens_fit import LensChoice
+    from vision.calibration.photographs import photographs
+
+    check_format(out)
+    if not images:
+        raise UserError("no photograph was given; name at least 4 that show the board")
+    chosen, lens = read_board(board, square, marker=marker, dictionary=dictionary), LensChoice(model, k3)
+    calibration = calibrated(photographs(images, without=without), chosen, lens=lens)
+    versions = package_versions()
+    save_calibration(out, calibration, {name: versions[name] for name in VERSIONS})
+    errors = calibration.view_errors
+    worst = max(errors, key=errors.__getitem__)
+    picture = out.with_suffix(".png")
+    photograph = next(image for name, image in photographs(images, without=without) if name == worst)
+    draw_calibration(picture, calibration, worst, photograph)
+    if calibration.boardless:
+        say(f"warning: no board of {chosen} was found in {', '.join(calibration.boardless)}")
+    if better := better_lens(calibration, lens):
+        say(f"warning: with {better[0]} the error held out would be {better[1]:.3f} px")
+    console = Console()
+    console.print(calibration_table(calibration))
+    console.print(view_table(calibration))
+    print(out)
+    print(picture)
+    return 0

@@ -1,0 +1,125 @@
+"""The one-shot main job: solve one finger with several solvers and compare them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+from rich.console import Console
+
+from compare.camera.film import Film
+from compare.commands.film_options import FilmOptions
+from compare.commands.options import OUTPUT, Adapt, FingerOptions, PhysicsOptions, SolverOptions, existing
+from compare.runtime.exits import NOT_CONVERGED, say
+from geometry.errors import UserError
+from solvers.solver import Solver
+
+
+def compare(
+    finger: FingerOptions = FingerOptions(),
+    physics: PhysicsOptions = PhysicsOptions(),
+    options: SolverOptions = SolverOptions(),
+    *,
+    adapt: Adapt = None,
+    solvers: Annotated[
+        str | None,
+        Parameter(
+            help="Names with commas between; `pinnray solvers` lists them. Without it those of the complete "
+            "table that can do the job."
+        ),
+    ] = None,
+    measurements: Annotated[
+        str | None,
+        Parameter(
+            help="CSV file of marker displacements (x_mm, y_mm, u_mm, v_mm), or a video, a folder or glob of "
+            "pictures to track. Without it they are simulated by a finite-strain run, and everything that "
+            "shows them says so."
+        ),
+    ] = None,
+    film: FilmOptions = FilmOptions(),
+    reference: Annotated[
+        str | None, Parameter(help="Solver that the others are compared with; fem, else the first.")
+    ] = None,
+    out: Annotated[
+        Path | None, Parameter(group=OUTPUT, help="Output folder; out/DESIGN if not given.")
+    ] = None,
+    resume: Annotated[
+        bool, Parameter(group=OUTPUT, help="Take over solutions that an earlier run finished.")
+    ] = False,
+    quiet: Annotated[bool, Parameter(group=OUTPUT, help="No progress, no table.")] = False,
+    json_: Annotated[
+        bool, Parameter(name="--json", group=OUTPUT, help="Print metrics.json and nothing else.")
+    ] = False,
+) -> int:
+    """Solve one finger with several solvers and compare them at the markers and on the shared mesh.
+
+    Draws the finger, meshes it once, solves it with every solver, and writes a report with tables, pictures
+    and fields. Examples:
+
+    - compare --design default
+    - compare --design slender --solvers fem
+    - compare --set rib_count=6 --set height=110 --measurements markers.csv
+    - compare --design default --measurements video.mkv --camera camera.json
+    - compare --preset paper --device cuda
+    """
+    from compare.commands.preset_jobs import job_defaults
+    from compare.evaluation.shared_mesh import adapted_enough
+    from compare.pipeline import Job, run
+    from compare.report.terminal import body_table, marker_table
+    from compare.runtime.stages import Stages
+
+    design, mesh = finger.read(options.preset)
+    material, load = physics.read(options.preset)
+    made = options.read(job_defaults(options.preset).solvers if solvers is None else solvers)
+    physics.check_law(made)
+    job = Job(
+        design=design,
+        solvers=made,
+        spare=_nobodys(made, options, reference) if solvers is None else (),
+        mesh=mesh,
+        adapt=adapt,
+        material=material,
+        load=load,
+        measurements=_measurements(measurements, film),
+        reference=reference,
+        out=out or Path("out") / design.name,
+        resume=resume,
+    )
+    try:
+        with Stages(Console(stderr=True), quiet=quiet or json_) as stages:
+            outcome = run(job, stages)
+    except KeyboardInterrupt:
+        kept = job.out.with_name(f"{job.out.name}.partial").exists()
+        note = "what was finished is kept; --resume goes on from it" if kept else "nothing was finished yet"
+        raise KeyboardInterrupt(note) from None
+    for remark in outcome.remarks:
+        say(f"warning: {remark}")
+    if json_:
+        print((job.out / "metrics.json").read_text(encoding="utf-8"), end="")
+    elif not quiet:
+        console = Console()
+        console.print(marker_table(outcome.evaluations, outcome.observations))
+        console.print()
+        console.print(body_table(outcome.evaluations, outcome.reference, outcome.truth))
+        console.print(f"report: {job.out / 'report.html'}", soft_wrap=True, highlight=False)
+    unconverged = [evaluation for evaluation in outcome.evaluations if not evaluation.converged]
+    for evaluation in unconverged:
+        say(f"error: {evaluation.solver} did not converge: {evaluation.message}")
+    return NOT_CONVERGED if unconverged or not adapted_enough(outcome.adaptation) else 0
+
+
+def _nobodys(solvers: Sequence[Solver], options: SolverOptions, reference: str | None) -> list[str]:
+    """Names of the solvers that no other option asks for."""
+    asked = {text.partition(".")[0] for text in options.solver_set} | {reference}
+    if options.preset is not None:
+        asked |= {solver.name for solver in solvers if solver.settings().get("preset") == options.preset}
+    return [solver.name for solver in solvers if solver.name not in asked]
+
+
+def _measurements(source: str | None, options: FilmOptions) -> Path | Film | None:
+    """A CSV file by its suffix, else a film."""
+    if source is None or Path(source).suffix.lower() != ".csv":
+        if source is None and options != FilmOptions():
+            raise UserError("a camera, workspace, colour or method is for --measurements VIDEO; give it too")
+        return None if source is None else options.film(source)
+    return existing(Path(source))

@@ -1,0 +1,94 @@
+"""Solvers judged by what they were not given."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+from rich.console import Console
+
+from compare.commands.options import OUTPUT, FingerOptions, PhysicsOptions, SolverOptions, existing
+from compare.runtime.exits import NOT_CONVERGED, say
+
+
+def crossval(
+    finger: FingerOptions = FingerOptions(),
+    physics: PhysicsOptions = PhysicsOptions(),
+    options: SolverOptions = SolverOptions(),
+    *,
+    solvers: Annotated[
+        str,
+        Parameter(
+            help="Names with commas; one that can choose its weights is there in three ways (linear law)."
+        ),
+    ] = "fem,fem-nonlinear,fem-asm,fem-id,gp,statfem",
+    schemes: Annotated[
+        str, Parameter(help="What is held out: one-out, tip-out, random, load-out, with commas.")
+    ] = "one-out,tip-out,random,load-out",
+    seeds: Annotated[int, Parameter(help="How often noise is drawn.")] = 5,
+    noise: Annotated[
+        float, Parameter(help="Standard deviation of a simulated marker's displacement, mm.")
+    ] = 0.005,
+    measurements: Annotated[
+        Path | None,
+        Parameter(
+            show_default=False, help="CSV file of marker displacements; without it they are simulated."
+        ),
+    ] = None,
+    processes: Annotated[
+        int | None, Parameter(help="Solvers at a time; as many as there are cores if not given.")
+    ] = None,
+    out: Annotated[
+        Path | None, Parameter(group=OUTPUT, help="Output folder; out/crossval-DESIGN if not given.")
+    ] = None,
+) -> int:
+    """Judge solvers by markers, loads and fields that they were not given.
+
+    The truth is a finite-strain simulation with a sliding contact on a finer mesh, the markers follow it with
+    noise. Elements of 0.5 mm, not 0.25, unless --mesh-size is given. Finished folds are kept: the same
+    command again goes on where it was stopped.
+    """
+    from compare.commands.crossval_options import check_draws, read_entries, read_finger, read_schemes
+    from compare.commands.gridsearch_options import read_processes
+    from compare.crossval.folds import LOAD
+    from compare.crossval.run import crossval as judged
+    from compare.crossval.study import Study
+    from compare.crossval.tables import tables
+    from compare.runtime.provenance import machine
+    from compare.runtime.stages import Stages
+
+    design, mesh = read_finger(finger, options.preset)
+    material, load = physics.read(options.preset)
+    check_draws(seeds, noise)
+    count, threads = read_processes(processes, int(machine()["cores"]))
+    study = Study(
+        design=design,
+        mesh=mesh,
+        material=material,
+        load=load,
+        entries=read_entries(options, solvers, material),
+        schemes=read_schemes(schemes),
+        seeds=seeds,
+        noise=noise,
+        measurements=existing(measurements),
+        out=out or Path("out") / f"crossval-{design.name}",
+        processes=count,
+        threads=threads,
+    )
+    physics.check_law([entry.make(0) for entry in study.entries])
+    if study.measurements and LOAD in study.schemes:
+        say(f"warning: {LOAD} needs a truth at other loads, and is left out with --measurements")
+    try:
+        with Stages(Console(stderr=True)) as stages:
+            result = judged(study, stages)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"the same command goes on from what {study.out} keeps") from None
+    console = Console()
+    for table in tables(result):
+        console.print(table)
+    for name in ("crossval.json", "report.html", "held_out.csv", "fields.csv"):
+        if (study.out / name).exists():
+            print(study.out / name)
+    for name, message in result.failed.items():
+        say(f"error: {name} failed, and is tried again by the same command: {message}")
+    converged = all(score.converged == 1 for each in result.scores.values() for score in each.values())
+    return 0 if converged and not result.failed else NOT_CONVERGED

@@ -1,0 +1,72 @@
+"""The paper's search for its learning rate and weights."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+from rich.console import Console
+
+from compare.commands.options import OUTPUT, FingerOptions, PhysicsOptions, SolverOptions
+from compare.runtime.exits import NOT_CONVERGED, say
+
+
+def gridsearch(
+    finger: FingerOptions = FingerOptions(),
+    physics: PhysicsOptions = PhysicsOptions(),
+    options: SolverOptions = SolverOptions(),
+    *,
+    learning_rates: Annotated[str, Parameter(help="With commas between.")] = "1e-4,1e-3,1e-2",
+    bc_weights: Annotated[
+        str, Parameter(help="Weights of the boundary conditions in the loss, MPa/mm², with commas.")
+    ] = "0.1,1,10,100,1000",
+    epochs: Annotated[
+        int | None,
+        Parameter(help="Of every run; 2,000 if not given, a short training, and 60,000 with --preset paper."),
+    ] = None,
+    processes: Annotated[
+        int | None, Parameter(help="Runs at a time; as many as there are cores if not given.")
+    ] = None,
+    out: Annotated[
+        Path | None, Parameter(group=OUTPUT, help="Output folder; out/gridsearch-DESIGN if not given.")
+    ] = None,
+) -> int:
+    """Repeat the paper's search for the learning rate and the weight of the boundary conditions.
+
+    Trains the paper's networks at every point of the grid, each run in a process of its own, and ranks them
+    by their distance from `fem`. Finished runs are kept: the same command again goes on where it was stopped.
+    """
+    from compare.commands.gridsearch_options import read_processes, read_settings, read_values
+    from compare.gridsearch.run import Search, search
+    from compare.gridsearch.tables import best_of, runs_table
+    from compare.gridsearch.training_run import FAILED
+    from compare.runtime.provenance import machine
+    from compare.runtime.stages import Stages
+
+    design, mesh = finger.read(options.preset)
+    material, load = physics.read(options.preset)
+    count, threads = read_processes(processes, int(machine()["cores"]))
+    job = Search(
+        design=design,
+        mesh=mesh,
+        material=material,
+        load=load,
+        learning_rates=read_values("learning-rates", learning_rates),
+        bc_weights=read_values("bc-weights", bc_weights),
+        settings=read_settings(options, epochs),
+        out=out or Path("out") / f"gridsearch-{design.name}",
+        processes=count,
+        threads=threads,
+    )
+    physics.check_law([job.solver(point) for point in job.points])
+    try:
+        with Stages(Console(stderr=True)) as stages:
+            runs = search(job, stages)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"the same command goes on from what {job.out} keeps") from None
+    Console().print(runs_table(runs))
+    for name in ("gridsearch.csv", "gridsearch.json", "gridsearch.png"):
+        print(job.out / name)
+    failed = [run for run in runs if run.status == FAILED]
+    for run in failed:
+        say(f"error: {run.point.name} failed, and is tried again by the same command: {run.message}")
+    return 0 if best_of(runs) and not failed else NOT_CONVERGED

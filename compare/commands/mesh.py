@@ -1,0 +1,48 @@
+"""Mesh the finger."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+from rich.console import Console
+
+from compare.commands.options import Adapt, FingerOptions, PhysicsOptions
+from compare.runtime.exits import NOT_CONVERGED
+from geometry.errors import UserError
+
+
+def mesh(
+    finger: FingerOptions = FingerOptions(),
+    physics: PhysicsOptions = PhysicsOptions(),
+    *,
+    adapt: Adapt = None,
+    out: Annotated[Path, Parameter(help="Folder for the files.")] = Path("out/mesh"),
+) -> int:
+    """Mesh the finger: the shared mesh as a VTU and a NumPy file, and a picture of it.
+
+    Material and load matter for --adapt only.
+    """
+    from compare.evaluation.shared_mesh import adapted_enough, shared_mesh, write_rounds
+    from compare.figures.mesh_drawing import draw_mesh
+    from compare.report.vtu_file import write_mesh
+    from compare.runtime.stages import Stages
+
+    chosen, settings = finger.read()
+    material, load = physics.read()
+    if out.is_file():
+        raise UserError(f"--out {out}: this is a file; name a folder")
+    with Stages(Console(stderr=True)) as stages:
+        triangles, adaptation = shared_mesh(
+            chosen, settings, stages, tolerance=adapt, material=material, load=load
+        )
+    out.mkdir(parents=True, exist_ok=True)
+    if adaptation is not None:
+        write_rounds(out / "adapt.csv", adaptation)
+    write_mesh(out / "mesh.vtu", triangles)
+    triangles.save(out / "mesh.npz")
+    draw_mesh(out / "mesh.png", triangles)
+    nodes, area = len(triangles.points), triangles.areas.sum()
+    print(f"{nodes} nodes, {len(triangles.triangles)} triangles, area {area:.4f} mm^2")
+    for name in ("mesh.vtu", "mesh.npz", "mesh.png", *(["adapt.csv"] if adaptation else [])):
+        print(out / name)
+    return 0 if adapted_enough(adaptation) else NOT_CONVERGED

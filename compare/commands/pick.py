@@ -1,0 +1,80 @@
+"""Pick the colour of the markers."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from compare.commands.options import OUTPUT
+from compare.runtime.exits import say
+from geometry.errors import UserError
+
+AMBIGUOUS = 0.05
+"""Share of the image that markers hardly have."""
+
+
+def pick(
+    source: Annotated[
+        str,
+        Parameter(
+            allow_leading_hyphen=True,
+            help="Picture, video, folder or glob of pictures, number of a camera, or - for a pipe.",
+        ),
+    ],
+    *,
+    at: Annotated[
+        str | None,
+        Parameter(help="X,Y of a point in a marker, or X0,Y0,X1,Y1 of a rectangle filled by it, pixels."),
+    ] = None,
+    colour: Annotated[
+        str | None, Parameter(help="A colour to look at instead: dark, or L*,L*:a*,a*:b*,b* as this prints.")
+    ] = None,
+    radii: Annotated[
+        str | None, Parameter(help="LEAST,LARGEST radius, pixels: circles that this proposes are drawn too.")
+    ] = None,
+    frame: Annotated[int, Parameter(help="Number of the frame, from 0.")] = 0,
+    out: Annotated[Path, Parameter(group=OUTPUT, help="The picture.")] = Path("out/pick.png"),
+) -> int:
+    """Derive the markers' colour from a point in one of them, and show what else has it.
+
+    Prints the colour as --colour takes it, and writes a picture in which the pixels that have it are magenta.
+    """
+    from vision.discs.circle_proposals import highlighted, propose
+    from vision.discs.colour import read_colour
+    from vision.discs.colour_picker import pick_colour
+    from vision.frames.pictures import SUFFIXES, write_picture
+    from vision.frames.video import open_frames
+
+    if out.suffix.lower() not in SUFFIXES:
+        raise UserError(f"--out {out}: give the name of a picture, such as pick.png")
+    if (at is None) == (colour is None):
+        raise UserError("give either --at X,Y or --colour")
+    place = [] if at is None else read_numbers("--at", at, counts=(2, 4))
+    limits = [] if radii is None else read_numbers("--radii", radii, counts=(2,))
+    with open_frames(source) as frames:
+        image = next((found.image for found in frames if found.number == frame), None)
+        if image is None:
+            raise UserError(f"{source} has no frame {frame}")
+    chosen = read_colour(colour) if colour is not None else pick_colour(image, place)
+    circles = propose(image, chosen, radii=(limits[0], limits[1])) if limits else None
+    picture, share = highlighted(image, chosen, circles, radius=limits[1] if limits else 25.0)
+    write_picture(out, picture)
+    print(f"--colour {chosen}")
+    print(f"{share:.2%} of the image" + ("" if circles is None else f", {len(circles)} circles"))
+    print(out)
+    if share > AMBIGUOUS:
+        say(f"warning: {share:.0%} of the image has this colour, so it may not tell markers from the rest")
+    return 0
+
+
+def read_numbers(option: str, text: str, *, counts: tuple[int, ...]) -> list[float]:
+    """Numbers with commas between, of which there must be as many as one of `counts`."""
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in counts:
+        raise UserError(
+            f"{option} {text!r}: give {' or '.join(map(str, counts))} numbers with commas between"
+        )
+    return numbers

@@ -1,0 +1,101 @@
+"""Film the finger with a camera that does not exist."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+from rich.console import Console
+
+from compare.commands.options import OUTPUT, FingerOptions, PhysicsOptions, SolverOptions
+from compare.commands.rig_options import EXPOSURE, MOTION, BoardOptions, CameraOptions, SceneOptions
+from vision.rig.exposure import Exposure
+from vision.rig.motion import Motion
+
+
+def rig(
+    finger: FingerOptions = FingerOptions(),
+    physics: PhysicsOptions = PhysicsOptions(),
+    options: SolverOptions = SolverOptions(),
+    *,
+    solver: Annotated[
+        str | None,
+        Parameter(
+            help="Whose displacements are filmed; if not given, those of the finite-strain simulation that "
+            "`compare` takes for measurements."
+        ),
+    ] = None,
+    lens: CameraOptions = CameraOptions(),
+    exposure: Annotated[Exposure, Parameter(name="*", group=EXPOSURE)] = Exposure(),
+    motion: Annotated[Motion, Parameter(name="*", group=MOTION)] = Motion(),
+    scene: SceneOptions = SceneOptions(),
+    boards: BoardOptions = BoardOptions(),
+    codec: Annotated[
+        str, Parameter(group=OUTPUT, help="ffv1 or png, which lose nothing; mjpg or mp4v.")
+    ] = "ffv1",
+    out: Annotated[Path, Parameter(group=OUTPUT, help="Output folder.")] = Path("out/rig"),
+) -> int:
+    """Render what a camera would have seen of a finger that is pressed, with the truth beside it.
+
+    Writes a video, the true positions of the markers in every frame, the camera, the workspace, and
+    photographs of a calibration board if asked for: all that is needed to track the markers and to score how
+    well that went. --seed is of the noise too. Examples:
+
+    - pinnray rig --tilt 3 --noise 2 --blur 0.8 --seed 1
+    - pinnray rig --boards 20 --board 9x6 --square 8
+    - pinnray rig --moving 0 --cover 5=0.4 --codec mjpg --size 640x480
+    """
+    from compare.camera.rig_displacements import filmed
+    from compare.runtime.output_folder import check_output, replaced_folder, write_run
+    from compare.runtime.provenance import machine, package_versions
+    from compare.runtime.stages import Stages
+    from vision.rig.bench import Bench
+    from vision.rig.boards import board_poses, board_scene
+    from vision.rig.occluders import cables
+    from vision.rig.recorder import check_codec, photograph, record
+    from vision.rig.recording import Recording
+    from vision.tracking.workspace import default_workspace
+
+    design, mesh_settings = finger.read(options.preset)
+    material, load = physics.read(options.preset)
+    workspace = default_workspace(design).model_copy(update={"marker_plane": scene.marker_plane})
+    camera, pose = lens.read(workspace)
+    board, covered = boards.read(), scene.covered()
+    check_codec(codec)
+    check_output(out)
+    with Stages(Console(stderr=True)) as stages:
+        mesh, displacement, source = filmed(
+            design, mesh_settings, material, load, options.read(solver or ""), stages
+        )
+        bench = Bench(mesh, design, workspace, scene.paint)
+        recording = Recording(
+            bench=bench,
+            displacement=displacement,
+            camera=camera,
+            pose=pose,
+            exposure=exposure,
+            motion=motion,
+            occluders=cables(
+                bench, displacement, motion, covered, scene.cover_during, paint=scene.cover_paint
+            ),
+            seed=options.seed,
+        )
+        with replaced_folder(out) as folder:
+            with stages.stage("film") as progress:
+                record(recording, folder, source=source, codec=codec, progress=progress)
+            if boards.boards:
+                with stages.stage("boards") as progress:
+                    poses = board_poses(board, camera, boards.boards, seed=options.seed)
+                    photograph(board_scene(board), poses, recording, folder / "boards", progress=progress)
+            write_run(
+                folder,
+                {
+                    "source": source,
+                    "cover": {"shares": covered, "during": scene.cover_during} if covered else None,
+                    "board": str(board) if boards.boards else None,
+                    "versions": package_versions(),
+                    "machine": machine(),
+                },
+            )
+    for path in sorted(out.iterdir()):
+        print(path)
+    return 0

@@ -1,0 +1,81 @@
+"""Solve one finger with one solver."""
+
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+from rich.console import Console
+
+from compare.commands.options import Adapt, FingerOptions, PhysicsOptions, SolverOptions, existing
+from compare.runtime.exits import NOT_CONVERGED
+from geometry.errors import UserError
+
+
+def solve(
+    solver: Annotated[str, Parameter(help="Name of the solver; `pinnray solvers` lists them.")],
+    finger: FingerOptions = FingerOptions(),
+    physics: PhysicsOptions = PhysicsOptions(),
+    options: SolverOptions = SolverOptions(),
+    *,
+    adapt: Adapt = None,
+    measurements: Annotated[
+        Path | None,
+        Parameter(help="CSV file of marker displacements, for a solver that assimilates them."),
+    ] = None,
+    out: Annotated[Path, Parameter(help="The VTU file for the fields.")] = Path("out/solution.vtu"),
+) -> int:
+    """Solve one finger with one solver and write its fields, without comparing anything."""
+    from compare.evaluation.convergence import certified
+    from compare.evaluation.force_displacement import force_curves, write_force_displacement
+    from compare.evaluation.labels import solver_label
+    from compare.evaluation.shared_mesh import adapted_enough, check_inside, shared_mesh
+    from compare.evaluation.uncertainty import evaluated
+    from compare.figures.force_chart import draw_force_displacement
+    from compare.report.vtu_file import write_vtu
+    from compare.runtime.stages import Stages
+    from solvers.assimilation.misfit import assimilates
+    from solvers.problem import Problem
+    from solvers.solver import with_law
+    from vision.measurements import read_measurements
+
+    chosen, settings = finger.read(options.preset)
+    material, load = physics.read(options.preset)
+    if out.suffix != ".vtu":
+        raise UserError(f"--out {out}: the fields are a VTU file; give a name that ends in .vtu")
+    chosen_solvers = options.read(solver)
+    if len(chosen_solvers) != 1:
+        raise UserError(f"name one solver, not {solver!r}; `compare` takes several")
+    physics.check_law(chosen_solvers)
+    (made,) = chosen_solvers
+    given = read_measurements(file) if (file := existing(measurements)) else None
+    if given and not assimilates(made):
+        raise UserError(f"{made.name} does not assimilate markers; `compare` compares it with --measurements")
+    with Stages(Console(stderr=True)) as stages:
+        triangles, adaptation = shared_mesh(
+            chosen,
+            settings,
+            stages,
+            tolerance=adapt,
+            material=material,
+            load=load,
+            solvers=[made],
+            check=partial(check_inside, given) if given else None,
+        )
+        with stages.stage(made.name) as progress:
+            problem = Problem(triangles, with_law(material, made), load, given)
+            solution = made.solve(problem, progress)
+        with stages.stage("certificate"):
+            (evaluation,) = certified([evaluated(solution, triangles)], problem)
+        write_vtu(out, triangles, evaluation)
+        written = [out]
+        if curves := force_curves([evaluation], load):
+            written += [out.with_name(f"{out.stem}_force_displacement.{kind}") for kind in ("csv", "png")]
+            write_force_displacement(written[1], curves, load, depth=chosen.depth)
+            draw_force_displacement(written[2], curves=curves, depth=chosen.depth)
+    print(f"{solver_label(evaluation)}: {evaluation.message}")
+    u, v = solution.reaction
+    print(f"energy {solution.energy:.6g} N mm/mm, reaction ({u:.6g}, {v:.6g}) N/mm")
+    for path in written:
+        print(path)
+    return 0 if evaluation.converged and adapted_enough(adaptation) else NOT_CONVERGED

@@ -1,0 +1,68 @@
+"""Track markers through a video."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+from rich.console import Console
+
+from compare.commands.film_options import FilmOptions
+from compare.commands.options import OUTPUT, FingerOptions
+from compare.runtime.exits import say
+
+
+def track(
+    source: Annotated[
+        str,
+        Parameter(
+            allow_leading_hyphen=True,
+            help="Video, folder or glob of pictures, number of a camera, or - for a pipe.",
+        ),
+    ],
+    finger: FingerOptions = FingerOptions(),
+    options: FilmOptions = FilmOptions(),
+    *,
+    live: Annotated[
+        bool, Parameter(negative="", help="Print the displacements of every frame as it comes.")
+    ] = False,
+    without_video: Annotated[bool, Parameter(group=OUTPUT, help="Write no annotated video.")] = False,
+    out: Annotated[Path, Parameter(group=OUTPUT, help="Output folder.")] = Path("out/track"),
+) -> int:
+    """Measure how the markers of a finger move, from a video that shows it at rest, pressed, and held.
+
+    Writes the displacements with standard deviations as `compare --measurements` reads them, the way of every
+    marker, and annotated pictures to check by eye. An interrupt from the keyboard ends a camera or a pipe.
+
+    For example:
+
+    - pinnray track video.mkv --camera camera.json
+    - pinnray track frames/ --camera camera.json --workspace workspace.json --design slender
+    - pinnray track 0 --camera camera.json --live
+    """
+    from compare.camera.live_display import LiveLine
+    from compare.camera.track_film import track_film, track_table
+    from compare.runtime.output_folder import check_output, replaced_folder, write_run
+    from compare.runtime.provenance import machine, package_versions
+    from compare.runtime.stages import Stages
+
+    design, _ = finger.read()
+    film = options.film(source)
+    check_output(out)
+    console = Console(stderr=True)
+    with replaced_folder(out) as folder:
+        with (
+            Stages(console, quiet=live) as stages,
+            LiveLine(console, shown=live) as line,
+            stages.stage("track") as report,
+        ):
+            tracking, observations = track_film(
+                film, design, folder, report, video=not without_video, watch=line
+            )
+        provenance = {"design": design.model_dump(), "versions": package_versions(), "machine": machine()}
+        write_run(folder, provenance | {"seconds": stages.seconds})
+    for warning in tracking.warnings:
+        say(f"warning: {warning}")
+    Console().print(track_table(tracking, observations))
+    for path in sorted(out.iterdir()):
+        print(path)
+    return 0

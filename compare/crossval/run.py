@@ -1,0 +1,177 @@
+"""Cross-validation: solvers judged by markers, loads and fields that they were not given."""
+
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from compare.crossval.folds import LOAD, Condition, conditions_of, folds_of
+from compare.crossval.l_curve import CURVED, weigh
+from compare.crossval.output import write_results
+from compare.crossval.predictions import Failed, Outcome, Task, judge
+from compare.crossval.result import Result
+from compare.crossval.study import Study, check_study, definition_of, seen_markers
+from compare.crossval.truth import Truth, TruthTask, find_truth
+from compare.evaluation.shared_mesh import check_inside
+from compare.evaluation.virtual_experiment import said_of
+from compare.runtime.kept_folder import check_kept_folder
+from compare.runtime.output_folder import locked
+from compare.runtime.processes import ProcessFailed
+from compare.runtime.provenance import machine
+from compare.runtime.staged_processes import in_stages
+from compare.runtime.stages import Stages
+from geometry.atomic import write_json
+from geometry.cache import finger_mesh
+from geometry.errors import UserError
+from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.observations import Observations
+from solvers.problem import Problem
+from vision.measurements import read_measurements
+
+DEFINITION = "definition.json"
+
+
+def crossval(study: Study, stages: Stages) -> Result:
+    """Judge the solvers and write the output folder.
+
+    Raises:
+        UserError: If it cannot be done, or the folder holds something else.
+    """
+    started = datetime.now(UTC)
+    check_study(study)
+    given = seen_markers(read_measurements(study.measurements)) if study.measurements else None
+    definition = definition_of(study, given)
+    check_kept_folder(study.out / DEFINITION, definition, job="cross-validation")
+    with stages.stage("mesh"):
+        mesh = finger_mesh(study.design, settings=study.mesh)
+        if given:
+            check_inside(given, mesh)
+        problem = Problem(mesh, study.material, study.load)
+    conditions = conditions_of(problem, others=LOAD in study.schemes and given is None)
+    study.out.mkdir(parents=True, exist_ok=True)
+    with locked(study.out):
+        write_json(study.out / DEFINITION, definition)
+        shared = study.out / "mesh.npz"
+        mesh.save(shared)
+        truths = [] if given else _truths(study, conditions, shared, stages)
+        observations = _observations(study, mesh, given, truths)
+        folds = folds_of(study.schemes, len(observations[0][0].points), conditions)
+        tasks = {
+            entry.label: Task(
+                entry=entry,
+                mesh=shared,
+                material=study.material,
+                conditions=conditions,
+                truths=truths,
+                observations=observations,
+                folds=folds,
+                radius=study.design.marker_diameter / 2,
+                folder=study.out / "runs" / entry.file_name,
+                threads=study.threads,
+            )
+            for entry in study.entries
+        }
+        outcomes, failed = _judged(study, tasks, stages)
+        curve = _curve(tasks, outcomes, stages) if truths else {}
+        result = Result.of(study, observations[0][0], folds, outcomes, failed)
+        provenance = {
+            "started": started.isoformat(timespec="seconds"),
+            "seconds": {name: round(seconds, 2) for name, seconds in stages.seconds.items()},
+            "problem_sha256": problem.digest,
+            "machine": machine(),
+        }
+        with stages.stage("report"):
+            write_results(study.out, result, outcomes, curve, {**definition, **provenance})
+    return result
+
+
+def _truths(study: Study, conditions: Sequence[Condition], shared: Path, stages: Stages) -> list[Path]:
+    """The true fields at every load, each simulated in a process of its own."""
+    stroke = -float(study.load.displacement[1] or 0.0)
+    tasks = {
+        f"truth, {condition.name}": TruthTask(
+            design=study.design.replaced(contact_position=condition.contact),
+            settings=study.mesh,
+            shared=shared,
+            radius=study.design.marker_diameter / 2,
+            material=study.material,
+            stroke=condition.share * stroke,
+        )
+        for condition in conditions
+    }
+    found: dict[str, Path] = {}
+    for name, answer in in_stages(
+        find_truth,
+        tasks,
+        processes=study.processes,
+        stages=stages,
+        kind="truths",
+        note=lambda _, answer: "failed" if isinstance(answer, ProcessFailed) else "known",
+    ):
+        if isinstance(answer, ProcessFailed):
+            raise UserError(
+                f"{name}: the virtual experiment did not come to its end; press less, or give --measurements"
+            )
+        found[name] = answer
+    return [found[name] for name in tasks]
+
+
+def _observations(
+    study: Study, mesh: TriangleMesh, given: Observations | None, truths: Sequence[Path]
+) -> list[list[Observations]]:
+    """What markers do, for each seed at each load: the truth with noise, or what was measured."""
+    if given:
+        return [[given] for _ in range(study.seeds)]
+    source = f"{said_of(Problem(mesh, study.material, study.load))}, with {study.noise:g} mm of noise"
+    displacements = [Truth.load(path).markers for path in truths]
+    return [
+        [
+            Observations(
+                points=mesh.markers,
+                displacements=true + np.random.default_rng([seed, at]).normal(0, study.noise, true.shape),
+                standard_deviations=np.full_like(true, study.noise),
+                visible=np.ones(len(true), dtype=bool),
+                source=source,
+                simulated=True,
+            )
+            for at, true in enumerate(displacements)
+        ]
+        for seed in range(study.seeds)
+    ]
+
+
+def _judged(
+    study: Study, tasks: Mapping[str, Task], stages: Stages
+) -> tuple[dict[str, list[list[Outcome]]], dict[str, str]]:
+    """The outcomes of every solver, and what went wrong with the others."""
+
+    def note(_: str, answer: list[list[Outcome]] | Failed | ProcessFailed) -> str:
+        if isinstance(answer, ProcessFailed):
+            return f"its process ended with exit code {answer.exit_code}"
+        return answer.message if isinstance(answer, Failed) else "judged"
+
+    outcomes, failed = {}, {}
+    for name, answer in in_stages(
+        judge, tasks, processes=study.processes, stages=stages, kind="solvers", note=note
+    ):
+        if isinstance(answer, list):
+            outcomes[name] = answer
+        else:
+            failed[name] = note(name, answer)
+    if not outcomes:
+        raise UserError("; ".join(f"{name}: {message}" for name, message in failed.items()))
+    return {name: outcomes[name] for name in tasks if name in outcomes}, failed
+
+
+def _curve(
+    tasks: Mapping[str, Task], outcomes: Mapping[str, list[list[Outcome]]], stages: Stages
+) -> dict[str, list[float]]:
+    """What more weight of the markers does to `fem-asm`, if it is there; see `weigh`."""
+    wanted = {"weights": tasks[CURVED]} if CURVED in outcomes else {}
+    curve: dict[str, list[float]] = {}
+    for _, answer in in_stages(
+        weigh, wanted, processes=1, stages=stages, kind="curves", note=lambda *_: "weighed"
+    ):
+        curve = {} if isinstance(answer, ProcessFailed) else answer
+    return curve

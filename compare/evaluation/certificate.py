@@ -1,0 +1,147 @@
+"""What a solution of the linear problem is worth, measured by finite elements' own energy."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+
+ENERGY_LIMIT = 0.02
+"""Most energy that the imbalance of a converged solution may have, relative to the energy of `fem`.
+
+It is 14 % in the energy norm, which adds up the errors of all stress components; with the networks of this
+project the von Mises stress is then within 10 %. Beyond it a picture of the stress misleads. A solver that
+reports less energy than `fem` by more than this has a quadrature that misses some: a solution can be better
+than `fem` by what `fem` would gain on a finer mesh, 1.5 % with three elements across every wall.
+"""
+
+INTERPOLANT_LIMIT = 0.05
+"""Largest excess energy of the interpolant of a converged solution, relative to the energy of `fem`.
+
+Interpolation at corners, where stress has no bound, costs energy: the interpolant of a nearly exact solution
+has 1 % too much on the default mesh and 3 % with three elements across every wall. A field that is wrong
+between the points where its stress was looked at has far more.
+"""
+
+CONDITION_LIMIT = 0.02
+"""Largest deviation from the conditions of a converged solution, relative to the prescribed displacement."""
+
+ROUNDING = 1e-8
+"""Relative difference that the rounding of a direct solver explains."""
+
+
+class Region(NamedTuple):
+    """The error in a part of the body.
+
+    Attributes:
+        area: Share of the body's area.
+        excess: Share of the excess energy; NaN where there is no excess to share.
+        rel_l2_displacement: L2 norm of the difference from `fem` in this part over that of `fem` in the whole
+            body, so that the squares of all parts add up to the square for the body.
+        rel_l2_von_mises: The same for the von Mises stress.
+    """
+
+    area: float
+    excess: float
+    rel_l2_displacement: float
+    rel_l2_von_mises: float
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """A solution against the finite-element solution of the same mesh, by energies per depth, N mm / mm.
+
+    Its interpolant in the finite-element space is split into the minimiser of the energy with the same values
+    at base and contact, and a rest. The rest and what the conditions were missed by are orthogonal in energy:
+    the difference between the interpolant and the solution of `fem` has the energy `excess + violation`.
+
+    Attributes:
+        energy: Of the interpolant.
+        fem_energy: Of the solution of `fem`.
+        excess: By how much `energy` is above the least that the same values at base and contact allow.
+        violation: Energy of the least displacement that makes up for what the conditions were missed by.
+        missed: By how much the solver's own energy is below that least energy; negative if it is above.
+        weak_residual: Imbalance of the solver's own stress against all test functions, in the dual of the
+            energy norm, over the norm of the solution of `fem`.
+        imbalance: Largest force on a node that is not in balance, over the reaction of `fem`.
+        base: Largest displacement on the base, mm.
+        load: Largest deviation from the prescribed value of u and v, shape (2,), mm; NaN where free.
+        stroke: Largest prescribed displacement, mm.
+        regions: The error by region, see `compare.evaluation.regions`.
+        density: Energy density of the rest, its mean over each triangle, shape (t,), MPa.
+    """
+
+    energy: float
+    fem_energy: float
+    excess: float
+    violation: float
+    missed: float
+    weak_residual: float
+    imbalance: float
+    base: float
+    load: FloatArray
+    stroke: float
+    regions: Mapping[str, Region]
+    density: FloatArray
+
+    @property
+    def rel_excess(self) -> float:
+        """Excess over the energy of `fem`."""
+        return self.excess / self.fem_energy
+
+    @property
+    def rel_violation(self) -> float:
+        """Violation over the energy of `fem`."""
+        return self.violation / self.fem_energy
+
+    @property
+    def energy_norm_error(self) -> float:
+        """Relative difference of the interpolant from `fem` in the energy norm."""
+        return float(np.sqrt(self.rel_excess + self.rel_violation))
+
+    @property
+    def has_excess(self) -> bool:
+        """Whether there is more excess than rounding explains; the solution of `fem` has none."""
+        return self.rel_excess > ROUNDING**2
+
+    @property
+    def off_at_contact(self) -> float:
+        """Larger of the deviations from the prescribed u and v, mm."""
+        return float(np.nanmax(self.load))
+
+    @property
+    def misses_energy(self) -> bool:
+        """Whether the solver reports so little energy that its quadrature must have missed some."""
+        return self.missed > ENERGY_LIMIT * self.fem_energy
+
+    @property
+    def faults(self) -> list[str]:
+        """What keeps the solution from counting as converged, in words."""
+        limit = np.sqrt(ENERGY_LIMIT)
+        found = []
+        if not self.weak_residual <= limit:
+            found.append(
+                f"its stress is out of balance by {self.weak_residual:.0%} in the energy norm "
+                f"(limit {limit:.0%})"
+            )
+        off, most = max(self.base, self.off_at_contact), CONDITION_LIMIT * self.stroke
+        if not off <= most:
+            found.append(f"it misses the conditions by up to {off:.2g} mm (limit {most:.2g} mm)")
+        if not self.rel_excess <= INTERPOLANT_LIMIT:
+            found.append(
+                f"its energy is {self.rel_excess:.1%} above that of fem (limit {INTERPOLANT_LIMIT:.0%})"
+            )
+        return found
+
+    def numbers(self) -> dict[str, Any]:
+        """What `metrics.json` holds of it."""
+        plain = (
+            *("energy", "fem_energy", "excess", "rel_excess", "violation", "rel_violation"),
+            *("energy_norm_error", "weak_residual", "imbalance", "missed", "misses_energy", "base"),
+        )
+        return {name: getattr(self, name) for name in plain} | {
+            "load": self.load.tolist(),
+            "regions": {name: region._asdict() for name, region in self.regions.items()},
+        }

@@ -1,0 +1,171 @@
+"""A solution sampled on the shared mesh and at the markers: all that metrics, pictures and reports look at.
+
+It is an archive of NumPy arrays, so that a run can be resumed, and a result compared again, without any
+solver.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import TypeAdapter
+
+from compare.evaluation.certificate import Certificate
+from compare.evaluation.differences import ReferenceDifferences
+from geometry.arrays import FloatArray
+from geometry.atomic import atomic_path
+from geometry.mesh.quadrature import body_quadrature
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.lagrange import LagrangeSpace
+from solvers.solution import Solution
+
+QUADRATURE_DEGREE = 2
+HISTORY_PREFIX = "history_"
+UNCERTAINTY: TypeAdapter[ReferenceDifferences | None] = TypeAdapter(ReferenceDifferences | None)
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """One solver's result on the shared mesh: t triangles, n nodes, e edges, m markers, q = 3 t points.
+
+    Attributes:
+        solver: Name of the solver.
+        law: Material law that it had: "linear" (infinitesimal strain) or of finite strain (Green-Lagrange).
+        converged: Whether the solver's own criterion was met and, where there is a certificate, its limit.
+        message: The solver's sentence on how it ended, and what the certificate adds.
+        energy: Elastic energy per unit depth, N mm / mm.
+        reaction: Force of the indenter per unit depth, shape (2,), N/mm.
+        stats: What the solver says of its run: `seconds`, `unknowns`, ...
+        history: Columns of the training or load-stepping record, all of one length.
+        marker_displacement: Shape (m, 2), mm.
+        node_displacement: Shape (n, 2), mm.
+        edge_displacement: At the middles of the mesh's edges, shape (e, 2), mm.
+        weights: Quadrature weights, shape (q,), mm^2.
+        displacement: At the quadrature points, shape (q, 2), mm.
+        strain: At the quadrature points, shape (q, 2, 2).
+        stress: Cauchy, at the quadrature points, shape (q, 2, 2), MPa.
+        stress_zz: Shape (q,), MPa.
+        von_mises: Shape (q,), MPa.
+        energy_density: Shape (q,), MPa.
+        uncertainty: The solver's estimate of its own error, as differences of the exact solution from it.
+        marker_uncertainty: The same at the markers, absolute, shape (m, 2), mm.
+        in_sample: Whether the solver was given the observations: its errors at them are training errors.
+        left_out: What the solver says of each marker if it is not given that one, shape (m, 2), mm; None
+            where it does not tell.
+        certificate: What the result is worth by the energy of finite elements; not part of the archive.
+    """
+
+    solver: str
+    law: str
+    converged: bool
+    message: str
+    energy: float
+    reaction: FloatArray
+    stats: Mapping[str, float | int | str]
+    history: Mapping[str, FloatArray]
+    marker_displacement: FloatArray
+    node_displacement: FloatArray
+    edge_displacement: FloatArray
+    weights: FloatArray
+    displacement: FloatArray
+    strain: FloatArray
+    stress: FloatArray
+    stress_zz: FloatArray
+    von_mises: FloatArray
+    energy_density: FloatArray
+    uncertainty: ReferenceDifferences | None = None
+    marker_uncertainty: FloatArray | None = None
+    in_sample: bool = False
+    left_out: FloatArray | None = None
+    certificate: Certificate | None = None
+
+    @classmethod
+    def of(cls, solution: Solution, mesh: TriangleMesh, markers: ArrayLike | None = None) -> "Evaluation":
+        """Sample a solution on the nodes, edges and quadrature points of `mesh` and at the markers.
+
+        Args:
+            solution: What to sample; it may have been found on another mesh of the same body.
+            mesh: The shared mesh.
+            markers: Marker positions, shape (m, 2), mm; those of the mesh if None.
+        """
+        quadrature = body_quadrature(mesh, QUADRATURE_DEGREE)
+        inside, nodes = quadrature.location, LagrangeSpace(mesh, 2).at_nodes()
+        if solution.problem.mesh is not mesh:  # a location belongs to its mesh
+            inside, nodes = (solution.problem.mesh.locate(place.points) for place in (inside, nodes))
+        state, displacement = solution.state(inside), solution.displacement(nodes)
+        return cls(
+            solver=solution.solver,
+            law=solution.problem.material.law,
+            converged=bool(solution.status.converged),
+            message=solution.status.message,
+            energy=float(solution.energy),
+            reaction=np.asarray(solution.reaction, dtype=np.float64),
+            stats={name: _plain(value) for name, value in solution.stats.items()},
+            history={name: np.asarray(column) for name, column in solution.history.items()},
+            marker_displacement=solution.displacement(mesh.markers if markers is None else markers),
+            node_displacement=displacement[: len(mesh.points)],
+            edge_displacement=displacement[len(mesh.points) :],
+            weights=quadrature.weights,
+            displacement=solution.displacement(inside),
+            strain=state.strain,
+            stress=state.stress,
+            stress_zz=state.stress_zz,
+            von_mises=state.von_mises,
+            energy_density=state.energy_density,
+            in_sample=solution.problem.observations is not None,
+            left_out=solution.left_out,
+        )
+
+    @property
+    def finite(self) -> bool:
+        """Whether displacement and stress are numbers everywhere."""
+        fields = (self.node_displacement, self.edge_displacement, self.stress)
+        return all(np.isfinite(values).all() for values in fields)
+
+    def per_triangle(self, values: FloatArray) -> FloatArray:
+        """Area-weighted mean over each triangle: values at the quadrature points (q, ...) to (t, ...)."""
+        points = 3
+        weights = self.weights.reshape(-1, points)
+        grouped = values.reshape(-1, points, *values.shape[1:])
+        return np.asarray(np.einsum("tq,tq...->t...", weights / weights.sum(axis=1, keepdims=True), grouped))
+
+    def save(self, path: Path, key: str) -> None:
+        """Write the evaluation atomically under a key that says what it is the result of."""
+        header: dict[str, Any] = {"key": key}
+        arrays: dict[str, FloatArray] = {}
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if isinstance(value, np.ndarray):
+                arrays[entry.name] = value
+            elif entry.name not in ("history", "certificate"):
+                header[entry.name] = dict(value) if isinstance(value, Mapping) else value
+        arrays |= {HISTORY_PREFIX + name: column for name, column in self.history.items()}
+        with atomic_path(path) as partial:
+            np.savez_compressed(partial, header=np.array(json.dumps(header)), **arrays)
+
+    @classmethod
+    def load(cls, path: Path, key: str) -> "Evaluation | None":
+        """Read an evaluation, or None if there is none under that path and key."""
+        if not path.exists():
+            return None
+        with np.load(path) as archive:
+            header = json.loads(str(archive["header"]))
+            if header.pop("key") != key:
+                return None
+            arrays = {name: archive[name] for name in archive.files if name != "header"}
+        history = {
+            name.removeprefix(HISTORY_PREFIX): arrays.pop(name)
+            for name in list(arrays)
+            if name.startswith(HISTORY_PREFIX)
+        }
+        header["uncertainty"] = UNCERTAINTY.validate_python(header["uncertainty"])
+        return cls(history=history, **(header | arrays))
+
+
+def _plain(value: float | int | str) -> float | int | str:
+    """A NumPy number as Python's own, which JSON takes."""
+    return value.item() if isinstance(value, np.generic) else value

@@ -1,0 +1,114 @@
+"""How far each solver is from the measurements and from the reference."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from compare.evaluation.differences import FieldDifference, ReferenceDifferences, field_difference
+from compare.evaluation.evaluation import Evaluation
+from geometry.arrays import FloatArray
+from geometry.observations import Observations
+
+COMPONENTS: dict[str, tuple[int, int]] = {"xx": (0, 0), "yy": (1, 1), "xy": (0, 1)}
+
+
+class MarkerErrors(NamedTuple):
+    """Errors at the visible markers; rows of markers that were not seen are NaN.
+
+    Attributes:
+        ae_u: Absolute error of u at each marker, shape (m,), mm.
+        ae_v: The same for v.
+        mae_u: Its mean over the visible markers, mm.
+        mae_v: The same for v.
+        mae_sum: Mean of |du| + |dv|: the absolute error as the paper's text defines it, mm.
+        mae_rss: sqrt(mae_u^2 + mae_v^2): what the `disp` row of the paper's Table I holds, mm.
+    """
+
+    ae_u: FloatArray
+    ae_v: FloatArray
+    mae_u: float
+    mae_v: float
+    mae_sum: float
+    mae_rss: float
+
+
+def marker_errors(evaluation: Evaluation, observations: Observations) -> MarkerErrors:
+    """Absolute and mean absolute errors at the markers, in-sample for a solver that assimilated them."""
+    return _errors(evaluation.marker_displacement, observations)
+
+
+def held_out_errors(evaluation: Evaluation, observations: Observations) -> MarkerErrors | None:
+    """The same at markers that the solver was not given: all, or each left out in its turn.
+
+    None for a solver that was given the markers and does not tell what it would say without.
+    """
+    if not evaluation.in_sample:
+        return marker_errors(evaluation, observations)
+    return None if evaluation.left_out is None else _errors(evaluation.left_out, observations)
+
+
+def _errors(displacement: FloatArray, observations: Observations) -> MarkerErrors:
+    error = np.abs(displacement - observations.displacements)
+    error[~observations.visible] = np.nan
+    mae_u, mae_v = (float(value) for value in np.nanmean(error, axis=0))
+    return MarkerErrors(
+        ae_u=error[:, 0],
+        ae_v=error[:, 1],
+        mae_u=mae_u,
+        mae_v=mae_v,
+        mae_sum=mae_u + mae_v,
+        mae_rss=float(np.hypot(mae_u, mae_v)),
+    )
+
+
+def reference_differences(evaluation: Evaluation, reference: Evaluation) -> ReferenceDifferences:
+    """Differences of displacement, strain and stress from the reference."""
+
+    def differ(name: str, index: tuple[int, ...] = ()) -> FieldDifference:
+        chosen = (slice(None), *index)
+        return field_difference(
+            getattr(evaluation, name)[chosen], getattr(reference, name)[chosen], reference.weights
+        )
+
+    markers = np.abs(evaluation.marker_displacement - reference.marker_displacement).sum(axis=1)
+    return ReferenceDifferences(
+        displacement=differ("displacement"),
+        von_mises=differ("von_mises"),
+        stress={name: differ("stress", index) for name, index in COMPONENTS.items()},
+        strain={name: differ("strain", index) for name, index in COMPONENTS.items()},
+        mae_markers=float(markers.mean()),
+        energy=(evaluation.energy - reference.energy) / reference.energy,
+    )
+
+
+class TruthDifferences(NamedTuple):
+    """A solver against the fields of the virtual experiment, on the shared mesh.
+
+    Attributes:
+        displacement: Of the displacement vector, mm.
+        strain: Of the strain tensor, each with the strain of its own law.
+        von_mises: Of the von Mises stress, MPa.
+    """
+
+    displacement: FieldDifference
+    strain: FieldDifference
+    von_mises: FieldDifference
+
+
+def truth_differences(evaluation: Evaluation, truth: Evaluation) -> TruthDifferences:
+    """Differences from what is true where the markers are simulated."""
+
+    def differ(name: str) -> FieldDifference:
+        values, true = (
+            np.reshape(getattr(each, name), (len(truth.weights), -1)) for each in (evaluation, truth)
+        )
+        return field_difference(values, true, truth.weights)
+
+    return TruthDifferences(*map(differ, TruthDifferences._fields))
+
+
+def pick_reference(evaluations: Sequence[Evaluation], wanted: str | None = None) -> Evaluation:
+    """The evaluation called `wanted`, else `fem`, else the first."""
+    named = {evaluation.solver: evaluation for evaluation in evaluations}
+    return named.get(wanted or "fem", evaluations[0])

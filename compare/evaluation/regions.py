@@ -1,0 +1,45 @@
+"""Parts of the body by which errors are told apart; together they are the whole mesh, each triangle once."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from geometry.arrays import BoolArray
+from geometry.mesh.boundary import boundary_loops, mean_thickness, singular_points
+from solvers.problem import Problem, contact_nodes
+
+NEAR = 0.5
+"""How far from a corner or the contact still counts as there, in mean wall thicknesses."""
+
+REGIONS = {
+    "corners": "at re-entrant corners and base ends",
+    "contact": "at the contact",
+    "tip": "in the tip",
+    "walls": "in walls and ribs",
+}
+"""Every region and how to say in words what is there."""
+
+
+def body_regions(problem: Problem) -> dict[str, BoolArray]:
+    """The triangles of every region that the mesh has, masks of shape (t,), by the names of `REGIONS`.
+
+    A triangle with its centroid within `NEAR` of a re-entrant corner or an end of the base belongs to the
+    corners; of the others, one within `NEAR` of the contact's nodes to the contact; of the others, one beyond
+    the last cavity to the tip; all others are walls and ribs.
+    """
+    mesh = problem.mesh
+    centroids = mesh.at_centroids().points
+    near = NEAR * mean_thickness(mesh)
+    cavities = boundary_loops(mesh)[1:]
+    last = max((mesh.points[cavity, 0].max() for cavity in cavities), default=np.inf)
+    contact = mesh.points[contact_nodes(problem)]
+    belongs = {
+        "corners": cKDTree(singular_points(mesh)).query(centroids)[0] <= near,
+        "contact": cKDTree(contact).query(centroids)[0] <= near,
+        "tip": centroids[:, 0] > last,
+        "walls": np.ones(len(centroids), dtype=bool),
+    }
+    regions, left = {}, np.ones(len(centroids), dtype=bool)
+    for name, here in belongs.items():
+        regions[name] = here & left
+        left &= ~here
+    return {name: here for name, here in regions.items() if here.any()}

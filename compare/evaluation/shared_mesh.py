@@ -1,0 +1,107 @@
+"""The shared mesh, refined first if that is asked for."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from compare.runtime.csv_files import write_csv
+from compare.runtime.exits import say
+from compare.runtime.stages import Stages
+from geometry.cache import finger_mesh
+from geometry.errors import OutsideBodyError, UserError
+from geometry.finger.design import Design
+from geometry.finger.section import finger_section
+from geometry.mesh.settings import MeshSettings
+from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.observations import Observations
+from solvers.adaptation import Adaptation, check_adaptable
+from solvers.problem import Load, Material, Problem
+from solvers.solver import Solver
+
+
+def shared_mesh(
+    design: Design,
+    settings: MeshSettings,
+    stages: Stages,
+    *,
+    tolerance: float | None = None,
+    material: Material = Material(),
+    load: Load = Load(),
+    solvers: Sequence[Solver] = (),
+    check: Callable[[TriangleMesh], None] | None = None,
+) -> tuple[TriangleMesh, Adaptation | None]:
+    """The mesh of a finger, refined until `fem` knows the markers to a tolerance if one is given.
+
+    Args:
+        design: The finger.
+        settings: Element sizes of the first mesh.
+        stages: Told of the progress.
+        tolerance: Largest estimated error of u or v at a marker, mm.
+        material: Its elastic constants; the law is the linear one.
+        load: What moves the finger.
+        solvers: If `fem` is one of them, the degree of its elements is taken.
+        check: Raises a `UserError` if the first mesh will not do.
+
+    Raises:
+        UserError: If the mesh cannot be made or adapted.
+    """
+    if tolerance is not None:
+        check_adaptable(tolerance, load)
+    with stages.stage("mesh"):
+        mesh = finger_mesh(design, settings=settings)
+        if check is not None:
+            check(mesh)
+    if tolerance is None:
+        return mesh, None
+    try:
+        from solvers.fem.adaptive_refinement import adapted
+    except ImportError as error:
+        raise UserError(f"--adapt refines by the estimate of fem, which needs DOLFINx: {error}") from None
+    degrees = [solver.settings()["degree"] for solver in solvers if solver.name == "fem"]
+    linear = material.model_copy(update={"law": "linear"})
+    with stages.stage("adapt") as progress:
+        adaptation = adapted(
+            Problem(mesh, linear, load),
+            tolerance,
+            degree=int(str(degrees[0])) if degrees else 2,
+            section=finger_section(design),
+            progress=progress,
+        )
+        if not adaptation.reached:
+            progress(1.0, adaptation.message)
+    return adaptation.mesh, adaptation
+
+
+def write_rounds(path: Path, adaptation: Adaptation) -> None:
+    """Write a row for every mesh on the way, the last one the shared mesh."""
+    write_csv(
+        path,
+        [
+            {
+                "round": number,
+                "triangles": step.triangles,
+                "nodes": step.nodes,
+                "markers_mm": step.at_markers,
+                "energy_norm_rel": step.energy_norm,
+            }
+            for number, step in enumerate(adaptation.rounds)
+        ],
+    )
+
+
+def adapted_enough(adaptation: Adaptation | None) -> bool:
+    """Whether the tolerance of --adapt was reached, if there is one; a line on standard error if not."""
+    if adaptation is None or adaptation.reached:
+        return True
+    say(f"error: --adapt {adaptation.tolerance:g}: {adaptation.message}")
+    return False
+
+
+def check_inside(observations: Observations, mesh: TriangleMesh) -> None:
+    """Raise a `UserError` if a marker is not on the body."""
+    try:
+        mesh.locate(observations.points)
+    except OutsideBodyError as error:
+        raise UserError(
+            f"the measurements are not of this finger: {error}; "
+            "positions are those before loading, in the finger's frame"
+        ) from None

@@ -1,0 +1,134 @@
+"""Marker displacements from a finite-strain simulation, where no camera has measured any.
+
+The indenter is a sliding patch on a neo-Hookean finger: a model that is richer than the linear ones that are
+judged by it, and whose distance from them is known to be of the size and pattern of the paper's gap between
+simulation and experiment.
+"""
+
+import hashlib
+import json
+from contextlib import suppress
+from zipfile import BadZipFile
+
+import numpy as np
+
+from compare.evaluation.evaluation import Evaluation
+from compare.runtime.provenance import package_versions, sources_digest
+from geometry.cache import cache_folder
+from geometry.errors import UserError
+from geometry.observations import Observations
+from solvers.problem import Load, Problem
+from solvers.registry import make_solver
+from solvers.solution import Solution
+from solvers.solver import Progress, Solver, silent
+
+SOURCE = (
+    "simulated by fem-nonlinear (neo-Hookean, finite strain, plane strain, contact patch that is "
+    "pressed in by {:.4g} mm and slides along x); no camera was involved"
+)
+"""What is said of the numbers wherever they appear; the number is -v of the indenter."""
+
+SOURCES = (
+    "compare.evaluation.evaluation",
+    "geometry",
+    "solvers.elasticity",
+    "solvers.fem",
+    "solvers.problem",
+    "solvers.solution",
+)
+"""Modules whose change makes a new simulation."""
+
+
+def virtual_experiment(problem: Problem, progress: Progress = silent) -> Observations:
+    """Simulate what a camera would have measured at the mesh's markers; kept in the cache folder.
+
+    Raises:
+        UserError: If the simulation cannot be run or does not reach the full load.
+    """
+    return simulated(problem, progress)[0]
+
+
+def simulated(problem: Problem, progress: Progress = silent) -> tuple[Observations, Evaluation]:
+    """The virtual experiment: what a camera would have measured, and the true fields on the problem's mesh.
+
+    Raises:
+        UserError: If the simulation cannot be run or does not reach the full load.
+    """
+    truth = _truth(problem, progress)
+    markers = problem.mesh.markers
+    observations = Observations(
+        points=markers,
+        displacements=truth.marker_displacement,
+        standard_deviations=np.zeros_like(markers),
+        visible=np.ones(len(markers), dtype=bool),
+        source=said_of(problem),
+        simulated=True,
+    )
+    return observations, truth
+
+
+def _truth(problem: Problem, progress: Progress) -> Evaluation:
+    """The true fields; kept in the cache folder."""
+    try:
+        solver, richer = _richer(problem)
+        key = _key(solver, richer)
+        entry = cache_folder() / f"experiment-{key}.npz"
+        with suppress(OSError, ValueError, EOFError, LookupError, BadZipFile):  # damaged: made again
+            if (kept := Evaluation.load(entry, key)) is not None:
+                progress(1.0, "from the cache")
+                return kept
+        solution = _solved(solver, richer, progress)
+    except UserError as error:
+        raise UserError(f"{error}; or give --measurements FILE.csv") from None
+    evaluation = Evaluation.of(solution, problem.mesh)
+    evaluation.save(entry, key)
+    return evaluation
+
+
+def simulation(problem: Problem, progress: Progress = silent) -> Solution:
+    """The solution whose displacements `virtual_experiment` gives at the markers; it is not kept.
+
+    Raises:
+        UserError: If it cannot be run or does not reach the full load.
+    """
+    return _solved(*_richer(problem), progress)
+
+
+def said_of(problem: Problem) -> str:
+    """One sentence on where the numbers of the simulation come from."""
+    return SOURCE.format(-(problem.load.displacement[1] or 0.0))
+
+
+def _solved(solver: Solver, richer: Problem, progress: Progress) -> Solution:
+    solution = solver.solve(richer, progress)
+    if not solution.status.converged:
+        raise UserError(f"the virtual experiment {solution.status.message}")
+    return solution
+
+
+def _richer(problem: Problem) -> tuple[Solver, Problem]:
+    """What simulates, and the problem that it solves."""
+    normal = problem.load.displacement[1]
+    if normal is None:
+        raise UserError("the virtual experiment presses on the finger: prescribe v")
+    if problem.load.position is not None:
+        raise UserError(
+            "the virtual experiment presses where the mesh has its contact: mesh the finger with its "
+            "contact_position there"
+        )
+    try:
+        solver = make_solver("fem-nonlinear")
+    except ImportError as error:
+        raise UserError(f"the virtual experiment: {error}") from None
+    richer = Problem(
+        mesh=problem.mesh,
+        material=problem.material.model_copy(update={"law": "neo-hookean", "plane": "strain"}),
+        load=Load(kind="patch", displacement=(None, normal)),
+    )
+    return solver, richer
+
+
+def _key(solver: Solver, problem: Problem) -> str:
+    """SHA-256 over all that the simulation depends on."""
+    parts = [problem.digest, solver.settings(), package_versions(), sources_digest(SOURCES), SOURCE]
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()

@@ -1,0 +1,96 @@
+"""The runs of a grid search: ranked, as a CSV file and as a table for the terminal."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, fields
+from math import inf
+from pathlib import Path
+
+from rich.table import Table
+
+from compare.gridsearch.training_run import Measured, Run
+from compare.runtime.csv_files import Cell, write_csv
+
+UNITS = {
+    "base_violation": "mm",
+    "load_violation": "mm",
+    "energy": "N_mm_per_mm",
+    "loss": "MPa",
+    "seconds": "s",
+}
+"""Of the columns that have one."""
+
+
+def ranked(runs: Sequence[Run]) -> list[Run]:
+    """The runs by their distance from `fem`, those that were not trained last.
+
+    Not by their loss, which is not comparable between weights.
+    """
+    return sorted(runs, key=lambda run: run.measured.rel_l2_displacement if run.measured else inf)
+
+
+def best_of(runs: Sequence[Run]) -> Run | None:
+    """The run nearest to `fem`; None if none was trained."""
+    return next((run for run in ranked(runs) if run.measured), None)
+
+
+def run_note(run: Run) -> str:
+    """A run in a few words."""
+    if run.measured is None:
+        return f"{run.status}: {run.message}"
+    return (
+        f"relative L2 to fem {run.measured.rel_l2_displacement:.1%}, "
+        f"boundary violation {run.measured.boundary_violation:.1%}"
+    )
+
+
+def write_runs(path: Path, runs: Sequence[Run]) -> None:
+    """Write a row a run, units in the header; what is not known is empty."""
+    write_csv(path, [{"rank": rank, **_row(run)} for rank, run in enumerate(ranked(runs), start=1)])
+
+
+def _row(run: Run) -> dict[str, Cell]:
+    values = asdict(run.measured) if run.measured else {}
+    row: dict[str, Cell] = {
+        "learning_rate": run.point.learning_rate,
+        "bc_weight_MPa_per_mm2": run.point.bc_weight,
+        "status": run.status,
+    }
+    for name in (entry.name for entry in fields(Measured)):
+        row["_".join(filter(None, [name, UNITS.get(name)]))] = values.get(name, "")
+    return row | {"message": run.message}
+
+
+def runs_table(runs: Sequence[Run]) -> Table:
+    """The runs for the terminal."""
+    table = Table(
+        title="Runs by their distance from fem",
+        caption=(
+            "L²: relative difference of the displacement field from fem on the same mesh. Violation: of base "
+            "or load, over the stroke. Losses do not compare between weights; the order of short trainings "
+            "need not be that of long ones."
+        ),
+        title_justify="left",
+        caption_justify="left",
+    )
+    headings = (
+        "learning\nrate",
+        "BC weight\nMPa/mm²",
+        "L²\n%",
+        "energy\nof fem's",
+        "violation\n%",
+        "loss\nMPa",
+    )
+    for heading in (*headings, "time\ns"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for run in ranked(runs):
+        numbers = [run.status, *["–"] * 4]
+        if measured := run.measured:
+            numbers = [
+                f"{100 * measured.rel_l2_displacement:.3g}",
+                f"{1 + measured.rel_energy:.3g}",
+                f"{100 * measured.boundary_violation:.3g}",
+                f"{measured.loss:.3g}",
+                f"{measured.seconds:.0f}",
+            ]
+        table.add_row(f"{run.point.learning_rate:g}", f"{run.point.bc_weight:g}", *numbers)
+    return table

@@ -1,0 +1,192 @@
+"""One run of a grid search: train the paper's networks and measure how far they are from `fem`."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from compare.evaluation.differences import field_difference
+from geometry.arrays import FloatArray
+from geometry.atomic import write_json
+from geometry.errors import UserError
+from geometry.mesh.quadrature import body_quadrature, edge_quadrature
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.problem import Load, Material, Problem, contact_functional
+from solvers.registry import make_solver
+from solvers.solution import Solution
+from solvers.solver import Progress
+from solvers.training import TrainedSolver, TrainingContext, TrainingDiverged
+
+RESULT_FILE = "result.json"
+TRAINED, DIVERGED, FAILED = "trained", "diverged", "failed"
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point of the grid.
+
+    Attributes:
+        learning_rate: Of the optimiser.
+        bc_weight: Weight of the boundary conditions in the loss, MPa/mm².
+    """
+
+    learning_rate: float
+    bc_weight: float
+
+    @property
+    def name(self) -> str:
+        """A name for people and for a folder."""
+        return f"lr-{self.learning_rate}_bc-{self.bc_weight}"
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """What the runs are compared with: a solution on the shared mesh.
+
+    Attributes:
+        energy: Elastic energy per depth, N mm/mm.
+        displacement: At the points of `body_quadrature`, shape (q, 2), mm.
+    """
+
+    energy: float
+    displacement: FloatArray
+
+    @classmethod
+    def of(cls, solution: Solution) -> "Reference":
+        """Sample a solution on its own mesh."""
+        inside = body_quadrature(solution.problem.mesh).location
+        return cls(float(solution.energy), solution.displacement(inside))
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """All that a process needs for one run.
+
+    Attributes:
+        point: The point of the grid.
+        settings: The other settings of the solver.
+        mesh: File of the shared mesh.
+        material: The elastic law.
+        load: What moves the finger.
+        reference: The solution to compare with.
+        folder: Where the run keeps its checkpoints and its result.
+        threads: Of the processor.
+    """
+
+    point: Point
+    settings: Mapping[str, object]
+    mesh: Path
+    material: Material
+    load: Load
+    reference: Reference
+    folder: Path
+    threads: int
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What a finished training is worth.
+
+    Attributes:
+        rel_l2_displacement: Relative L2 difference of the displacement from the reference.
+        rel_energy: Relative difference of the energy, with its sign.
+        boundary_violation: The larger of the next two over the stroke.
+        base_violation: Root mean square of the displacement along the base, mm.
+        load_violation: Distance of the load's functional from what is prescribed, mm.
+        energy: Elastic energy per depth, N mm/mm.
+        loss: Last value of the total loss, MPa.
+        epochs: Epochs trained.
+        seconds: Time of the training, s.
+    """
+
+    rel_l2_displacement: float
+    rel_energy: float
+    boundary_violation: float
+    base_violation: float
+    load_violation: float
+    energy: float
+    loss: float
+    epochs: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Run:
+    """How the training at a point of the grid ended.
+
+    Attributes:
+        point: The point.
+        status: `TRAINED`, `DIVERGED` or `FAILED`.
+        message: A sentence.
+        measured: What it is worth; None unless trained.
+    """
+
+    point: Point
+    status: str
+    message: str
+    measured: Measured | None = None
+
+    @classmethod
+    def load(cls, path: Path) -> "Run":
+        """Read what `train` wrote."""
+        content = json.loads(path.read_text(encoding="utf-8"))
+        measured = content["measured"] and Measured(**content["measured"])
+        return cls(Point(**content["point"]), content["status"], content["message"], measured)
+
+
+def train(task: Task, progress: Progress) -> Run:
+    """Train at one point of the grid, going on from a checkpoint if there is one, and write the result.
+
+    A run that failed for another reason than that it diverged writes none, so that it can be tried again.
+    """
+    import torch
+
+    torch.set_num_threads(task.threads)
+    problem = Problem(TriangleMesh.load(task.mesh), task.material, task.load)
+    solver = make_solver("pinn-std", **task.settings, **asdict(task.point))
+    if not isinstance(solver, TrainedSolver):
+        raise TypeError(f"{solver.name} cannot be resumed")
+    context = TrainingContext(folder=task.folder, resume=True, reference_energy=task.reference.energy)
+    try:
+        solution = solver.in_context(context).solve(problem, progress)
+        run = Run(task.point, TRAINED, solution.status.message, measure(solution, task.reference))
+    except TrainingDiverged as error:
+        run = Run(task.point, DIVERGED, str(error))
+    except UserError as error:
+        return Run(task.point, FAILED, str(error))
+    write_json(task.folder / RESULT_FILE, asdict(run))
+    return run
+
+
+def measure(solution: Solution, reference: Reference) -> Measured:
+    """Distance of a solution from the reference and from its own conditions."""
+    rule = body_quadrature(solution.problem.mesh)
+    displacement = solution.displacement(rule.location)
+    base, load = boundary_violations(solution)
+    stroke = float(np.linalg.norm(solution.problem.load.values))
+    return Measured(
+        rel_l2_displacement=field_difference(displacement, reference.displacement, rule.weights).rel_l2,
+        rel_energy=float(solution.energy) / reference.energy - 1,
+        boundary_violation=max(base, load) / stroke,
+        base_violation=base,
+        load_violation=load,
+        energy=float(solution.energy),
+        loss=float(solution.history["total"][-1]),
+        epochs=int(solution.stats["epochs"]),
+        seconds=float(solution.stats["seconds"]),
+    )
+
+
+def boundary_violations(solution: Solution) -> tuple[float, float]:
+    """Root mean square of the displacement along the base, and the miss of the load's functional, mm."""
+    problem = solution.problem
+    points, lengths = edge_quadrature(problem.mesh, "base")
+    squares = (solution.displacement(points) ** 2).sum(axis=1)
+    contact, weights = contact_functional(problem)
+    mean = (weights @ solution.displacement(contact))[problem.load.prescribed]
+    return (
+        float(np.sqrt(lengths @ squares / lengths.sum())),
+        float(np.linalg.norm(mean - problem.load.values)),
+    )

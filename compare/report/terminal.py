@@ -1,0 +1,112 @@
+"""The numbers of a comparison as tables for the terminal; both fit into 80 columns."""
+
+from collections.abc import Sequence
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.labels import significant, solver_label
+from compare.evaluation.metrics import reference_differences, truth_differences
+from compare.report.table_one import MEANS, PAPER, PRINTED, Row, millimetres, table_one
+from compare.report.tables import seconds
+from geometry.observations import Observations
+
+NONE = "–"
+
+
+def marker_table(evaluations: Sequence[Evaluation], observations: Observations) -> Table:
+    """Mean absolute errors at the markers, those of the paper's Table I below."""
+    seen, count = int(observations.visible.sum()), len(observations.visible)
+    markers = f"{count} marker{'s' * (count > 1)}" if seen == count else f"{seen} of {count} markers"
+    table = _table(
+        f"Mean absolute error at {markers}, mm ({observations.label} displacements)",
+        "given: at markers that the solver was given, a training error.\n"
+        "held out: at markers that it was not given; one that is given markers has\n"
+        "all but the one that it predicts.\n"
+        "sum: mean of |Δu| + |Δv| (the paper's text); rss: √(u² + v²) (its Table I).\n"
+        "paper: as it prints them, of its own experiment and not of this run.",
+    )
+    for heading in ("given\nu", "\nv", "\nsum", "\nrss", "held out\nu", "\nv", "\nsum", "\nrss"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    rows = table_one(evaluations, observations)
+    for row, evaluation in zip(rows, evaluations, strict=True):
+        style = None if evaluation.converged else "yellow"
+        table.add_row(_name(evaluation), *_means(row), style=style)
+    table.add_section()
+    for row in PRINTED:
+        label = f"{row.source}: {row.solver.removeprefix('PINN-Ray ')}"
+        table.add_row(label, *_means(row), style="dim")
+    return table
+
+
+def body_table(
+    evaluations: Sequence[Evaluation], reference: Evaluation, truth: Evaluation | None = None
+) -> Table:
+    """Distances over the body, energy and time."""
+    label = solver_label(reference)
+    lines = [f"from {label}: relative L² difference of the displacement."]
+    if reference.uncertainty is not None and len(evaluations) > 1:
+        lines.append(f"±: error of {label} itself, estimated; a smaller difference says nothing.")
+    lines.append("above fem: energy of the displacement on fem's elements above the least there.")
+    if truth is not None:
+        lines.append("truth: relative L² difference from the simulated finger, of finite strain.")
+    table = _table("Over the whole body", "\n".join(lines))
+    headings = [f"from {reference.solver}\n%", "energy\nN mm/mm", "above fem\n%"]
+    headings += ["truth\ndispl., %", "\nv. Mises, %"] * (truth is not None)
+    for heading in [*headings, "time\ns"]:
+        table.add_column(heading, justify="right", no_wrap=True)
+    for evaluation in evaluations:
+        distance = reference_differences(evaluation, reference).displacement.rel_l2
+        cells = [NONE if evaluation is reference else _with_own_error(distance, reference)]
+        cells += [f"{evaluation.energy:.4g}", above_fem(evaluation)]
+        if truth is not None:
+            found = truth_differences(evaluation, truth)
+            cells += [percent(found.displacement.rel_l2), percent(found.von_mises.rel_l2)]
+        style = None if evaluation.converged else "yellow"
+        table.add_row(_name(evaluation), *cells, seconds(evaluation), style=style)
+    return table
+
+
+def above_fem(evaluation: Evaluation) -> str:
+    """By how much the energy is above the least of finite elements, %; a dash where that is no measure."""
+    certificate = evaluation.certificate
+    if certificate is None:
+        return NONE
+    percent = 100 * certificate.rel_excess if certificate.has_excess else 0.0
+    return f"{percent:.1f}" if percent >= 1 else f"{percent:.1g}"
+
+
+def percent(share: float) -> str:
+    """A share in per cent, two digits, or all before the point."""
+    return f"{100 * share:.0f}" if share >= 1 else significant(100 * share, 2)
+
+
+def _table(title: str, caption: str) -> Table:
+    table = Table(
+        title=title,
+        caption=caption,
+        box=SIMPLE_HEAD,
+        collapse_padding=True,
+        title_justify="left",
+        caption_justify="left",
+    )
+    table.add_column("solver", no_wrap=True)
+    return table
+
+
+def _name(evaluation: Evaluation) -> str:
+    return solver_label(evaluation).replace(" (", "\n(")
+
+
+def _means(row: Row) -> list[str]:
+    values = [value for means in (row.given, row.held_out) for value in means or [None] * len(MEANS)]
+    return [NONE if value is None else millimetres(value, row.source == PAPER) for value in values]
+
+
+def _with_own_error(distance: float, reference: Evaluation) -> str:
+    """The relative difference in %, and that of the reference from the exact solution."""
+    own = reference.uncertainty
+    if own is None:
+        return significant(100 * distance, 3)
+    return f"{percent(distance)}±{100 * own.displacement.rel_l2:.1g}"

@@ -1,0 +1,185 @@
+"""Words and numbers of the report."""
+
+import base64
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from markupsafe import Markup
+
+from compare.evaluation.evaluation import Evaluation
+from geometry.arrays import FloatArray
+from geometry.finger.parameters import Parameters, fact
+from geometry.observations import Observations
+from solvers.problem import Load, Material
+
+
+def design_rows(design: Parameters) -> list[tuple[str, str, str]]:
+    """The design's parameters as meaning, the paper's symbol, and value with unit."""
+    rows = []
+    for name, described in type(design).model_fields.items():
+        if name in ("name", "contact_position"):
+            continue
+        value = getattr(design, name)
+        meaning = (described.description or name).split(" [")[0].replace("`", "")
+        rows.append((meaning, str(fact(name, "symbol")), _value(value, str(fact(name, "unit")))))
+    return [*rows, ("Abscissa of the contact's middle", "", _value(design.contact_abscissa, "mm"))]
+
+
+def _value(value: object, unit: str) -> str:
+    number = f"{value:g}" if isinstance(value, int | float) else str(value)
+    return number + {"": "", "deg": "°"}.get(unit, f" {unit}")
+
+
+FINITE_STRAIN = "finite strain: the strain is Green-Lagrange, the stress Cauchy"
+LAWS = {
+    "linear": "linear elastic (Hooke), infinitesimal strain",
+    "neo-hookean": f"neo-Hookean, {FINITE_STRAIN}",
+    "st-venant-kirchhoff": f"St Venant-Kirchhoff, {FINITE_STRAIN}",
+}
+
+
+def material_rows(material: Material, laws: Mapping[str, str]) -> list[tuple[str, str]]:
+    """The material in words, and the solvers of each law where they differ."""
+    constants = f"plane {material.plane}; E = {material.young:g} MPa, Poisson’s ratio {material.poisson:g}"
+    if len(set(laws.values())) == 1:
+        return [("Material", f"{LAWS[next(iter(laws.values()))]}; {constants}")]
+    having = {law: [solver for solver in laws if laws[solver] == law] for law in laws.values()}
+    rows = [(f"Law of {', '.join(solvers)}", LAWS[law]) for law, solvers in having.items()]
+    return [("Material", constants), *rows]
+
+
+def load_sentence(load: Load, design: Parameters) -> str:
+    """What the indenter does, in a sentence."""
+    width = f"{design.contact_width:g} mm wide contact"
+    where = {
+        "mean": f"The weighted mean displacement of the {width} is prescribed",
+        "point": "The displacement of one point, the contact’s middle, is prescribed",
+        "patch": f"Every point of the {width} has the prescribed displacement",
+        "cylinder": f"A rigid cylinder of radius {load.radius or 0:g} mm presses without friction where it "
+        "touches the front face, and moves by the prescribed displacement",
+    }[load.kind]
+    parts = [
+        f"{name} is free"
+        if value is None
+        else f"{name} = {value:g} mm".replace("-", "−").replace(" ", "\N{NO-BREAK SPACE}")
+        for name, value in zip("uv", load.displacement, strict=True)
+    ]
+    moved = ", ".join(parts).replace(" ", "\N{NO-BREAK SPACE}").replace(",\N{NO-BREAK SPACE}", ", ")
+    middle = design.contact_abscissa if load.position is None else load.position
+    about = f"{'from' if load.kind == 'cylinder' else 'about'} x = {middle:g} mm on the front face"
+    return f"{where}: {moved}, {about} (load “{load.kind}”)."
+
+
+def source_sentence(observations: Observations) -> str:
+    """Where the marker displacements come from, opened by `Simulated` or `Measured`."""
+    said = observations.source.lower().startswith(observations.label)
+    return sentence(observations.source if said else f"{observations.label}: {observations.source}")
+
+
+def grouped(provenance: Mapping[str, object]) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Provenance as groups of lines; what is not in a mapping comes first, in a group without a title."""
+    groups = {"": {key: value for key, value in provenance.items() if not isinstance(value, Mapping)}}
+    groups |= {key: dict(value) for key, value in provenance.items() if isinstance(value, Mapping)}
+    return [
+        (
+            title.replace("_", " "),
+            [(str(key).replace("_", " "), in_words(value)) for key, value in lines.items()],
+        )
+        for title, lines in groups.items()
+        if lines
+    ]
+
+
+def in_words(value: object) -> str:
+    """A value of any kind; a mapping as `name value` pairs."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {in_words(inner)}" for key, inner in value.items()) or "defaults"
+    return "–" if value is None else str(value)
+
+
+def embedded(path: Path) -> str:
+    """A PNG file as a data URL."""
+    return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
+
+
+def symbol(name: str) -> Markup:
+    """A symbol of the paper, such as `L_tip`, with its index set as one."""
+    letter, _, index = name.partition("_")
+    return (
+        Markup("<i>{}</i><sub>{}</sub>").format(letter, index)
+        if index
+        else Markup("<i>{}</i>").format(letter)
+    )
+
+
+def stat(value: object) -> str:
+    """A number of a solver's record: whole numbers in full, others with four digits."""
+    return number(value) if isinstance(value, float) else str(value)
+
+
+def sentence(text: str) -> str:
+    """The text with a capital at its start and one full stop at its end."""
+    return text[:1].upper() + text[1:].rstrip(". ") + "."
+
+
+def number(value: float, digits: int = 4) -> str:
+    """A number with so many significant digits, with a typographic minus; no exponent from 1 to a million."""
+    text = f"{value:#.{digits}g}"
+    if 1 <= abs(value) < 1e6:
+        text = f"{float(text):.0f}" if "e" in text else text
+    return text.rstrip(".").replace("-", "−")
+
+
+def without_rounding(force: FloatArray) -> tuple[float, float]:
+    """A force of shape (2,) without the component that rounding left, 1e-9 of the other or less."""
+    size = np.abs(force).max()
+    u, v = (float(component) if abs(component) > 1e-9 * size else 0.0 for component in force)
+    return u, v
+
+
+def percent(value: float) -> str:
+    """A share as a percentage with three significant digits."""
+    return f"{number(100 * value, 3)} %"
+
+
+def beside(value: float, own: float | None) -> Markup:
+    """A difference and, if there is one, the own error of what it is a difference from, as HTML.
+
+    A difference that is smaller than that error is set in grey.
+    """
+    if own is None:
+        return Markup("{}").format(number(value, 3))
+    kind = "within" if abs(value) < abs(own) else "beyond"
+    return Markup('<span class="{}">{}</span><br><span class="unit">±&nbsp;{}</span>').format(
+        kind, number(value, 3), number(abs(own), 2)
+    )
+
+
+def own_error_sentence(label: str, evaluation: Evaluation) -> str:
+    """What a solver says of its own error."""
+    own, markers = evaluation.uncertainty, evaluation.marker_uncertainty
+    if own is None or markers is None:
+        return f"{label} gives no estimate of its own error."
+    return (
+        f"The error of {label} itself, by its own estimate: {percent(own.displacement.rel_l2)} in the "
+        f"displacement, {percent(own.von_mises.rel_l2)} in the von Mises stress (relative L²), "
+        f"{percent(np.sqrt(abs(own.energy)))} in the energy norm, {distance(markers.max())} mm at most at a "
+        "marker."
+    ).replace(" %", "\N{NO-BREAK SPACE}%")
+
+
+def indistinct_sentence(label: str, reference: str, names: Sequence[str]) -> str:
+    """Where a solver differs from the reference by less than the reference's own error; empty if nowhere."""
+    if not names:
+        return ""
+    said = ", ".join(names[:-1]) + (" and " if names[:-1] else "") + names[-1]
+    return (
+        f"{label} differs from {reference} by less than the own error of {reference} in: {said}. There the "
+        "comparison does not say which of the two is nearer to the exact solution."
+    )
+
+
+def distance(value: float) -> str:
+    """A small length, mm, with two significant digits; a dash where it is NaN, zero where it is rounding."""
+    return "–" if np.isnan(value) else f"{value if value > 1e-9 else 0:.2g}".replace("-", "−")

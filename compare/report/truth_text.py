@@ -1,0 +1,53 @@
+"""Is the stress better once a solver is given the markers? In sentences, by the truth of the simulation."""
+
+from collections.abc import Sequence
+
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.labels import significant, solver_label
+from compare.evaluation.metrics import TruthDifferences, truth_differences
+
+
+def truth_sentences(
+    evaluations: Sequence[Evaluation], reference: Evaluation, truth: Evaluation | None
+) -> list[str]:
+    """What the markers change, against the reference, for each solver that was given them; then the answer.
+
+    Empty without a truth, without such a solver, or if the reference was given the markers too.
+    """
+    given = [evaluation for evaluation in evaluations if evaluation.in_sample]
+    if truth is None or reference.in_sample or not given:
+        return []
+    plain, label = truth_differences(reference, truth), solver_label(reference)
+    found = {solver_label(evaluation): truth_differences(evaluation, truth) for evaluation in given}
+    sentences = [f"{name}, given the markers: {_changes(plain, own)}." for name, own in found.items()]
+    return [
+        f"{label}, which was given none: {_sizes(plain)} away from the simulated finger.",
+        *sentences,
+        f"Nearer than {label} in displacement: {_nearer('displacement', plain, found)}. Nearer in von Mises "
+        f"stress: {_nearer('von_mises', plain, found)}.",
+    ]
+
+
+def _sizes(differences: TruthDifferences) -> str:
+    return (
+        f"displacement {_percent(differences.displacement.rel_l2)}, "
+        f"von Mises stress {_percent(differences.von_mises.rel_l2)}"
+    )
+
+
+def _changes(plain: TruthDifferences, own: TruthDifferences) -> str:
+    words = []
+    for name, title in (("displacement", "displacement"), ("von_mises", "von Mises stress")):
+        before, after = getattr(plain, name).rel_l2, getattr(own, name).rel_l2
+        words.append(f"{title} {_percent(after)} ({'nearer' if after < before else 'farther'})")
+    return ", ".join(words)
+
+
+def _nearer(field: str, plain: TruthDifferences, found: dict[str, TruthDifferences]) -> str:
+    limit = getattr(plain, field).rel_l2
+    names = [name for name, own in found.items() if getattr(own, field).rel_l2 < limit]
+    return ", ".join(names) or "none"
+
+
+def _percent(share: float) -> str:
+    return f"{significant(100 * share, 3)}\N{NO-BREAK SPACE}%"

@@ -1,0 +1,89 @@
+"""One writer of fields for every solver: VTK unstructured grids (.vtu) that ParaView opens."""
+
+from pathlib import Path
+
+import numpy as np
+import pyvista
+
+from compare.evaluation.evaluation import Evaluation
+from geometry.arrays import FloatArray
+from geometry.atomic import atomic_path
+from geometry.mesh.triangle_mesh import TriangleMesh
+
+SYMMETRIC = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
+"""VTK's order of the six components of a symmetric tensor."""
+
+
+def write_vtu(path: Path, mesh: TriangleMesh, evaluation: Evaluation) -> None:
+    """Write one solver's fields on the shared mesh, atomically.
+
+    At the nodes: `displacement_mm` (u, v, 0).
+
+    In the triangles, each the area-weighted mean over the triangle: `strain_xx`, `strain_yy`, `strain_xy`
+    (the tensor's component, half the engineering shear), `stress_MPa` (Cauchy; six components named XX to XZ,
+    of which YZ and XZ are zero), `stress_zz_MPa`, `von_mises_MPa`, `energy_density_MPa`.
+
+    For the whole: `solver`, `converged` (1 or 0), `status`, `energy_N_mm_per_mm`, `reaction_N_per_mm`.
+
+    Args:
+        path: Where to write; the suffix is .vtu.
+        mesh: The mesh of n nodes and t triangles that the evaluation was made on.
+        evaluation: The solver's result.
+    """
+    grid = _grid(mesh)
+    grid.point_data["displacement_mm"] = in_space(evaluation.node_displacement)
+    strain = evaluation.per_triangle(evaluation.strain)
+    for name, (row, column) in {"xx": (0, 0), "yy": (1, 1), "xy": (0, 1)}.items():
+        grid.cell_data[f"strain_{name}"] = strain[:, row, column]
+    stress, stress_zz = (
+        evaluation.per_triangle(values) for values in (evaluation.stress, evaluation.stress_zz)
+    )
+    grid.cell_data["stress_MPa"] = symmetric_tensor(stress, stress_zz)
+    components = grid.GetCellData().GetArray("stress_MPa")
+    for number, name in enumerate(SYMMETRIC):
+        components.SetComponentName(number, name)
+    grid.cell_data["stress_zz_MPa"] = stress_zz
+    grid.cell_data["von_mises_MPa"] = evaluation.per_triangle(evaluation.von_mises)
+    grid.cell_data["energy_density_MPa"] = evaluation.per_triangle(evaluation.energy_density)
+    grid.field_data["solver"] = [evaluation.solver]
+    grid.field_data["converged"] = [int(evaluation.converged)]
+    grid.field_data["status"] = [evaluation.message]
+    grid.field_data["energy_N_mm_per_mm"] = [evaluation.energy]
+    grid.field_data["reaction_N_per_mm"] = evaluation.reaction[None]
+    with atomic_path(path) as partial:
+        grid.save(partial)
+
+
+def write_mesh(path: Path, mesh: TriangleMesh) -> None:
+    """Write the mesh atomically; point data `boundary_NAME` and `marker` (number or 0) say what is where."""
+    grid = _grid(mesh)
+    for name, edges in mesh.boundaries.items():
+        grid.point_data[f"boundary_{name}"] = np.isin(np.arange(len(mesh.points)), edges).astype(np.uint8)
+    marker = np.zeros(len(mesh.points), dtype=np.int32)
+    marker[mesh.marker_nodes] = np.arange(1, len(mesh.marker_nodes) + 1)
+    grid.point_data["marker"] = marker
+    with atomic_path(path) as partial:
+        grid.save(partial)
+
+
+def _grid(mesh: TriangleMesh) -> pyvista.UnstructuredGrid:
+    return pyvista.UnstructuredGrid({pyvista.CellType.TRIANGLE: mesh.triangles}, in_space(mesh.points))
+
+
+def in_space(vectors: FloatArray) -> FloatArray:
+    """Vectors of shape (n, 2) with z = 0, shape (n, 3)."""
+    return np.column_stack([vectors, np.zeros(len(vectors))])
+
+
+def symmetric_tensor(in_plane: FloatArray, zz: FloatArray) -> FloatArray:
+    """Six components in VTK's order.
+
+    Args:
+        in_plane: Shape (t, 2, 2).
+        zz: Out-of-plane component, shape (t,).
+
+    Returns:
+        Shape (t, 6): xx, yy, zz, xy, yz, xz.
+    """
+    zero = np.zeros(len(zz))
+    return np.column_stack([in_plane[:, 0, 0], in_plane[:, 1, 1], zz, in_plane[:, 0, 1], zero, zero])

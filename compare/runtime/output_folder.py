@@ -1,0 +1,152 @@
+"""The output folder: the last complete result or the new one, never half of one.
+
+A run works in `NAME.partial` beside the output folder `NAME` and takes its place at the end. A killed run
+leaves there the solutions that it had finished and the checkpoints of the one in training, from which a
+resumed run goes on.
+"""
+
+import fcntl
+import json
+import os
+import shutil
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from compare.runtime.provenance import file_digest
+from geometry.atomic import write_json
+from geometry.errors import UserError
+
+RUN_FILE = "run.json"
+SOLUTIONS = "solutions"
+TRAINING = "training"
+
+
+def check_output(out: Path) -> None:
+    """Refuse, before anything is computed, a folder that must not be replaced."""
+    if out.exists() and not out.is_dir():
+        raise UserError(f"{out} is a file; name a folder with --out")
+    if Path.cwd().is_relative_to(out.resolve()):
+        raise UserError(
+            f"the output folder is replaced as a whole, so the program cannot run inside it ({out}); "
+            "name another folder with --out"
+        )
+    ours = _written(out)
+    files = (path.relative_to(out) for path in out.rglob("[!.]*") if path.is_file())
+    if foreign := next((path for path in files if path.as_posix() not in ours), None):
+        raise UserError(
+            f"{out} holds {foreign}, which no run has written and which would be lost; "
+            "move it, or name another folder with --out"
+        )
+
+
+@contextmanager
+def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
+    """A folder that takes the place of `out` when the block ends without an error.
+
+    Args:
+        out: The output folder.
+        keep: Names of the solvers whose solutions and checkpoints are left in place if there are any of an
+            earlier, killed run.
+
+    Raises:
+        UserError: If the folder cannot be written, or another run is writing it.
+    """
+    out = out.resolve()
+    partial = out.with_name(f"{out.name}.partial")
+    missing = [folder for folder in partial.parents if not folder.exists()]
+    try:
+        partial.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"cannot write to {partial}: {error.strerror}") from None
+    with locked(partial):
+        _clear(partial, keep)
+        try:
+            yield partial
+        except BaseException:
+            if not any([*partial.glob(f"{SOLUTIONS}/*.npz"), *partial.glob(f"{TRAINING}/*/*")]):
+                shutil.rmtree(partial, ignore_errors=True)
+                for folder in missing:
+                    with suppress(OSError):  # somebody else uses it by now
+                        folder.rmdir()
+            raise
+        _take_place(partial, out)
+
+
+def write_run(folder: Path, provenance: Mapping[str, Any]) -> None:
+    """Write `run.json`: what the results depend on, and the SHA-256 of every file beside it."""
+    files = {
+        path.relative_to(folder).as_posix(): file_digest(path)
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name != RUN_FILE
+    }
+    write_json(folder / RUN_FILE, {"schema": 1, **provenance, "files_sha256": files})
+
+
+def take_training(name: str, source: Path, target: Path) -> None:
+    """Copy what a solver's training left from one output folder to another, in place of what is there."""
+    left, place = source / TRAINING / name, target / TRAINING / name
+    if left != place:
+        shutil.rmtree(place, ignore_errors=True)
+        if left.is_dir():
+            shutil.copytree(left, place)
+
+
+def _take_place(partial: Path, out: Path) -> None:
+    previous = out.with_name(f".{out.name}.previous")
+    shutil.rmtree(previous, ignore_errors=True)  # of a run that was killed right here
+    try:
+        if out.exists():
+            out.replace(previous)
+        partial.replace(out)
+    except OSError as error:
+        raise UserError(
+            f"cannot replace {out} ({error.strerror}); the complete result is in {partial}"
+        ) from None
+    shutil.rmtree(previous, ignore_errors=True)
+
+
+def _written(out: Path) -> set[str]:
+    """The files that the run which made `out` says it wrote."""
+    try:
+        return {RUN_FILE, *json.loads((out / RUN_FILE).read_text(encoding="utf-8"))["files_sha256"]}
+    except (OSError, ValueError, LookupError, TypeError):
+        return set()
+
+
+def _clear(partial: Path, keep: Collection[str]) -> None:
+    """Remove what an earlier run left, except solutions and checkpoints that can be taken over."""
+    for path in partial.iterdir():
+        if path.name not in (SOLUTIONS, TRAINING):
+            _remove(path)
+    for path in partial.glob(f"{SOLUTIONS}/*"):
+        if path.suffix != ".npz" or path.stem not in keep:
+            path.unlink()
+    for path in partial.glob(f"{TRAINING}/*"):
+        if path.name not in keep:
+            _remove(path)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink()
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Keep a second run out of the folder; the lock ends with the process, however that ends."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # some network file systems have no locks
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise UserError(
+                    f"another run is writing to {folder}; wait for it, or name another folder with --out"
+                ) from None
+        yield
+    finally:
+        os.close(handle)

@@ -1,0 +1,56 @@
+"""The design of a finger: parameters that obey every rule."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ValidationError, model_validator
+
+from geometry.errors import UserError
+from geometry.finger.error_messages import one_line
+from geometry.finger.parameters import SYMBOLS, Parameters, title
+from geometry.finger.validation import check
+
+
+class Design(Parameters):
+    """A finger that can be made; a combination that cannot be is refused on construction.
+
+    Every parameter goes by its name or by the paper's symbol: `Design(rib_count=6)` equals `Design(N=6)`.
+
+    Raises:
+        UserError: One line with the parameter, the value, the reason and what would be right.
+    """
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            raise UserError(one_line(error, Design)) from None
+
+    def replaced(self, **changes: Any) -> "Design":
+        """A checked copy with some parameters changed, by name or symbol."""
+        return Design(**{**self.model_dump(), **by_name(changes)})
+
+    @model_validator(mode="before")
+    @classmethod
+    def _accept_symbols(cls, values: Any) -> Any:
+        return by_name(values) if isinstance(values, Mapping) else values
+
+    @model_validator(mode="after")
+    def _obey_rules(self) -> "Design":
+        check(self)
+        return self
+
+
+def by_name(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The values with the paper's symbols turned into names.
+
+    Raises:
+        UserError: If a parameter is given by name and by symbol.
+    """
+    named: dict[str, Any] = {}
+    for key, value in values.items():
+        name = SYMBOLS.get(key, key)
+        if name in named:
+            raise UserError(f"{title(name)} is given twice, by its name and by its symbol; give it once")
+        named[name] = value
+    return named

@@ -1,0 +1,46 @@
+"""What a wrong value is told: one line with the parameter, the value, and what would be right."""
+
+import difflib
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from geometry.finger.parameters import fact, title, with_unit
+
+
+def one_line(error: ValidationError, model: type[BaseModel]) -> str:
+    """A pydantic error of `model` as one line; several problems are separated by semicolons."""
+    return "; ".join(_sentence(problem, model) for problem in error.errors())
+
+
+def unknown_parameter(key: str, model: type[BaseModel]) -> str:
+    """What to say about a parameter that `model` does not have: near matches, or the whole list."""
+    known = list(model.model_fields)
+    near = difflib.get_close_matches(key.lower(), known, n=3, cutoff=0.6)
+    near = near or [name for name in known if key.lower() in name or key.lower()[:3] == name[:3]]
+    titles = ", ".join(title(name, model) for name in near or known)
+    hint = f"did you mean {titles}?" if near else f"there are {titles}"
+    return f"unknown parameter {key!r}; {hint}"
+
+
+def _sentence(problem: ErrorDetails, model: type[BaseModel]) -> str:
+    kind, value, context = problem["type"], problem["input"], problem.get("ctx", {})
+    if not problem["loc"]:
+        return str(context.get("error", problem["msg"]))
+    name = str(problem["loc"][0])
+    if kind == "extra_forbidden":
+        return unknown_parameter(name, model)
+    what = title(name, model)
+    if kind in ("greater_than_equal", "less_than_equal"):
+        return f"{what} = {with_unit(float(value), name, model)} is outside its range, {_bounds(name, model)}"
+    if kind in ("int_from_float", "int_parsing", "int_type"):
+        return f"{what} = {value!r} is not a whole number; give one from {_bounds(name, model)}"
+    if kind in ("float_parsing", "float_type", "finite_number"):
+        return f"{what} = {value!r} is not a finite number; give one from {_bounds(name, model)}"
+    if kind == "string_pattern_mismatch":
+        return f"{what} = {value!r} must be a letter or digit, then only letters, digits, '.', '_', '-'"
+    return f"{what} = {value!r}: {problem['msg'].lower()}"
+
+
+def _bounds(name: str, model: type[BaseModel]) -> str:
+    return f"{fact(name, 'low', model):g} to {with_unit(fact(name, 'high', model), name, model)}"

@@ -1,0 +1,82 @@
+"""Designs by name, from TOML files, and with single parameters changed."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from geometry.errors import UserError
+from geometry.finger.design import Design, by_name
+from geometry.finger.error_messages import unknown_parameter
+from geometry.finger.parameters import SYMBOLS, Parameters, title
+
+FOLDER = Path(__file__).parent.parent / "designs"
+"""Where the presets lie, one TOML file each."""
+
+
+def preset_names() -> list[str]:
+    """Names of the presets, `default` first."""
+    names = sorted(path.stem for path in FOLDER.glob("*.toml"))
+    return sorted(names, key=lambda name: name != "default")
+
+
+def load_design(name_or_path: str | Path = "default", overrides: Mapping[str, Any] | None = None) -> Design:
+    """A preset, or the design in a TOML file, with some parameters overridden.
+
+    Args:
+        name_or_path: Name of a preset, or path of a TOML file that gives parameters by name or symbol; those
+            it leaves out have their default value. Without `name`, the file's name is the design's.
+        overrides: Parameters by name or symbol; values may be text, as from a command line.
+
+    Raises:
+        UserError: If there is no such preset or file, it cannot be read, or the design is not admissible.
+    """
+    path = _path_of(name_or_path)
+    try:
+        with path.open("rb") as file:
+            values = by_name(tomllib.load(file))
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise UserError(f"cannot read design file {path}: {reason}") from None
+    changes = by_name(overrides or {})
+    try:
+        return Design(**{"name": path.stem, **values, **changes})
+    except UserError as error:
+        raise UserError(f"design {str(name_or_path)!r}: {error}") from None
+
+
+def parse_overrides(settings: Sequence[str]) -> dict[str, Any]:
+    """Turn texts such as `rib_count=6` or `N=6` into overrides for `load_design`.
+
+    `contact_position=none` goes back to the middle of the ribbed part.
+
+    Raises:
+        UserError: If a text is no assignment, or names an unknown parameter or one twice.
+    """
+    overrides: dict[str, Any] = {}
+    for setting in settings:
+        key, equals, value = (part.strip() for part in setting.partition("="))
+        name = SYMBOLS.get(key, key)
+        if not (equals and key and value):
+            raise UserError(f"cannot read {setting!r}; write parameter=value, such as rib_count=6")
+        if name not in Parameters.model_fields:
+            raise UserError(unknown_parameter(key, Parameters))
+        if name in overrides:
+            raise UserError(f"{title(name)} is set twice; set it once")
+        overrides[name] = None if name == "contact_position" and value.lower() == "none" else value
+    return overrides
+
+
+def _path_of(name_or_path: str | Path) -> Path:
+    """The TOML file of a preset's name or of a path."""
+    path = Path(name_or_path)
+    if path.suffix == ".toml" or isinstance(name_or_path, Path) or len(path.parts) > 1:
+        if not path.is_file():
+            raise UserError(f"there is no design file {path}; the presets are {', '.join(preset_names())}")
+        return path
+    if name_or_path not in preset_names():
+        raise UserError(
+            f"there is no design {name_or_path!r}; the presets are {', '.join(preset_names())}, "
+            "or give the path of a .toml file"
+        )
+    return FOLDER / f"{name_or_path}.toml"

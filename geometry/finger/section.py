@@ -1,0 +1,181 @@
+"""The finger's section in closed form: outline, cells, ribs, area and lengths; no CAD."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from geometry.arrays import BoolArray, FloatArray
+from geometry.finger.parameters import Parameters
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """Outline and cavities of a finger.
+
+    Attributes:
+        outer: Corners (0, 0), (0, -base_width), (height, 0), shape (3, 2), mm; counter-clockwise.
+        cells: The cavities from base to tip with sharp corners, each of shape (4, 2), mm, counter-clockwise:
+            front and back corner nearer the base, back and front corner nearer the tip.
+        ribs: The ribs between the walls' inner faces, corners in the order of `cells`, each of shape (4, 2),
+            mm.
+        fillet_radius: Radius that rounds every corner of every cell, mm.
+        contact: Both ends of the contact on the front face, shape (2, 2), mm.
+    """
+
+    outer: FloatArray
+    cells: tuple[FloatArray, ...]
+    ribs: tuple[FloatArray, ...]
+    fillet_radius: float
+    contact: FloatArray
+
+    @property
+    def area(self) -> float:
+        """Area of the body, mm^2, fillets included."""
+        return polygon_area(self.outer) - sum(
+            polygon_area(cell) - sum(corner_area(angle, self.fillet_radius) for angle in corner_angles(cell))
+            for cell in self.cells
+        )
+
+    def holds(self, points: FloatArray) -> BoolArray:
+        """Which points, shape (n, 2), mm, lie in the body or on its boundary; fillets do not count."""
+        inside = _within(self.outer, points)
+        for cell in self.cells:
+            inside &= ~_within(cell, points, strictly=True)
+        return inside
+
+    @property
+    def boundary_lengths(self) -> dict[str, float]:
+        """Length of the named boundaries `base`, `front`, `back` and `contact`, mm."""
+        base, back, front = polygon_sides(self.outer)
+        return {
+            "base": float(base),
+            "front": float(front),
+            "back": float(back),
+            "contact": float(np.ptp(self.contact[:, 0])),
+        }
+
+    @property
+    def perimeter(self) -> float:
+        """Length of the whole boundary, the cells' included, mm."""
+        total = float(polygon_sides(self.outer).sum())
+        for cell in self.cells:
+            turns = np.pi - corner_angles(cell)
+            shortened = 2 * np.tan(turns / 2) - turns
+            total += float(polygon_sides(cell).sum() - self.fillet_radius * shortened.sum())
+        return total
+
+
+def finger_section(parameters: Parameters) -> Section:
+    """The section of a finger; meaningful for parameters that obey the rules."""
+    p = parameters
+    half = p.rib_thickness / (2 * np.cos(np.radians(p.rib_angle)))
+    sides = [_wall_side(p, p.base_thickness)]
+    for foot in rib_feet(p):
+        sides += [_rib_side(p, foot - half), _rib_side(p, foot + half)]
+    sides.append(_wall_side(p, p.height - p.tip_length))
+    quads = [np.array([*left, *right[::-1]]) for left, right in pairwise(sides)]
+    return Section(
+        outer=np.array([[0, 0], [0, -p.base_width], [p.height, 0]], dtype=np.float64),
+        cells=tuple(quads[::2]),
+        ribs=tuple(quads[1::2]),
+        fillet_radius=p.fillet_radius,
+        contact=np.array([[x, 0] for x in p.contact_ends], dtype=np.float64),
+    )
+
+
+def rib_feet(parameters: Parameters) -> FloatArray:
+    """Where the rib axes meet the front wall's inner face: x, shape (rib_count,), mm.
+
+    Equal pitch over the cavity's length there. The paper gives no spacing; this and `rib_direction` are the
+    one place that decides it.
+    """
+    p = parameters
+    pitch = rib_pitch(p)
+    return p.base_thickness + pitch * np.arange(1, p.rib_count + 1)
+
+
+def rib_pitch(parameters: Parameters) -> float:
+    """Distance of neighbouring rib axes along the front wall, mm."""
+    p = parameters
+    return (p.height - p.tip_length - p.base_thickness) / (p.rib_count + 1)
+
+
+def rib_direction(parameters: Parameters) -> FloatArray:
+    """Unit vector along the ribs from front to back, shape (2,).
+
+    A positive angle leans toward the tip: x grows on the way from the front wall to the back wall.
+    """
+    angle = np.radians(parameters.rib_angle)
+    return np.array([np.sin(angle), -np.cos(angle)])
+
+
+def rib_axes(parameters: Parameters) -> FloatArray:
+    """Where each rib's axis meets the front and the back wall's centre line, shape (rib_count, 2, 2), mm."""
+    p = parameters
+    direction = rib_direction(p)
+    axes = np.empty((p.rib_count, 2, 2))
+    for axis, foot in zip(axes, rib_feet(p), strict=True):
+        start = np.array([foot, -p.front_thickness])
+        axis[0] = start + direction * (p.front_thickness / 2) / direction[1]
+        axis[1] = _to_back(p, start, direction, p.back_thickness / 2)
+    return axes
+
+
+def back_offset_line(parameters: Parameters, distance: float) -> tuple[float, float]:
+    """Slope and intercept, mm, of the line y = slope * x + intercept `distance` mm inside the back face."""
+    p = parameters
+    slope = p.base_width / p.height
+    return slope, -p.base_width + distance * float(np.hypot(1, slope))
+
+
+def polygon_area(corners: FloatArray) -> float:
+    """Signed area of a polygon of shape (n, 2), mm^2; positive if counter-clockwise."""
+    following = np.roll(corners, -1, axis=0)
+    return float(0.5 * (corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0]).sum())
+
+
+def polygon_sides(corners: FloatArray) -> FloatArray:
+    """Length of every side of a polygon of shape (n, 2), from each corner to the next, shape (n,), mm."""
+    return np.asarray(np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1), dtype=np.float64)
+
+
+def corner_angles(corners: FloatArray) -> FloatArray:
+    """Interior angle at every corner of a convex polygon of shape (n, 2), shape (n,), radians."""
+    ahead, behind = np.roll(corners, -1, axis=0) - corners, np.roll(corners, 1, axis=0) - corners
+    cross = ahead[:, 0] * behind[:, 1] - ahead[:, 1] * behind[:, 0]
+    return np.asarray(np.arctan2(cross, (ahead * behind).sum(axis=1)), dtype=np.float64)
+
+
+def corner_area(angle: float, radius: float) -> float:
+    """Area that a fillet of `radius` mm cuts off a corner of `angle` radians, mm^2."""
+    return float(radius**2 * (1 / np.tan(angle / 2) - (np.pi - angle) / 2))
+
+
+def _wall_side(p: Parameters, x: float) -> tuple[FloatArray, FloatArray]:
+    """Front and back end of the vertical side of the cavity at `x`."""
+    slope, intercept = back_offset_line(p, p.back_thickness)
+    return np.array([x, -p.front_thickness]), np.array([x, slope * x + intercept])
+
+
+def _rib_side(p: Parameters, x: float) -> tuple[FloatArray, FloatArray]:
+    """Front and back end of the rib's side that starts at `x` on the front wall's inner face."""
+    start = np.array([x, -p.front_thickness])
+    return start, _to_back(p, start, rib_direction(p), p.back_thickness)
+
+
+def _to_back(p: Parameters, start: FloatArray, direction: FloatArray, distance: float) -> FloatArray:
+    """From `start` along `direction` to the line `distance` mm inside the back face."""
+    slope, intercept = back_offset_line(p, distance)
+    closing = max(slope * direction[0] - direction[1], 1e-9)  # zero where a rib is parallel to the back wall
+    return np.asarray(
+        start + direction * (start[1] - slope * start[0] - intercept) / closing, dtype=np.float64
+    )
+
+
+def _within(corners: FloatArray, points: FloatArray, *, strictly: bool = False) -> BoolArray:
+    """Which points lie in a convex polygon whose corners run counter-clockwise."""
+    sides = np.roll(corners, -1, axis=0) - corners
+    away = points[:, None] - corners
+    left = sides[:, 0] * away[..., 1] - sides[:, 1] * away[..., 0]
+    return np.asarray((left > 0 if strictly else left >= 0).all(axis=1))

@@ -1,0 +1,134 @@
+"""Check a finger against every rule, and find the range in which a parameter would obey them."""
+
+import math
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.finger.parameters import Parameters, fact
+from geometry.finger.rules import RULES, Rule
+
+ROUNDING = -1e-9
+"""Margins down to this count as zero, mm."""
+
+STEP = 0.01
+"""Printed ranges are rounded inward to multiples of this, mm or degrees."""
+
+SCAN = 240
+"""Values tried over a parameter's bounds before bisection."""
+
+
+def check(parameters: Parameters) -> None:
+    """Raise if a rule is broken.
+
+    Raises:
+        UserError: One line with the reason and the admissible ranges.
+    """
+    for rule in RULES:
+        finding = rule.check(parameters)
+        if finding.margin < ROUNDING:
+            raise UserError(f"{finding.sentence}; {advice(parameters, rule)}")
+
+
+def advice(parameters: Parameters, broken: Rule) -> str:
+    """The ranges of the parameters that can mend a broken rule, each with the others unchanged."""
+    ranges = _ranges(parameters, broken.mends, RULES)
+    if ranges:
+        return f"admissible with the rest unchanged: {', or '.join(ranges[:3])}"
+    ranges = _ranges(parameters, broken.mends, [broken])
+    alone = (
+        f"this rule alone asks for {', or '.join(ranges[:3])}" if ranges else f"try {', '.join(broken.mends)}"
+    )
+    return f"more than one parameter must change; {alone}"
+
+
+def obeys(parameters: Parameters, rules: Iterable[Rule] = RULES) -> bool:
+    """True if every rule is obeyed."""
+    return all(rule.check(parameters).margin >= ROUNDING for rule in rules)
+
+
+def admissible_range(
+    parameters: Parameters, name: str, rules: Iterable[Rule] = RULES
+) -> tuple[float, float] | None:
+    """The interval nearest to the present value in which every rule is obeyed, the rest unchanged.
+
+    Args:
+        parameters: The finger, admissible or not.
+        name: The parameter to vary, over its own bounds.
+        rules: The rules to obey.
+
+    Returns:
+        Both ends, rounded inward to `STEP`; None if no value was found.
+    """
+    rules = tuple(rules)
+    low, high = fact(name, "low"), fact(name, "high")
+    whole = name in ("rib_count", "marker_count")
+
+    def good(value: float) -> bool:
+        return obeys(parameters.model_copy(update={name: int(value) if whole else float(value)}), rules)
+
+    present = getattr(parameters, name)
+    present = parameters.contact_abscissa if present is None else present
+    tried = np.arange(low, high + 1) if whole else _trial_values(low, high, present)
+    passed = np.array([good(value) for value in tried])
+    if not passed.any():
+        return None
+    nearest = int(np.abs(np.where(passed, tried, np.inf) - present).argmin())
+    first = last = nearest
+    while first > 0 and passed[first - 1]:
+        first -= 1
+    while last < len(tried) - 1 and passed[last + 1]:
+        last += 1
+    start, stop = float(tried[first]), float(tried[last])
+    if whole:
+        return start, stop
+    if first > 0:
+        start = _rounded(good, _edge(good, start, float(tried[first - 1])), math.ceil)
+    if last < len(tried) - 1:
+        stop = _rounded(good, _edge(good, stop, float(tried[last + 1])), math.floor)
+    return (start, stop) if start <= stop and good(start) and good(stop) else None
+
+
+def _trial_values(low: float, high: float, present: float) -> FloatArray:
+    """Values from `low` to `high`, evenly and, where both are positive, also evenly in their logarithm."""
+    values = [np.linspace(low, high, SCAN), np.array([present])]
+    if low > 0:
+        values.append(np.geomspace(low, high, SCAN // 2))
+    return np.asarray(np.unique(np.clip(np.concatenate(values), low, high)), dtype=np.float64)
+
+
+def _edge(good: Callable[[float], bool], inside: float, outside: float) -> float:
+    """The last good value between a good and a bad one, by bisection."""
+    while abs(outside - inside) > STEP / 1000:
+        middle = (inside + outside) / 2
+        inside, outside = (middle, outside) if good(middle) else (inside, middle)
+    return inside
+
+
+def _rounded(good: Callable[[float], bool], edge: float, inward: Callable[[float], int]) -> float:
+    """The edge as a multiple of `STEP`: the nearest one if it is good, else the next one inward."""
+    nearest = round(edge / STEP) * STEP
+    return nearest if good(nearest) else inward(edge / STEP) * STEP
+
+
+def _ranges(parameters: Parameters, names: Iterable[str], rules: Iterable[Rule]) -> list[str]:
+    """`name low to high unit` for every parameter that has a range."""
+    texts = []
+    for name in names:
+        found = admissible_range(parameters, name, rules)
+        if found is not None:
+            texts.append(_in_words(name, *found))
+    return texts
+
+
+def _in_words(name: str, start: float, stop: float) -> str:
+    """A range as text; an end at the parameter's own bound is left out unless both are."""
+    low, high, unit = fact(name, "low"), fact(name, "high"), fact(name, "unit")
+    first, last = f"{start:.2f}".rstrip("0").rstrip("."), f"{stop:.2f}".rstrip("0").rstrip(".")
+    if start == low and stop < high:
+        return f"{name} up to {last} {unit}".rstrip()
+    if stop == high and start > low:
+        return f"{name} at least {first} {unit}".rstrip()
+    return f"{name} {first} to {last} {unit}".rstrip()

@@ -1,0 +1,108 @@
+"""The boundary of a mesh: edges, closed loops, widths of walls and cavities, re-entrant corners."""
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from geometry.arrays import FloatArray, IntArray
+from geometry.mesh.triangle_mesh import TriangleMesh
+
+CORNER_ANGLE = np.radians(10.0)
+"""Turn of the boundary from which on it counts as a corner."""
+FACING = -0.9
+"""Cosine of the angle between the normals of two edges below which they face each other."""
+
+
+def boundary_edges(triangles: IntArray) -> IntArray:
+    """Edges that belong to one triangle only, shape (k, 2), with the body on their left."""
+    directed = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    _, first, count = np.unique(np.sort(directed, axis=1), axis=0, return_index=True, return_counts=True)
+    return np.asarray(directed[np.sort(first[count == 1])], dtype=np.int64)
+
+
+def boundary_loops(mesh: TriangleMesh) -> list[IntArray]:
+    """The nodes of every closed boundary: the outline first, then the cells from base to tip."""
+    edges = boundary_edges(mesh.triangles)
+    nodes, local = np.unique(edges, return_inverse=True)
+    local = local.reshape(-1, 2)
+    graph = coo_matrix((np.ones(len(local)), (local[:, 0], local[:, 1])), shape=(len(nodes), len(nodes)))
+    count, label = connected_components(graph, directed=False)
+    loops = [nodes[label == which] for which in range(count)]
+    return sorted(loops, key=lambda loop: float(mesh.points[loop, 0].min()))
+
+
+def mean_thickness(mesh: TriangleMesh) -> float:
+    """Twice the area over the perimeter, mm: the thickness of a body that is all walls."""
+    ends = mesh.points[boundary_edges(mesh.triangles)]
+    perimeter = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
+    return float(2 * mesh.areas.sum() / perimeter)
+
+
+def boundary_widths(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
+    """Boundary points (b, 2), mm, and the width there, (b,), mm.
+
+    That is the distance from the nearest other closed boundary, which is across the wall, or the width of the
+    cavity beside it if that is less; infinite where there is neither.
+    """
+    loops = boundary_loops(mesh)
+    edges = mesh.points[boundary_edges(mesh.triangles)]
+    middles = edges.mean(axis=1)
+    _, nearest = cKDTree(mesh.points[np.concatenate(loops)]).query(edges[:, 0])
+    loop_of = np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])[nearest]
+    widths = np.full(len(middles), np.inf)
+    for number in range(len(loops)):
+        own = loop_of == number
+        if not own.all():
+            widths[own], _ = cKDTree(edges[~own, 0]).query(middles[own])
+        widths[own] = np.minimum(widths[own], _open_distance(edges[own]))
+    return middles, widths
+
+
+def _open_distance(edges: FloatArray) -> FloatArray:
+    """Distance from each edge (k, 2, 2) of a closed boundary to one that faces it outside, (k,), mm."""
+    start, along = edges[:, 0], edges[:, 1] - edges[:, 0]
+    middles, normals = edges.mean(axis=1), np.column_stack([along[:, 1], -along[:, 0]])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    offset = start[None] - middles[:, None]
+    # middle + t normal = start + s along, for every pair of a middle and an edge
+    determinant = _cross(normals[:, None], along[None])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = _cross(offset, along[None]) / determinant
+        s = _cross(offset, normals[:, None]) / determinant
+    facing = normals @ normals.T < FACING
+    hit = facing & (s >= 0) & (s <= 1) & (t > 1e-9) & np.isfinite(t)
+    return np.asarray(np.where(hit, t, np.inf).min(axis=1))
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def singular_points(mesh: TriangleMesh) -> FloatArray:
+    """Re-entrant corners, points of re-entrant arcs and the ends of the clamped base, shape (s, 2), mm."""
+    sharp, round_, _ = re_entrant_points(mesh)
+    return np.concatenate([sharp, round_])
+
+
+def re_entrant_points(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray, float]:
+    """Re-entrant corners and the base's ends (s, 2), points of re-entrant arcs (a, 2), their radius, all mm.
+
+    The radius is the median over the arcs, NaN where there are none.
+    """
+    edges = boundary_edges(mesh.triangles)
+    follows = dict(edges.tolist())
+    comes_before = {after: node for node, after in follows.items()}
+    nodes = np.array(list(follows))
+    after, before = (np.array([step[node] for node in nodes]) for step in (follows, comes_before))
+    into, out = mesh.points[nodes] - mesh.points[before], mesh.points[after] - mesh.points[nodes]
+    turn = np.arctan2(_cross(into, out), (into * out).sum(axis=1))
+    # The body is on the left of its boundary: a right turn opens it beyond a straight angle.
+    bent = turn < -CORNER_ANGLE
+    is_bent = dict(zip(nodes.tolist(), bent.tolist(), strict=True))
+    arc = bent & np.array([is_bent[a] or is_bent[b] for a, b in zip(after, before, strict=True)])
+    lengths = 0.5 * (np.linalg.norm(into, axis=1) + np.linalg.norm(out, axis=1))
+    radius = float(np.median(lengths[arc] / -turn[arc])) if arc.any() else float("nan")
+    base, times = np.unique(mesh.boundary("base"), return_counts=True)
+    sharp = np.concatenate([mesh.points[nodes[bent & ~arc]], mesh.points[base[times == 1]]])
+    return sharp, mesh.points[nodes[arc]], radius

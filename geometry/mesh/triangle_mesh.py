@@ -1,0 +1,206 @@
+"""The triangle mesh that every solver shares."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from geometry.arrays import FloatArray, IntArray, frozen_array
+from geometry.errors import UserError
+from geometry.mesh.point_location import Location, Locator
+
+BOUNDARY_PREFIX = "boundary_"
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """A conforming triangulation of the finger's section.
+
+    Attributes:
+        points: Nodes, shape (n, 2), mm.
+        triangles: Node numbers, shape (t, 3), counter-clockwise.
+        boundaries: Named boundary edges as node numbers, each of shape (k, 2): `base` (clamped),
+            `front` (the whole contact face y = 0), `back`, and `contact` (the part of `front` that the
+            indenter touches).
+        marker_nodes: The node of every marker, shape (m,), ordered from base to tip.
+        contact_node: The node in the middle of `contact`, where a point load acts.
+
+    Raises:
+        ShapeError: If an array has the wrong shape.
+        UserError: If a triangle is degenerate or clockwise, or a node number is out of range.
+    """
+
+    points: FloatArray
+    triangles: IntArray
+    boundaries: Mapping[str, IntArray]
+    marker_nodes: IntArray
+    contact_node: int
+    _cache: dict[str, Locator] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        def freeze(name: str, values: object) -> None:
+            object.__setattr__(self, name, values)
+
+        freeze("points", frozen_array(self.points, dtype=np.float64, shape=(None, 2), name="points"))
+        freeze("triangles", frozen_array(self.triangles, dtype=np.int64, shape=(None, 3), name="triangles"))
+        freeze(
+            "marker_nodes",
+            frozen_array(self.marker_nodes, dtype=np.int64, shape=(None,), name="marker_nodes"),
+        )
+        edges = {
+            name: frozen_array(nodes, dtype=np.int64, shape=(None, 2), name=f"boundary {name!r}")
+            for name, nodes in self.boundaries.items()
+        }
+        freeze("boundaries", MappingProxyType(edges))
+        freeze("contact_node", int(self.contact_node))
+        numbers = [self.triangles, self.marker_nodes, np.array([self.contact_node]), *edges.values()]
+        if any(nodes.size and (nodes.min() < 0 or nodes.max() >= len(self.points)) for nodes in numbers):
+            raise UserError(f"the mesh names a node outside 0..{len(self.points) - 1}")
+        if (self.areas <= 0).any():
+            raise UserError(
+                f"{int((self.areas <= 0).sum())} of {len(self.triangles)} triangles are flat or clockwise"
+            )
+
+    @cached_property
+    def areas(self) -> FloatArray:
+        """Area of every triangle, shape (t,), mm^2."""
+        a, b, c = (self.points[self.triangles[:, corner]] for corner in range(3))
+        return np.asarray(
+            0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]), dtype=np.float64
+        )
+
+    @property
+    def markers(self) -> FloatArray:
+        """Marker positions, shape (m, 2), mm."""
+        return self.points[self.marker_nodes]
+
+    @cached_property
+    def edges(self) -> IntArray:
+        """Every edge once, as sorted node numbers, shape (e, 2)."""
+        first, second = np.sort(self.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1).T
+        numbers = np.unique(first * len(self.points) + second)  # many times faster than unique pairs
+        return np.stack(np.divmod(numbers, len(self.points)), axis=1)
+
+    def edge_numbers(self, pairs: IntArray) -> IntArray:
+        """Rows of `edges` of edges given as node pairs, shape (..., 2), in any order: shape (...)."""
+        count, ordered = len(self.points), np.sort(pairs, axis=-1)
+        keys = self.edges[:, 0] * count + self.edges[:, 1]
+        return np.asarray(np.searchsorted(keys, ordered[..., 0] * count + ordered[..., 1]), dtype=np.int64)
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 over every array, in hexadecimal; equal for equal meshes."""
+        sha = hashlib.sha256()
+        for name, array in self._arrays().items():
+            sha.update(name.encode())
+            sha.update(np.ascontiguousarray(array).tobytes())
+        return sha.hexdigest()
+
+    def boundary(self, name: str) -> IntArray:
+        """Edges of the boundary called `name`, shape (k, 2).
+
+        Raises:
+            UserError: If the mesh has no boundary of that name.
+        """
+        if name not in self.boundaries:
+            raise UserError(f"the mesh has no boundary {name!r}; it has {', '.join(self.boundaries)}")
+        return self.boundaries[name]
+
+    def boundary_length(self, name: str) -> float:
+        """Length of a named boundary, mm."""
+        ends = self.points[self.boundary(name)]
+        return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+
+    def locate(self, points: ArrayLike) -> Location:
+        """The triangle and the barycentric coordinates of points in the body.
+
+        Args:
+            points: Shape (n, 2), mm.
+
+        Raises:
+            OutsideBodyError: If a point lies outside the body.
+        """
+        if "locator" not in self._cache:
+            self._cache["locator"] = Locator(self.points, self.triangles)
+        return self._cache["locator"].locate(points)
+
+    def at_centroids(self) -> Location:
+        """The location of every triangle's centroid, in the order of the triangles."""
+        return self.at_barycentric(np.full((1, 3), 1 / 3))
+
+    def at_barycentric(self, barycentric: ArrayLike) -> Location:
+        """The same barycentric points in every triangle.
+
+        Args:
+            barycentric: Shape (q, 3).
+
+        Returns:
+            t * q points, those of one triangle next to each other.
+        """
+        rule = frozen_array(barycentric, dtype=np.float64, shape=(None, 3), name="barycentric")
+        points = np.einsum("qc,tcx->tqx", rule, self.points[self.triangles]).reshape(-1, 2)
+        return Location(
+            points=points,
+            cells=np.repeat(np.arange(len(self.triangles)), len(rule)),
+            barycentric=np.tile(rule, (len(self.triangles), 1)),
+        )
+
+    def at_nodes(self) -> Location:
+        """The location of every node, in the order of the nodes."""
+        cells = np.zeros(len(self.points), dtype=np.int64)
+        corners = np.zeros(len(self.points), dtype=np.int64)
+        for corner in range(3):
+            cells[self.triangles[:, corner]] = np.arange(len(self.triangles))
+            corners[self.triangles[:, corner]] = corner
+        return Location(points=self.points, cells=cells, barycentric=np.eye(3)[corners])
+
+    def permuted(self, seed: int) -> "TriangleMesh":
+        """The same mesh with nodes and triangles numbered in another order."""
+        rng = np.random.default_rng(seed)
+        order, cells = rng.permutation(len(self.points)), rng.permutation(len(self.triangles))
+        new = np.argsort(order)
+        return TriangleMesh(
+            points=self.points[order],
+            triangles=new[np.roll(self.triangles[cells], int(rng.integers(3)), axis=1)],
+            boundaries={name: new[nodes] for name, nodes in self.boundaries.items()},
+            marker_nodes=new[self.marker_nodes],
+            contact_node=int(new[self.contact_node]),
+        )
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """How to send the mesh to another process: its arrays; what follows from them is not sent."""
+        arrays = (self.points, self.triangles, dict(self.boundaries), self.marker_nodes, self.contact_node)
+        return TriangleMesh, arrays
+
+    def save(self, path: Path) -> None:
+        """Write the mesh as a NumPy archive."""
+        np.savez_compressed(path, **self._arrays())
+
+    @classmethod
+    def load(cls, path: Path) -> "TriangleMesh":
+        """Read a mesh that `save` wrote."""
+        with np.load(path) as archive:
+            return cls(
+                points=archive["points"],
+                triangles=archive["triangles"],
+                boundaries={
+                    name.removeprefix(BOUNDARY_PREFIX): archive[name]
+                    for name in archive.files
+                    if name.startswith(BOUNDARY_PREFIX)
+                },
+                marker_nodes=archive["marker_nodes"],
+                contact_node=int(archive["contact_node"]),
+            )
+
+    def _arrays(self) -> dict[str, FloatArray | IntArray]:
+        return {
+            "points": self.points,
+            "triangles": self.triangles,
+            "marker_nodes": self.marker_nodes,
+            "contact_node": np.asarray(self.contact_node),
+        } | {BOUNDARY_PREFIX + name: nodes for name, nodes in sorted(self.boundaries.items())}

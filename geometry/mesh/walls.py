@@ -1,0 +1,47 @@
+"""Walls and ribs of a finger, found in its mesh."""
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from geometry.arrays import BoolArray, FloatArray
+from geometry.mesh.boundary import boundary_loops
+from geometry.mesh.triangle_mesh import TriangleMesh
+
+
+def walls_and_ribs(mesh: TriangleMesh) -> dict[str, BoolArray]:
+    """Triangles of `front` and `back` wall, as far as there are cavities beside them, and of the `rib`s.
+
+    A wall is as thick as the nearest cavity is far from its face. What remains falls into pieces: the one at
+    the base and the one that reaches farthest are base and tip, the others are ribs.
+
+    Returns:
+        Masks of shape (t,), without any triangle where the finger has no such part.
+    """
+    inner = [mesh.points[loop] for loop in boundary_loops(mesh)[1:]]
+    none = np.zeros(len(mesh.triangles), dtype=bool)
+    if not inner:
+        return {"front": none, "back": none, "rib": none}
+    cavities = np.concatenate(inner)
+    centroids = mesh.at_centroids().points
+    beside = (centroids[:, 0] > cavities[:, 0].min()) & (centroids[:, 0] < cavities[:, 0].max())
+    parts = {}
+    for name in ("front", "back"):
+        thickness = _distance(mesh, name, cavities).min()
+        parts[name] = beside & (_distance(mesh, name, centroids) < thickness)
+    rest = np.flatnonzero(~(parts["front"] | parts["back"]))
+    corners = mesh.triangles[rest].ravel()
+    touching = coo_matrix((np.ones(len(corners)), (np.repeat(np.arange(len(rest)), 3), corners))).tocsr()
+    _, piece = connected_components(touching @ touching.T)
+    base = np.isin(mesh.triangles[rest], mesh.boundary("base")).any(axis=1)
+    ends = [*piece[base], piece[centroids[rest, 0].argmax()]]
+    return parts | {"rib": np.isin(np.arange(len(none)), rest[~np.isin(piece, ends)])}
+
+
+def _distance(mesh: TriangleMesh, face: str, points: FloatArray) -> FloatArray:
+    """Distance from the straight line through a face, shape (n,), mm."""
+    nodes = mesh.points[mesh.boundary(face).ravel()]
+    start, end = nodes[nodes[:, 0].argmin()], nodes[nodes[:, 0].argmax()]
+    along = (end - start) / np.linalg.norm(end - start)
+    away = points - start
+    return np.asarray(np.abs(along[0] * away[:, 1] - along[1] * away[:, 0]))

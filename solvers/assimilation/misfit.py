@@ -1,0 +1,174 @@
+"""The misfit of a displacement to the markers: one definition for every solver that assimilates them.
+
+What is minimised is, per depth, elastic energy plus misfit:
+
+    J(u) = E(u) + 1/2 (B u - d)^T W (B u - d)
+
+with the displacements B u of the markers, d observed there, and a diagonal of weights W. B takes the mean
+over a marker's disc, which is what a camera sees. At a radius of zero it takes the centre's displacement, as
+the paper does; that has no limit under refinement, since a force at a point of a plane body moves it by
+infinitely much.
+
+Sources: X. Wang et al., PINN-Ray, arXiv:2407.08222, section "Loss function", whose loss times the body's area
+this is; A. M. Stuart, Inverse problems: a Bayesian perspective, Acta Numerica 19 (2010) 451-559, section 2,
+for the posterior's mode.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+from scipy.special import roots_legendre
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.mesh.boundary import boundary_edges
+from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.observations import Observations
+from solvers.problem import Problem
+from solvers.solver import Solver
+
+Weighting = Literal["paper", "precision"]
+
+SMALLEST_DEVIATION = 0.005
+"""Standard deviation that an observation has at least, mm.
+
+Simulated displacements have none at all; a camera that is calibrated well knows a marker to about this.
+"""
+
+MARKER_RADIUS = 0.8
+"""Of a printed marker, mm: half the diameter of `geometry.finger.parameters.Parameters`."""
+
+RINGS, ANGLES = 4, 12
+"""Points of the rule for the mean over a disc: Gauss's in the squared radius, even ones around."""
+
+
+@dataclass(frozen=True, eq=False)
+class Misfit:
+    """1/2 (B u - d)^T W (B u - d) at the m markers that were seen, per depth.
+
+    Attributes:
+        points: Positions of the markers at rest, shape (m, 2), mm.
+        observed: Displacements d, shape (m, 2), mm.
+        weights: The diagonal of W, shape (m, 2), MPa: N/mm of force per depth for 1 mm of misfit.
+        radius: Of the discs over which the displacement is averaged, mm; zero for the points alone.
+    """
+
+    points: FloatArray
+    observed: FloatArray
+    weights: FloatArray
+    radius: float = 0.0
+
+    def sampling(self) -> tuple[FloatArray, FloatArray]:
+        """Points (q, 2), mm, and the weights (m, q) by which a field's values there give B u."""
+        count = len(self.points)
+        if not self.radius:
+            return self.points, np.eye(count)
+        roots, shares = roots_legendre(RINGS)
+        angles = 2 * np.pi * (np.arange(ANGLES) + 0.5) / ANGLES
+        distance = self.radius * np.sqrt(0.5 * (1 + roots))
+        disc = distance[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        points = self.points[:, None] + disc.reshape(-1, 2)
+        return points.reshape(-1, 2), np.kron(np.eye(count), np.repeat(shares / (2 * ANGLES), ANGLES))
+
+    def value(self, displacement: FloatArray) -> float:
+        """The misfit of displacements at the markers, shape (m, 2), mm: N mm / mm."""
+        return 0.5 * float((self.weights * (displacement - self.observed) ** 2).sum())
+
+    def forces(self, displacement: FloatArray) -> FloatArray:
+        """Forces W (d - B u) that pull at the markers, shape (m, 2), N/mm: minus the gradient."""
+        return self.weights * (self.observed - displacement)
+
+    def without(self, marker: int) -> "Misfit":
+        """The misfit of the other markers, whose weights stay what they are."""
+        arrays = (self.points, self.observed, self.weights)
+        points, observed, weights = (np.delete(values, marker, axis=0) for values in arrays)
+        return Misfit(points, observed, weights, self.radius)
+
+    def scaled(self, factor: float) -> "Misfit":
+        """The misfit times a factor."""
+        return replace(self, weights=factor * self.weights)
+
+
+def misfit_of(
+    problem: Problem,
+    *,
+    weights: Weighting = "paper",
+    asm_weight: float = 1000.0,
+    scale: float = 1.0,
+    marker_radius: float = MARKER_RADIUS,
+) -> Misfit | None:
+    """The misfit to a problem's observations; None where it has none.
+
+    Args:
+        problem: With the observations; markers that were not seen are left out.
+        weights: "paper": the loss λ_ASM 1/m Σ |u - d|² beside the mean energy density, times the body's area
+            A, is W = 2 A λ_ASM / m. "precision": W = scale / σ², by the observations' standard deviations,
+            of which none counts as less than `SMALLEST_DEVIATION`. The minimiser of J is then the mode of
+            the posterior for the prior exp(-E / scale) and independent normal errors of the observations.
+        asm_weight: λ_ASM, MPa/mm², for "paper".
+        scale: For "precision", the model's own error as an energy per depth, N mm / mm: a typical deviation
+            from the model's solution has half of it in every degree of freedom. The less, the more the model
+            is believed.
+        marker_radius: Of the discs over which the displacement is averaged, mm; less where a marker is nearer
+            to the boundary of the body.
+    """
+    observations = problem.observations
+    if observations is None:
+        return None
+    seen = observations.visible
+    if weights == "paper":
+        area = float(problem.mesh.areas.sum())
+        diagonal = np.full((int(seen.sum()), 2), 2 * area * asm_weight / seen.sum())
+    else:
+        diagonal = scale / standard_deviations(observations) ** 2
+    points = observations.points[seen]
+    radius = min(marker_radius, _room(problem.mesh, points))
+    return Misfit(points, observations.displacements[seen], diagonal, radius)
+
+
+def standard_deviations(observations: Observations) -> FloatArray:
+    """Those of the markers seen, shape (m, 2), mm, none of them less than `SMALLEST_DEVIATION`."""
+    return np.maximum(observations.standard_deviations[observations.visible], SMALLEST_DEVIATION)
+
+
+def without_each(problem: Problem, missed: FloatArray) -> FloatArray:
+    """What a solver that was not given marker i says of it, from what it misses it by, (m, 2), mm.
+
+    Returns:
+        The displacement of every marker of the observations; NaN where it was not seen.
+    """
+    observations = problem.observations
+    if observations is None:
+        raise UserError("there are no markers to leave out")
+    predicted = np.full(observations.displacements.shape, np.nan)
+    predicted[observations.visible] = observations.displacements[observations.visible] - missed
+    return predicted
+
+
+def _room(mesh: TriangleMesh, points: FloatArray) -> float:
+    """The least distance of points (m, 2), mm, from the boundary of the body, mm."""
+    start, end = mesh.points[boundary_edges(mesh.triangles)].transpose(1, 0, 2)
+    along, offset = end - start, points[:, None] - start
+    share = ((offset * along).sum(axis=2) / (along**2).sum(axis=1)).clip(0, 1)
+    return float(np.linalg.norm(offset - share[..., None] * along, axis=2).min())
+
+
+def check_weighting(
+    solver: str, weights: str, asm_weight: float, scale: float, marker_radius: float = MARKER_RADIUS
+) -> None:
+    """Raise a `UserError` if a solver's settings make no misfit."""
+    if weights not in get_args(Weighting):
+        raise UserError(f"{solver}: weights must be {' or '.join(get_args(Weighting))}, got {weights!r}")
+    for name, value in (
+        ("asm_weight", asm_weight),
+        ("scale", scale),
+        ("marker_radius", marker_radius),
+    ):
+        if not (np.isfinite(value) and value >= 0):
+            raise UserError(f"{solver}: {name} must be zero or more, got {value}")
+
+
+def assimilates(solver: Solver) -> bool:
+    """Whether a solver uses the observations of a problem: those only that say so are given any."""
+    return bool(getattr(solver, "assimilates", False))

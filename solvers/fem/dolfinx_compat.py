@@ -1,0 +1,246 @@
+"""The one module that knows how DOLFINx changed between 0.5 (Debian 12) and 0.11.
+
+It offers a vector space on the shared mesh, with a map between its degrees of freedom and the nodes of a
+`LagrangeSpace`, and sparse solves by MUMPS.
+"""
+
+import inspect
+import logging
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, ClassVar
+
+import dolfinx
+import dolfinx.fem.petsc
+import numpy as np
+import ufl
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from geometry.arrays import BoolArray, FloatArray, IntArray
+from geometry.errors import UserError
+from solvers.fem.ranks import communicator
+from solvers.lagrange import LagrangeSpace
+
+
+def _vector_element() -> Any:
+    if hasattr(ufl, "VectorElement"):  # until 0.6
+        return ufl.VectorElement("Lagrange", "triangle", 1)
+    import basix.ufl
+
+    return basix.ufl.element("Lagrange", "triangle", 1, shape=(2,))
+
+
+def _create_mesh(comm: MPI.Comm, cells: IntArray, points: FloatArray) -> Any:
+    domain = ufl.Mesh(_vector_element())
+    names = inspect.signature(dolfinx.mesh.create_mesh).parameters
+    return dolfinx.mesh.create_mesh(
+        comm, cells=cells, x=points, **{"domain" if "domain" in names else "e": domain}
+    )
+
+
+def _vector_space(mesh: Any, degree: int) -> Any:
+    if hasattr(dolfinx.fem, "functionspace"):  # from 0.7
+        return dolfinx.fem.functionspace(mesh, ("Lagrange", degree, (2,)))
+    return dolfinx.fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
+
+
+def _nodes_of_dofs(space: LagrangeSpace, domain: Any, dolfinx_space: Any) -> IntArray:
+    """The node of the `LagrangeSpace` that every blocked degree of freedom of this rank is.
+
+    A cell of DOLFINx has its degrees of freedom at its corners and, for degree 2, at the middles of the edges
+    opposite to them, in the order of the corners.
+    """
+    geometry = domain.geometry
+    table = geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap  # until 0.10
+    nodes = np.asarray(geometry.input_global_indices)[_rows(table, 3)]
+    if space.degree == 2:
+        nodes = np.concatenate([nodes, space.edge_nodes(nodes[:, OPPOSITE])], axis=1)
+    positions = dolfinx_space.tabulate_dof_coordinates()[:, :2]
+    node_of_dof = np.zeros(len(positions), dtype=np.int64)
+    node_of_dof[_rows(dolfinx_space.dofmap.list, nodes.shape[1])] = nodes
+    if not np.allclose(space.nodes[node_of_dof], positions, rtol=0, atol=1e-9):
+        raise RuntimeError("the degrees of freedom of DOLFINx are numbered in another way than expected")
+    return node_of_dof
+
+
+def _rows(table: Any, width: int) -> IntArray:
+    """A table of DOLFINx with one row a cell: an array from 0.7 on, before it an adjacency list."""
+    return np.asarray(getattr(table, "array", table)).reshape(-1, width)
+
+
+@contextmanager
+def _quiet_compiler() -> Iterator[None]:
+    """Compile forms without the build log that distutils would print through the root logger."""
+    before = logging.root.manager.disable
+    logging.disable(logging.INFO)
+    try:
+        yield
+    finally:
+        logging.disable(before)
+
+
+OPPOSITE = np.array([[1, 2], [0, 2], [0, 1]])
+"""The corners that the edge opposite to each corner joins."""
+
+
+class DistributedSpace:
+    """A DOLFINx vector space on the shared mesh, distributed over ranks.
+
+    Nodal arrays of shape (N, 2), in the numbering of the `LagrangeSpace`, are the same on every rank.
+
+    Attributes:
+        space: The elements in NumPy.
+        comm: The ranks.
+        function: The DOLFINx function that forms are written with.
+    """
+
+    def __init__(self, space: LagrangeSpace, comm: MPI.Comm | None = None) -> None:
+        mesh = space.mesh
+        comm = comm or communicator()
+        share = slice(None) if comm.rank == 0 else slice(0, 0)
+        self.space = space
+        self.comm = comm
+        self.domain = _create_mesh(comm, mesh.triangles[share], np.array(mesh.points[share]))
+        with _quiet_compiler():
+            self.dolfinx_space = _vector_space(self.domain, space.degree)
+        self.function = dolfinx.fem.Function(self.dolfinx_space)
+        self._node_of_dof = _nodes_of_dofs(space, self.domain, self.dolfinx_space)
+        self._owned = self.dolfinx_space.dofmap.index_map.size_local
+
+    def constant(self, value: float) -> Any:
+        """A number that can change without compiling the form again."""
+        return dolfinx.fem.Constant(self.domain, PETSc.ScalarType(value))
+
+    def form(self, expression: Any) -> Any:
+        """Compile a UFL form."""
+        with _quiet_compiler():
+            return dolfinx.fem.form(expression)
+
+    def clamp(self, nodes: IntArray, axes: Sequence[int] = (0, 1)) -> list[Any]:
+        """Homogeneous Dirichlet conditions on components of nodes."""
+        dofs = np.flatnonzero(np.isin(self._node_of_dof, nodes)).astype(np.int32)
+        conditions = []
+        for axis in axes:
+            part = self.dolfinx_space.sub(axis)
+            # A sub-space numbers its degrees of freedom within the blocked parent.
+            conditions.append(
+                dolfinx.fem.dirichletbc(PETSc.ScalarType(0.0), (2 * dofs + axis).astype(np.int32), part)
+            )
+        return conditions
+
+    def assemble_matrix(
+        self, form: Any, conditions: Sequence[Any], *, into: PETSc.Mat | None = None
+    ) -> PETSc.Mat:
+        """Matrix with rows and columns of clamped components replaced by the identity.
+
+        Args:
+            form: The compiled bilinear form.
+            conditions: What is clamped.
+            into: An earlier matrix of the same form, which is overwritten; a new one if None.
+        """
+        assemble: Any = dolfinx.fem.petsc.assemble_matrix
+        if into is None:
+            matrix = assemble(form, bcs=list(conditions))
+        else:
+            into.zeroEntries()
+            matrix = assemble(into, form, bcs=list(conditions))
+        matrix.assemble()
+        return matrix
+
+    def add_blocks(self, matrix: PETSc.Mat, nodes: IntArray, blocks: FloatArray) -> None:
+        """Add blocks of shape (m, 2, 2) to a matrix, each on the diagonal of one of m different nodes."""
+        row_of_node = np.full(len(self.space.nodes), -1, dtype=np.int32)
+        row_of_node[self._node_of_dof[: self._owned]] = np.arange(self._owned)
+        for row, block in zip(row_of_node[nodes], blocks, strict=True):
+            if row >= 0:
+                matrix.setValuesBlockedLocal(row, row, block, addv=PETSc.InsertMode.ADD_VALUES)
+        matrix.assemble()
+
+    def assemble_nodal(self, form: Any) -> FloatArray:
+        """A linear form on every shape function, shape (N, 2)."""
+        vector = dolfinx.fem.petsc.assemble_vector(form)
+        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        return self.gather(vector)
+
+    def assemble_scalar(self, form: Any) -> float:
+        """An integral over the whole body."""
+        return float(self.comm.allreduce(dolfinx.fem.assemble_scalar(form), op=MPI.SUM))
+
+    def set_function(self, values: FloatArray) -> None:
+        """Give `function` nodal values of shape (N, 2)."""
+        self.function.x.array[:] = values[self._node_of_dof].ravel()
+
+    def distribute(self, values: FloatArray, vector: PETSc.Vec) -> None:
+        """Fill a PETSc vector from nodal values of shape (N, 2)."""
+        vector.array[:] = values[self._node_of_dof[: self._owned]].ravel()
+
+    def gather(self, vector: PETSc.Vec) -> FloatArray:
+        """Nodal values of shape (N, 2) of a PETSc vector, the same on every rank."""
+        values = np.zeros((len(self.space.nodes), 2))
+        values[self._node_of_dof[: self._owned]] = vector.array.reshape(-1, 2)
+        if self.comm.size > 1:
+            self.comm.Allreduce(MPI.IN_PLACE, values, op=MPI.SUM)
+        return values
+
+
+class Factorisation:
+    """A symmetric matrix factorised by MUMPS, for any number of right-hand sides.
+
+    Args:
+        space: Whose nodal arrays the right-hand sides and solutions are.
+        matrix: The assembled matrix.
+        clamped: Mask of shape (N, 2): components whose right-hand side is set to zero.
+        positive_definite: False where a tangent may be indefinite.
+
+    Attributes:
+        message: How the systems are solved, for people.
+        stats: The same for a table.
+    """
+
+    message: ClassVar[str] = "solved directly"
+    stats: ClassVar[dict[str, float | int | str]] = {"linear_solver": "direct"}
+
+    def __init__(
+        self, space: DistributedSpace, matrix: PETSc.Mat, clamped: BoolArray, *, positive_definite: bool
+    ) -> None:
+        self._space = space
+        self._clamped = clamped
+        self._matrix = matrix
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        matrix.setOption(PETSc.Mat.Option.SPD, positive_definite)
+        self._ksp = PETSc.KSP().create(space.comm)
+        self._ksp.setOperators(matrix)
+        self._ksp.setType(PETSc.KSP.Type.PREONLY)
+        preconditioner = self._ksp.getPC()
+        preconditioner.setType(PETSc.PC.Type.CHOLESKY)
+        preconditioner.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+        preconditioner.destroy()  # the name only: petsc4py would keep it, and the factors, for ever
+        self._ksp.setErrorIfNotConverged(True)
+        self.update()
+
+    def update(self) -> None:
+        """Factorise again after the matrix has got new values in its old places: the analysis is kept."""
+        self._ksp.setOperators(self._matrix)
+        try:
+            self._ksp.setUp()
+        except PETSc.Error as error:
+            raise UserError(
+                "MUMPS cannot factorise the stiffness matrix: "
+                "is there enough memory, and is no element nearly flat?"
+            ) from error
+
+    def solve(self, nodal: FloatArray) -> FloatArray:
+        """Solve for a right-hand side of shape (N, 2); the solution has the same shape."""
+        right, solution = self._matrix.createVecs()
+        self._space.distribute(np.where(self._clamped, 0.0, nodal), right)
+        self._ksp.solve(right, solution)
+        values = self._space.gather(solution)
+        right.destroy()
+        solution.destroy()
+        return values
+
+    def destroy(self) -> None:
+        """Free the factors."""
+        self._ksp.destroy()
+        self._matrix.destroy()

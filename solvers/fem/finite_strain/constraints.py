@@ -1,0 +1,81 @@
+"""Functionals of the displacements whose values are given, rigidly or through springs, and their forces."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import BoolArray, FloatArray
+from solvers.assimilation.misfit import Misfit
+from solvers.fem.conditions import load_functionals
+from solvers.lagrange import LagrangeSpace
+from solvers.problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class Constraints:
+    """b_k . c + s_k f_k = d_k, with displacements c and forces f_k by which the functionals are held.
+
+    Attributes:
+        functionals: b_k, shape (k, N, 2).
+        targets: d_k under the full load, shape (k,), mm.
+        slacks: s_k, shape (k,), mm per N/mm: zero where the value is prescribed, else the compliance of a
+            spring between functional and value, whose energy is (d_k - b_k . c)^2 / (2 s_k).
+    """
+
+    functionals: FloatArray
+    targets: FloatArray
+    slacks: FloatArray
+
+    @classmethod
+    def of(cls, problem: Problem, space: LagrangeSpace, slack: float = 0.0) -> "Constraints":
+        """The load's, all of one slack; none but for a `mean` or `point` load."""
+        if problem.load.kind not in ("mean", "point"):
+            return cls(np.zeros((0, len(space.nodes), 2)), np.zeros(0), np.zeros(0))
+        targets = problem.load.values
+        return cls(load_functionals(problem, space), targets, np.full(len(targets), slack))
+
+    @classmethod
+    def springs(cls, misfit: Misfit, space: LagrangeSpace) -> "Constraints":
+        """Springs between markers and where they were observed, whose energy is the misfit; u v u v ..."""
+        points, weights = misfit.sampling()
+        sampling = weights @ space.shape_functions(space.mesh.locate(points)).toarray()
+        functionals = np.kron(sampling, np.eye(2)).reshape(-1, len(space.nodes), 2)
+        return cls(functionals, misfit.observed.ravel(), 1 / misfit.weights.ravel())
+
+    def joined(self, other: "Constraints") -> "Constraints":
+        """These and others after them."""
+        return Constraints(
+            np.concatenate([self.functionals, other.functionals]),
+            np.concatenate([self.targets, other.targets]),
+            np.concatenate([self.slacks, other.slacks]),
+        )
+
+    def only(self, kept: BoolArray) -> "Constraints":
+        """Those of a mask of shape (k,)."""
+        return Constraints(self.functionals[kept], self.targets[kept], self.slacks[kept])
+
+    def values(self, nodal: FloatArray) -> FloatArray:
+        """b_k . c of displacements of shape (N, 2), mm: shape (k,)."""
+        return np.asarray(np.einsum("knx,nx->k", self.functionals, nodal))
+
+    def at_nodes(self, forces: FloatArray) -> FloatArray:
+        """f_k b_k of forces of shape (k,), N/mm: shape (N, 2)."""
+        return np.asarray(np.einsum("k,knx->nx", forces, self.functionals))
+
+    def missing(self, nodal: FloatArray, forces: FloatArray, fraction: float) -> FloatArray:
+        """By how much they are missed at a fraction of the load, shape (k,), mm."""
+        return np.asarray(fraction * self.targets - self.values(nodal) - self.slacks * forces)
+
+    def held(
+        self, nodal: FloatArray, missing: FloatArray, responses: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Displacements under more forces, by which the constraints that are missed are met, and these.
+
+        Args:
+            nodal: Displacements, shape (N, 2), mm.
+            missing: d_k - b_k . c, shape (k,), mm.
+            responses: Displacements K^-1 b_k under unit forces, shape (k, N, 2), mm per N/mm.
+        """
+        compliance = np.einsum("inx,jnx->ij", self.functionals, responses) + np.diag(self.slacks)
+        forces = np.linalg.solve(compliance, missing)
+        return nodal + np.einsum("k,knx->nx", forces, responses), forces

@@ -1,0 +1,179 @@
+"""A rigid cylinder pressed on the front face without friction: gaps, forces and what they do to equilibrium.
+
+The gap is collocated at the nodes of the boundary `front`, which are the points of Simpson's rule on the
+edges of quadratic elements (of the trapezium rule on linear ones). With g the gap of a node, positive outside
+the cylinder, and λ its multiplier, the nodal force is q = max(0, λ - k g): the augmented Lagrangian of
+J. C. Simo, T. A. Laursen, An augmented Lagrangian treatment of contact problems involving friction, Computers
+& Structures 42 (1992) 97-116, without friction. Which nodes touch is found, not given.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import FloatArray, IntArray
+from solvers.lagrange import LagrangeSpace
+from solvers.problem import Problem, contact_ends
+
+STIFFNESS = 10.0
+"""k over Young's modulus: a larger one needs fewer updates of the multipliers but more Newton iterations."""
+
+
+@dataclass(frozen=True, eq=False)
+class CylinderContact:
+    """The cylinder and the m nodes that it may touch, in the order of x.
+
+    Attributes:
+        nodes: Numbers of the nodes, shape (m,).
+        positions: Where they are before the load, shape (m, 2), mm.
+        centre: Of the cylinder before the load, shape (2,), mm: it touches y = 0 from outside.
+        travel: Of the cylinder under the full load, shape (2,), mm.
+        radius: mm.
+        stiffness: k, N/mm per mm.
+        degree: Of the elements.
+    """
+
+    nodes: IntArray
+    positions: FloatArray
+    centre: FloatArray
+    travel: FloatArray
+    radius: float
+    stiffness: float
+    degree: int
+
+    @classmethod
+    def of(cls, problem: Problem, space: LagrangeSpace) -> "CylinderContact":
+        """The contact of a problem whose load is a `cylinder`."""
+        load = problem.load
+        nodes = space.boundary_nodes("front")
+        nodes = nodes[np.argsort(space.nodes[nodes, 0])]
+        return cls(
+            nodes=nodes,
+            positions=space.nodes[nodes],
+            centre=np.array([np.mean(contact_ends(problem)), load.radius]),
+            travel=load.values,
+            radius=float(load.radius or 0),
+            stiffness=STIFFNESS * problem.material.young,
+            degree=space.degree,
+        )
+
+    @property
+    def longest_step(self) -> float:
+        """The fraction of the load in which the cylinder moves by half its radius."""
+        return float(0.5 * self.radius / np.linalg.norm(self.travel))
+
+    def gaps(self, nodal: FloatArray, fraction: float) -> tuple[FloatArray, FloatArray]:
+        """Distances from the cylinder, shape (m,), mm, and its outer normals there, shape (m, 2).
+
+        Args:
+            nodal: Displacements of all nodes, shape (N, 2), mm.
+            fraction: Of the load.
+        """
+        away = self.positions + nodal[self.nodes] - self.centre - fraction * self.travel
+        distance = np.linalg.norm(away, axis=1)
+        return distance - self.radius, away / distance[:, None]
+
+    def forces(self, nodal: FloatArray, fraction: float, multipliers: FloatArray) -> FloatArray:
+        """Forces q of the cylinder on the nodes along its outer normal, shape (m,), N/mm; never tension."""
+        gap, _ = self.gaps(nodal, fraction)
+        return np.maximum(0.0, multipliers - self.stiffness * gap)
+
+    def gradient(self, nodal: FloatArray, fraction: float, multipliers: FloatArray) -> FloatArray:
+        """What contact adds to the balance of the m nodes: - q n, shape (m, 2), N/mm.
+
+        It is the derivative of the sum of (q^2 - λ^2) / 2 k.
+        """
+        _, normal = self.gaps(nodal, fraction)
+        return -self.forces(nodal, fraction, multipliers)[:, None] * normal
+
+    def tangent(self, nodal: FloatArray, fraction: float, multipliers: FloatArray) -> FloatArray:
+        """Derivative of the gradient, a block k n n^T - q (I - n n^T) / |away| a node, shape (m, 2, 2)."""
+        gap, normal = self.gaps(nodal, fraction)
+        force = np.maximum(0.0, multipliers - self.stiffness * gap)
+        across = np.einsum("mi,mj->mij", normal, normal)
+        turning = (force / (gap + self.radius))[:, None, None] * (np.eye(2) - across)
+        return np.asarray((force > 0)[:, None, None] * self.stiffness * across - turning)
+
+    def lengths(self, nodal: FloatArray) -> FloatArray:
+        """Deformed length of front face that each node stands for by the edges' rule, shape (m,), mm."""
+        pieces = np.linalg.norm(np.diff(self.positions + nodal[self.nodes], axis=0), axis=1)
+        edges = pieces.reshape(-1, self.degree).sum(axis=1)
+        lengths = np.zeros(len(self.nodes))
+        for place, share in enumerate({1: (1 / 2, 1 / 2), 2: (1 / 6, 4 / 6, 1 / 6)}[self.degree]):
+            lengths[place :: self.degree][: len(edges)] += share * edges
+        return lengths
+
+
+@dataclass(frozen=True)
+class ContactRegion:
+    """Where the cylinder touches the finger, and how hard.
+
+    Attributes:
+        start: Abscissa before the load of the end nearer to the base, mm.
+        end: Of the other end, mm.
+        parts: Number of separate intervals between them.
+        width: Deformed length of front face in contact, mm.
+        spacing: Deformed length between neighbouring points there, mm: how well the width is known.
+        pressure: Largest Cauchy pressure, MPa.
+        penetration: How far a point of the front lies within the cylinder at most, mm.
+        force: Integral of the pressure, N/mm: sum of q n.
+        at_end: Whether the region reaches an end of the front face, beyond which no contact is looked for.
+    """
+
+    start: float
+    end: float
+    parts: int
+    width: float
+    spacing: float
+    pressure: float
+    penetration: float
+    force: tuple[float, float]
+    at_end: bool
+
+    def stats(self) -> dict[str, float | int]:
+        """The numbers for a solution's record."""
+        return {
+            "contact_start_mm": self.start,
+            "contact_end_mm": self.end,
+            "contact_parts": self.parts,
+            "contact_width_mm": self.width,
+            "contact_spacing_mm": self.spacing,
+            "contact_pressure_MPa": self.pressure,
+            "penetration_mm": self.penetration,
+        }
+
+    @classmethod
+    def of(
+        cls, contact: CylinderContact, nodal: FloatArray, fraction: float, force: FloatArray
+    ) -> "ContactRegion | None":
+        """The region in a state of equilibrium; none where the cylinder does not touch the finger.
+
+        Its ends are taken half way between a point that touches and the next one that does not.
+
+        Args:
+            contact: The cylinder.
+            nodal: Displacements of all nodes, shape (N, 2), mm.
+            fraction: Of the load.
+            force: On the nodes of the front, shape (m,), N/mm.
+        """
+        gap, normal = contact.gaps(nodal, fraction)
+        touching = np.flatnonzero(force > 0)
+        if not len(touching):
+            return None
+        first, last = int(touching[0]), int(touching[-1])
+        x = contact.positions[:, 0]
+        between = np.concatenate([x[:1], 0.5 * (x[1:] + x[:-1]), x[-1:]])
+        moved = contact.positions + nodal[contact.nodes]
+        halves = 0.5 * np.linalg.norm(np.diff(moved, axis=0), axis=1)
+        shares = np.append(halves, 0.0) + np.insert(halves, 0, 0.0)
+        return cls(
+            start=float(between[first]),
+            end=float(between[last + 1]),
+            parts=int(np.count_nonzero(np.diff(touching) > 1)) + 1,
+            width=float(shares[touching].sum()),
+            spacing=float(shares[touching].max()),
+            pressure=float((force / contact.lengths(nodal)).max()),
+            penetration=float(max(0.0, -gap.min())),
+            force=(float(force @ normal[:, 0]), float(force @ normal[:, 1])),
+            at_end=first == 0 or last == len(x) - 1,
+        )

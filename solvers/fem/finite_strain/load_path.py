@@ -1,0 +1,197 @@
+"""From rest to the full load in steps that adapt to how hard they are."""
+
+import math
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from geometry.arrays import BoolArray, FloatArray
+from solvers.fem.conditions import reaction_by_residual_work
+from solvers.fem.finite_strain.constraints import Constraints
+from solvers.fem.finite_strain.contact import ContactRegion
+from solvers.fem.finite_strain.equilibrium import Equilibrium, Stage
+from solvers.fem.finite_strain.newton import BorderedNewton
+from solvers.lagrange import LagrangeSpace
+from solvers.problem import Problem
+from solvers.solver import Progress
+
+QUICK = 5
+"""Newton iterations of a step after which the next one may be twice as long."""
+UPDATES = 30
+"""Solves in a step, each with better multipliers of the contact, before the step counts as failed."""
+PENETRATION = 1e-5
+"""How far a node may lie within the cylinder, and one that is pressed outside of it, mm."""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Fractions of the load: of the first step, of the longest and of the shortest one."""
+
+    first: float
+    longest: float
+    shortest: float
+
+
+@dataclass(frozen=True, eq=False)
+class PathPoint:
+    """Equilibrium at a fraction of the load.
+
+    Attributes:
+        fraction: Of the load.
+        nodal: Displacements, shape (N, 2), mm.
+        forces: Multipliers of the constraints, shape (k,), N/mm.
+        contact: Forces of the cylinder on the nodes of the front, shape (m,), N/mm.
+    """
+
+    fraction: float
+    nodal: FloatArray
+    forces: FloatArray
+    contact: FloatArray
+
+
+class LoadPath:
+    """Equilibria that a problem runs through as its load grows.
+
+    Every step starts from the last two states extrapolated, the first from the linear solution. A step whose
+    Newton iteration fails is halved.
+
+    Attributes:
+        equilibrium: The discrete problem.
+        points: What was found, from rest.
+        halved: How many steps failed.
+        iterations: Newton iterations of all steps.
+        reason: How the last step that failed did, where it was Newton's method in PETSc's word.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        space: LagrangeSpace,
+        steps: Steps,
+        *,
+        tolerance: float,
+        max_iterations: int,
+        constraints: Constraints | None = None,
+    ) -> None:
+        """Prepare the path.
+
+        Args:
+            problem: With the full load.
+            space: The elements.
+            steps: Fractions of the load.
+            tolerance: Of `BorderedNewton`.
+            max_iterations: Of `BorderedNewton`.
+            constraints: The load's, and others whose targets grow with it; the load's if None.
+        """
+        self._steps, self._space = steps, space
+        self.equilibrium = Equilibrium(problem, space, constraints)
+        self._begin = partial(
+            BorderedNewton,
+            self.equilibrium,
+            scale=problem.material.young,
+            tolerance=tolerance,
+            max_iterations=max_iterations,
+        )
+        self._newton = self._begin()
+        contact = self.equilibrium.contact
+        self._longest = steps.longest if contact is None else min(steps.longest, contact.longest_step)
+        pressed = np.zeros(0 if contact is None else len(contact.nodes))
+        rest = np.zeros((len(space.nodes), 2))
+        self.points = [PathPoint(0.0, rest, np.zeros(len(self.equilibrium.constraints.targets)), pressed)]
+        self.halved = self.iterations = 0
+        self.reason = ""
+
+    def close(self) -> None:
+        """Free what PETSc holds, on all ranks at once."""
+        self._newton.close()
+        self.equilibrium.factors.destroy()
+
+    def follow(self, progress: Progress) -> None:
+        """Go to the full load, or as far as there is equilibrium."""
+        step = min(self._steps.first, self._longest)
+        while (rest := 1 - self.points[-1].fraction) > 0:
+            fraction = 1 - rest * (1 - 1 / math.ceil(rest / step - 1e-9))  # equal steps to the end
+            before = self.iterations
+            point, hardest = self._step(fraction)
+            if point is None:
+                self.halved += 1
+                step /= 2
+                if step < self._steps.shortest:
+                    return
+                continue
+            self.points.append(point)
+            progress(fraction, f"{fraction:.0%} of the load, {self.iterations - before} Newton iterations")
+            step = min(self._longest, step * (2 if hardest <= QUICK else 1))
+
+    def continued(self, problem: Problem, nodal: FloatArray, forces: FloatArray) -> PathPoint | None:
+        """Equilibrium at the full load of a problem for which `Equilibrium.become` is; None if none is found.
+
+        Args:
+            problem: With another load and moduli.
+            nodal: Displacements that are near, shape (N, 2), mm.
+            forces: Multipliers that are near, shape (k,), N/mm.
+        """
+        self.equilibrium.become(problem)
+        balance = self._newton.solve(nodal, forces, Stage(1.0, np.zeros(0)))
+        self.iterations += balance.iterations
+        if not balance.converged:
+            return None
+        return PathPoint(1.0, balance.nodal, balance.forces, np.zeros(0))
+
+    def relaxed(self, kept: BoolArray) -> PathPoint | None:
+        """Equilibrium at the full load near the last one, under the constraints of a mask alone, if any."""
+        last, constraints = self.points[-1], self.equilibrium.constraints
+        self.equilibrium.constraints = constraints.only(kept)
+        newton = self._begin()
+        balance = newton.solve(last.nodal, last.forces[kept], Stage(1.0, last.contact))
+        newton.close()
+        self.equilibrium.constraints = constraints
+        self.iterations += balance.iterations
+        return PathPoint(1.0, balance.nodal, balance.forces, last.contact) if balance.converged else None
+
+    def _step(self, fraction: float) -> tuple[PathPoint | None, int]:
+        """Equilibrium at a fraction of the load, None if there is none; iterations of the hardest solve."""
+        nodal, forces, pressed = self._guess(fraction)
+        hardest = 0
+        for _ in range(UPDATES):
+            balance = self._newton.solve(nodal, forces, Stage(fraction, pressed))
+            self.iterations += balance.iterations
+            hardest = max(hardest, balance.iterations)
+            if not balance.converged:
+                self.reason = f"SNES: {balance.reason}"
+                return None, hardest
+            nodal, forces = balance.nodal, balance.forces
+            contact = self.equilibrium.contact
+            if contact is None:
+                return PathPoint(fraction, nodal, forces, pressed), hardest
+            pressed = contact.forces(nodal, fraction, pressed)
+            gap, _ = contact.gaps(nodal, fraction)
+            if max(np.abs(gap[pressed > 0]).max(initial=0.0), -gap.min()) <= PENETRATION:
+                return PathPoint(fraction, nodal, forces, pressed), hardest
+        self.reason = "the contact does not settle"
+        return None, hardest
+
+    def _guess(self, fraction: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Displacements and multipliers at a fraction of the load: the last two states continued."""
+        last = self.points[-1]
+        if len(self.points) == 1:
+            return self.equilibrium.linear_guess(fraction)
+        before = self.points[-2]
+        slope = (fraction - last.fraction) / (last.fraction - before.fraction)
+        return (
+            last.nodal + slope * (last.nodal - before.nodal),
+            last.forces + slope * (last.forces - before.forces),
+            last.contact,
+        )
+
+    def reaction(self, point: PathPoint) -> FloatArray:
+        """Force of the indenter on the finger, shape (2,), N/mm."""
+        return reaction_by_residual_work(self._space, self.equilibrium.internal_force(point.nodal))
+
+    def region(self, point: PathPoint) -> ContactRegion | None:
+        """Where a cylinder touches the finger; None where it does not, or there is none."""
+        contact = self.equilibrium.contact
+        if contact is None:
+            return None
+        return ContactRegion.of(contact, point.nodal, point.fraction, point.contact)

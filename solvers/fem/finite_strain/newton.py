@@ -1,0 +1,173 @@
+"""Newton's method with line search by PETSc's SNES, for displacements and multipliers together."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from geometry.arrays import FloatArray
+from solvers.fem.finite_strain.equilibrium import Equilibrium, Stage
+
+SMALL = 1e-4
+"""Least size of the internal forces over Young's modulus, mm: rounding of positions makes forces too."""
+SHORTEST = 2.0**-10
+"""Fraction of a Newton step below which shortening it any further is no use."""
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """How a Newton iteration ended.
+
+    Attributes:
+        nodal: Displacements, shape (N, 2), mm.
+        forces: Multipliers of the constraints, shape (k,), N/mm.
+        converged: Whether they are in equilibrium.
+        reason: PETSc's word for the end, in lower case.
+        iterations: Newton steps taken.
+    """
+
+    nodal: FloatArray
+    forces: FloatArray
+    converged: bool
+    reason: str
+    iterations: int
+
+
+class BorderedNewton:
+    """SNES on the unknowns [c; f] of an `Equilibrium`.
+
+        R(c, f) = [dΠ/dc - f_k b_k;  s (d_k - b_k . c - s_k f_k)]      J = [K, -b;  -s b^T, -s diag(s_k)]
+
+    The factor s, Young's modulus, makes forces of the constraints. J y = R is solved by elimination: with K
+    factorised, a = K^-1 R_c and x_k = K^-1 b_k,
+
+        (b_i . x_j + s_i δ_ij) y_f = -R_f / s - b . a        y_c = a + x_k y_fk
+
+    A step that would turn an element inside out is halved before the line search begins, which looks at the
+    size of R.
+    """
+
+    def __init__(
+        self, equilibrium: Equilibrium, *, scale: float, tolerance: float, max_iterations: int
+    ) -> None:
+        """Prepare the solver.
+
+        Args:
+            equilibrium: The problem.
+            scale: s, MPa.
+            tolerance: The iteration ends where R is below this fraction of the largest internal force.
+            max_iterations: Newton steps.
+        """
+        self._equilibrium, self._scale, self._tolerance = equilibrium, scale, tolerance
+        self._stage = Stage(0.0, np.zeros(0))
+        self._size = 0.0
+        self._torn = False
+        self._part, _ = equilibrium.matrix.createVecs()
+        comm = equilibrium.distributed.comm
+        self._last = comm.size - 1
+        own = self._part.getLocalSize()
+        border = len(equilibrium.constraints.targets) if comm.rank == self._last else 0
+        self._unknown = PETSc.Vec().createMPI((own + border, PETSc.DETERMINE), comm=comm)
+        self._residual = self._unknown.duplicate()
+        sizes = self._unknown.getSizes()
+        self._jacobian = PETSc.Mat().createPython((sizes, sizes), context=self, comm=comm)
+        self._jacobian.setUp()
+        self._snes = PETSc.SNES().create(comm)
+        self._snes.setFunction(self._evaluate, self._residual)
+        self._snes.setJacobian(self._factorise, self._jacobian)
+        self._snes.setLineSearchPreCheck(self._shorten)
+        self._snes.setConvergenceTest(self._ended)
+        self._snes.setTolerances(max_it=max_iterations)
+        linear = self._snes.getKSP()
+        linear.setType(PETSc.KSP.Type.PREONLY)
+        elimination = linear.getPC()
+        elimination.setType(PETSc.PC.Type.PYTHON)
+        elimination.setPythonContext(self)
+        elimination.destroy()  # the names only: petsc4py would keep them for ever
+        linear.destroy()
+
+    def close(self) -> None:
+        """Free what PETSc holds, on all ranks at once."""
+        for item in (self._snes, self._jacobian, self._residual, self._unknown, self._part):
+            item.destroy()
+
+    def solve(self, nodal: FloatArray, forces: FloatArray, stage: Stage) -> Balance:
+        """Find equilibrium at a stage from displacements that meet its constraints."""
+        self._stage, self._torn = stage, not self._equilibrium.possible(nodal)
+        if self._torn:
+            return Balance(nodal, forces, False, "diverged_function_domain", 0)
+        self._join(nodal, forces, self._unknown)
+        self._snes.solve(None, self._unknown)
+        nodal, forces = self._split(self._unknown)
+        reason = self._snes.getConvergedReason()
+        words = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if name[0] != "_"}
+        word = "diverged_function_domain" if self._torn else words[reason].lower()
+        return Balance(nodal, forces, reason > 0, word, self._snes.getIterationNumber())
+
+    def apply(self, preconditioner: PETSc.PC, right: PETSc.Vec, step: PETSc.Vec) -> None:
+        """J^-1, as PETSc calls it."""
+        balance, missed = self._split(right)
+        nodal = self._equilibrium.factors.solve(balance)
+        constraints = self._equilibrium.constraints
+        missing = -missed / self._scale - constraints.values(nodal)
+        self._join(*constraints.held(nodal, missing, self._responses), step)
+
+    def mult(self, matrix: PETSc.Mat, step: PETSc.Vec, product: PETSc.Vec) -> None:
+        """J times a step, as the line search calls it."""
+        nodal, forces = self._split(step)
+        distributed, constraints = self._equilibrium.distributed, self._equilibrium.constraints
+        distributed.distribute(nodal, self._part)
+        force = self._part.duplicate()
+        self._equilibrium.matrix.mult(self._part, force)
+        balance = distributed.gather(force) - constraints.at_nodes(forces)
+        force.destroy()
+        missed = self._scale * constraints.missing(nodal, forces, 0.0)
+        self._join(np.where(self._equilibrium.clamped, 0.0, balance), missed, product)
+
+    def _evaluate(self, snes: PETSc.SNES, unknown: PETSc.Vec, residual: PETSc.Vec) -> None:
+        nodal, forces = self._split(unknown)
+        balance, self._size = self._equilibrium.unbalanced(nodal, forces, self._stage)
+        missed = self._equilibrium.constraints.missing(nodal, forces, self._stage.fraction)
+        self._join(balance, self._scale * missed, residual)
+
+    def _factorise(self, snes: PETSc.SNES, unknown: PETSc.Vec, jacobian: PETSc.Mat, other: PETSc.Mat) -> None:
+        nodal, _ = self._split(unknown)
+        self._equilibrium.factorise(nodal, self._stage)
+        self._responses = self._equilibrium.responses()
+
+    def _shorten(self, unknown: PETSc.Vec, step: PETSc.Vec) -> bool:
+        """Halve the step, which will be subtracted, until no element is turned inside out."""
+        start, _ = self._split(unknown)
+        down, _ = self._split(step)
+        length = 1.0
+        while not self._equilibrium.possible(start - length * down) and length >= SHORTEST:
+            length /= 2
+        self._torn = length < SHORTEST
+        step.scale(length)
+        return length < 1
+
+    def _ended(self, snes: PETSc.SNES, iteration: int, norms: Any) -> int:
+        reasons = PETSc.SNES.ConvergedReason
+        if self._torn:
+            return int(reasons.DIVERGED_FUNCTION_DOMAIN)
+        residual = snes.getFunction()[0].norm(PETSc.NormType.INFINITY)
+        if not np.isfinite(residual):
+            return int(reasons.DIVERGED_FNORM_NAN)
+        if residual <= self._tolerance * max(self._size, SMALL * self._scale):
+            return int(reasons.CONVERGED_FNORM_RELATIVE)
+        return int(reasons.CONVERGED_ITERATING)
+
+    def _split(self, unknown: PETSc.Vec) -> tuple[FloatArray, FloatArray]:
+        """Displacements, shape (N, 2), and multipliers, shape (k,), the same on every rank."""
+        values = unknown.array_r
+        own = self._part.getLocalSize()
+        self._part.array[:] = values[:own]
+        nodal = self._equilibrium.distributed.gather(self._part)
+        return nodal, self._equilibrium.distributed.comm.bcast(values[own:].copy(), root=self._last)
+
+    def _join(self, nodal: FloatArray, forces: FloatArray, unknown: PETSc.Vec) -> None:
+        self._equilibrium.distributed.distribute(nodal, self._part)
+        own = self._part.getLocalSize()
+        unknown.array[:own] = self._part.array_r
+        unknown.array[own:] = forces[: unknown.getLocalSize() - own]

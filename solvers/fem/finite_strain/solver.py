@@ -1,0 +1,166 @@
+"""`fem-nonlinear`: finite-strain elasticity with DOLFINx, the project's virtual experiment."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from solvers.fem.error_estimate import ErrorEstimator
+from solvers.fem.finite_strain.constraints import Constraints
+from solvers.fem.finite_strain.contact import ContactRegion
+from solvers.fem.finite_strain.equilibrium import Stage
+from solvers.fem.finite_strain.load_path import LoadPath, Steps
+from solvers.fem.locking import locking_advice
+from solvers.fem.ranks import on_all_ranks
+from solvers.lagrange import LagrangeField, LagrangeSpace
+from solvers.problem import Problem
+from solvers.solution import ErrorEstimate, Solution, Status
+from solvers.solver import Progress, check_problem, silent
+
+
+@dataclass(frozen=True)
+class FemNonlinearSolver:
+    """Neo-Hookean or St Venant-Kirchhoff plane strain by Newton's method, the load applied in adaptive steps.
+
+    Every step starts from the last two states extrapolated; the first from the linear solution. A step whose
+    Newton iteration fails, or turns an element inside out, is halved. A `patch` whose tangential component is
+    free slides. A `cylinder` presses without friction on the part of the front face that is found.
+
+    Attributes:
+        degree: Degree of the elements, 1 or 2.
+        first_step: First fraction of the load.
+        max_step: Largest fraction of the load in one step.
+        min_step: Fraction of the load below which the solver gives up.
+        tolerance: Newton stops when the residual force is below this fraction of the internal forces.
+        max_iterations: Newton iterations in one step.
+    """
+
+    degree: int = 2
+    first_step: float = 0.05
+    max_step: float = 0.2
+    min_step: float = 1e-3
+    tolerance: float = 1e-8
+    max_iterations: int = 12
+    name: ClassVar[str] = "fem-nonlinear"
+    laws: ClassVar[tuple[str, ...]] = ("neo-hookean", "st-venant-kirchhoff")
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch", "cylinder")
+
+    def __post_init__(self) -> None:
+        if self.degree not in (1, 2):
+            raise UserError(f"fem-nonlinear has elements of degree 1 and 2, not {self.degree}")
+        if not 0 < self.min_step <= self.first_step <= self.max_step <= 1:
+            raise UserError("fem-nonlinear needs 0 < min_step <= first_step <= max_step <= 1")
+
+    def settings(self) -> dict[str, object]:
+        """Element degree, load steps and Newton's criteria."""
+        return asdict(self)
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        """Solve the finite-strain problem; see `Solver`. The material law must be one of finite strain."""
+        check_problem(self, problem)
+        return on_all_ranks(self._solve, problem, progress)
+
+    def path(
+        self, problem: Problem, space: LagrangeSpace, constraints: Constraints | None = None
+    ) -> LoadPath:
+        """The load path that is to be followed, with constraints as `LoadPath` has them."""
+        return LoadPath(
+            problem,
+            space,
+            Steps(self.first_step, self.max_step, self.min_step),
+            tolerance=self.tolerance,
+            max_iterations=self.max_iterations,
+            constraints=constraints,
+        )
+
+    def _solve(self, problem: Problem, progress: Progress) -> Solution:
+        started = time.perf_counter()
+        space = LagrangeSpace(problem.mesh, self.degree)
+        path = self.path(problem, space)
+        path.follow(progress)
+        points, energies = path.points, [path.equilibrium.energy(point.nodal) for point in path.points]
+        reactions = np.array([path.reaction(point) for point in points])
+        last = points[-1]
+        regions = [path.region(point) for point in points]
+        solved = time.perf_counter()
+        error = _error(path, problem, space)
+        path.close()
+        remarks = [
+            f"error of the discretisation {error.phrase}" if error else "",
+            locking_advice(self.degree, problem.material),
+        ]
+        return Solution(
+            solver=self.name,
+            problem=problem,
+            field=LagrangeField(space, last.nodal),
+            energy=energies[-1],
+            reaction=reactions[-1],
+            status=_status(path, regions, "; ".join(filter(None, remarks))),
+            stats={
+                "seconds": solved - started,
+                "estimate_seconds": time.perf_counter() - solved,
+                "unknowns": last.nodal.size,
+                "load_steps": len(points) - 1,
+                "halved_steps": path.halved,
+                "newton_iterations": path.iterations,
+                "degree": self.degree,
+                **(regions[-1].stats() if regions[-1] else {}),
+            },
+            history={
+                "load_fraction": np.array([point.fraction for point in points]),
+                "energy": np.array(energies),
+                "reaction_x": reactions[:, 0],
+                "reaction_y": reactions[:, 1],
+                **_contact_history(path, regions),
+            },
+            error=error,
+        )
+
+
+def _error(path: LoadPath, problem: Problem, space: LagrangeSpace) -> ErrorEstimate | None:
+    """The discretisation error at the full load; None where it was not reached, has no limit or no force."""
+    last = path.points[-1]
+    untouched = path.equilibrium.contact is not None and not last.contact.any()
+    if last.fraction < 1 or problem.load.kind == "point" or untouched:
+        return None
+    path.equilibrium.factorise(last.nodal, Stage(last.fraction, last.contact))
+    return ErrorEstimator(problem, space).estimate(last.nodal, path.equilibrium.response)
+
+
+def _status(path: LoadPath, regions: Sequence[ContactRegion | None], remarks: str) -> Status:
+    """Whether the path led to the full load, and what to try where it did not; else remarks."""
+    contact = path.equilibrium.contact
+    fraction = path.points[-1].fraction
+    if fraction < 1:
+        wider = "a wider contact" if contact is None else "another radius"
+        return Status(
+            False,
+            f"stopped at {fraction:.1%} of the load: Newton's method fails beyond ({path.reason}); "
+            f"take a finer mesh, {wider} or a smaller stroke",
+        )
+    taken = f"all of the load applied in {len(path.points) - 1} steps, {path.iterations} Newton iterations"
+    if any(region and region.at_end for region in regions):
+        return Status(
+            False,
+            f"{taken}, but the contact reaches an end of the front face, beyond which none is looked for; "
+            "press nearer to its middle or take a smaller stroke or radius",
+        )
+    if contact is not None and regions[-1] is None:
+        return Status(True, f"{taken}; the cylinder does not touch the finger any more")
+    if (region := regions[-1]) is not None:
+        parts = f" in {region.parts} parts" if region.parts > 1 else ""
+        taken += f"; contact from x = {region.start:.4g} to {region.end:.4g} mm{parts}"
+    return Status(True, "; ".join(filter(None, [taken, remarks])))
+
+
+def _contact_history(path: LoadPath, regions: Sequence[ContactRegion | None]) -> dict[str, FloatArray]:
+    if path.equilibrium.contact is None:
+        return {}
+    return {
+        name: np.array([region.stats()[name] if region else 0.0 for region in regions])
+        for name in ("contact_width_mm", "contact_pressure_MPa")
+    }

@@ -1,0 +1,124 @@
+"""The finger at finite strain as a function of its parameters, with exact derivatives at the equilibrium.
+
+With the internal force F, the equilibrium F(c, θ) = f_k b_k(θ), b_k(θ) . c = d_k(θ) and the tangent K there,
+the derivative by a parameter, written ', costs one back-substitution:
+
+    K c' - f_k' b_k = f_k b_k' - dF/dθ,   b_k . c' = d_k' - b_k' . c
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from solvers.elasticity import Lame, lame_slopes
+from solvers.fem.constrained_solve import Bordered
+from solvers.fem.finite_strain.equilibrium import Stage
+from solvers.fem.finite_strain.load_path import LoadPath, PathPoint, Steps
+from solvers.fem.identification.linear_model import Response
+from solvers.fem.identification.parameters import moved_functionals, problem_with, target_slope
+from solvers.lagrange import LagrangeSpace
+from solvers.problem import Problem
+from solvers.solver import silent
+
+PARAMETERS = ("position", "stroke_u", "stroke_v", "poisson", "young")
+"""What can be found at finite strain."""
+
+STEPS = Steps(first=0.05, longest=0.2, shortest=1e-3)
+TOLERANCE = 1e-10
+"""Of Newton's method: derivatives are of no use where the equilibrium is not exact."""
+ITERATIONS = 12
+
+
+class NonlinearFinger:
+    """Responses of a finger at finite strain to a `mean` or `point` load; each starts from the last one.
+
+    Args:
+        problem: With the values of all that is no parameter.
+        space: The elements.
+        names: The parameters, of `PARAMETERS`.
+    """
+
+    def __init__(self, problem: Problem, space: LagrangeSpace, names: Sequence[str]) -> None:
+        self._problem, self._space, self._names = problem, space, tuple(names)
+        self._path: LoadPath | None = None
+        self._last: tuple[FloatArray, Response] | None = None
+
+    def close(self) -> None:
+        """Free what PETSc holds."""
+        if self._path is not None:
+            self._path.close()
+
+    def response(self, values: FloatArray) -> Response:
+        """The response at parameters of shape (p,).
+
+        Raises:
+            UserError: If there is no equilibrium.
+        """
+        problem = problem_with(self._problem, dict(zip(self._names, map(float, values), strict=True)))
+        point = self._continued(problem, values)
+        if point is None:
+            self.close()
+            point = self._from_rest(problem)
+        response = self._with_slopes(problem, point)
+        self._last = values.copy(), response
+        return response
+
+    def _continued(self, problem: Problem, values: FloatArray) -> PathPoint | None:
+        """From the last response, along its derivatives."""
+        if self._path is None or self._last is None:
+            return None
+        before, last = self._last
+        step = values - before
+        nodal = last.nodal + np.einsum("p,pnx->nx", step, last.nodal_slopes)
+        return self._path.continued(problem, nodal, last.forces + step @ last.force_slopes)
+
+    def _from_rest(self, problem: Problem) -> PathPoint:
+        self._path = LoadPath(problem, self._space, STEPS, tolerance=TOLERANCE, max_iterations=ITERATIONS)
+        self._path.follow(silent)
+        last = self._path.points[-1]
+        if last.fraction < 1:
+            raise UserError(
+                f"fem-id found no equilibrium beyond {last.fraction:.0%} of the load "
+                f"{problem.load.displacement} mm; "
+                "take a smaller prior or model=fem"
+            )
+        return last
+
+    def _with_slopes(self, problem: Problem, point: PathPoint) -> Response:
+        path = self._path
+        if path is None:
+            raise RuntimeError("there is no path to an equilibrium yet")
+        equilibrium, nodal, shape = path.equilibrium, point.nodal, point.nodal.shape
+        equilibrium.factorise(nodal, Stage(1.0, np.zeros(0)))
+        functionals = equilibrium.constraints.functionals.reshape(len(point.forces), -1)
+        bordered = Bordered.of(
+            lambda right: equilibrium.factors.solve(right.reshape(shape)).ravel(), functionals
+        )
+        slopes = []
+        for name in self._names:
+            moved = moved_functionals(name, problem, self._space).reshape(functionals.shape)
+            force = equilibrium.force_slope(nodal, problem.material.lame, _moduli_slope(name, problem))
+            slopes.append(
+                bordered.solution(
+                    point.forces @ moved - force.ravel(), target_slope(name, problem) - moved @ nodal.ravel()
+                )
+            )
+        return Response(
+            nodal=nodal,
+            forces=point.forces,
+            nodal_slopes=np.array([slope.reshape(shape) for slope, _ in slopes]).reshape(-1, *shape),
+            force_slopes=np.array([force for _, force in slopes]).reshape(-1, len(point.forces)),
+            energy=equilibrium.energy(nodal),
+        )
+
+
+def _moduli_slope(name: str, problem: Problem) -> Lame:
+    """Derivatives of λ and μ by a parameter."""
+    material = problem.material
+    if name == "poisson":
+        return lame_slopes(material.young, material.poisson, material.plane)
+    if name == "young":
+        return Lame(*(value / material.young for value in material.lame))
+    return Lame(0.0, 0.0, 0.0)

@@ -1,0 +1,82 @@
+"""What is observed of a finger: displacements of its markers and, if it was measured, the reaction."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.observations import Observations
+from solvers.assimilation.estimation import Estimate, Prediction
+from solvers.assimilation.misfit import misfit_of, standard_deviations
+from solvers.fem.identification.linear_model import Response
+from solvers.lagrange import LagrangeSpace
+from solvers.problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class Observer:
+    """Observations of the m markers that were seen, in the order u v u v ..., then of the reaction if any.
+
+    Attributes:
+        sampling: From nodal displacements to the markers', a matrix (m, N).
+        observed: Shape (2 m,) or (2 m + 1,), mm and N/mm.
+        deviations: Their standard deviations, of the same shape.
+        axis: Which of the load's prescribed components the reaction belongs to; None if it was not measured.
+    """
+
+    sampling: Any
+    observed: FloatArray
+    deviations: FloatArray
+    axis: int | None = None
+
+    @classmethod
+    def of(
+        cls, problem: Problem, space: LagrangeSpace, observations: Observations, radius: float
+    ) -> "Observer":
+        """Of the markers alone, each the mean over a disc of the radius, mm."""
+        misfit = misfit_of(replace(problem, observations=observations), marker_radius=radius)
+        if misfit is None:
+            raise UserError("there are no markers to find parameters by")
+        points, weights = misfit.sampling()
+        sampling = weights @ space.shape_functions(problem.mesh.locate(points))
+        return cls(sampling, misfit.observed.ravel(), standard_deviations(observations).ravel())
+
+    def with_reaction(self, problem: Problem, reaction: float, deviation: float) -> "Observer":
+        """The same with the reaction along y and its standard deviation, N/mm.
+
+        Raises:
+            UserError: If the load leaves v free.
+        """
+        if 1 not in problem.load.prescribed:
+            raise UserError("v of the load is free, so that there is no reaction along y to measure")
+        return replace(
+            self,
+            observed=np.append(self.observed, reaction),
+            deviations=np.append(self.deviations, deviation),
+            axis=problem.load.prescribed.index(1),
+        )
+
+    def predicted(self, response: Response) -> Prediction:
+        """What a model says of them, with its derivatives."""
+        values = (self.sampling @ response.nodal).ravel()
+        slopes = np.stack([(self.sampling @ slope).ravel() for slope in response.nodal_slopes], axis=1)
+        if self.axis is None:
+            return values, slopes
+        forces, force_slopes = response.forces[self.axis], response.force_slopes[:, self.axis]
+        return np.append(values, forces), np.vstack([slopes, force_slopes])
+
+    def missed(self, found: Estimate) -> FloatArray:
+        """Predicted minus observed displacements of the markers, shape (m, 2), mm."""
+        return self._markers(found.residuals * found.inflation * self.deviations)
+
+    def missed_without_each(self, found: Estimate) -> FloatArray:
+        """The same where each marker is predicted by the others, shape (m, 2), mm."""
+        residuals = np.zeros_like(self.observed)
+        for rows in np.arange(self._markers(residuals).size).reshape(-1, 2):
+            residuals[rows] = found.left_out(rows)
+        return self._markers(residuals * found.inflation * self.deviations)
+
+    def _markers(self, values: FloatArray) -> FloatArray:
+        return values[: 2 * self.sampling.shape[0]].reshape(-1, 2)

@@ -1,0 +1,125 @@
+"""Parameters of a finger that markers may tell: what they are and what is assumed of them."""
+
+from collections.abc import Mapping, Sequence
+from math import log
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.mesh.walls import walls_and_ribs
+from solvers.assimilation.estimation import Unknown
+from solvers.lagrange import LagrangeSpace
+from solvers.problem import Load, Problem, contact_ends, contact_functional
+from solvers.solver import UnfitError
+
+MEANINGS = {
+    "position": "abscissa of the contact's middle",
+    "stroke_u": "travel of the contact along the finger",
+    "stroke_v": "travel of the contact across the finger",
+    "base_compliance": "how far the base gives under a traction of Young's modulus",
+    "poisson": "Poisson's ratio",
+    "front_stiffness": "factor of Young's modulus in the front wall",
+    "back_stiffness": "factor of Young's modulus in the back wall",
+    "rib_stiffness": "factor of Young's modulus in the ribs",
+    "young": "Young's modulus",
+}
+"""Every parameter that can be asked for."""
+
+STIFFNESS = {"front_stiffness": "front", "back_stiffness": "back", "rib_stiffness": "rib"}
+"""From a parameter to the part whose stiffness it is."""
+
+
+def parse_parameters(solver: str, text: str) -> tuple[str, ...]:
+    """The names in a text such as `position,stroke_v`.
+
+    Raises:
+        UserError: If one is not known or is there twice, or there is none.
+    """
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    for name in names:
+        if name not in MEANINGS:
+            raise UserError(f"{solver} has no parameter {name!r}; it has {', '.join(MEANINGS)}")
+        if names.count(name) > 1:
+            raise UserError(f"{solver}: the parameter {name!r} is there twice")
+    if not names:
+        raise UserError(f"{solver} needs at least one parameter of {', '.join(MEANINGS)}")
+    return names
+
+
+def unknowns_of(problem: Problem, names: Sequence[str], width: float = 1.0) -> list[Unknown]:
+    """The parameters with what is assumed of them.
+
+    Args:
+        problem: Whose values are the means of the priors.
+        names: Keys of `MEANINGS`.
+        width: Factor of the standard deviations of the priors.
+
+    Raises:
+        UserError: If the problem has no such parameter.
+    """
+    mesh, load, material = problem.mesh, problem.load, problem.material
+    left, right = contact_ends(problem)
+    front = mesh.points[mesh.boundary("front").ravel(), 0]
+    half = 0.5 * (right - left) if load.kind != "point" else 0.0
+    travel = float(np.abs(load.values).max()) or 1.0
+    parts = walls_and_ribs(mesh) if set(names) & set(STIFFNESS) else {}
+    found = []
+    for name in names:
+        if name.startswith("stroke") and load.displacement["uv".index(name[-1])] is None:
+            raise UnfitError(f"{name[-1]} of the load is free, so that there is no {name} to find")
+        if name in STIFFNESS and not parts[STIFFNESS[name]].any():
+            raise UserError(f"this finger has no {STIFFNESS[name]} beside cavities: leave out {name}")
+        if name == "position" and load.kind == "patch":
+            raise UnfitError("a patch lies on whole elements and cannot move: leave out position")
+        found.append(
+            {
+                "position": Unknown(
+                    name, "mm", 0.5 * (left + right), 2.0 * width, front.min() + half, front.max() - half
+                ),
+                "stroke_u": Unknown(name, "mm", load.displacement[0] or 0.0, 0.2 * travel * width),
+                "stroke_v": Unknown(name, "mm", load.displacement[1] or 0.0, 0.2 * travel * width),
+                "base_compliance": Unknown(name, "mm", 0.1, log(10) * width, logarithmic=True),
+                "poisson": Unknown(name, "", material.poisson, 0.05 * width, 0.0, 0.499),
+                "young": Unknown(name, "MPa", material.young, 0.3 * width, logarithmic=True),
+            }.get(name, Unknown(name, "", 1.0, 0.3 * width, logarithmic=True))
+        )
+    return found
+
+
+def problem_with(problem: Problem, values: Mapping[str, float]) -> Problem:
+    """The problem with load and material as found; what it has no place for is left out."""
+    load, material = problem.load, problem.material
+    u, v = (
+        values.get(name, known)
+        for name, known in zip(("stroke_u", "stroke_v"), load.displacement, strict=True)
+    )
+    position = values.get("position", load.position)
+    own = {name: values[name] for name in ("young", "poisson") if name in values}
+    return Problem(
+        problem.mesh,
+        material.model_copy(update=own),
+        Load(kind=load.kind, displacement=(u, v), position=position, radius=load.radius),
+        problem.observations,
+    )
+
+
+def moved_functionals(name: str, problem: Problem, space: LagrangeSpace) -> FloatArray:
+    """Derivatives of `load_functionals` by a parameter, shape (k, N, 2).
+
+    The weight moves with the contact: by its position, the mean of the displacement over it changes by the
+    mean of du/dx.
+    """
+    slopes = np.zeros((len(problem.load.prescribed), len(space.nodes), 2))
+    if name == "position":
+        points, weights = contact_functional(problem)
+        along: csr_matrix = space.shape_gradients(problem.mesh.locate(points))[0]
+        for row, axis in enumerate(problem.load.prescribed):
+            slopes[row, :, axis] = along.T @ weights
+    return slopes
+
+
+def target_slope(name: str, problem: Problem) -> FloatArray:
+    """Derivative of the prescribed displacements by a parameter, shape (k,)."""
+    return np.array([float(name == f"stroke_{'uv'[axis]}") for axis in problem.load.prescribed])

@@ -1,0 +1,124 @@
+"""Continuous Lagrange elements on the shared mesh, in NumPy: nodes, shape functions, functionals, evaluation.
+
+DOLFINx assembles and PETSc solves; nodes here are matched to its degrees of freedom by position, so that a
+finite-element solution is an array that outlives both, and no code depends on how they number things.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from geometry.arrays import FloatArray, IntArray
+from geometry.mesh.point_location import Location
+from geometry.mesh.triangle_mesh import TriangleMesh
+
+# Edge k joins the corners EDGES[k]; its node is number 3 + k of a quadratic element.
+EDGES = np.array([[0, 1], [1, 2], [2, 0]])
+
+
+@dataclass(frozen=True, eq=False)
+class LagrangeSpace:
+    """Scalar Lagrange elements of degree 1 or 2 on a triangle mesh.
+
+    Attributes:
+        mesh: The mesh; its nodes come first in `nodes`, the middles of `mesh.edges` follow for degree 2.
+        degree: 1 or 2.
+    """
+
+    mesh: TriangleMesh
+    degree: int
+
+    @cached_property
+    def nodes(self) -> FloatArray:
+        """Node positions, shape (N, 2), mm."""
+        if self.degree == 1:
+            return self.mesh.points
+        return np.concatenate([self.mesh.points, self.mesh.points[self.mesh.edges].mean(axis=1)])
+
+    @cached_property
+    def cell_nodes(self) -> IntArray:
+        """Nodes of every element, shape (t, 3) or (t, 6)."""
+        if self.degree == 1:
+            return self.mesh.triangles
+        return np.concatenate([self.mesh.triangles, self.edge_nodes(self.mesh.triangles[:, EDGES])], axis=1)
+
+    def boundary_nodes(self, name: str) -> IntArray:
+        """Nodes on a named boundary, each once."""
+        edges = self.mesh.boundary(name)
+        nodes = np.unique(edges)
+        if self.degree == 1:
+            return nodes
+        return np.concatenate([nodes, self.edge_nodes(edges)])
+
+    def edge_nodes(self, edges: IntArray) -> IntArray:
+        """Nodes in the middles of edges given as pairs of nodes, shape (..., 2), for degree 2."""
+        return len(self.mesh.points) + self.mesh.edge_numbers(edges)
+
+    def at_nodes(self) -> Location:
+        """The location of every node, in the order of the nodes."""
+        corners = np.eye(3)
+        barycentric = np.concatenate([corners, corners[EDGES].mean(axis=1)])[: self.cell_nodes.shape[1]]
+        cells, local = (np.zeros(len(self.nodes), dtype=np.int64) for _ in range(2))
+        for number, nodes in enumerate(self.cell_nodes.T):
+            cells[nodes] = np.arange(len(nodes))
+            local[nodes] = number
+        return Location(points=self.nodes, cells=cells, barycentric=barycentric[local])
+
+    def shape_functions(self, location: Location) -> csr_matrix:
+        """Values of the shape functions, as a matrix (n, N) that maps nodal values to values at points."""
+        λ = location.barycentric
+        if self.degree == 1:
+            return self._matrix(location, λ)
+        corners = λ * (2 * λ - 1)
+        middles = 4 * λ[:, EDGES[:, 0]] * λ[:, EDGES[:, 1]]
+        return self._matrix(location, np.concatenate([corners, middles], axis=1))
+
+    def shape_gradients(self, location: Location) -> tuple[csr_matrix, csr_matrix]:
+        """Derivatives of the shape functions along x and y, each a matrix (n, N), 1/mm."""
+        dλ = self._barycentric_gradients[location.cells]
+        if self.degree == 1:
+            gradients = dλ
+        else:
+            λ = location.barycentric
+            corners = (4 * λ - 1)[:, :, None] * dλ
+            first, second = EDGES[:, 0], EDGES[:, 1]
+            middles = 4 * (λ[:, first, None] * dλ[:, second] + λ[:, second, None] * dλ[:, first])
+            gradients = np.concatenate([corners, middles], axis=1)
+        return self._matrix(location, gradients[..., 0]), self._matrix(location, gradients[..., 1])
+
+    @cached_property
+    def _barycentric_gradients(self) -> FloatArray:
+        """Gradients of the barycentric coordinates, shape (t, 3, 2), 1/mm."""
+        corners = self.mesh.points[self.mesh.triangles]
+        opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+        rotated = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
+        return np.asarray(rotated / (2 * self.mesh.areas)[:, None, None], dtype=np.float64)
+
+    def _matrix(self, location: Location, values: FloatArray) -> csr_matrix:
+        columns = self.cell_nodes[location.cells]
+        rows = np.arange(len(location) + 1) * columns.shape[1]
+        return csr_matrix((values.ravel(), columns.ravel(), rows), shape=(len(location), len(self.nodes)))
+
+
+@dataclass(frozen=True, eq=False)
+class LagrangeField:
+    """A finite-element displacement field.
+
+    Attributes:
+        space: The elements.
+        values: Nodal displacements, shape (N, 2), mm.
+    """
+
+    space: LagrangeSpace
+    values: FloatArray
+
+    def displacement(self, location: Location) -> FloatArray:
+        """Displacement, shape (n, 2), mm."""
+        return np.asarray(self.space.shape_functions(location) @ self.values)
+
+    def gradient(self, location: Location) -> FloatArray:
+        """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
+        dx, dy = self.space.shape_gradients(location)
+        return np.stack([dx @ self.values, dy @ self.values], axis=-1)

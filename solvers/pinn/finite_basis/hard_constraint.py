@@ -1,0 +1,45 @@
+"""The clamped base as a factor of the network."""
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+import torch
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.mesh.triangle_mesh import TriangleMesh
+
+Points = TypeVar("Points", torch.Tensor, FloatArray)
+
+
+@dataclass(frozen=True)
+class BaseFactor:
+    """The factor d / (d + length) of the distance d to the base, where u = 0 then holds whatever the weights.
+
+    Attributes:
+        abscissa: Where the base is, mm.
+        length: Distance at which the factor is one half, mm.
+    """
+
+    abscissa: float
+    length: float
+
+    @classmethod
+    def of(cls, mesh: TriangleMesh, length: float) -> "BaseFactor":
+        """The factor for a mesh.
+
+        Raises:
+            UserError: If the base is not a straight edge x = constant with the body on its right.
+        """
+        x = mesh.points[np.unique(mesh.boundary("base")), 0]
+        if np.ptp(x) > 1e-9 or mesh.points[:, 0].min() < x.min() - 1e-9:
+            raise UserError(
+                "the network's hard condition needs a base on a line x = constant, left of the body"
+            )
+        return cls(float(x.mean()), length)
+
+    def at(self, points: Points) -> tuple[Points, Points]:
+        """The factor and its slope along x, 1/mm, at points (n, 2), mm, each (n, 1): tensors or arrays."""
+        distance = points[:, :1] - self.abscissa
+        return distance / (distance + self.length), self.length / (distance + self.length) ** 2

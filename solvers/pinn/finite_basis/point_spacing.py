@@ -1,0 +1,148 @@
+"""Spacing of a network's neurons and quadrature points: dense in thin walls and at re-entrant corners."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from geometry.arrays import FloatArray, IntArray
+from geometry.mesh.boundary import boundary_edges, boundary_widths, mean_thickness, re_entrant_points
+from geometry.mesh.quadrature import triangle_rule
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.pinn.finite_basis.load_conditions import contact_end_points
+from solvers.problem import Problem, contact_ends, contact_nodes
+
+
+class Singularities(NamedTuple):
+    """Points where the strain is singular or nearly so.
+
+    Attributes:
+        points: Shape (s, 2), mm.
+        spacing: Wanted distance between neighbours there, mm.
+    """
+
+    points: FloatArray
+    spacing: float
+
+
+@dataclass(frozen=True, eq=False)
+class Spacing:
+    """Wanted distance between neighbours: that of the nearest boundary, less near singularities.
+
+    At distance d from a singularity with spacing s it is at most s + growth * d.
+
+    Attributes:
+        boundary: Points of the boundary, shape (b, 2), mm.
+        walls: The spacing there, shape (b,), mm.
+        singularities: Of one kind each.
+        growth: Growth of the spacing per distance from a singularity.
+    """
+
+    boundary: FloatArray
+    walls: FloatArray
+    singularities: tuple[Singularities, ...]
+    growth: float
+
+    @classmethod
+    def of(cls, problem: Problem, *, wall: float, corner: float, growth: float) -> "Spacing":
+        """The spacing for a body, in units of its own thicknesses.
+
+        Args:
+            problem: The body and its load; the ends of a rigid patch are as singular as sharp corners.
+            wall: Spacing in the width of a wall, of a narrower cavity beside it, or of the contact, or in the
+                radius of a fillet.
+            corner: Spacing at a sharp corner in mean thicknesses.
+            growth: Growth of the spacing per distance from singularities.
+        """
+        mesh = problem.mesh
+        mean = mean_thickness(mesh)
+        boundary, widths = boundary_widths(mesh)
+        sharp, round_, radius = re_entrant_points(mesh)
+        if problem.load.kind == "patch":
+            sharp = np.concatenate([sharp, contact_end_points(problem)])
+        left, right = contact_ends(problem)
+        kinds = [
+            Singularities(sharp, corner * mean),
+            Singularities(mesh.points[contact_nodes(problem)], wall * (right - left)),
+        ]
+        if len(round_):
+            kinds.append(Singularities(round_, max(wall * radius, corner * mean)))
+        return cls(boundary, wall * np.minimum(widths, mean), tuple(kinds), growth)
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """The spacing at points (n, 2), mm: (n,), mm."""
+        _, nearest = cKDTree(self.boundary).query(points)
+        found = self.walls[nearest]
+        for kind in self.singularities:
+            distance, _ = cKDTree(kind.points).query(points)
+            found = np.minimum(found, kind.spacing + self.growth * distance)
+        return np.asarray(found)
+
+    def distance(self, points: FloatArray) -> FloatArray:
+        """Distance of points (n, 2), mm, from the nearest singularity: (n,), mm."""
+        distance, _ = cKDTree(np.concatenate([kind.points for kind in self.singularities])).query(points)
+        return np.asarray(distance)
+
+
+def graded_triangles(mesh: TriangleMesh, spacing: Spacing, share: float) -> FloatArray:
+    """The mesh's triangles, cut in four until no edge exceeds `share` of the spacing, shape (t, 3, 2)."""
+    todo = mesh.points[mesh.triangles]
+    done = []
+    while len(todo):
+        cut = _longest_edge(todo) > share * spacing.at(todo.mean(axis=1))
+        done.append(todo[~cut])
+        corners = todo[cut]
+        middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
+        outer = [np.stack([corners[:, k], middles[:, k], middles[:, k - 1]], axis=1) for k in range(3)]
+        todo = np.concatenate([*outer, middles])
+    return np.concatenate(done)
+
+
+def graded_quadrature(triangles: FloatArray, spacing: Spacing, share: float) -> tuple[FloatArray, FloatArray]:
+    """Points (q, 2), mm, and weights (q,), mm^2, in triangles (t, 3, 2).
+
+    Three points of degree 2, but one in a triangle whose edges are below a quarter of `share` of the spacing:
+    of such there are sixteen where one would do.
+    """
+    small = _longest_edge(triangles) <= 0.25 * share * spacing.at(triangles.mean(axis=1))
+    parts = [_element_rule(triangles[small], 1), _element_rule(triangles[~small], 2)]
+    points, weights = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return points, weights
+
+
+def _element_rule(triangles: FloatArray, degree: int) -> tuple[FloatArray, FloatArray]:
+    barycentric, weights = triangle_rule(degree)
+    first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    areas = 0.5 * (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+    points = np.einsum("qc,tcx->tqx", barycentric, triangles).reshape(-1, 2)
+    return points, np.outer(areas, weights).ravel()
+
+
+def _longest_edge(triangles: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1))
+
+
+def spread_points(triangles: FloatArray, mesh: TriangleMesh, spacing: Spacing, share: float) -> FloatArray:
+    """Corners of triangles (t, 3, 2), thinned to at least `share` of the spacing apart, shape (c, 2), mm.
+
+    The mesh's boundary nodes are taken before all others, and near singular points before those far away.
+    """
+    points = np.unique(np.round(triangles.reshape(-1, 2), 9), axis=0)
+    distance = spacing.distance(points)
+    inside = _distance_from_boundary(points, mesh) > 1e-9
+    tree, radius = cKDTree(points), share * spacing.at(points)
+    free = np.ones(len(points), dtype=bool)
+    kept: list[int] = []
+    for index in np.lexsort((distance, inside)):
+        if free[index]:
+            kept.append(int(index))
+            free[tree.query_ball_point(points[index], radius[index])] = False
+    return np.asarray(points[kept])
+
+
+def _distance_from_boundary(points: FloatArray, mesh: TriangleMesh) -> FloatArray:
+    """Distance of points from the nearest boundary node, which is zero only at the nodes, shape (n,), mm."""
+    nodes: IntArray = np.unique(boundary_edges(mesh.triangles))
+    distance, _ = cKDTree(mesh.points[nodes]).query(points)
+    return np.asarray(distance)

@@ -1,0 +1,51 @@
+"""Where gradient-trained networks see the problem: collocation points of the energy, points of the base."""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.mesh.quadrature import body_quadrature
+from geometry.mesh.triangle_mesh import TriangleMesh
+
+Collocation = Literal["nodes", "elements", "random"]
+"""`nodes`: the mesh's nodes, all alike (the paper); `elements`: the rule of degree 2 in every triangle;
+`random`: as many points as nodes, drawn uniformly in the body."""
+
+
+class Sample(NamedTuple):
+    """Points and the share that each has in a mean over the body.
+
+    Attributes:
+        points: Shape (n, 2), mm.
+        shares: Shape (n,); they sum to one.
+    """
+
+    points: FloatArray
+    shares: FloatArray
+
+
+def body_sample(mesh: TriangleMesh, collocation: Collocation, seed: int) -> Sample:
+    """Collocation points of the body.
+
+    The mean over nodes is the paper's. It is biased to where the mesh is dense.
+    """
+    if collocation == "elements":
+        rule = body_quadrature(mesh)
+        return Sample(rule.location.points, rule.weights / rule.weights.sum())
+    points = mesh.points if collocation == "nodes" else _uniform_points(mesh, len(mesh.points), seed)
+    return Sample(points, np.full(len(points), 1 / len(points)))
+
+
+def base_points(mesh: TriangleMesh, count: int) -> FloatArray:
+    """Evenly spaced points of the straight base with both its ends, shape (count, 2), mm."""
+    nodes, times = np.unique(mesh.boundary("base"), return_counts=True)
+    start, end = mesh.points[nodes[times == 1]]
+    return np.asarray(np.linspace(start, end, count))
+
+
+def _uniform_points(mesh: TriangleMesh, count: int, seed: int) -> FloatArray:
+    rng = np.random.default_rng(seed)
+    cells = rng.choice(len(mesh.areas), count, p=mesh.areas / mesh.areas.sum())
+    barycentric = rng.dirichlet(np.ones(3), count)
+    return np.asarray(np.einsum("nc,ncx->nx", barycentric, mesh.points[mesh.triangles[cells]]))

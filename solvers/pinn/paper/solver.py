@@ -1,0 +1,215 @@
+"""`pinn-std --preset paper`: the paper's two networks, its loss, its optimiser, its 60,000 epochs."""
+
+import hashlib
+import json
+import time
+from dataclasses import dataclass, field, fields, replace
+from typing import ClassVar, Literal
+
+import numpy as np
+import torch
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from solvers.pinn.marker_terms import Observing
+from solvers.pinn.paper.collocation import Collocation, base_points, body_sample
+from solvers.pinn.paper.convergence import judge
+from solvers.pinn.paper.loss_gradient import Loss
+from solvers.pinn.paper.losses import DisplacementTerm, EnergyTerm, LossTerm, stiffness_matrix
+from solvers.pinn.paper.mlp_field import MlpField
+from solvers.pinn.paper.modified_mlp import ModifiedMlp
+from solvers.pinn.paper.processes import ONE_PROCESS, Processes
+from solvers.pinn.paper.progress import TrainingProgress
+from solvers.pinn.paper.training import OPTIMISERS, Recipe, Store, Training
+from solvers.pinn.threading import pool, torch_threads
+from solvers.problem import Problem, contact_functional
+from solvers.solution import Solution
+from solvers.solver import Progress, check_problem, silent
+from solvers.training import TrainingContext
+
+PRECISIONS = {"single": torch.float32, "double": torch.float64}
+
+FREE = ("epochs", "patience", "min_change", "checkpoint_every", "threads", "device")
+"""Settings that may change when a training is resumed."""
+
+
+@dataclass(frozen=True)
+class PaperPinnSolver(Observing):
+    """Two modified MLPs, one for u and one for v, trained by gradients on energy plus soft conditions.
+
+    Attributes:
+        epochs: Steps of the optimiser, each over all points.
+        learning_rate: Of the optimiser.
+        bc_weight: Factor of L_BC in the loss, MPa/mm².
+        width: Neurons in a layer.
+        layers: Gated layers of each network.
+        base_points: Evenly spaced points of the base where the displacement should vanish.
+        collocation: Where the energy is evaluated: "nodes" of the shared mesh with equal weights, as in the
+            paper, "elements", by quadrature in its triangles, or "random", uniformly in the body.
+        optimiser: "adam".
+        device: "cpu" or "cuda".
+        precision: "single" or "double".
+        literal_gate: Whether the first gate has a hidden layer of its own, as printed in the paper.
+        patience: The training ends early when the mean loss of so many epochs is no better than that of
+            as many before; 0 never ends it, as in the paper.
+        min_change: Relative decrease of that mean which counts as better.
+        checkpoint_every: Epochs between checkpoints.
+        threads: Threads of the processor; 0 takes as many as torch is set to.
+        seed: Of the random numbers.
+    """
+
+    epochs: int = 60_000
+    learning_rate: float = 1e-3
+    bc_weight: float = 1000.0
+    width: int = 64
+    layers: int = 4
+    base_points: int = 1000
+    collocation: Collocation = "nodes"
+    optimiser: str = "adam"
+    device: Literal["cpu", "cuda"] = "cpu"
+    precision: Literal["single", "double"] = "single"
+    literal_gate: bool = False
+    patience: int = 0
+    min_change: float = 1e-4
+    checkpoint_every: int = 1000
+    threads: int = 0
+    seed: int = 0
+    _context: TrainingContext = field(default=TrainingContext(), init=False, repr=False, compare=False)
+    name: ClassVar[str] = "pinn-std"
+    laws: ClassVar[tuple[str, ...]] = ("linear",)
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point")
+
+    def __post_init__(self) -> None:
+        for setting in ("epochs", "learning_rate", "bc_weight", "width", "layers"):
+            if not getattr(self, setting) > 0:
+                raise UserError(f"{self.name}: {setting} must be positive, got {getattr(self, setting)}")
+        if self.base_points < 2:
+            raise UserError(f"{self.name}: base_points must be at least 2, got {self.base_points}")
+        for setting in ("patience", "checkpoint_every", "threads", "seed"):
+            if getattr(self, setting) < 0:
+                raise UserError(f"{self.name}: {setting} must be zero or more, got {getattr(self, setting)}")
+        if self.optimiser not in OPTIMISERS:
+            raise UserError(
+                f"{self.name}: optimiser must be {' or '.join(OPTIMISERS)}, got {self.optimiser!r}"
+            )
+        if self.device == "cuda" and not torch.cuda.is_available():
+            raise UserError(f"{self.name}: device cuda needs a GPU and torch's CUDA build; take device=cpu")
+
+    def settings(self) -> dict[str, object]:
+        """Network, loss, optimiser and seed."""
+        return {"preset": "paper"} | {
+            entry.name: getattr(self, entry.name) for entry in fields(self) if entry.init
+        }
+
+    def in_context(self, context: TrainingContext) -> "PaperPinnSolver":
+        """The same solver that saves and resumes in `context`; see `TrainedSolver`."""
+        solver = replace(self)
+        object.__setattr__(solver, "_context", context)
+        return solver
+
+    @property
+    def network(self) -> ModifiedMlp:
+        """The two networks' shape."""
+        return ModifiedMlp(width=self.width, layers=self.layers, literal_gate=self.literal_gate)
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        """Train on the problem; see `Solver`.
+
+        Raises:
+            TrainingDiverged: If the loss is not a number or has grown beyond all bounds.
+        """
+        check_problem(self, problem)
+        started = time.perf_counter()
+        processes = Processes.of_environment()
+        area = float(problem.mesh.areas.sum())
+        with torch_threads(self.threads) as threads, pool():
+            loss = self.loss(problem, processes)
+            initial = self.network.initial(self.seed, PRECISIONS[self.precision]).to(self.device)
+            training = Training(loss, initial, self._recipe(), area, self._store(problem, processes))
+            told = TrainingProgress(
+                progress if processes.rank == 0 else silent,
+                self.epochs,
+                training.epoch,
+                area,
+                self._context.reference_energy,
+            )
+            training.run(told)
+            field = MlpField(self.network, training.parameters.double().cpu())
+            result = judge(problem, field, training)
+        seconds = time.perf_counter() - started
+        return Solution(
+            solver=self.name,
+            problem=problem,
+            field=field,
+            energy=result.energy,
+            reaction=result.reaction,
+            status=result.status,
+            stats={
+                "seconds": seconds,
+                "epochs": training.epoch,
+                "parameters": initial.numel(),
+                "collocation_points": len(loss.terms[0].points),
+                "seconds_per_epoch": float(training.history[-1, -1] / training.epoch),
+                "seed": self.seed,
+                "device": self.device,
+                "threads": threads,
+                "processes": processes.count,
+            },
+            history=dict(zip(training.columns, training.history.T, strict=True)),
+        )
+
+    def _recipe(self) -> Recipe:
+        return Recipe(**{entry.name: getattr(self, entry.name) for entry in fields(Recipe)})
+
+    def _store(self, problem: Problem, processes: Processes) -> Store | None:
+        """Where to save; a checkpoint belongs to the problem and to all settings but those of `FREE`."""
+        if self._context.folder is None:
+            return None
+        binding = {name: value for name, value in self.settings().items() if name not in FREE}
+        digest = hashlib.sha256((problem.digest + json.dumps(binding, sort_keys=True)).encode()).hexdigest()
+        return Store(self._context.folder, digest, self._context.resume, writes=processes.rank == 0)
+
+    def loss(self, problem: Problem, processes: Processes = ONE_PROCESS) -> Loss:
+        """The paper's loss: L_PDE + bc_weight L_BC and, of a solver that assimilates, its factor times L_ASM.
+
+        L_ASM is the mean square of the misfits' lengths, mm²; with unequal weights, the weighted mean.
+        """
+
+        def tensor(array: FloatArray) -> torch.Tensor:
+            return torch.tensor(np.asarray(array), dtype=PRECISIONS[self.precision], device=self.device)
+
+        body = body_sample(problem.mesh, self.collocation, self.seed)
+        base = base_points(problem.mesh, self.base_points)
+        contact, functional = contact_functional(problem)
+        targets = np.array([[value or 0.0] for value in problem.load.displacement])
+        wanted = np.array([[float(value is not None)] for value in problem.load.displacement])
+        terms: list[LossTerm] = [
+            EnergyTerm(
+                tensor(body.points), tensor(body.shares), tensor(stiffness_matrix(problem.material.lame))
+            ),
+            DisplacementTerm(
+                "BC",
+                tensor(base),
+                targets=tensor(np.zeros((2, len(base)))),
+                weights=tensor(np.full((2, len(base)), 1 / len(base))),
+            ),
+            DisplacementTerm(
+                "BC", tensor(contact), tensor(targets), tensor(wanted), functional=tensor(functional[None])
+            ),
+        ]
+        factors = {"PDE": 1.0, "BC": self.bc_weight}
+        misfit = self.misfit(problem)
+        if misfit is not None and misfit.weights.any():
+            points, shares = misfit.sampling()
+            total = float(misfit.weights.sum())
+            factors["ASM"] = total / (4 * float(problem.mesh.areas.sum()))
+            terms.append(
+                DisplacementTerm(
+                    "ASM",
+                    tensor(points),
+                    targets=tensor(misfit.observed.T),
+                    weights=tensor(2 * misfit.weights.T / total),
+                    functional=tensor(shares),
+                )
+            )
+        return Loss(self.network, terms, factors, processes)

@@ -1,0 +1,169 @@
+"""The training loop: epochs of an optimiser, recorded, saved, resumed, and ended when they lead astray."""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from geometry.arrays import FloatArray
+from solvers.pinn.paper.checkpoint import load_checkpoint, save_checkpoint
+from solvers.pinn.paper.history import HistoryFiles
+from solvers.pinn.paper.loss_gradient import Evaluation, Loss
+from solvers.training import TrainingDiverged
+
+OPTIMISERS: dict[str, Callable[..., torch.optim.Optimizer]] = {"adam": torch.optim.Adam}
+"""By the names of the settings; called with the parameters and `lr`."""
+
+ASTRAY = 1e3
+"""How many times its first value the loss may reach."""
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How to train; see `PaperPinnSolver` for the meaning of its settings."""
+
+    optimiser: str
+    learning_rate: float
+    epochs: int
+    patience: int
+    min_change: float
+    checkpoint_every: int
+
+
+@dataclass(frozen=True)
+class Store:
+    """Where a training is saved.
+
+    Attributes:
+        folder: The folder of the checkpoint and the history.
+        digest: Identifies the problem and the settings that decide the result.
+        resume: Whether to go on from a checkpoint in the folder.
+        writes: Whether this process writes.
+    """
+
+    folder: Path
+    digest: str
+    resume: bool
+    writes: bool
+
+
+class Training:
+    """A training that can be run, saved and resumed.
+
+    Args:
+        loss: What is minimised.
+        initial: Parameters to start from, shape (networks, parameters); they are changed in place.
+        recipe: How.
+        area: What the mean energy density is multiplied by to give the energy, mm².
+        store: Where to save, if anywhere.
+    """
+
+    def __init__(
+        self, loss: Loss, initial: torch.Tensor, recipe: Recipe, area: float, store: Store | None
+    ) -> None:
+        self.parameters = initial
+        self.columns = ("epoch", *loss.factors, "total", "energy", "seconds")
+        self._loss, self._recipe, self._area, self._store = loss, recipe, area, store
+        self._stepper = OPTIMISERS[recipe.optimiser]([initial], lr=recipe.learning_rate)
+        self._rows: list[tuple[float, ...]] = []
+        saved = load_checkpoint(store.folder, store.digest) if store and store.resume else None
+        if saved:
+            self._restore(saved)
+        self._started = time.perf_counter() - (self._rows[-1][-1] if self._rows else 0.0)
+        self._files = HistoryFiles(store.folder, self.columns, self.epoch) if store and store.writes else None
+
+    @property
+    def epoch(self) -> int:
+        """How many epochs are done."""
+        return len(self._rows)
+
+    @property
+    def history(self) -> FloatArray:
+        """The columns of every epoch, shape (epochs, columns); losses are those before the epoch's step."""
+        return np.array(self._rows).reshape(-1, len(self.columns))
+
+    def run(self, report: Callable[[int, Evaluation], None]) -> None:
+        """Train up to the recipe's number of epochs; `report` is called after each.
+
+        Raises:
+            TrainingDiverged: If the loss is not a number or has grown beyond all bounds.
+        """
+        last = self._state()
+        try:
+            while self.epoch < self._recipe.epochs and not self.settled():
+                evaluation = self._step()
+                last = self._state()
+                if self._recipe.checkpoint_every and self.epoch % self._recipe.checkpoint_every == 0:
+                    self._save(last)
+                report(self.epoch, evaluation)
+        except KeyboardInterrupt:
+            self._save(last)
+            raise
+        self._save(last)
+
+    def settled(self) -> bool:
+        """Whether the mean loss of the last `patience` epochs is no better than that of as many before."""
+        count = self._recipe.patience
+        if count == 0 or self.epoch < 2 * count or self.epoch % count:
+            return False
+        total = self.history[-2 * count :, self.columns.index("total")].reshape(2, count).mean(axis=1)
+        return bool(total[1] > (1 - self._recipe.min_change) * total[0])
+
+    def _step(self) -> Evaluation:
+        """One step of the optimiser."""
+        evaluations: list[Evaluation] = []
+
+        def closure() -> float:
+            evaluation = self._loss(self.parameters)
+            self._check(evaluation.total)
+            evaluations.append(evaluation)
+            self.parameters.grad = evaluation.gradient
+            return evaluation.total
+
+        self._stepper.step(closure)
+        terms, total, _ = evaluations[0]
+        seconds = time.perf_counter() - self._started
+        self._rows.append((self.epoch + 1, *terms.values(), total, self._area * terms["PDE"], seconds))
+        return evaluations[0]
+
+    def _check(self, total: float) -> None:
+        first = self._rows[0][self.columns.index("total")] if self._rows else total
+        if math.isfinite(total) and total <= ASTRAY * first:
+            return
+        what = (
+            f"grew to {total / first:.3g} times its first value"
+            if math.isfinite(total)
+            else f"became {total}"
+        )
+        raise TrainingDiverged(
+            f"the loss {what} in epoch {self.epoch + 1}; take a learning_rate below "
+            f"{self._recipe.learning_rate:g} or smaller weights of the loss"
+        )
+
+    def _state(self) -> tuple[int, dict[str, torch.Tensor]]:
+        """The epoch, and a copy of all that the following epochs depend on: an interrupt may halve a step."""
+        state = {"parameters": self.parameters.clone()}
+        for name, value in self._stepper.state[self.parameters].items():
+            state[f"optimiser.{name}"] = value.clone()
+        return self.epoch, state
+
+    def _restore(self, state: dict[str, torch.Tensor]) -> None:
+        self.parameters.copy_(state.pop("parameters"))
+        self._rows = [tuple(row) for row in state.pop("history").tolist()]
+        values = {name.removeprefix("optimiser."): value for name, value in state.items()}
+        groups = self._stepper.state_dict()["param_groups"]
+        self._stepper.load_state_dict({"state": {0: values} if values else {}, "param_groups": groups})
+
+    def _save(self, state: tuple[int, dict[str, torch.Tensor]]) -> None:
+        if self._store is None or self._files is None:
+            return
+        epoch, tensors = state
+        history = self.history[:epoch]
+        save_checkpoint(
+            self._store.folder, {**tensors, "history": torch.from_numpy(history)}, self._store.digest
+        )
+        self._files.write(history)

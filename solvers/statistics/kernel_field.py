@@ -1,0 +1,70 @@
+"""Displacement fields of Matérn's kernels, as Gaussian processes make them.
+
+Source: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006, equations
+4.9, 4.16 and 4.17.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.mesh.point_location import Location
+
+Kernel = Literal["matern32", "matern52", "gaussian"]
+SMOOTHNESS: dict[Kernel, float] = {"matern32": 1.5, "matern52": 2.5, "gaussian": np.inf}
+"""ν: a process has as many derivatives as there are whole numbers below it."""
+
+
+@dataclass(frozen=True, eq=False)
+class KernelField:
+    """Σ_i c_i k(|x - x_i|), each component with coefficients and a length of its own.
+
+    Attributes:
+        centres: x_i, shape (m, 2), mm.
+        coefficients: c_i, shape (m, 2), mm.
+        lengths: Of k for u and v, shape (2,), mm.
+        kernel: k.
+    """
+
+    centres: FloatArray
+    coefficients: FloatArray
+    lengths: FloatArray
+    kernel: Kernel
+
+    def displacement(self, location: Location) -> FloatArray:
+        """Displacement, shape (n, 2), mm."""
+        kernels = [correlation(location.points, self.centres, length, self.kernel) for length in self.lengths]
+        return np.asarray((np.stack(kernels, axis=-1) * self.coefficients).sum(axis=1))
+
+    def gradient(self, location: Location) -> FloatArray:
+        """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
+        slopes = [_slope(location.points, self.centres, length, self.kernel) for length in self.lengths]
+        weighted = np.stack(slopes, axis=-1) * self.coefficients
+        offset = self.centres - location.points[:, None]
+        return np.asarray(np.einsum("nmc,nmx->ncx", weighted, offset))
+
+
+def correlation(points: FloatArray, others: FloatArray, length: float, kernel: Kernel) -> FloatArray:
+    """The kernel between points (n, 2) and others (m, 2), mm: shape (n, m); 1 at distance zero."""
+    distance = _distance(points, others, length, kernel)
+    if kernel == "gaussian":
+        return np.asarray(np.exp(-(distance**2) / 2))
+    series = 1 + distance if kernel == "matern32" else 1 + distance + distance**2 / 3
+    return np.asarray(series * np.exp(-distance))
+
+
+def _slope(points: FloatArray, others: FloatArray, length: float, kernel: Kernel) -> FloatArray:
+    """What others minus points have to be multiplied by for the gradient of k at the points, 1/mm²."""
+    distance = _distance(points, others, length, kernel)
+    if kernel == "gaussian":
+        return np.asarray(np.exp(-(distance**2) / 2) / length**2)
+    series = 3 if kernel == "matern32" else 5 / 3 * (1 + distance)
+    return np.asarray(series * np.exp(-distance) / length**2)
+
+
+def _distance(points: FloatArray, others: FloatArray, length: float, kernel: Kernel) -> FloatArray:
+    """√(2 ν) |x - x'| / length, and |x - x'| / length for the limit of large ν: shape (n, m)."""
+    scale = 1.0 if kernel == "gaussian" else np.sqrt(2 * SMOOTHNESS[kernel])
+    return np.asarray(np.linalg.norm(points[:, None] - others, axis=2) * scale / length)

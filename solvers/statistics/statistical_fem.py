@@ -1,0 +1,170 @@
+"""`statfem`: finite elements whose load is uncertain, plus a Gaussian process for what the model lacks.
+
+What is observed is d = ρ B u + δ + e: the displacement u of finite elements at the markers, times a factor, a
+discrepancy δ and the error e of the observations. Random are, and normal a priori:
+
+- the prescribed displacement of the contact, about its nominal value, each component with the standard
+  deviation `stroke_deviation`; as the problem is linear, u is a sum of one field for each component;
+- δ, a process of mean zero with one of Matérn's kernels, one length, an amplitude each for u and v;
+- e, with the observations' standard deviations.
+
+ρ, the amplitudes and the length have the largest marginal likelihood. The displacement that is returned is
+the posterior mean of ρ u + δ.
+
+Source: M. Girolami, E. Febrianto, G. Yin, F. Cirak, The statistical finite element method (statFEM) for
+coherent synthesis of observation data and model predictions, Comput. Methods Appl. Mech. Engrg. 375 (2021)
+113533: the model of the data, its conditioning and its marginal likelihood. There the source term is random;
+here it is the prescribed displacement.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.mesh.quadrature import body_quadrature
+from geometry.observations import Observations
+from solvers.assimilation.misfit import standard_deviations, without_each
+from solvers.elasticity import linear_energy_density
+from solvers.fem.linear import FemSolver
+from solvers.problem import Problem
+from solvers.section_force import section_force
+from solvers.solution import Solution, Status
+from solvers.solver import Progress, check_problem, silent
+from solvers.statistics.kernel_field import Kernel
+from solvers.statistics.statistical_posterior import Data, Posterior, StatFemField
+
+
+@dataclass(frozen=True)
+class StatFemSolver:
+    """Finite elements with an uncertain load and a discrepancy, conditioned on the markers.
+
+    Attributes:
+        degree: Degree of the elements, 1 or 2.
+        stroke_deviation: Standard deviation of each component of the prescribed displacement, mm.
+        kernel: How smooth the discrepancy is: "matern32", "matern52" or "gaussian" (squared exponential).
+    """
+
+    degree: int = 2
+    stroke_deviation: float = 0.5
+    kernel: Kernel = "matern52"
+    name: ClassVar[str] = "statfem"
+    laws: ClassVar[tuple[str, ...]] = FemSolver.laws
+    loads: ClassVar[tuple[str, ...]] = FemSolver.loads
+    assimilates: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        if self.degree not in (1, 2):
+            raise UserError(f"statfem has elements of degree 1 and 2, not {self.degree}")
+        if not (np.isfinite(self.stroke_deviation) and self.stroke_deviation >= 0):
+            raise UserError(
+                f"statfem: stroke_deviation must be zero or more, got {self.stroke_deviation} (mm)"
+            )
+
+    def settings(self) -> dict[str, object]:
+        """The element degree, the spread of the load, and the kernel."""
+        return asdict(self)
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        """Condition on the problem's observations; see `Solver`. Without any it is `fem`."""
+        check_problem(self, problem)
+        if problem.observations is None:
+            plain = FemSolver(degree=self.degree, estimate=False).solve(problem, progress)
+            return replace(plain, solver=self.name, status=Status(True, "without markers this is fem"))
+        started = time.perf_counter()
+        shapes = self._shapes(problem, progress)
+        data = self._data(problem, problem.observations, shapes)
+        solution = self._conditioned(problem, data, shapes)
+        missed, spread = _without_each(data, progress)
+        within = float((np.abs(missed) < 2 * spread).mean())
+        seconds = time.perf_counter() - started
+        stats = {**solution.stats, "seconds": seconds, "left_out_within_2sd": within}
+        return replace(solution, stats=stats, left_out=without_each(problem, missed))
+
+    def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
+        """What solves for other observations, by the same finite elements; see `Refitting`."""
+        shapes = self._shapes(problem, silent)
+
+        def refit(observations: Observations) -> Solution:
+            data = self._data(problem, observations, shapes)
+            return self._conditioned(replace(problem, observations=observations), data, shapes)
+
+        return refit
+
+    def _data(self, problem: Problem, observations: Observations, shapes: Sequence[Solution]) -> Data:
+        points = observations.points[observations.visible]
+        return Data(
+            points=points,
+            observed=observations.displacements[observations.visible],
+            deviations=standard_deviations(observations),
+            shapes=np.stack([shape.displacement(points) for shape in shapes]),
+            load=problem.load.values,
+            load_deviation=self.stroke_deviation,
+            kernel=self.kernel,
+        )
+
+    def _shapes(self, problem: Problem, progress: Progress) -> list[Solution]:
+        """Finite elements for a unit displacement of each prescribed component of the contact."""
+        fem = FemSolver(degree=self.degree, estimate=False)
+        shapes = []
+        for axis in problem.load.prescribed:
+            unit = [None if value is None else 0.0 for value in problem.load.displacement]
+            unit[axis] = 1.0
+            load = problem.load.model_copy(update={"displacement": tuple(unit)})
+            shapes.append(fem.solve(replace(problem, load=load, observations=None), progress))
+        return shapes
+
+    def _conditioned(self, problem: Problem, data: Data, shapes: Sequence[Solution]) -> Solution:
+        started = time.perf_counter()
+        posterior = Posterior.of(data, np.arange(len(data.points)))
+        field = StatFemField(posterior, tuple(shape.field for shape in shapes))
+        rule = body_quadrature(problem.mesh, 4)
+        gradient = field.gradient(rule.location)
+        density = linear_energy_density(gradient, problem.material.lame)
+        constants = posterior.constants
+        discrepancy = constants.spreads
+        _, variances = posterior.at(data.points, data.shapes)
+        return Solution(
+            solver=self.name,
+            problem=problem,
+            field=field,
+            energy=float((rule.weights * density).sum()),
+            reaction=section_force(problem, rule, gradient),
+            status=Status(
+                True,
+                f"fem times {constants.factor:.3g} plus a discrepancy of {discrepancy[0]:.2g} mm in u and "
+                f"{discrepancy[1]:.2g} mm in v over {constants.length:.3g} mm; its energy and force include "
+                "the discrepancy's",
+            ),
+            stats={
+                "seconds": time.perf_counter() - started,
+                "unknowns": int(shapes[0].stats["unknowns"]),
+                "factor": constants.factor,
+                "discrepancy_u": float(discrepancy[0]),
+                "discrepancy_v": float(discrepancy[1]),
+                "length": constants.length,
+                "log_evidence": posterior.log_evidence,
+                "deviation_at_markers": float(np.sqrt(variances.max())),
+            }
+            | {
+                f"load_{'uv'[axis]}": float(value)
+                for axis, value in zip(problem.load.prescribed, posterior.load, strict=True)
+            },
+        )
+
+
+def _without_each(data: Data, progress: Progress) -> tuple[FloatArray, FloatArray]:
+    """What each marker is missed by without it, and the standard deviation of that, each (m, 2), mm."""
+    every = np.arange(len(data.points))
+    missed, spread = np.zeros((2, len(every), 2))
+    for marker in every:
+        progress(0.5 + marker / len(every) / 2, "leaving each marker out")
+        others = Posterior.of(data, np.delete(every, marker))
+        mean, covariance = others.at(data.points[[marker]], data.shapes[:, [marker]])
+        missed[marker] = data.observed[marker] - mean[0]
+        spread[marker] = np.sqrt(covariance[0] + data.deviations[marker] ** 2)
+    return missed, spread

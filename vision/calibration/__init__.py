@@ -1,0 +1,4 @@
+"""Cameras: intrinsics, lens distortion, calibration boards, bundle adjustment, camera files.
+
+Imports `vision.frames`.
+"""

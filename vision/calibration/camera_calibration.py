@@ -1,0 +1,160 @@
+"""A camera from photographs of a board, with what is known about its errors.
+
+Z. Zhang, "A flexible new technique for camera calibration", IEEE TPAMI 22, 2000: a plane seen in several
+poses determines the camera. All intrinsics and poses are fitted by least squares. The fit's own residuals
+flatter it, so `held_out` repeats it without some of the photographs and asks how well it predicts corners
+there. Units: pixels, mm.
+"""
+
+import math
+import warnings
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from vision.calibration.board_views import FEWEST_VIEWS, by_view, coverage, find_views
+from vision.calibration.camera import Camera
+from vision.calibration.chessboard import Board
+from vision.calibration.lens_fit import LENS_CHOICES, LensChoice, fit_lens, held_out, rms
+from vision.frames.frame import GreyImage
+
+LEAST_COVERAGE = 0.6
+"""Share of the image below which the distortion near its edges is a guess."""
+OUTLIER = 3.0
+"""Error of a view in medians of all from which it deserves a look."""
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A camera and how well it is known.
+
+    Attributes:
+        camera: With covariance.
+        board: What was photographed.
+        views: Where its corners were seen, by the name of the photograph, shape (n, 2), pixels;
+            NaN where one was not seen.
+        residuals: Seen minus predicted by the fit, likewise.
+        held_out: Root mean square distance in photographs that the camera was not fitted to, pixels.
+        coverage: Share of the image area that was inside a board at least once.
+        boardless: Names of the photographs in which no board was found.
+    """
+
+    camera: Camera
+    board: Board
+    views: Mapping[str, FloatArray]
+    residuals: Mapping[str, FloatArray]
+    held_out: float
+    coverage: float
+    boardless: tuple[str, ...] = ()
+
+    @property
+    def rms(self) -> float:
+        """Root mean square distance between corners and their projections in the fit, pixels."""
+        return rms(list(self.residuals.values()))
+
+    @property
+    def view_errors(self) -> dict[str, float]:
+        """The same for every photograph that shows the board, by name."""
+        return {name: rms([residuals]) for name, residuals in self.residuals.items()}
+
+
+def calibrate(
+    images: Iterable[tuple[str, GreyImage]], board: Board, *, lens: LensChoice = LENS_CHOICES[0]
+) -> Calibration:
+    """Calibrate a camera from photographs of a board.
+
+    Args:
+        images: Names and grey photographs, all of one size; only one is held at a time.
+        board: What they show.
+        lens: What is fitted.
+
+    Raises:
+        UserError: If the sizes differ, fewer than 4 photographs show the board, or they do not determine the
+            camera.
+    """
+    views, size, boardless = find_views(images, board)
+    return calibrate_views(views, board, size, lens=lens, boardless=boardless)
+
+
+def calibrate_views(
+    views: Mapping[str, FloatArray],
+    board: Board,
+    size: tuple[int, int],
+    *,
+    lens: LensChoice = LENS_CHOICES[0],
+    boardless: tuple[str, ...] = (),
+) -> Calibration:
+    """Calibrate a camera from the corners of a board in images of `size`, (width, height).
+
+    Args:
+        views: By name, in the order of `board.corners`, shape (n, 2), pixels; NaN where one was not seen.
+        board: Whose corners they are.
+        size: Of the images, pixels.
+        lens: What is fitted.
+        boardless: What to call the photographs without a board.
+
+    Raises:
+        UserError: If there are fewer than 4 views, or they do not determine the camera.
+    """
+    if len(views) < FEWEST_VIEWS:
+        raise UserError(
+            f"{len(views)} of {len(views) + len(boardless)} photographs show the board of {board}; "
+            + (
+                f"at least {FEWEST_VIEWS} must, better 15, tilted in different directions"
+                if views
+                else "count them"
+            )
+        )
+    corners = list(views.values())
+    adjusted = fit_lens(corners, board, size, lens)
+    calibration = Calibration(
+        camera=adjusted.camera,
+        board=board,
+        views=views,
+        residuals=dict(zip(views, by_view(adjusted.residuals, corners), strict=True)),
+        held_out=held_out(corners, board, adjusted.camera, lens),
+        coverage=coverage(corners, size),
+        boardless=boardless,
+    )
+    _warn(calibration)
+    return calibration
+
+
+def better_lens(
+    calibration: Calibration, lens: LensChoice, *, ratio: float = 0.8
+) -> tuple[LensChoice, float] | None:
+    """A lens that would bring the error held out below `ratio` of what it is, and that error, pixels."""
+    camera, corners = calibration.camera, list(calibration.views.values())
+    errors = {}
+    for other in LENS_CHOICES:
+        if other != lens:
+            try:
+                fitted = fit_lens(corners, calibration.board, (camera.width, camera.height), other).camera
+                errors[other] = held_out(corners, calibration.board, fitted, other)
+            except UserError:
+                continue
+    best = min(errors, key=errors.__getitem__, default=lens)
+    return (best, errors[best]) if errors.get(best, np.inf) < ratio * calibration.held_out else None
+
+
+def _warn(calibration: Calibration) -> None:
+    """Say what would make the calibration better."""
+    errors = calibration.view_errors
+    usual = float(np.median(list(errors.values())))
+    for name, error in errors.items():
+        if error > OUTLIER * usual:
+            warnings.warn(
+                f"{name} has an error of {error:.2f} px, the median is {usual:.2f} px; look whether it is "
+                f"blurred or the board bent, or calibrate without it: --without {name}",
+                stacklevel=3,
+            )
+    if calibration.coverage < LEAST_COVERAGE:
+        warnings.warn(
+            f"the boards cover {math.floor(100 * calibration.coverage)}% of the image, less than "
+            f"{LEAST_COVERAGE:.0%}: beyond them the distortion is a guess; add photographs with the board "
+            "near edges and corners",
+            stacklevel=3,
+        )

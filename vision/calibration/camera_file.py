@@ -1,0 +1,154 @@
+"""Camera files: JSON or YAML with the names of OpenCV's calibration sample, which `cv2.FileStorage` reads."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.atomic import atomic_path
+from geometry.errors import UserError
+from vision.calibration.camera import Camera
+from vision.calibration.camera_calibration import Calibration
+
+Entry = int | float | str | list[str] | FloatArray
+FORMATS = (".json", ".yml", ".yaml")
+
+
+def save_camera(path: Path, camera: Camera) -> None:
+    """Write a camera atomically, as JSON or YAML by the suffix; `load_camera` gives the same camera back.
+
+    Raises:
+        UserError: If the suffix is none of `FORMATS`.
+    """
+    _write(path, _content(camera))
+
+
+def save_calibration(path: Path, calibration: Calibration, versions: Mapping[str, str] | None = None) -> None:
+    """Write a camera with what is known about it: errors, coverage, board, and the versions that made it.
+
+    Raises:
+        UserError: If the suffix is none of `FORMATS`.
+    """
+    board, errors = calibration.board, calibration.view_errors
+    _write(
+        path,
+        _content(calibration.camera)
+        | {
+            "avg_reprojection_error": calibration.rms,
+            "held_out_reprojection_error": calibration.held_out,
+            "coverage": calibration.coverage,
+            "nframes": len(errors),
+            "image_names": list(errors),
+            "per_view_reprojection_errors": np.array([list(errors.values())]).T,
+            "board": type(board).__name__,
+            "board_width": board.columns,
+            "board_height": board.rows,
+            "square_size": board.square,
+            "versions": [f"{name} {version}" for name, version in (versions or {}).items()],
+        },
+    )
+
+
+def load_camera(path: Path) -> Camera:
+    """Read a camera that was written here or by OpenCV's calibration sample.
+
+    Raises:
+        UserError: If the file cannot be read, a key is missing or its value is of another kind.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        storage = cv2.FileStorage(text, cv2.FileStorage_READ | cv2.FileStorage_MEMORY)
+    except OSError as error:
+        raise UserError(f"cannot read the camera {path}: {error.strerror}") from None
+    except (UnicodeDecodeError, cv2.error, SystemError):
+        raise UserError(
+            f"cannot read the camera {path}: it is not JSON or YAML as OpenCV writes it"
+        ) from None
+    width, height = (_number(storage, name, path) for name in ("image_width", "image_height"))
+    matrix = _matrix(storage, "camera_matrix", path, sizes=(9,)).reshape(3, 3)
+    model = "fisheye" if storage.getNode("fisheye_model").real() else "brown"
+    sizes = (4,) if model == "fisheye" else (4, 5)
+    distortion = _matrix(storage, "distortion_coefficients", path, sizes=sizes)
+    try:
+        camera = Camera(
+            width=width,
+            height=height,
+            fx=float(matrix[0, 0]),
+            fy=float(matrix[1, 1]),
+            cx=float(matrix[0, 2]),
+            cy=float(matrix[1, 2]),
+            distortion=tuple(np.resize([*distortion, 0.0], max(sizes)).tolist()),
+            model=model,
+        )
+        return replace(camera, covariance=_covariance(storage, len(camera.names), path))
+    except UserError as error:
+        raise UserError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
+
+
+def check_format(path: Path) -> None:
+    """Raise `UserError` unless the suffix says how to write a camera."""
+    if path.suffix.lower() not in FORMATS:
+        raise UserError(f"{path}: a camera is written as {', '.join(FORMATS)}; give a name that ends so")
+
+
+def _content(camera: Camera) -> dict[str, Entry]:
+    content: dict[str, Entry] = {
+        "image_width": camera.width,
+        "image_height": camera.height,
+        "fisheye_model": int(camera.model == "fisheye"),
+        "camera_matrix": camera.matrix,
+        "distortion_coefficients": np.array([camera.distortion]),
+    }
+    if camera.covariance is not None:
+        content["intrinsics"] = list(camera.names)
+        content["intrinsics_standard_deviations"] = np.array([camera.standard_deviations])
+        content["intrinsics_covariance"] = np.array(camera.covariance)
+    return content
+
+
+def _write(path: Path, content: Mapping[str, Entry]) -> None:
+    check_format(path)
+    storage = cv2.FileStorage(path.suffix.lower(), cv2.FileStorage_WRITE | cv2.FileStorage_MEMORY)
+    for name, value in content.items():
+        storage.write(name, value)
+    with atomic_path(path) as partial:
+        partial.write_text(storage.releaseAndGetString(), encoding="utf-8")
+
+
+def _covariance(storage: cv2.FileStorage, size: int, path: Path) -> tuple[tuple[float, ...], ...] | None:
+    """The covariance, or the diagonal one of the standard deviations, or None."""
+    if not storage.getNode("intrinsics_covariance").empty():
+        covariance = _matrix(storage, "intrinsics_covariance", path, sizes=(size**2,)).reshape(size, size)
+    elif not storage.getNode("intrinsics_standard_deviations").empty():
+        deviations = _matrix(storage, "intrinsics_standard_deviations", path, sizes=(size,))
+        if (deviations < 0).any():
+            raise UserError("a standard deviation is below zero")
+        covariance = np.diag(deviations**2)
+    else:
+        return None
+    return tuple(map(tuple, covariance.tolist()))
+
+
+def _number(storage: cv2.FileStorage, name: str, path: Path) -> int:
+    node = storage.getNode(name)
+    if not node.isInt():
+        raise UserError(f"{path}: {name} is {'missing' if node.empty() else 'no whole number'}; give pixels")
+    return int(node.real())
+
+
+def _matrix(storage: cv2.FileStorage, name: str, path: Path, *, sizes: tuple[int, ...]) -> FloatArray:
+    """The entries of a matrix, whose number must be one of `sizes`."""
+    node = storage.getNode(name)
+    what = f"a matrix of {' or '.join(map(str, sizes))} numbers"
+    if node.empty():
+        raise UserError(f"{path}: {name} is missing; it must be {what}")
+    try:
+        values = np.asarray(node.mat(), dtype=np.float64).ravel()
+    except (cv2.error, SystemError, TypeError):
+        values = np.empty(0)
+    if len(values) not in sizes:
+        raise UserError(f"{path}: {name} is not {what}")
+    return values

@@ -1,0 +1,105 @@
+"""A ChArUco board: a chessboard with a marker in every white square, of which any part may be seen."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from vision.calibration.chessboard import Board
+from vision.frames.frame import GreyImage
+
+REACH = 0.6
+"""Distance from a corner that stays clear of its markers, over the difference of the sides of both."""
+DICTIONARIES = {
+    name.removeprefix("DICT_"): int(getattr(cv2.aruco, name))
+    for name in sorted(dir(cv2.aruco))
+    if name.startswith("DICT_") and name == name.upper()
+}
+LARGEST = [name for name in DICTIONARIES if not name.endswith(("_50", "_100", "_250"))]
+"""Dictionaries that are no part of another one."""
+FEWEST_MARKERS = 3
+
+
+@dataclass(frozen=True)
+class CharucoBoard(Board):
+    """A ChArUco board.
+
+    Attributes:
+        columns, rows: Inner corners along either side, one less than squares.
+        square: Side of a square, mm.
+        marker: Side of a marker, mm.
+        dictionary: Of its markers, a name in `DICTIONARIES`.
+
+    Raises:
+        UserError: Besides what a chessboard refuses, if a marker has no room in a square, the dictionary is
+            not known or too small.
+    """
+
+    marker: float
+    dictionary: str
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 < self.marker < self.square:
+            raise UserError(
+                f"a marker of {self.marker:g} mm in a square of {self.square:g} mm; it must be above zero "
+                "and smaller than the square"
+            )
+        if self.dictionary not in DICTIONARIES:
+            raise UserError(
+                f"no dictionary of markers is called {self.dictionary!r}; there are: "
+                f"{', '.join(DICTIONARIES)}"
+            )
+        markers = (self.columns + 1) * (self.rows + 1) // 2
+        size = len(cv2.aruco.getPredefinedDictionary(DICTIONARIES[self.dictionary]).bytesList)
+        if markers > size:
+            raise UserError(f"{self} has {markers} markers, but the dictionary only {size}")
+
+    def __str__(self) -> str:
+        return f"{self.columns + 1}x{self.rows + 1} squares with markers {self.dictionary}"
+
+    def find(self, image: GreyImage) -> FloatArray | None:
+        """Where `corners` are in an image, shape (n, 2), pixels, NaN where one is not seen; None if few are.
+
+        Boards of the layout before OpenCV 4.6 are found too.
+
+        Source: S. Garrido-Jurado et al., "Automatic generation and detection of highly reliable fiducial
+        markers under occlusion", Pattern Recognition 47, 2014, as in OpenCV,
+        which before 4.14 puts corners half a pixel to the right and below; then
+        `vision.calibration.corner_refinement`.
+        """
+        for legacy in (False, True):
+            board = self._opencv(legacy=legacy)
+            pixels, numbers, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(image)
+            if numbers is not None and len(numbers):
+                break
+        else:
+            return None
+        corners = np.full((len(self.corners), 2), np.nan)
+        corners[np.ravel(numbers)] = np.reshape(pixels, (-1, 2))
+        return self.refine(image, corners, REACH * (self.square - self.marker))
+
+    def seems(self, image: GreyImage) -> str | None:
+        """Another dictionary that most markers in an image seem to be of; None if it is this one."""
+        counts = {name: _markers_seen(image, name) for name in LARGEST}
+        best = max(counts, key=counts.__getitem__)
+        own = self.dictionary.rsplit("_", 1)[0] == best.rsplit("_", 1)[0]
+        return None if own or counts[best] < FEWEST_MARKERS else f"markers {best.removesuffix('_1000')}"
+
+    def _opencv(self, *, legacy: bool) -> cv2.aruco.CharucoBoard:
+        board = cv2.aruco.CharucoBoard(
+            (self.columns + 1, self.rows + 1),
+            self.square,
+            self.marker,
+            cv2.aruco.getPredefinedDictionary(DICTIONARIES[self.dictionary]),
+        )
+        board.setLegacyPattern(legacy)
+        return board
+
+
+def _markers_seen(image: GreyImage, dictionary: str) -> int:
+    detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(DICTIONARIES[dictionary]))
+    _, numbers, _ = detector.detectMarkers(image)
+    return 0 if numbers is None else len(numbers)

@@ -1,0 +1,145 @@
+"""A chessboard to calibrate with, and its corners in a photograph."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from geometry.arrays import BoolArray, FloatArray
+from geometry.errors import UserError
+from vision.calibration.corner_refinement import fit_saddles
+from vision.frames.frame import GreyImage
+
+EDGE = 0.45
+"""Part of a square's side along which its edges are alone."""
+RADII = (2.5, 12.0)
+"""Of the discs of pixels in which a corner is sought."""
+LARGE = 1600
+"""Longer side of an image, pixels, from which on corners are first sought in a smaller one."""
+FEWEST_CORNERS = 4
+"""In either half of the corners: as many as determine a pose."""
+
+
+@dataclass(frozen=True)
+class Board:
+    """A chessboard.
+
+    Attributes:
+        columns, rows: Inner corners, where four squares meet, along either side.
+        square: Side of a square, mm.
+
+    Raises:
+        UserError: If there are fewer than 3 corners along a side, or the square has no size.
+    """
+
+    columns: int
+    rows: int
+    square: float
+
+    def __post_init__(self) -> None:
+        if min(self.columns, self.rows) < 3 or max(self.columns, self.rows) > 100:
+            raise UserError(
+                f"a board of {self.columns}x{self.rows} inner corners; either side must have 3 to 100"
+            )
+        if not 0 < self.square < np.inf:
+            raise UserError(f"a square of {self.square:g} mm; its side must be above zero")
+
+    def __str__(self) -> str:
+        return f"{self.columns}x{self.rows} inner corners"
+
+    @property
+    def corners(self) -> FloatArray:
+        """The inner corners in the board's frame, row by row, shape (columns * rows, 3), mm."""
+        rows, columns = np.mgrid[: self.rows, : self.columns]
+        corners = np.stack([columns.ravel(), rows.ravel(), np.zeros(rows.size)], axis=1)
+        return np.asarray(self.square * corners, dtype=np.float64)
+
+    @property
+    def halves(self) -> tuple[BoolArray, BoolArray]:
+        """The corners in two halves that interlock like the squares of a board, shape (n,) each."""
+        first = np.indices((self.rows, self.columns)).sum(axis=0).ravel() % 2 == 0
+        return first, ~first
+
+    def find(self, image: GreyImage) -> FloatArray | None:
+        """Where `corners` are in an image, shape (n, 2), pixels; None if it does not show the whole board.
+
+        Source: A. Duda, U. Frese, "Accurate detection and localization of checkerboard corners for
+        calibration", BMVC 2018, as in OpenCV; then `vision.calibration.corner_refinement`.
+        """
+        shrink = max(1.0, max(image.shape) / LARGE)
+        guesses = self._guesses(image, shrink)
+        if guesses is None:
+            guesses = self._guesses(image, 2 * shrink)  # which sharpens a blurred one
+        refined = None if guesses is None else self.refine(image, guesses, EDGE * self.square)
+        if refined is None:
+            return None
+        seen = np.isfinite(refined[:, 0]).reshape(self.rows, self.columns)
+        whole = seen.any(axis=0).all() and seen.any(axis=1).all()  # OpenCV adds rows to smaller boards
+        return refined if whole else None
+
+    def _guesses(self, image: GreyImage, shrink: float) -> FloatArray | None:
+        """The corners in an image as OpenCV finds them in a smaller one, shape (n, 2), pixels."""
+        small = _smaller(image, shrink)
+        found, corners = cv2.findChessboardCornersSB(
+            small, (self.columns, self.rows), flags=cv2.CALIB_CB_ACCURACY
+        )
+        if not found:
+            return None
+        scale = np.divide(image.shape[::-1], small.shape[::-1])
+        return np.asarray((np.reshape(corners, (-1, 2)).astype(np.float64) + 0.5) * scale - 0.5)
+
+    def refine(self, image: GreyImage, corners: FloatArray, reach: float) -> FloatArray | None:
+        """Corners to hundredths of a pixel from guesses, both of shape (n, 2) with NaN where one is not seen.
+
+        Args:
+            image: What shows them.
+            corners: Guesses.
+            reach: How far from a corner the board shows nothing but its edges, mm.
+
+        Returns:
+            None if those that are seen do not determine a pose.
+        """
+        seen = np.isfinite(corners[:, 0])
+        if not self._determine(seen):
+            return None
+        homography, _ = cv2.findHomography(self.corners[seen, :2], corners[seen])
+        edges = _slopes(np.asarray(homography, np.float64), self.corners[seen, :2])
+        lengths = np.linalg.norm(edges, axis=2)
+        narrowest = np.abs(np.linalg.det(edges)) / lengths.max(axis=1)
+        radii = np.clip(reach * narrowest, *RADII)
+        refined = np.full_like(corners, np.nan)
+        refined[seen] = fit_saddles(image, corners[seen], edges, radii)
+        return refined if self._determine(np.isfinite(refined[:, 0])) else None
+
+    def _determine(self, seen: BoolArray) -> bool:
+        """Whether either half of the seen corners determines a pose."""
+        for half in self.halves:
+            points = self.corners[half & seen, :2]
+            if len(points) < FEWEST_CORNERS:
+                return False
+            spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+            if spread[1] < 0.1 * spread[0]:
+                return False
+        return True
+
+    def seems(self, image: GreyImage) -> str | None:
+        """Another size that the board in an image seems to have; None if there is none."""
+        small = _smaller(image, max(image.shape) / LARGE)
+        found, _, cells = cv2.findChessboardCornersSBWithMeta(small, (3, 3), cv2.CALIB_CB_LARGER)
+        return f"{max(cells.shape)}x{min(cells.shape)}" if found else None
+
+
+def _smaller(image: GreyImage, shrink: float) -> GreyImage:
+    """An image with its sides divided by `shrink`; as it is if that is not above 1."""
+    if shrink <= 1:
+        return image
+    width, height = (round(side / shrink) for side in image.shape[::-1])
+    return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def _slopes(homography: FloatArray, points: FloatArray) -> FloatArray:
+    """How far a homography moves points, shape (n, 2), per mm along x and y, in rows, shape (n, 2, 2)."""
+    places = np.column_stack([points, np.ones(len(points))]) @ homography.T
+    pixels = places[:, :2] / places[:, 2:]
+    slopes = homography[:2, :2].T - homography[2, :2][:, None] * pixels[:, None, :]
+    return np.asarray(slopes / places[:, 2, None, None])

@@ -1,0 +1,137 @@
+"""What colour a marker has: a box in CIELAB, or simply darker than what is around it.
+
+CIELAB (L* 0 to 100, a* and b* about -128 to 127) is OpenCV's, from sRGB with the white point D65, rounded
+to 8 bits: steps of 0.4 in L*, of 1 in a* and b*. A grey image has L* alone.
+"""
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from typing import Protocol
+
+import cv2
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from vision.frames.frame import Image
+
+Lab = tuple[float, float, float]
+
+LOWEST: Lab = (0.0, -128.0, -128.0)
+HIGHEST: Lab = (100.0, 127.0, 127.0)
+
+HALF = 0.45
+"""Of the greatest darkness nearby: about where a blurred edge is, and beyond what a grey wall has."""
+
+
+class Colour(Protocol):
+    """What decides which pixels may be a marker's."""
+
+    def mask(self, image: Image, radius: float = ...) -> Image:
+        """255 where a pixel may belong to a disc of at most `radius`, pixels; 0 elsewhere."""
+
+
+@dataclass(frozen=True)
+class ColourRange:
+    """Colours between two limits, each L*, a*, b*.
+
+    Raises:
+        UserError: If a limit is not finite or the lower one is above the higher one.
+    """
+
+    low: Lab = LOWEST
+    high: Lab = HIGHEST
+
+    def __post_init__(self) -> None:
+        for name, low, high in zip(("L*", "a*", "b*"), self.low, self.high, strict=True):
+            if not low <= high or not np.isfinite([low, high]).all():
+                raise UserError(f"a range of {name} from {low:g} to {high:g}; it must go from low to high")
+
+    def __str__(self) -> str:
+        return ":".join(f"{low:g},{high:g}" for low, high in zip(self.low, self.high, strict=True))
+
+    def mask(self, image: Image, radius: float = np.inf) -> Image:
+        """255 where a colour lies in the range, 0 elsewhere, shape (h, w); `radius` does not matter."""
+        low, high = _in_8_bits(self.low), _in_8_bits(self.high)
+        if image.ndim == 2:
+            inside = (_lightness_of_grey() >= low[0]) & (_lightness_of_grey() <= high[0])
+            return np.asarray(cv2.LUT(image, np.where(inside, 255, 0).astype(np.uint8)), dtype=np.uint8)
+        return np.asarray(cv2.inRange(cv2.cvtColor(image, cv2.COLOR_BGR2LAB), low, high), dtype=np.uint8)
+
+
+@dataclass(frozen=True)
+class Darker:
+    """Darker than the surroundings by `contrast` in L*, and about half as dark as what is darkest there.
+
+    How bright the surroundings are comes from a morphological closing, so the light may be uneven: a
+    black-hat transform (F. Meyer, "Iterative image transformations for an automatic screening of cervical
+    smears", J. Histochem. Cytochem. 27, 1979).
+    """
+
+    contrast: float = 15.0
+
+    def __post_init__(self) -> None:
+        if not 0 < self.contrast <= 100:
+            raise UserError(f"a contrast of {self.contrast:g} in L*; it must be above 0 and at most 100")
+
+    def __str__(self) -> str:
+        return "dark" if self == DARK else f"dark:{self.contrast:g}"
+
+    def mask(self, image: Image, radius: float = 25.0) -> Image:
+        """255 where a dark disc of at most `radius` pixels may be, 0 elsewhere, shape (h, w)."""
+        lightness = lightness_of(image)
+        side = 2 * int(np.ceil(1.5 * radius)) + 1
+        box = cv2.getStructuringElement(cv2.MORPH_RECT, (side, side))
+        darker = cv2.morphologyEx(lightness, cv2.MORPH_BLACKHAT, box)
+        half = cv2.convertScaleAbs(cv2.dilate(darker, box), alpha=HALF)
+        threshold = cv2.max(half, np.rint(2.55 * self.contrast))
+        return np.asarray(cv2.compare(darker, threshold, cv2.CMP_GT), dtype=np.uint8)
+
+
+DARK = Darker()
+
+
+def read_colour(text: str) -> Colour:
+    """The colour of a text: "dark", "dark:CONTRAST", or L*, a* and b* such as "20,60:40,80:-10,30".
+
+    Of the ranges, a* and b* may be left out. `str` of a colour gives its text.
+
+    Raises:
+        UserError: If it is none of these.
+    """
+    kind, _, rest = text.strip().lower().partition(":")
+    number = r"[-+]?\d+(?:\.\d*)?"
+    if kind == "dark" and (not rest or re.fullmatch(number, rest)):
+        return Darker(float(rest)) if rest else DARK
+    if re.fullmatch(rf"{number},{number}(:{number},{number}){{0,2}}", text.strip()):
+        pairs = [tuple(map(float, pair.split(","))) for pair in text.strip().split(":")]
+        low, high = (tuple(side) for side in zip(*pairs, strict=True))
+        return ColourRange(_filled(low, LOWEST), _filled(high, HIGHEST))
+    raise UserError(
+        f"cannot read the colour {text!r}; give dark, dark:CONTRAST or ranges of L*, a* and b* such as "
+        "20,60:40,80:-10,30"
+    )
+
+
+def lightness_of(image: Image) -> Image:
+    """L* of a grey or coloured image in 8 bits: 255 is L* 100."""
+    if image.ndim == 2:
+        return np.asarray(cv2.LUT(image, _lightness_of_grey()), dtype=np.uint8)
+    return np.asarray(cv2.extractChannel(cv2.cvtColor(image, cv2.COLOR_BGR2LAB), 0), dtype=np.uint8)
+
+
+@cache
+def _lightness_of_grey() -> Image:
+    levels = np.repeat(np.arange(256, dtype=np.uint8)[None, :, None], 3, axis=2)
+    return np.asarray(cv2.cvtColor(levels, cv2.COLOR_BGR2LAB)[0, :, 0], dtype=np.uint8)
+
+
+def _in_8_bits(colour: Lab) -> FloatArray:
+    """As OpenCV codes it, rounded, shape (3,)."""
+    return np.asarray(np.rint(np.array(colour) * (2.55, 1, 1) + (0, 128, 128)))
+
+
+def _filled(given: tuple[float, ...], usual: Lab) -> Lab:
+    lightness, a, b = (*given, *usual[len(given) :])
+    return lightness, a, b

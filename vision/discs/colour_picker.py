@@ -1,0 +1,98 @@
+"""A colour from an example: a click into a marker, or a rectangle within it."""
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from geometry.arrays import BoolArray, FloatArray
+from geometry.errors import UserError
+from vision.discs.colour import HIGHEST, LOWEST, ColourRange
+from vision.frames.frame import Image
+
+ALIKE = 12.0
+"""In L*, a* and b*: how far pixels around a click may be from it and yet be of the same marker."""
+LEAST_WIDTH, USUAL_WIDTH = 6.0, 25.0
+"""Of the range on either side: at least for noise; where nothing is near, for shadows and other lamps."""
+FEWEST = 9
+"""Pixels of an example."""
+NEAR, FAR = 3.0, 9.0
+"""Pixels around an example: what lies between is its surroundings."""
+NOTABLE = 0.1
+"""Share of the surroundings that must have another colour for the range to keep clear of it."""
+
+
+def pick_colour(image: Image, place: Sequence[float]) -> ColourRange:
+    """The range of colours of the marker at a place.
+
+    It reaches half way to what surrounds the marker, and 25 in L*, a* or b* where that is not met.
+
+    Args:
+        image: Shape (h, w), of which L* alone counts, or (h, w, 3).
+        place: x, y of a point in the marker, or x0, y0, x1, y1 of a rectangle that it mostly fills, pixels.
+
+    Raises:
+        UserError: If the place is not in the image, or there is no patch of one colour.
+    """
+    lab = _lab(np.asarray(cv2.medianBlur(image, 3), dtype=np.uint8))
+    example = _example(lab, place)
+    values = lab[example]
+    middle = np.median(values, axis=0)
+    spread = 1.4826 * np.median(np.abs(values - middle), axis=0)
+    away = cv2.distanceTransform(np.where(example, 0, 255).astype(np.uint8), cv2.DIST_L2, 5)
+    around = lab[(away > NEAR) & (away <= FAR)]
+    least = np.maximum(3 * spread, LEAST_WIDTH)
+    low, high = middle - _width(middle - around, least), middle + _width(around - middle, least)
+    channels = 1 if image.ndim == 2 else 3
+    low = np.maximum(np.append(low[:channels], LOWEST[channels:]), LOWEST)
+    high = np.minimum(np.append(high[:channels], HIGHEST[channels:]), HIGHEST)
+    return ColourRange(_rounded(low), _rounded(high))
+
+
+def _lab(image: Image) -> FloatArray:
+    coloured = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image
+    return np.asarray((cv2.cvtColor(coloured, cv2.COLOR_BGR2LAB) - (0.0, 128.0, 128.0)) / (2.55, 1, 1))
+
+
+def _example(lab: FloatArray, place: Sequence[float]) -> BoolArray:
+    """Which pixels are alike and connected to the place, shape (h, w)."""
+    height, width = lab.shape[:2]
+    if len(place) not in (2, 4) or not np.isfinite(place).all():
+        raise UserError(f"a place is x,y or x0,y0,x1,y1 in pixels, not {','.join(map(str, place))}")
+    where = ",".join(f"{value:g}" for value in place)
+    corners = np.rint(np.resize(place, 4)).astype(int)
+    (x0, x1), (y0, y1) = sorted(corners[::2].tolist()), sorted(corners[1::2].tolist())
+    if x0 < 0 or y0 < 0 or x1 >= width or y1 >= height:
+        raise UserError(f"{where} is not within the image of {width}x{height} pixels")
+    if len(place) == 2:
+        x0, y0, x1, y1 = max(x0 - 1, 0), max(y0 - 1, 0), x1 + 1, y1 + 1
+    chosen = np.s_[y0 : y1 + 1, x0 : x1 + 1]
+    alike = (np.abs(lab - np.median(lab[chosen], axis=(0, 1))) <= ALIKE).all(axis=2)
+    _, patches = cv2.connectedComponents(alike.astype(np.uint8), connectivity=4)
+    example = alike & np.isin(patches, patches[chosen])
+    if example.sum() < FEWEST:
+        raise UserError(
+            f"at {where} there are {example.sum()} pixels of one colour; "
+            f"choose the middle of a marker, with at least {FEWEST}"
+        )
+    return np.asarray(example)
+
+
+def _width(beyond: FloatArray, least: FloatArray) -> FloatArray:
+    """How far the range reaches to one side, shape (3,).
+
+    Args:
+        beyond: By how much the surroundings lie to that side, shape (n, 3).
+        least: Shape (3,); what is nearer is the marker's own noise.
+    """
+    widths = np.full(3, USUAL_WIDTH)
+    for channel in range(3):
+        other = beyond[beyond[:, channel] > least[channel], channel]
+        if len(other) > NOTABLE * len(beyond):
+            widths[channel] = min(USUAL_WIDTH, np.quantile(other, NOTABLE) / 2)
+    return np.asarray(np.maximum(widths, least))
+
+
+def _rounded(values: FloatArray) -> tuple[float, float, float]:
+    lightness, a, b = np.round(values, 1).tolist()
+    return lightness, a, b

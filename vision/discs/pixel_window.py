@@ -1,0 +1,91 @@
+"""The pixels around discs of a size, gathered for all of them at once."""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import cv2
+import numpy as np
+
+from geometry.arrays import BoolArray, FloatArray, IntArray
+from vision.discs.edge_model import Array
+from vision.frames.frame import GreyImage
+
+QUANTISATION = 1 / 12
+"""Variance of rounding to grey levels: the least that the noise can be."""
+
+SCALE = 1.4826
+"""Standard deviation over median absolute value, of normal noise."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """The pixels around some discs.
+
+    Attributes:
+        origins: Pixels that the others are relative to, shape (n, 2).
+        x, y: Of the pixels, shape (p,).
+        values: Grey levels, shape (n, p).
+        within: Whether the image has that pixel, shape (n, p).
+        ring: Which pixels of the squares around the discs these are, shape (s, s).
+        noise: Standard deviation that the second differences along the rows show, shape (n,), grey levels;
+            edges in the window make it larger.
+    """
+
+    origins: IntArray
+    x: Array
+    y: Array
+    values: Array
+    within: BoolArray
+    ring: BoolArray
+    noise: FloatArray
+
+    @classmethod
+    def of(cls, grey: GreyImage, centres: FloatArray, inner: float, outer: float) -> Self:
+        """Pixels at distances from `inner` to `outer` from the centres, shape (n, 2)."""
+        origins = np.rint(centres).astype(np.int64)
+        reach = int(np.ceil(outer))
+        y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]
+        away = np.hypot(x, y)
+        ring = (away >= inner) & (away <= outer)
+        columns, rows = origins[:, 0, None, None] + x, origins[:, 1, None, None] + y
+        height, width = grey.shape
+        values = grey[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)].astype(np.float32)
+        within = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
+        second = np.abs(values[:, :, 2:] - 2 * values[:, :, 1:-1] + values[:, :, :-2])
+        count = len(origins)
+        return cls(
+            origins=origins,
+            x=x[ring].astype(np.float32),
+            y=y[ring].astype(np.float32),
+            values=values[:, ring],
+            within=within[:, ring],
+            ring=ring,
+            noise=SCALE
+            / 6**0.5
+            * median_where(second.reshape(count, -1), within[:, :, 1:-1].reshape(count, -1)),
+        )
+
+    def at(self, places: IntArray) -> "Window":
+        """Those of some discs."""
+        return replace(
+            self,
+            origins=self.origins[places],
+            values=self.values[places],
+            within=self.within[places],
+            noise=self.noise[places],
+        )
+
+    def smoothed(self, values: Array, size: int) -> Array:
+        """Means over `size`² pixels, with zero where there is none, shape (n, p)."""
+        count, side = len(values), len(self.ring)
+        tiles = np.zeros((count, side + size, side), dtype=np.float32)
+        tiles[:, :side][:, self.ring] = values
+        strip = cv2.blur(tiles.reshape(-1, side), (size, size), borderType=cv2.BORDER_CONSTANT)
+        return np.asarray(strip.reshape(tiles.shape)[:, :side][:, self.ring], dtype=np.float32)
+
+
+def median_where(values: Array, chosen: BoolArray) -> FloatArray:
+    """The median of the chosen values of every row, shape (n,); zero where there is none."""
+    ordered = np.sort(np.where(chosen, values, np.inf), axis=1)
+    middle = np.take_along_axis(ordered, chosen.sum(axis=1, keepdims=True) // 2, axis=1)[:, 0]
+    return np.where(chosen.any(axis=1), middle, 0.0).astype(np.float64)

@@ -1,0 +1,138 @@
+"""Sub-pixel centres of disc markers, with covariances: a parametric fit to the grey levels around the edge.
+
+The picture is that of `vision.discs.edge_model`; `vision.discs.least_squares` adjusts all discs at once.
+What is beside a disc or in front of it gets little weight, and the covariance
+follows from the noise that the residuals show.
+Units: pixels, grey levels.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from geometry.arrays import BoolArray, FloatArray, frozen_array
+from geometry.errors import UserError
+from vision.discs.disc_fit import fit_alike
+from vision.discs.edge_model import BLUR, CONTRAST, RADIUS, SHADE_X, SHADE_Y, SLANT, STRETCH, X, Y
+from vision.discs.least_squares import Fit
+from vision.frames.frame import GreyImage
+
+KNOWN_RADIUS = 0.01
+"""Relative standard deviation of a radius that is called known: a marker turns and comes nearer a little."""
+
+LEAST_SEEN, LEAST_SEEN_UNKNOWN = 0.25, 0.7
+"""Share of the edge below which a disc is not found, with a known radius and without."""
+
+LARGEST_DEVIATION = 0.5
+"""Standard deviation of the centre, pixels, above which a disc is not found."""
+
+LARGEST_RESIDUAL = 0.25
+"""Root mean square residual, over the contrast, above which a disc is not found."""
+
+RADII = (0.6, 1.6)
+"""Radius found over radius guessed."""
+
+
+@dataclass(frozen=True)
+class Discs:
+    """Fitted discs; where `found` is false, all but `seen` is NaN.
+
+    Attributes:
+        centres: x, y, shape (n, 2), pixels.
+        covariances: Of the centres, shape (n, 2, 2), pixels². Correlated noise, such as a codec's, counts, by
+            its mean over the discs of about a size.
+        radii: Square root of the product of the semi-axes, shape (n,), pixels.
+        shapes: Stretch and slant as in `vision.discs.edge_model`, shape (n, 2); zero for circles.
+        contrast: Level around the disc less level within, shape (n,), grey levels; negative for light discs.
+        blur: Width of the edge, with the pixels' own width, shape (n,), pixels.
+        residual: Root mean square of the weighted residuals, shape (n,), grey levels.
+        seen: Share of the edge that supports the fit, shape (n,).
+        found: Shape (n,).
+    """
+
+    centres: FloatArray
+    covariances: FloatArray
+    radii: FloatArray
+    shapes: FloatArray
+    contrast: FloatArray
+    blur: FloatArray
+    residual: FloatArray
+    seen: FloatArray
+    found: BoolArray
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            getattr(self, field.name).setflags(write=False)
+
+
+def fit_discs(grey: GreyImage, guesses: ArrayLike, *, radii: ArrayLike | None = None) -> Discs:
+    """Fit discs to an image, each from a guess that may be off by several pixels.
+
+    Args:
+        grey: Shape (height, width).
+        guesses: x, y and radius of every disc, shape (n, 3), pixels.
+        radii: Known radii, one for all or shape (n,), pixels. They serve discs that are partly hidden, whose
+            size and place cannot be told apart; without them such discs are found only if most is seen.
+
+    Returns:
+        As many discs as guesses, in their order. A disc is found if the fit came to rest near the guess and
+        agrees with enough of the edge.
+
+    Raises:
+        UserError: If the image is not grey in eight bits, or a radius is not above zero.
+        ShapeError: If the guesses or radii have another shape.
+    """
+    guesses = frozen_array(guesses, dtype=np.float64, shape=(None, 3), name="guesses")
+    if grey.ndim != 2 or grey.dtype != np.uint8:
+        raise UserError(
+            f"discs are fitted in grey images of eight bits; this one is {grey.dtype} {grey.shape}"
+        )
+    known = guesses[:, 2] if radii is None else radii
+    known = frozen_array(
+        np.broadcast_to(known, (len(guesses),)), dtype=np.float64, shape=(None,), name="radii"
+    )
+    if not (guesses[:, 2] > 0).all() or not (known > 0).all():
+        raise UserError("the radius of a disc must be above zero")
+    tolerance = np.inf if radii is None else KNOWN_RADIUS
+    fit = Fit.empty(len(guesses))
+    sizes = np.rint(np.log(known) / np.log(1.4))
+    for size in np.unique(sizes):  # discs of a size share their window
+        (alike,) = np.nonzero(sizes == size)
+        fit.put(alike, fit_alike(grey, guesses[alike, :2], known[alike], tolerance))
+    return _judged(fit, guesses, LEAST_SEEN_UNKNOWN if radii is None else LEAST_SEEN)
+
+
+def _judged(fit: Fit, guesses: FloatArray, least_seen: float) -> Discs:
+    """What the fit says of the discs, those that it did not find struck out."""
+    parameters = fit.parameters
+    shade, blur, radii = parameters[:, [SHADE_X, SHADE_Y]], parameters[:, BLUR], parameters[:, RADIUS]
+    centres = fit.origins + parameters[:, [X, Y]]
+    centres = (
+        centres + blur[:, None] ** 2 * shade
+    )  # the light is blurred as well, which moves the picture back
+    deviations = np.sqrt(np.linalg.eigvalsh(fit.covariances)[:, 1])
+    contrast = parameters[:, CONTRAST]
+    residual = np.sqrt(fit.variance)
+    ratio = radii / guesses[:, 2]
+    found = (
+        fit.settled
+        & (fit.seen >= least_seen)
+        & (deviations <= LARGEST_DEVIATION)
+        & (residual <= LARGEST_RESIDUAL * np.abs(contrast))
+        & (np.hypot(*(centres - guesses[:, :2]).T) <= np.maximum(guesses[:, 2], 3))
+        & (ratio >= RADII[0])
+        & (ratio <= RADII[1])
+    )
+    kept = np.where(found, 1.0, np.nan)
+    return Discs(
+        centres=centres * kept[:, None],
+        covariances=fit.covariances * kept[:, None, None],
+        radii=radii * kept,
+        shapes=parameters[:, [STRETCH, SLANT]] * kept[:, None],
+        contrast=contrast * kept,
+        blur=blur * kept,
+        residual=residual * kept,
+        seen=fit.seen,
+        found=found,
+    )

@@ -1,0 +1,90 @@
+"""Frames: what every source of images gives, whether file, folder, camera or pipe.
+
+Images are uint8, shape (height, width) in grey or (height, width, 3) in blue, green, red. They are as the
+sensor read them: a file's note that it should be shown turned is not followed, in photographs neither
+(`vision.calibration.photographs`), so that one calibration fits both.
+"""
+
+from collections.abc import Generator, Iterator
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.errors import UserError
+
+Image = NDArray[np.uint8]
+GreyImage = NDArray[np.uint8]
+
+
+class Frame(NamedTuple):
+    """One image of a sequence.
+
+    Attributes:
+        number: From 0.
+        time: Since the first frame, s.
+        image: Shape (height, width) or (height, width, 3).
+    """
+
+    number: int
+    time: float
+    image: Image
+
+
+class Shot(NamedTuple):
+    """What a source yields: an image, when it was taken, s, and how to call it in a message."""
+
+    image: Image
+    time: float
+    name: str
+
+
+class Frames:
+    """A sequence of frames of one size, to be iterated once and closed: a context manager.
+
+    Attributes:
+        name: Of the source, for messages.
+        size: (width, height), pixels.
+        rate: Frames a second, as the source says or as it was told.
+        count: How many frames the source says that it has; None for a camera or a pipe. Of a video with a
+            variable rate it can be wrong.
+
+    Raises:
+        UserError: If the source has no frame; on iterating, if an image cannot be read or has another size.
+    """
+
+    def __init__(
+        self, name: str, shots: Generator[Shot, None, None], *, rate: float, count: int | None = None
+    ) -> None:
+        self.name, self.rate, self.count = name, rate, count
+        self._shots = shots
+        first = next(shots, None)
+        if first is None:
+            raise UserError(f"{name} has no frame that can be read")
+        self._first = first
+        self.size = _size(first.image)
+
+    def __iter__(self) -> Iterator[Frame]:
+        yield Frame(0, 0.0, self._first.image)
+        for number, shot in enumerate(self._shots, start=1):
+            if _size(shot.image) != self.size:
+                (w, h), (width, height) = self.size, _size(shot.image)
+                raise UserError(
+                    f"{self._first.name} has {w}x{h} pixels and {shot.name} {width}x{height}; "
+                    "frames of one sequence must have one size"
+                )
+            yield Frame(number, shot.time - self._first.time, shot.image)
+
+    def close(self) -> None:
+        """Let go of the file or the camera."""
+        self._shots.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _size(image: Image) -> tuple[int, int]:
+    return image.shape[1], image.shape[0]

@@ -1,0 +1,170 @@
+"""Sequences of pictures: a folder, a glob, or a pipe of JPEG or PNG pictures one after another."""
+
+import re
+import warnings
+from collections.abc import Callable, Generator, Iterator, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from geometry.atomic import atomic_path
+from geometry.errors import UserError
+from vision.frames.frame import Image, Shot
+from vision.frames.quiet_opencv import silenced
+
+SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm", ".jp2"})
+JPEG, PNG = b"\xff\xd8", b"\x89PNG\r\n\x1a\n"
+DEPTHS = (10, 12, 14, 16)
+"""Significant bits of what cameras put into 16-bit pictures."""
+
+_AS_STORED = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
+
+
+def natural_order(path: Path) -> list[tuple[int, str]]:
+    """A key that sorts frame2 before frame10."""
+    parts = re.split(r"(\d+)", path.name)
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts]
+
+
+def pictures_in(folder: Path) -> list[Path]:
+    """The pictures of a folder in natural order; other files and hidden ones are passed over.
+
+    Raises:
+        UserError: If there is none.
+    """
+    found = [
+        path
+        for path in folder.iterdir()
+        if path.suffix.lower() in SUFFIXES and not path.name.startswith(".") and path.is_file()
+    ]
+    if not found:
+        raise UserError(f"{folder} holds no picture, such as PNG or JPEG")
+    return sorted(found, key=natural_order)
+
+
+def shots_of_files(paths: Sequence[Path], rate: float) -> Generator[Shot, None, None]:
+    """Read pictures one by one; see `Decoder` for what is made of 16 bits."""
+    decode = Decoder()
+    for number, path in enumerate(paths):
+        try:
+            content = path.read_bytes()
+        except OSError as error:
+            raise UserError(f"cannot read the picture {path}: {error.strerror}") from None
+        yield Shot(decode(content, f"the picture {path}"), number / rate, path.name)
+
+
+def shots_of_stream(read: Callable[[int], bytes], name: str, rate: float) -> Generator[Shot, None, None]:
+    """Pictures from a stream of bytes, such as `ffmpeg -f image2pipe` writes; `read` gives b"" at its end."""
+    decode = Decoder()
+    for number, content in enumerate(split(read, name)):
+        label = f"picture {number + 1} of {name}"
+        yield Shot(decode(content, label), number / rate, label)
+
+
+class Decoder:
+    """Decodes the pictures of one sequence into 8 bits, all by the same scale.
+
+    Pictures of 16 bits are taken to have 10, 12, 14 or 16 significant bits, as the brightest pixel of the
+    first one needs: many cameras of 10 to 14 bits leave the highest ones empty.
+    """
+
+    def __init__(self) -> None:
+        self._white: int | None = None
+
+    def __call__(self, content: bytes, label: str) -> Image:
+        """The image in a file's content.
+
+        Raises:
+            UserError: If it is no whole picture, or neither of 8 nor of 16 bits.
+        """
+        if not content:
+            raise UserError(f"cannot read {label}: it is empty")
+        if content.startswith((JPEG, PNG)) and picture_end(content) is None:
+            raise UserError(f"cannot read {label}: its end is missing")
+        with silenced():
+            image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), _AS_STORED)
+        if image is None:
+            raise UserError(
+                f"cannot read {label}: it is damaged, or not one that OpenCV knows, such as PNG or JPEG"
+            )
+        if image.dtype == np.uint8:
+            return np.asarray(image, dtype=np.uint8)
+        if image.dtype != np.uint16:
+            raise UserError(f"cannot read {label}: its pixels are {image.dtype}; they must have 8 or 16 bits")
+        if self._white is None:
+            brightest = int(image.max()).bit_length()
+            self._white = 2 ** next(bits for bits in DEPTHS if bits >= brightest) - 1
+        return np.asarray(cv2.convertScaleAbs(image, alpha=255 / self._white), dtype=np.uint8)
+
+
+def write_picture(path: Path, image: Image) -> None:
+    """Write a picture atomically, in the format of its suffix."""
+    done, content = cv2.imencode(path.suffix.lower(), image)
+    if not done:
+        raise UserError(f"cannot write the picture {path}")
+    with atomic_path(path) as partial:
+        partial.write_bytes(content.tobytes())
+
+
+def split(read: Callable[[int], bytes], name: str) -> Iterator[bytes]:
+    """Cut a stream of JPEG and PNG pictures into its pictures.
+
+    It warns if the stream ends within a picture, as one does that was interrupted.
+
+    Raises:
+        UserError: If it carries something else.
+    """
+    buffer = bytearray()
+    more = True
+    while more or buffer:
+        if more:
+            more = bool(chunk := read(1 << 20))
+            buffer += chunk
+        while (end := picture_end(buffer)) is not None:
+            yield bytes(buffer[:end])
+            del buffer[:end]
+        if len(buffer) >= len(PNG) and not buffer.startswith((JPEG, PNG)):
+            raise UserError(
+                f"{name} carries neither JPEG nor PNG pictures; send them by, for example, "
+                "ffmpeg -i VIDEO -f image2pipe -c:v mjpeg -q:v 2 -"
+            )
+        if not more and buffer:
+            warnings.warn(f"{name} ended within a picture, which is left out", stacklevel=2)
+            return
+
+
+def picture_end(content: bytes | bytearray) -> int | None:
+    """Where the JPEG or PNG that `content` starts with ends; None if it does not hold all of it."""
+    if content.startswith(JPEG):
+        return _jpeg_end(content)
+    return _png_end(content) if content.startswith(PNG) else None
+
+
+_MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]", re.DOTALL)
+"""Of a segment of a JPEG, apart from those that may stand within its compressed data."""
+
+
+def _jpeg_end(content: bytes | bytearray) -> int | None:
+    """Walks over the segments, since a preview in one of them has an end marker of its own.
+
+    Source: ITU-T T.81, annex B.
+    """
+    position = len(JPEG)
+    while marker := _MARKER.search(content, position):
+        position = marker.end()
+        if marker[0] == b"\xff\xd9":
+            return position
+        position += int.from_bytes(content[position : position + 2], "big")
+    return None
+
+
+def _png_end(content: bytes | bytearray) -> int | None:
+    """Source: PNG specification, third edition, section 5.3: length, type, data and checksum of a chunk."""
+    position = len(PNG)
+    while position + 8 <= len(content):
+        kind = content[position + 4 : position + 8]
+        position += 12 + int.from_bytes(content[position : position + 4], "big")
+        if kind == b"IEND":
+            return position if position <= len(content) else None
+    return None

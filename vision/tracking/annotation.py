@@ -1,0 +1,73 @@
+"""Pictures to check by eye: which disc is which marker, how it moved, and what was not seen."""
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.arrays import FloatArray
+from vision.frames.frame import Image
+from vision.tracking.frame_tracker import Sighting
+
+SEEN, LOST, FIXED, WAY = (40, 150, 0), (0, 60, 230), (200, 110, 0), (190, 0, 190)
+"""Blue, green, red of markers, of markers not seen, of fiducials, and of displacements."""
+SHIFT = 4
+"""Binary digits of a pixel's fractions in what is drawn."""
+
+
+def annotated(
+    image: Image, sighting: Sighting, text: Sequence[str], *, ways: Sequence[FloatArray] = ()
+) -> Image:
+    """A copy of an image with what was seen in it.
+
+    Args:
+        image: Grey or coloured.
+        sighting: What it shows; markers that were not seen are crossed where they probably are.
+        text: Lines in the upper left corner.
+        ways: Of markers, each of shape (f, 2), pixels; nan where one was not seen.
+
+    Returns:
+        Shape (h, w, 3).
+    """
+    coloured = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image.copy()
+    canvas: Image = np.asarray(coloured, dtype=np.uint8)
+    size = max(canvas.shape[1] / 1280, 0.5)
+    width = max(1, round(size))
+    for way in ways:
+        known = way[np.isfinite(way).all(axis=1)]
+        cv2.polylines(canvas, [_fixed(known)], False, WAY, width, cv2.LINE_AA, SHIFT)
+    for spots, colour in ((sighting.fiducials, FIXED), (sighting.markers, SEEN)):
+        for centre, radius in zip(spots.centres, spots.radii, strict=True):
+            if np.isfinite(radius):
+                whole = round(float(radius) * 2**SHIFT)
+                cv2.circle(canvas, _point(centre), whole, colour, width, cv2.LINE_AA, SHIFT)
+    for number, (seen, guess) in enumerate(
+        zip(sighting.markers.radii, sighting.guesses, strict=True), start=1
+    ):
+        colour = SEEN if np.isfinite(seen) else LOST
+        if not np.isfinite(seen):
+            centre = (round(float(guess[0])), round(float(guess[1])))
+            cv2.drawMarker(
+                canvas, centre, LOST, cv2.MARKER_TILTED_CROSS, round(16 * size), width, cv2.LINE_AA
+            )
+        _write(canvas, str(number), guess + size * np.array([-5, -14]), 0.55 * size, colour)
+    for number, line in enumerate(text):
+        _write(canvas, line, size * np.array([14, 26 + 24 * number]), 0.6 * size, (30, 30, 30))
+    return canvas
+
+
+def _write(canvas: Image, text: str, place: FloatArray, scale: float, colour: tuple[int, ...]) -> None:
+    """Letters with a light rim, readable on anything."""
+    where = (round(float(place[0])), round(float(place[1])))
+    for width, paint in ((4, (255, 255, 255)), (1, colour)):
+        cv2.putText(canvas, text, where, cv2.FONT_HERSHEY_SIMPLEX, scale, paint, width, cv2.LINE_AA)
+
+
+def _point(pixels: FloatArray) -> tuple[int, int]:
+    x, y = _fixed(pixels[None])[0]
+    return int(x), int(y)
+
+
+def _fixed(pixels: FloatArray) -> NDArray[np.int32]:
+    return np.asarray(np.rint(pixels * 2**SHIFT), dtype=np.int32)

@@ -1,0 +1,207 @@
+"""From pixels to the markers' plane and back, with what is known about the errors.
+
+A plane is seen through a few parameters: pose and intrinsics of a calibrated camera, the eight of a
+homography, or the four of a similarity. The measured fiducials determine them, and their errors move all
+markers alike: in a displacement most of that cancels, because both of its ends go through the same
+parameters. All is linear propagation of covariances by the implicit function theorem (R. Hartley,
+A. Zisserman, "Multiple View Geometry", 2nd ed., 2003, chapter 5). Units: pixels, mm.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import cv2
+import numpy as np
+
+from geometry.arrays import FloatArray
+from vision.calibration.camera import Camera, Pose
+
+CORNERS = 24
+"""Of the polygon that stands for a circle."""
+
+
+class Slopes(NamedTuple):
+    """Derivatives of pixels: by the point in the plane, (n, 2, 2), and by the parameters, (n, 2, k)."""
+
+    point: FloatArray
+    parameters: FloatArray
+
+
+class View(Protocol):
+    """How a plane is seen; `parameters` has shape (k,)."""
+
+    def pixels(self, points: FloatArray, parameters: FloatArray) -> FloatArray:
+        """Where points of the plane, shape (n, 2), mm, are seen; shape (n, 2), pixels."""
+        ...
+
+    def points(self, pixels: FloatArray, parameters: FloatArray) -> FloatArray:
+        """The inverse of `pixels`."""
+        ...
+
+    def slopes(self, points: FloatArray, parameters: FloatArray) -> Slopes:
+        """Derivatives of `pixels`."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """A plane in space whose image is known.
+
+    Attributes:
+        view: How it is seen.
+        parameters: Shape (k,).
+        covariance: Of the parameters, shape (k, k).
+        residual: Root mean square distance of the fiducials from where they should be, mm.
+    """
+
+    view: View
+    parameters: FloatArray
+    covariance: FloatArray
+    residual: float
+
+    def points(self, pixels: FloatArray) -> FloatArray:
+        """Where in the plane pixels lie; shapes (n, 2), mm."""
+        return self.view.points(pixels, self.parameters)
+
+    def pixels(self, points: FloatArray) -> FloatArray:
+        """Where points of the plane are seen; shapes (n, 2), pixels."""
+        return self.view.pixels(points, self.parameters)
+
+    def circles(self, pixels: FloatArray, radius: float) -> FloatArray:
+        """Centres of circles in the plane from the middles of their pictures, shapes (n, 2), mm."""
+        return self.points(pixels - self.beside(self.points(pixels), radius))
+
+    def beside(self, centres: FloatArray, radius: float) -> FloatArray:
+        """From the pictures of circles' centres to the middles of their pictures, shape (n, 2), pixels.
+
+        Perspective and lens bend the map from the plane, so that they are not the same. The middle is the
+        centroid of the area, as it is the centre of an ellipse.
+        """
+        angles = 2 * np.pi * np.arange(CORNERS) / CORNERS
+        reach = radius * np.sqrt(angles[1] / np.sin(angles[1]))  # the polygon has the circle's area
+        around = reach * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        seen = self.pixels((centres[:, None] + around).reshape(-1, 2)).reshape(-1, CORNERS, 2)
+        x, y = np.moveaxis(seen - self.pixels(centres)[:, None], 2, 0)
+        turns = x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)
+        middle = [((of + np.roll(of, -1, axis=1)) * turns).sum(axis=1) for of in (x, y)]
+        return np.asarray(np.stack(middle, axis=1) / (3 * turns.sum(axis=1)[:, None]))
+
+    def scales(self, points: FloatArray) -> FloatArray:
+        """Pixels per mm at points of the plane, shape (n,): the root of the ratio of areas."""
+        return np.asarray(np.sqrt(np.abs(np.linalg.det(self.view.slopes(points, self.parameters).point))))
+
+    def displacement_covariance(
+        self, initial: FloatArray, final: FloatArray, initial_noise: FloatArray, final_noise: FloatArray
+    ) -> FloatArray:
+        """Covariance of the displacements of m points, shape (2 m, 2 m), mm², in the order u1, v1, u2, ...
+
+        Args:
+            initial: Initial positions in the plane, shape (m, 2), mm.
+            final: Final ones.
+            initial_noise: Covariances of the initial pixels, shape (m, 2, 2), pixels².
+            final_noise: Of the final ones.
+        """
+        count = len(initial)
+        shared = np.zeros((2 * count, len(self.parameters)))
+        own = np.zeros((count, 2, 2))
+        for sign, points, noise in ((-1, initial, initial_noise), (1, final, final_noise)):
+            slopes = self.view.slopes(points, self.parameters)
+            inverse = np.linalg.inv(slopes.point)
+            shared -= sign * (inverse @ slopes.parameters).reshape(shared.shape)
+            own += inverse @ noise @ inverse.transpose(0, 2, 1)
+        covariance = shared @ self.covariance @ shared.T
+        blocks = covariance.reshape(count, 2, count, 2)
+        blocks[np.arange(count), :, np.arange(count)] += own
+        return np.asarray(covariance)
+
+
+@dataclass(frozen=True)
+class CameraView:
+    """The plane z = `height` through a calibrated camera: rotation vector, translation and its intrinsics."""
+
+    camera: Camera
+    height: float = 0.0
+
+    def pixels(self, points: FloatArray, parameters: FloatArray) -> FloatArray:
+        """See `View`."""
+        return self.camera.project(self._raised(points), _pose(parameters))
+
+    def points(self, pixels: FloatArray, parameters: FloatArray) -> FloatArray:
+        """See `View`: the ray of every pixel meets the plane."""
+        pose = _pose(parameters)
+        rotation = cv2.Rodrigues(pose.rotation)[0]
+        plane = np.column_stack([rotation[:, :2], pose.translation + self.height * rotation[:, 2]])
+        return _divided(self.camera.undistort(pixels), np.linalg.inv(self.camera.matrix @ plane))
+
+    def slopes(self, points: FloatArray, parameters: FloatArray) -> Slopes:
+        """See `View`."""
+        pose = _pose(parameters)
+        matrix, by_rotation = cv2.Rodrigues(pose.rotation)
+        raised = self._raised(points)
+        seen = self.camera.see(raised @ matrix.T + pose.translation)
+        turned = np.einsum("kij,nj->nik", by_rotation.reshape(3, 3, 3), raised)
+        by_all = [seen.by_place @ turned, seen.by_place, seen.by_intrinsics]
+        return Slopes(seen.by_place @ matrix[:, :2], np.concatenate(by_all, axis=2))
+
+    def _raised(self, points: FloatArray) -> FloatArray:
+        return np.column_stack([points, np.full(len(points), self.height)])
+
+
+@dataclass(frozen=True)
+class HomographyView:
+    """A plane without a camera: the homography's entries but the last, which is 1, row by row."""
+
+    def pixels(self, points: FloatArray, parameters: FloatArray) -> FloatArray:
+        """See `View`."""
+        return _divided(points, np.append(parameters, 1.0).reshape(3, 3))
+
+    def points(self, pixels: FloatArray, parameters: FloatArray) -> FloatArray:
+        """See `View`."""
+        return _divided(pixels, np.linalg.inv(np.append(parameters, 1.0).reshape(3, 3)))
+
+    def slopes(self, points: FloatArray, parameters: FloatArray) -> Slopes:
+        """See `View`."""
+        homography = np.append(parameters, 1.0).reshape(3, 3)
+        pixels = _divided(points, homography)
+        whole = np.column_stack([points, np.ones(len(points))])
+        depth = (whole @ homography[2])[:, None, None]
+        by_point = (homography[None, :2, :2] - pixels[:, :, None] * homography[2, :2]) / depth
+        by_entries = np.zeros((len(points), 2, 8))
+        by_entries[:, 0, :3] = by_entries[:, 1, 3:6] = whole
+        by_entries[:, :, 6:] = -pixels[:, :, None] * points[:, None, :]
+        return Slopes(by_point, by_entries / depth)
+
+
+@dataclass(frozen=True)
+class SimilarityView:
+    """The linear transform of the paper: pixel = (a x + b y + c, b x - a y + d), for y is up in the plane."""
+
+    def pixels(self, points: FloatArray, parameters: FloatArray) -> FloatArray:
+        """See `View`."""
+        return points @ self._linear(parameters).T + parameters[2:]
+
+    def points(self, pixels: FloatArray, parameters: FloatArray) -> FloatArray:
+        """See `View`."""
+        return np.asarray((pixels - parameters[2:]) @ np.linalg.inv(self._linear(parameters)).T)
+
+    def slopes(self, points: FloatArray, parameters: FloatArray) -> Slopes:
+        """See `View`."""
+        by_point = np.repeat(self._linear(parameters)[None], len(points), axis=0)
+        (x, y), one, zero = points.T, np.ones(len(points)), np.zeros(len(points))
+        rows = np.stack([[x, y, one, zero], [-y, x, zero, one]])
+        return Slopes(by_point, rows.transpose(2, 0, 1))
+
+    @staticmethod
+    def _linear(parameters: FloatArray) -> FloatArray:
+        a, b = parameters[:2]
+        return np.array([[a, b], [b, -a]])
+
+
+def _pose(parameters: FloatArray) -> Pose:
+    return Pose(parameters[:3], parameters[3:6])
+
+
+def _divided(points: FloatArray, homography: FloatArray) -> FloatArray:
+    """Points, shape (n, 2), through a homography."""
+    mapped = points @ homography[:, :2].T + homography[:, 2]
+    return np.asarray(mapped[:, :2] / mapped[:, 2:])
