@@ -2,6 +2,7 @@
 
 import csv
 import json
+import pkgutil
 import re
 import runpy
 import shlex
@@ -200,6 +201,16 @@ def test_relative_links_lead_somewhere(page):
         if not other.exists() or (anchor and anchor not in anchors(other)):
             broken.append(target)
     assert broken == []
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.name != "CHANGELOG.md"], ids=id_of)
+def test_files_and_modules_that_a_page_names_exist(page):
+    text, packages = page.read_text(encoding="utf-8"), "geometry|solvers|vision|compare|pinnray|benchmarks"
+    paths = re.findall(rf"(?<![\w/.-])(?:{packages}|tests|docs|tools)/[\w/-]+(?:\.\w+)?", text)
+    assert [path for path in paths if not (ROOT / path).exists()] == []
+    for name in re.findall(rf"`((?:{packages})(?:\.\w+)+)[`(]", without_blocks(text)):
+        if not set(name.split(".")) & {*PLACEHOLDERS}:
+            pkgutil.resolve_name(name)
 
 
 def anchors(page: Path) -> set[str]:
