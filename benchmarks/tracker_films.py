@@ -12,7 +12,7 @@ from geometry.finger.parameters import Parameters
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.problem import Problem
-from vision.frames.frame import Frames, Image, Shot
+from vision.frames.frame import CapturedImage, Frames, Image
 from vision.rig.recording import Truth
 from vision.tracking.trajectories import Tracking
 
@@ -133,8 +133,8 @@ def coverage(ratios: FloatArray) -> tuple[float, float]:
 def film_of(pictures: Sequence[Image], *, rate: float = 30.0) -> Frames:
     """Images as a film of so many frames a second."""
 
-    def shots() -> Iterator[Shot]:
+    def shots() -> Iterator[CapturedImage]:
         for number, picture in enumerate(pictures):
-            yield Shot(picture, number / rate, f"picture {number}")
+            yield CapturedImage(picture, number / rate, f"picture {number}")
 
     return Frames("the virtual rig", shots(), rate=rate, count=len(pictures))

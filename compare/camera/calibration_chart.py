@@ -40,7 +40,7 @@ def draw_calibration(path: Path, calibration: Calibration, name: str, photograph
             drawn,
             f"Calibration from {len(calibration.views)} photographs",
             f"Lines: from every corner to where the fit puts it, {factor:g} times as long; rms "
-            f"{calibration.rms:.3f} px, held out {calibration.held_out:.3f} px.\n"
+            f"{calibration.rms:.3f} px, held out {calibration.held_out_rms:.3f} px.\n"
             f"Blue: inside a board at least once, {100 * calibration.coverage:.0f} % of the image.",
         )
         _residuals(_image(axes_at(drawn, (MARGIN, HEAD, wide, wide * shape)), camera), calibration, factor)

@@ -42,7 +42,7 @@ def calibrate(
     """Calibrate a camera from photographs of a chessboard or ChArUco board, and say how well it is known."""
     from compare.camera.calibration_chart import draw_calibration
     from compare.camera.calibration_table import calibration_table, view_table
-    from vision.calibration.board_names import read_board
+    from vision.calibration.board_parser import parse_board
     from vision.calibration.camera_calibration import better_lens
     from vision.calibration.camera_calibration import calibrate as calibrated
     from vision.calibration.camera_file import check_format, save_calibration
@@ -52,7 +52,7 @@ def calibrate(
     check_format(out)
     if not images:
         raise UserError("no photograph was given; name at least 4 that show the board")
-    chosen, lens = read_board(board, square, marker=marker, dictionary=dictionary), LensChoice(model, k3)
+    chosen, lens = parse_board(board, square, marker=marker, dictionary=dictionary), LensChoice(model, k3)
     calibration = calibrated(photographs(images, without=without), chosen, lens=lens)
     versions = package_versions()
     save_calibration(out, calibration, {name: versions[name] for name in VERSIONS})

@@ -109,8 +109,8 @@ class BoardOptions:
 
     def read(self) -> "Board":
         """The board."""
-        from vision.calibration.board_names import read_board
+        from vision.calibration.board_parser import parse_board
 
         if not 0 <= self.boards <= 1000:
             raise UserError(f"--boards {self.boards}: give 0 to 1000 photographs")
-        return read_board(self.board, self.square, marker=self.marker)
+        return parse_board(self.board, self.square, marker=self.marker)

@@ -29,7 +29,7 @@ def test_the_picture_tells_the_errors_and_leaves_nothing_outside(pages: dict, tm
     views = {f"photos/{name}.png": CAMERA.distort(CORNERS) for name in "ab"}
     views["photos/a.png"][3] = np.nan
     residuals = {name: rng.normal(0, 0.1, view.shape) + 0 * view for name, view in views.items()}
-    found = Calibration(CAMERA, Board(5, 4, 30.0), views, residuals, held_out=0.2345, coverage=0.5)
+    found = Calibration(CAMERA, Board(5, 4, 30.0), views, residuals, held_out_rms=0.2345, coverage=0.5)
     path = tmp_path / "camera.png"
     draw_calibration(path, found, "photos/a.png", np.full((240, 320), 128, np.uint8))
     page: Page = pages[path]

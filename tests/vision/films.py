@@ -9,7 +9,7 @@ from geometry.arrays import FloatArray
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
-from vision.frames.frame import Frames, Image, Shot
+from vision.frames.frame import CapturedImage, Frames, Image
 from vision.rig.bench import Bench
 from vision.rig.exposure import Exposure
 from vision.rig.motion import Motion
@@ -55,8 +55,8 @@ def images(*, hidden: int | None = None, tilt: float = 5.0) -> tuple[Image, ...]
 def frames_of(pictures: Sequence[Image]) -> Frames:
     """Images as a film."""
 
-    def shots() -> Iterator[Shot]:
+    def shots() -> Iterator[CapturedImage]:
         for number, picture in enumerate(pictures):
-            yield Shot(np.ascontiguousarray(picture), number / 30, f"picture {number}")
+            yield CapturedImage(np.ascontiguousarray(picture), number / 30, f"picture {number}")
 
     return Frames("the film", shots(), rate=30.0, count=len(pictures))

@@ -10,16 +10,16 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from vision.calibration.bundle_adjustment import Poses, Sightings, adjust
+from vision.calibration.bundle_adjustment import CornerObservations, Poses, adjust
 
 VIEWS = list(views(6, noise=0.3).values())
 FREE = np.arange(9) < 8
 START = CAMERA.with_intrinsics([1000, 1000, 640, 360, 0, 0, 0, 0, 0])
 
 
-def sightings(*, seen: np.ndarray) -> Sightings:
+def observations(*, seen: np.ndarray) -> CornerObservations:
     view, corner = np.nonzero(seen)
-    return Sightings(BOARD.corners[corner], np.array(VIEWS)[seen], view)
+    return CornerObservations(BOARD.corners[corner], np.array(VIEWS)[seen], view)
 
 
 def placed() -> Poses:
@@ -27,8 +27,8 @@ def placed() -> Poses:
     return Poses(Rotation.from_rotvec(rotations), np.array(translations))
 
 
-ALL = sightings(seen=np.ones((6, 54), dtype=bool))
-SOME = sightings(seen=np.random.default_rng(5).random((6, 54)) < 0.4)
+ALL = observations(seen=np.ones((6, 54), dtype=bool))
+SOME = observations(seen=np.random.default_rng(5).random((6, 54)) < 0.4)
 
 
 @pytest.mark.parametrize("seen", [ALL, SOME])

@@ -6,7 +6,7 @@ import pytest
 from chessboards import drawn
 
 from geometry.errors import UserError
-from vision.calibration.board_names import read_board
+from vision.calibration.board_parser import parse_board
 from vision.calibration.charuco import CharucoBoard
 from vision.calibration.chessboard import Board
 from vision.calibration.photographs import photographs
@@ -36,7 +36,7 @@ def test_corners_of_a_large_image_are_sought_in_a_smaller_one():
 def test_another_size_is_guessed():
     image = drawn(SMALL, np.linalg.inv(TO_PIXELS), (360, 260))
     assert Board(6, 4, 10.0).find(image) is None
-    assert Board(6, 4, 10.0).seems(image) == "5x4"
+    assert Board(6, 4, 10.0).suggest(image) == "5x4"
 
 
 def test_an_empty_picture_shows_no_board():
@@ -48,9 +48,9 @@ def test_corners_lie_a_square_apart():
 
 
 def test_a_board_is_read_from_text():
-    assert read_board(" 9X6", 25) == Board(9, 6, 25)
+    assert parse_board(" 9X6", 25) == Board(9, 6, 25)
     charuco = CharucoBoard(7, 5, 20, 15, "4X4_50")
-    assert read_board("ChArUco:8x6", 20, marker=15, dictionary="dict_4x4_50") == charuco
+    assert parse_board("ChArUco:8x6", 20, marker=15, dictionary="dict_4x4_50") == charuco
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_a_board_is_read_from_text():
 )
 def test_an_impossible_board_is_refused(size, square, message):
     with pytest.raises(UserError, match=message):
-        read_board(size, square)
+        parse_board(size, square)
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_an_impossible_board_is_refused(size, square, message):
 )
 def test_an_impossible_charuco_board_is_refused(text, options, message):
     with pytest.raises(UserError, match=message):
-        read_board(text, 20, **options)
+        parse_board(text, 20, **options)
 
 
 @pytest.mark.parametrize("content", [b"", b"no picture", b"\x89PNG\r\n\x1a\n"])

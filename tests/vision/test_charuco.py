@@ -58,10 +58,10 @@ def test_boards_of_the_layout_before_opencv_4_6_are_found():
 def test_another_board_is_not_found(other):
     image, _ = photographed(CHARUCO, pose(TILTS[0]))
     assert other.find(image) is None
-    assert other.seems(image) == "markers 5X5"
+    assert other.suggest(image) == "markers 5X5"
 
 
 def test_its_own_markers_are_no_other_ones():
     image, _ = photographed(CHARUCO, pose(TILTS[0]))
-    assert CHARUCO.seems(image) is None
-    assert CHARUCO.seems(np.full((100, 150), 128, np.uint8)) is None
+    assert CHARUCO.suggest(image) is None
+    assert CHARUCO.suggest(np.full((100, 150), 128, np.uint8)) is None

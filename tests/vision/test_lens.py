@@ -26,7 +26,7 @@ def test_slopes_are_those_of_differences(lens):
     for axis in range(2):
         shift = step * np.eye(2)[axis]
         difference = (lens.distort(PLANE + shift) - lens.distort(PLANE - shift)) / (2 * step)
-        np.testing.assert_allclose(lens.slope(PLANE)[:, :, axis], difference, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(lens.jacobian(PLANE)[:, :, axis], difference, rtol=0, atol=1e-8)
 
 
 @pytest.mark.parametrize("lens", [BROWN, FISHEYE])
@@ -45,4 +45,4 @@ def test_a_fisheye_maps_angles_to_distances():
 def test_a_lens_does_nothing_on_its_axis(lens):
     axis = np.zeros((1, 2))
     np.testing.assert_array_equal(lens.distort(axis), axis)
-    np.testing.assert_allclose(lens.slope(axis)[0], np.eye(2), atol=1e-12)
+    np.testing.assert_allclose(lens.jacobian(axis)[0], np.eye(2), atol=1e-12)

@@ -30,4 +30,4 @@ def test_the_camera_is_recovered_within_its_standard_deviations(board):
     deviations = np.array(found.camera.standard_deviations)[:8]
     assert (np.abs(off) < 3.5 * deviations).all()
     assert deviations[0] < 0.2  # pixels, 0.03 %
-    assert found.held_out < 0.03
+    assert found.held_out_rms < 0.03

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from vision.calibration.corner_refinement import fit_saddles
+from vision.calibration.corner_refinement import refine_corners
 
 SIZE, FINE = 40, 20
 EDGES = np.array([[[1.0, 0.1], [-0.3, 1.0]]])
@@ -23,7 +23,7 @@ def corner(centre: tuple[float, float], *, blur: float) -> np.ndarray:
 def test_a_corner_is_found_where_it_is(blur):
     centre = (19.7, 20.3)
     image = corner(centre, blur=blur)
-    found = fit_saddles(image, np.array([[20.3, 19.9]]), EDGES, np.array([8.0]))
+    found = refine_corners(image, np.array([[20.3, 19.9]]), EDGES, np.array([8.0]))
     np.testing.assert_allclose(found[0], centre, rtol=0, atol=0.01)
 
 
@@ -36,11 +36,11 @@ def test_a_corner_is_found_where_it_is(blur):
     ],
 )
 def test_what_is_no_corner_is_not_found(image):
-    found = fit_saddles(image, np.array([[20.0, 20.0]]), EDGES, np.array([8.0]))
+    found = refine_corners(image, np.array([[20.0, 20.0]]), EDGES, np.array([8.0]))
     assert np.isnan(found).all()
 
 
 def test_a_corner_at_the_border_of_the_image_is_fitted_to_what_is_there():
     image = corner((19.7, 20.3), blur=1.0)[16:, :]
-    found = fit_saddles(image, np.array([[20.0, 4.0]]), EDGES, np.array([8.0]))
+    found = refine_corners(image, np.array([[20.0, 4.0]]), EDGES, np.array([8.0]))
     np.testing.assert_allclose(found[0], (19.7, 4.3), rtol=0, atol=0.01)

@@ -12,7 +12,7 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from vision.calibration.bundle_adjustment import Sightings
+from vision.calibration.bundle_adjustment import CornerObservations
 from vision.calibration.chessboard import Board
 from vision.frames.frame import GreyImage
 
@@ -59,7 +59,7 @@ def find_views(images: Iterable[tuple[str, GreyImage]], board: Board) -> BoardVi
             views[name] = corners
             continue
         boardless.append(name)
-        if len(views) < FEWEST_VIEWS and len(boardless) <= GUESSES and (guess := board.seems(image)):
+        if len(views) < FEWEST_VIEWS and len(boardless) <= GUESSES and (guess := board.suggest(image)):
             guesses[guess] += 1
     guess, votes = guesses.most_common(1)[0] if guesses else ("", 0)
     if len(views) < FEWEST_VIEWS and votes > max(1, len(views)):
@@ -70,14 +70,14 @@ def find_views(images: Iterable[tuple[str, GreyImage]], board: Board) -> BoardVi
     return BoardViews(views, size, tuple(boardless))
 
 
-def sightings_of(views: Sequence[FloatArray] | FloatArray, board: Board) -> Sightings:
+def corner_observations(views: Sequence[FloatArray] | FloatArray, board: Board) -> CornerObservations:
     """The corners that were seen."""
     seen = np.isfinite(views).all(axis=2)
     view, corner = np.nonzero(seen)
-    return Sightings(board.corners[corner], np.asarray(views)[seen], view)
+    return CornerObservations(board.corners[corner], np.asarray(views)[seen], view)
 
 
-def by_view(values: FloatArray, views: Sequence[FloatArray]) -> FloatArray:
+def residuals_by_view(values: FloatArray, views: Sequence[FloatArray]) -> FloatArray:
     """What belongs to the corners that were seen, shape (m, 2), in the shape of the views, (views, n, 2)."""
     spread = np.full(np.shape(views), np.nan)
     spread[np.isfinite(views).all(axis=2)] = values

@@ -37,7 +37,7 @@ class Poses(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Sightings:
+class CornerObservations:
     """Corners that were seen, sorted by view.
 
     Attributes:
@@ -56,7 +56,7 @@ class Sightings:
         return np.flatnonzero(np.diff(self.view, prepend=-1))
 
 
-class Adjusted(NamedTuple):
+class Adjustment(NamedTuple):
     """What was fitted.
 
     Attributes:
@@ -70,20 +70,20 @@ class Adjusted(NamedTuple):
     residuals: FloatArray
 
 
-def adjust(camera: Camera, poses: Poses, sightings: Sightings, *, free: BoolArray) -> Adjusted:
+def adjust(camera: Camera, poses: Poses, observations: CornerObservations, *, free: BoolArray) -> Adjustment:
     """Fit intrinsics and poses, from a first guess of both.
 
     Args:
         camera: First guess.
         poses: First guess.
-        sightings: What was seen.
+        observations: What was seen.
         free: Which of the camera's intrinsics are fitted, shape (intrinsics,).
 
     Raises:
         UserError: If a corner of the first guess is behind the camera.
         LinAlgError: If what was seen does not determine the free intrinsics and the poses.
     """
-    residuals, normal = _linearised(camera, poses, sightings, free)
+    residuals, normal = _linearised(camera, poses, observations, free)
     cost, damping = np.sum(residuals**2), 1e-3
     for _ in range(STEPS):
         intrinsics = camera.intrinsics
@@ -91,7 +91,7 @@ def adjust(camera: Camera, poses: Poses, sightings: Sightings, *, free: BoolArra
         intrinsics[free] += step
         try:
             trial, trial_poses = camera.with_intrinsics(intrinsics), poses.moved(move)
-            missed = _missed(trial, trial_poses, sightings)
+            missed = _missed(trial, trial_poses, observations)
         except UserError:
             trial_cost = np.inf
         else:
@@ -99,7 +99,7 @@ def adjust(camera: Camera, poses: Poses, sightings: Sightings, *, free: BoolArra
         gain = cost - trial_cost
         if gain > 0:
             camera, poses, cost, damping = trial, trial_poses, trial_cost, damping / 10
-            residuals, normal = _linearised(camera, poses, sightings, free)
+            residuals, normal = _linearised(camera, poses, observations, free)
         else:
             damping *= 10
         if abs(gain) <= TOLERANCE * cost or damping > MOST_DAMPING:
@@ -107,11 +107,11 @@ def adjust(camera: Camera, poses: Poses, sightings: Sightings, *, free: BoolArra
     known = residuals.size - free.sum() - 6 * len(poses.translations)
     covariance = np.zeros((len(free), len(free)))
     covariance[np.ix_(free, free)] = normal.covariance() * cost / max(known, 1)
-    return Adjusted(replace(camera, covariance=tuple(map(tuple, covariance.tolist()))), poses, residuals)
+    return Adjustment(replace(camera, covariance=tuple(map(tuple, covariance.tolist()))), poses, residuals)
 
 
-def _missed(camera: Camera, poses: Poses, sightings: Sightings) -> FloatArray:
-    return sightings.pixels - camera.project(poses.place(sightings.points, sightings.view))
+def _missed(camera: Camera, poses: Poses, observations: CornerObservations) -> FloatArray:
+    return observations.pixels - camera.project(poses.place(observations.points, observations.view))
 
 
 class _Normal(NamedTuple):
@@ -151,16 +151,16 @@ class _Normal(NamedTuple):
 
 
 def _linearised(
-    camera: Camera, poses: Poses, sightings: Sightings, free: BoolArray
+    camera: Camera, poses: Poses, observations: CornerObservations, free: BoolArray
 ) -> tuple[FloatArray, _Normal]:
     """Residuals, shape (n, 2), and the normal equations of the next step."""
-    turned = poses.rotations[sightings.view].apply(sightings.points)
-    seen = camera.see(turned + poses.translations[sightings.view])
-    residuals = sightings.pixels - seen.pixels
+    turned = poses.rotations[observations.view].apply(observations.points)
+    seen = camera.project_with_jacobians(turned + poses.translations[observations.view])
+    residuals = observations.pixels - seen.pixels
     by_camera = seen.by_intrinsics[:, :, free]
-    by_turn = np.cross(turned[:, None], seen.by_place)  # ω x point: the gradient is point x gradient
-    by_pose = np.concatenate([by_turn, seen.by_place], axis=2)
-    starts = sightings.starts
+    by_turn = np.cross(turned[:, None], seen.by_point)  # ω x point: the gradient is point x gradient
+    by_pose = np.concatenate([by_turn, seen.by_point], axis=2)
+    starts = observations.starts
 
     def summed(left: FloatArray, right: FloatArray) -> FloatArray:
         return np.asarray(np.add.reduceat(np.einsum("nki,nkj->nij", left, right), starts))

@@ -30,21 +30,20 @@ class Pose(NamedTuple):
     translation: FloatArray
 
 
-IN_FRONT = Pose(np.zeros(3), np.zeros(3))
+IDENTITY = Pose(np.zeros(3), np.zeros(3))
 
 
-class Seen(NamedTuple):
-    """Pixels and how they move.
+class Projection(NamedTuple):
+    """Pixels of points, and their derivatives.
 
     Attributes:
         pixels: Shape (n, 2).
-        by_place: Derivative by what was seen: points in the camera's frame, shape (n, 2, 3), pixels per mm;
-            or pixels, (n, 2, 2).
+        by_point: Derivative by the points in the camera's frame, shape (n, 2, 3), pixels per mm.
         by_intrinsics: Derivative by the camera's `intrinsics`, shape (n, 2, intrinsics).
     """
 
     pixels: FloatArray
-    by_place: FloatArray
+    by_point: FloatArray
     by_intrinsics: FloatArray
 
 
@@ -78,7 +77,7 @@ class Camera:
     def __post_init__(self) -> None:
         if self.model not in LENSES:
             raise UserError(f"no lens model is called {self.model!r}; there are: {', '.join(LENSES)}")
-        coefficients = self.names[4:]
+        coefficients = self.intrinsic_names[4:]
         if len(self.distortion) != len(coefficients):
             raise UserError(
                 f"distortion has {len(self.distortion)} numbers; for the model {self.model} it must have "
@@ -90,7 +89,7 @@ class Camera:
             if (value := getattr(self, name)) <= 0:
                 raise UserError(f"the camera's {name} is {value:g}; it must be above zero")
         if self.covariance is not None:
-            _check_covariance(np.array(self.covariance, dtype=np.float64), self.names)
+            _check_covariance(np.array(self.covariance, dtype=np.float64), self.intrinsic_names)
 
     @cached_property
     def lens(self) -> Lens:
@@ -98,7 +97,7 @@ class Camera:
         return LENSES[self.model](*self.distortion)
 
     @property
-    def names(self) -> tuple[str, ...]:
+    def intrinsic_names(self) -> tuple[str, ...]:
         """What `intrinsics` are called: fx, fy, cx, cy and the coefficients of the lens."""
         return ("fx", "fy", "cx", "cy", *(field.name for field in fields(LENSES[self.model])))
 
@@ -122,7 +121,7 @@ class Camera:
         fx, fy, cx, cy, *distortion = map(float, values)
         return replace(self, fx=fx, fy=fy, cx=cx, cy=cy, distortion=tuple(distortion), covariance=None)
 
-    def project(self, points: ArrayLike, pose: Pose = IN_FRONT) -> FloatArray:
+    def project(self, points: ArrayLike, pose: Pose = IDENTITY) -> FloatArray:
         """Where points are seen.
 
         Args:
@@ -138,7 +137,7 @@ class Camera:
         points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
         return self._pixels(self.lens.distort(_plane(points @ _turn(pose).T + pose.translation)))
 
-    def see(self, points: ArrayLike) -> Seen:
+    def project_with_jacobians(self, points: ArrayLike) -> Projection:
         """Where points in the camera's frame, shape (n, 3), mm, are seen, with derivatives by both.
 
         Raises:
@@ -147,10 +146,10 @@ class Camera:
         points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
         plane = _plane(points)
         bent = self.lens.distort(plane)
-        by_plane = np.array([[self.fx], [self.fy]]) * self.lens.slope(plane)
+        by_plane = np.array([[self.fx], [self.fy]]) * self.lens.jacobian(plane)
         along_ray = -np.einsum("nij,nj->ni", by_plane, plane)
-        by_place = np.concatenate([by_plane, along_ray[:, :, None]], axis=2) / points[:, 2, None, None]
-        return Seen(self._pixels(bent), by_place, self._by_intrinsics(plane, bent))
+        by_point = np.concatenate([by_plane, along_ray[:, :, None]], axis=2) / points[:, 2, None, None]
+        return Projection(self._pixels(bent), by_point, self._by_intrinsics(plane, bent))
 
     def distort(self, pixels: ArrayLike) -> FloatArray:
         """Where the lens puts points that a pinhole would show at `pixels`; shapes (n, 2), pixels."""
@@ -172,24 +171,11 @@ class Camera:
         """
         return self._pixels(self._straight(self._on_plane(pixels)))
 
-    def undistorting(self, pixels: ArrayLike) -> Seen:
-        """`undistort` with its derivatives by the pixels, shape (n, 2, 2), and by the intrinsics.
-
-        Source: the implicit function theorem on `distort`.
-        """
-        bent = self._on_plane(pixels)
-        plane = self._straight(bent)
-        by_bent = np.linalg.inv(self.lens.slope(plane))
-        focal = np.array([self.fx, self.fy])
-        by_intrinsics = -focal[:, None] * (by_bent / focal) @ self._by_intrinsics(plane, bent)
-        by_intrinsics[:, :, :4] += _by_pinhole(plane)
-        return Seen(self._pixels(plane), focal[:, None] * by_bent / focal, by_intrinsics)
-
     def _straight(self, bent: FloatArray) -> FloatArray:
         """What the lens puts at `bent`; shapes (n, 2)."""
         plane, tolerance = bent.copy(), NEWTON_TOLERANCE / max(self.fx, self.fy)
         for _ in range(NEWTON_STEPS):
-            missed, slope = self.lens.distort(plane) - bent, self.lens.slope(plane)
+            missed, slope = self.lens.distort(plane) - bent, self.lens.jacobian(plane)
             upright = np.linalg.det(slope) > 0
             if not upright.all() or np.abs(missed).max(initial=0) < tolerance:
                 break

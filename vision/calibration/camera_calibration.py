@@ -2,7 +2,7 @@
 
 Z. Zhang, "A flexible new technique for camera calibration", IEEE TPAMI 22, 2000: a plane seen in several
 poses determines the camera. All intrinsics and poses are fitted by least squares. The fit's own residuals
-flatter it, so `held_out` repeats it without some of the photographs and asks how well it predicts corners
+flatter it, so `held_out_rms` repeats it without some of the photographs and asks how well it predicts corners
 there. Units: pixels, mm.
 """
 
@@ -15,10 +15,10 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from vision.calibration.board_views import FEWEST_VIEWS, by_view, coverage, find_views
+from vision.calibration.board_views import FEWEST_VIEWS, coverage, find_views, residuals_by_view
 from vision.calibration.camera import Camera
 from vision.calibration.chessboard import Board
-from vision.calibration.lens_fit import LENS_CHOICES, LensChoice, fit_lens, held_out, rms
+from vision.calibration.lens_fit import LENS_CHOICES, LensChoice, fit_lens, held_out_rms, rms
 from vision.frames.frame import GreyImage
 
 LEAST_COVERAGE = 0.6
@@ -37,7 +37,7 @@ class Calibration:
         views: Where its corners were seen, by the name of the photograph, shape (n, 2), pixels;
             NaN where one was not seen.
         residuals: Seen minus predicted by the fit, likewise.
-        held_out: Root mean square distance in photographs that the camera was not fitted to, pixels.
+        held_out_rms: Root mean square distance in photographs that the camera was not fitted to, pixels.
         coverage: Share of the image area that was inside a board at least once.
         boardless: Names of the photographs in which no board was found.
     """
@@ -46,7 +46,7 @@ class Calibration:
     board: Board
     views: Mapping[str, FloatArray]
     residuals: Mapping[str, FloatArray]
-    held_out: float
+    held_out_rms: float
     coverage: float
     boardless: tuple[str, ...] = ()
 
@@ -114,8 +114,8 @@ def calibrate_views(
         camera=adjusted.camera,
         board=board,
         views=views,
-        residuals=dict(zip(views, by_view(adjusted.residuals, corners), strict=True)),
-        held_out=held_out(corners, board, adjusted.camera, lens),
+        residuals=dict(zip(views, residuals_by_view(adjusted.residuals, corners), strict=True)),
+        held_out_rms=held_out_rms(corners, board, adjusted.camera, lens),
         coverage=coverage(corners, size),
         boardless=boardless,
     )
@@ -133,11 +133,11 @@ def better_lens(
         if other != lens:
             try:
                 fitted = fit_lens(corners, calibration.board, (camera.width, camera.height), other).camera
-                errors[other] = held_out(corners, calibration.board, fitted, other)
+                errors[other] = held_out_rms(corners, calibration.board, fitted, other)
             except UserError:
                 continue
     best = min(errors, key=errors.__getitem__, default=lens)
-    return (best, errors[best]) if errors.get(best, np.inf) < ratio * calibration.held_out else None
+    return (best, errors[best]) if errors.get(best, np.inf) < ratio * calibration.held_out_rms else None
 
 
 def _warn(calibration: Calibration) -> None:

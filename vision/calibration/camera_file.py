@@ -38,7 +38,7 @@ def save_calibration(path: Path, calibration: Calibration, versions: Mapping[str
         _content(calibration.camera)
         | {
             "avg_reprojection_error": calibration.rms,
-            "held_out_reprojection_error": calibration.held_out,
+            "held_out_reprojection_error": calibration.held_out_rms,
             "coverage": calibration.coverage,
             "nframes": len(errors),
             "image_names": list(errors),
@@ -83,7 +83,7 @@ def load_camera(path: Path) -> Camera:
             distortion=tuple(np.resize([*distortion, 0.0], max(sizes)).tolist()),
             model=model,
         )
-        return replace(camera, covariance=_covariance(storage, len(camera.names), path))
+        return replace(camera, covariance=_covariance(storage, len(camera.intrinsic_names), path))
     except UserError as error:
         raise UserError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
 
@@ -103,7 +103,7 @@ def _content(camera: Camera) -> dict[str, Entry]:
         "distortion_coefficients": np.array([camera.distortion]),
     }
     if camera.covariance is not None:
-        content["intrinsics"] = list(camera.names)
+        content["intrinsics"] = list(camera.intrinsic_names)
         content["intrinsics_standard_deviations"] = np.array([camera.standard_deviations])
         content["intrinsics_covariance"] = np.array(camera.covariance)
     return content

@@ -81,7 +81,7 @@ class CharucoBoard(Board):
         corners[np.ravel(numbers)] = np.reshape(pixels, (-1, 2))
         return self.refine(image, corners, REACH * (self.square - self.marker))
 
-    def seems(self, image: GreyImage) -> str | None:
+    def suggest(self, image: GreyImage) -> str | None:
         """Another dictionary that most markers in an image seem to be of; None if it is this one."""
         counts = {name: _markers_seen(image, name) for name in LARGEST}
         best = max(counts, key=counts.__getitem__)

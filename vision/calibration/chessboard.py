@@ -7,7 +7,7 @@ import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
-from vision.calibration.corner_refinement import fit_saddles
+from vision.calibration.corner_refinement import refine_corners
 from vision.frames.frame import GreyImage
 
 EDGE = 0.45
@@ -108,7 +108,7 @@ class Board:
         narrowest = np.abs(np.linalg.det(edges)) / lengths.max(axis=1)
         radii = np.clip(reach * narrowest, *RADII)
         refined = np.full_like(corners, np.nan)
-        refined[seen] = fit_saddles(image, corners[seen], edges, radii)
+        refined[seen] = refine_corners(image, corners[seen], edges, radii)
         return refined if self._determine(np.isfinite(refined[:, 0])) else None
 
     def _determine(self, seen: BoolArray) -> bool:
@@ -122,7 +122,7 @@ class Board:
                 return False
         return True
 
-    def seems(self, image: GreyImage) -> str | None:
+    def suggest(self, image: GreyImage) -> str | None:
         """Another size that the board in an image seems to have; None if there is none."""
         small = _smaller(image, max(image.shape) / LARGE)
         found, _, cells = cv2.findChessboardCornersSBWithMeta(small, (3, 3), cv2.CALIB_CB_LARGER)

@@ -23,7 +23,7 @@ TURN = 0.2
 """Longest step of an angle, rad."""
 
 
-def fit_saddles(
+def refine_corners(
     grey: NDArray[np.uint8], guesses: FloatArray, edges: FloatArray, radii: FloatArray
 ) -> FloatArray:
     """Corners from guesses that are off by a pixel or two, by the Gauss-Newton method on all at once.

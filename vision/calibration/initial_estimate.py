@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from vision.calibration.bundle_adjustment import Poses, Sightings
+from vision.calibration.bundle_adjustment import CornerObservations, Poses
 from vision.calibration.camera import Camera
 from vision.calibration.lens import LENSES
 
@@ -20,11 +20,11 @@ FOCAL_LENGTHS = 2.0 ** np.arange(-2.5, 4.5, 0.5)
 """In widths of the image: angles of view from 140 to 4 degrees (fisheye: beyond)."""
 
 
-def first_camera(sightings: Sightings, size: tuple[int, int], model: str) -> Camera:
+def initial_camera(observations: CornerObservations, size: tuple[int, int], model: str) -> Camera:
     """A camera near the one that saw a board.
 
     Args:
-        sightings: What was seen.
+        observations: What was seen.
         size: (width, height) of the images, pixels.
         model: Name of the lens.
 
@@ -37,8 +37,8 @@ def first_camera(sightings: Sightings, size: tuple[int, int], model: str) -> Cam
         centre = (0.5 * (size[0] - 1), 0.5 * (size[1] - 1))
         camera = Camera(*size, focal, focal, *centre, distortion, model)
         try:
-            placed = board_poses(camera, sightings).place(sightings.points, sightings.view)
-            cost = float(np.sum((camera.project(placed) - sightings.pixels) ** 2))
+            placed = initial_poses(camera, observations).place(observations.points, observations.view)
+            cost = float(np.sum((camera.project(placed) - observations.pixels) ** 2))
         except UserError:
             continue
         if cost < least:
@@ -48,7 +48,7 @@ def first_camera(sightings: Sightings, size: tuple[int, int], model: str) -> Cam
     return best
 
 
-def board_poses(camera: Camera, sightings: Sightings) -> Poses:
+def initial_poses(camera: Camera, observations: CornerObservations) -> Poses:
     """Where the board was in every view.
 
     Source: T. Collins, A. Bartoli, "Infinitesimal plane-based pose estimation", IJCV 109, 2014, as in OpenCV.
@@ -56,9 +56,9 @@ def board_poses(camera: Camera, sightings: Sightings) -> Poses:
     Raises:
         UserError: If the corners of a view are no image of a plane, or the distortion cannot be undone there.
     """
-    straight = camera.undistort(sightings.pixels)
+    straight = camera.undistort(observations.pixels)
     rotations, translations = [], []
-    views = zip(_split(sightings.points, sightings), _split(straight, sightings), strict=True)
+    views = zip(_split(observations.points, observations), _split(straight, observations), strict=True)
     for points, pixels in views:
         try:
             found, rotation, shift = cv2.solvePnP(
@@ -73,5 +73,5 @@ def board_poses(camera: Camera, sightings: Sightings) -> Poses:
     return Poses(Rotation.from_rotvec(rotations), np.array(translations))
 
 
-def _split(values: FloatArray, sightings: Sightings) -> list[FloatArray]:
-    return np.split(values, sightings.starts[1:])
+def _split(values: FloatArray, observations: CornerObservations) -> list[FloatArray]:
+    return np.split(values, observations.starts[1:])

@@ -21,7 +21,7 @@ class Lens(Protocol):
     def distort(self, plane: FloatArray) -> FloatArray:
         """Where the lens puts points; shapes (n, 2)."""
 
-    def slope(self, plane: FloatArray) -> FloatArray:
+    def jacobian(self, plane: FloatArray) -> FloatArray:
         """Derivative of `distort` by the points, shape (n, 2, 2)."""
 
     def by_coefficients(self, plane: FloatArray) -> FloatArray:
@@ -52,7 +52,7 @@ class BrownLens:
         )
         return np.asarray(bent)
 
-    def slope(self, plane: FloatArray) -> FloatArray:
+    def jacobian(self, plane: FloatArray) -> FloatArray:
         """Derivative of `distort` by the points, shape (n, 2, 2)."""
         x, y = plane.T
         s = x**2 + y**2
@@ -85,7 +85,7 @@ class FisheyeLens:
         """Where the lens puts points; shapes (n, 2)."""
         return np.asarray(plane * self._scale(_radius(plane))[:, None])
 
-    def slope(self, plane: FloatArray) -> FloatArray:
+    def jacobian(self, plane: FloatArray) -> FloatArray:
         """Derivative of `distort` by the points, shape (n, 2, 2)."""
         r = _radius(plane)
         s = np.arctan(r) ** 2

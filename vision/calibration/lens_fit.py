@@ -7,11 +7,11 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from vision.calibration.board_views import sightings_of
-from vision.calibration.bundle_adjustment import Adjusted, Sightings, adjust
+from vision.calibration.board_views import corner_observations
+from vision.calibration.bundle_adjustment import Adjustment, CornerObservations, adjust
 from vision.calibration.camera import Camera
 from vision.calibration.chessboard import Board
-from vision.calibration.initial_estimate import board_poses, first_camera
+from vision.calibration.initial_estimate import initial_camera, initial_poses
 
 FOLDS = 5
 CORNER_ERROR, LARGEST_DOUBT = 0.1, 0.05
@@ -40,41 +40,45 @@ class LensChoice(NamedTuple):
 LENS_CHOICES = (LensChoice(), LensChoice(fit_k3=True), LensChoice("fisheye"))
 
 
-def fit_lens(views: Sequence[FloatArray], board: Board, size: tuple[int, int], lens: LensChoice) -> Adjusted:
+def fit_lens(
+    views: Sequence[FloatArray], board: Board, size: tuple[int, int], lens: LensChoice
+) -> Adjustment:
     """Camera and poses from nothing but the views."""
-    sightings = sightings_of(views, board)
+    observations = corner_observations(views, board)
     try:
-        first = first_camera(sightings, size, lens.model)
+        first = initial_camera(observations, size, lens.model)
     except UserError:
         raise UserError(UNDETERMINED) from None
-    return _adjusted(first, sightings, lens)
+    return _adjusted(first, observations, lens)
 
 
-def held_out(views: Sequence[FloatArray], board: Board, camera: Camera, lens: LensChoice) -> float:
+def held_out_rms(views: Sequence[FloatArray], board: Board, camera: Camera, lens: LensChoice) -> float:
     """Root mean square error of prediction, pixels, by k-fold cross-validation over the views.
 
     In a view that was left out, half of the corners gives the pose and the rest are predicted; then the
     other way round.
     """
-    folds, none = min(FOLDS, len(views)), np.zeros(len(camera.names), dtype=bool)
+    folds, none = min(FOLDS, len(views)), np.zeros(len(camera.intrinsic_names), dtype=bool)
     distances = []
     for fold in range(folds):
         left_out = np.asarray(views[fold::folds])
-        kept = sightings_of([view for number, view in enumerate(views) if number % folds != fold], board)
+        kept = corner_observations(
+            [view for number, view in enumerate(views) if number % folds != fold], board
+        )
         trained = _adjusted(camera, kept, lens).camera
         for half in board.halves:
-            known = sightings_of(np.where(half[:, None], left_out, np.nan), board)
-            asked = sightings_of(np.where(half[:, None], np.nan, left_out), board)
-            poses = adjust(trained, board_poses(trained, known), known, free=none).poses
+            known = corner_observations(np.where(half[:, None], left_out, np.nan), board)
+            asked = corner_observations(np.where(half[:, None], np.nan, left_out), board)
+            poses = adjust(trained, initial_poses(trained, known), known, free=none).poses
             distances.append(trained.project(poses.place(asked.points, asked.view)) - asked.pixels)
     return rms(distances)
 
 
-def _adjusted(camera: Camera, sightings: Sightings, lens: LensChoice) -> Adjusted:
+def _adjusted(camera: Camera, observations: CornerObservations, lens: LensChoice) -> Adjustment:
     """Camera and poses from a camera that is nearly right."""
-    free = np.array([lens.fit_k3 or lens.model != "brown" or name != "k3" for name in camera.names])
+    free = np.array([lens.fit_k3 or lens.model != "brown" or name != "k3" for name in camera.intrinsic_names])
     try:
-        adjusted = adjust(camera, board_poses(camera, sightings), sightings, free=free)
+        adjusted = adjust(camera, initial_poses(camera, observations), observations, free=free)
     except (UserError, np.linalg.LinAlgError):
         raise UserError(UNDETERMINED) from None
     doubt = np.array(adjusted.camera.standard_deviations)[:2] / adjusted.camera.intrinsics[:2]

@@ -3,7 +3,6 @@
 import math
 import time
 import warnings
-from collections.abc import Generator
 from itertools import count
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import cv2
 import numpy as np
 
 from geometry.errors import UserError
-from vision.frames.frame import Frames, Image, Shot
+from vision.frames.frame import CapturedImage, Frames, Image, ImageStream
 from vision.frames.quiet_opencv import silenced
 
 USUAL_RATE = 30.0
@@ -47,12 +46,10 @@ def video_frames(path: Path, rate: float | None = None) -> Frames:
     known = capture.get(cv2.CAP_PROP_FRAME_COUNT)
     frames = int(known) if 0 < known < math.inf else None
     rate = _rate(capture, rate)
-    return Frames(str(path), _shots_of_video(path, capture, rate, frames), rate=rate, count=frames)
+    return Frames(str(path), _images_of_video(path, capture, rate, frames), rate=rate, count=frames)
 
 
-def _shots_of_video(
-    path: Path, capture: cv2.VideoCapture, rate: float, known: int | None
-) -> Generator[Shot, None, None]:
+def _images_of_video(path: Path, capture: cv2.VideoCapture, rate: float, known: int | None) -> ImageStream:
     """Where the file's times do not increase, a frame follows the last one by 1 / `rate`.
 
     The end is missing if the last time falls short too: where the rate varies, `known` is only the product of
@@ -64,7 +61,7 @@ def _shots_of_video(
             said = _time(capture, rate)
             last = said if said > last else last + 1 / rate
             first = first if read else last
-            yield Shot(image, last, f"frame {read}")
+            yield CapturedImage(image, last, f"frame {read}")
             read += 1
     finally:
         capture.release()
@@ -95,15 +92,15 @@ def camera_frames(index: int, *, size: tuple[int, int], rate: float | None = Non
     capture.set(cv2.CAP_PROP_FRAME_HEIGHT, size[1])
     if rate is not None:
         capture.set(cv2.CAP_PROP_FPS, rate)
-    return Frames(f"camera {index}", _shots_of_camera(index, capture), rate=_rate(capture, rate))
+    return Frames(f"camera {index}", _images_of_camera(index, capture), rate=_rate(capture, rate))
 
 
-def _shots_of_camera(index: int, capture: cv2.VideoCapture) -> Generator[Shot, None, None]:
+def _images_of_camera(index: int, capture: cv2.VideoCapture) -> ImageStream:
     try:
         for number in count():
             if (image := _next(capture)) is None:
                 raise UserError(f"camera {index} gives no image after {number} frames")
-            yield Shot(image, time.monotonic(), f"frame {number}")
+            yield CapturedImage(image, time.monotonic(), f"frame {number}")
     finally:
         capture.release()
 

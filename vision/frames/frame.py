@@ -31,12 +31,15 @@ class Frame(NamedTuple):
     image: Image
 
 
-class Shot(NamedTuple):
+class CapturedImage(NamedTuple):
     """What a source yields: an image, when it was taken, s, and how to call it in a message."""
 
     image: Image
     time: float
     name: str
+
+
+ImageStream = Generator[CapturedImage, None, None]
 
 
 class Frames:
@@ -53,12 +56,10 @@ class Frames:
         UserError: If the source has no frame; on iterating, if an image cannot be read or has another size.
     """
 
-    def __init__(
-        self, name: str, shots: Generator[Shot, None, None], *, rate: float, count: int | None = None
-    ) -> None:
+    def __init__(self, name: str, images: ImageStream, *, rate: float, count: int | None = None) -> None:
         self.name, self.rate, self.count = name, rate, count
-        self._shots = shots
-        first = next(shots, None)
+        self._images = images
+        first = next(images, None)
         if first is None:
             raise UserError(f"{name} has no frame that can be read")
         self._first = first
@@ -66,18 +67,18 @@ class Frames:
 
     def __iter__(self) -> Iterator[Frame]:
         yield Frame(0, 0.0, self._first.image)
-        for number, shot in enumerate(self._shots, start=1):
-            if _size(shot.image) != self.size:
-                (w, h), (width, height) = self.size, _size(shot.image)
+        for number, captured in enumerate(self._images, start=1):
+            if _size(captured.image) != self.size:
+                (w, h), (width, height) = self.size, _size(captured.image)
                 raise UserError(
-                    f"{self._first.name} has {w}x{h} pixels and {shot.name} {width}x{height}; "
+                    f"{self._first.name} has {w}x{h} pixels and {captured.name} {width}x{height}; "
                     "frames of one sequence must have one size"
                 )
-            yield Frame(number, shot.time - self._first.time, shot.image)
+            yield Frame(number, captured.time - self._first.time, captured.image)
 
     def close(self) -> None:
         """Let go of the file or the camera."""
-        self._shots.close()
+        self._images.close()
 
     def __enter__(self) -> Self:
         return self

@@ -2,7 +2,7 @@
 
 import re
 import warnings
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import cv2
@@ -10,7 +10,7 @@ import numpy as np
 
 from geometry.atomic import atomic_path
 from geometry.errors import UserError
-from vision.frames.frame import Image, Shot
+from vision.frames.frame import CapturedImage, Image, ImageStream
 from vision.frames.quiet_opencv import silenced
 
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm", ".jp2"})
@@ -43,7 +43,7 @@ def pictures_in(folder: Path) -> list[Path]:
     return sorted(found, key=natural_order)
 
 
-def shots_of_files(paths: Sequence[Path], rate: float) -> Generator[Shot, None, None]:
+def images_of_files(paths: Sequence[Path], rate: float) -> ImageStream:
     """Read pictures one by one; see `Decoder` for what is made of 16 bits."""
     decode = Decoder()
     for number, path in enumerate(paths):
@@ -51,15 +51,15 @@ def shots_of_files(paths: Sequence[Path], rate: float) -> Generator[Shot, None, 
             content = path.read_bytes()
         except OSError as error:
             raise UserError(f"cannot read the picture {path}: {error.strerror}") from None
-        yield Shot(decode(content, f"the picture {path}"), number / rate, path.name)
+        yield CapturedImage(decode(content, f"the picture {path}"), number / rate, path.name)
 
 
-def shots_of_stream(read: Callable[[int], bytes], name: str, rate: float) -> Generator[Shot, None, None]:
+def images_of_pipe(read: Callable[[int], bytes], name: str, rate: float) -> ImageStream:
     """Pictures from a stream of bytes, such as `ffmpeg -f image2pipe` writes; `read` gives b"" at its end."""
     decode = Decoder()
     for number, content in enumerate(split(read, name)):
         label = f"picture {number + 1} of {name}"
-        yield Shot(decode(content, label), number / rate, label)
+        yield CapturedImage(decode(content, label), number / rate, label)
 
 
 class Decoder:

@@ -16,7 +16,7 @@ from geometry.atomic import atomic_path
 from geometry.errors import ShapeError, UserError
 from vision.frames.capture import FASTEST, USUAL_RATE, camera_frames, video_frames
 from vision.frames.frame import Frame, Frames, Image
-from vision.frames.pictures import SUFFIXES, natural_order, pictures_in, shots_of_files, shots_of_stream
+from vision.frames.pictures import SUFFIXES, images_of_files, images_of_pipe, natural_order, pictures_in
 from vision.frames.quiet_opencv import silenced
 
 __all__ = ["CODECS", "Frame", "Frames", "VideoWriter", "open_frames"]
@@ -50,7 +50,7 @@ def open_frames(
         if sys.stdin.isatty():
             raise UserError("nothing is piped to standard input; '-' reads JPEG or PNG pictures from there")
         name, read = "standard input", partial(os.read, sys.stdin.fileno())
-        return Frames(name, shots_of_stream(read, name, usual), rate=usual)
+        return Frames(name, images_of_pipe(read, name, usual), rate=usual)
     camera = re.fullmatch(r"(?:/dev/video)?(\d+)", str(source))
     if camera and (isinstance(source, int) or not (path.is_file() or path.is_dir())):
         return camera_frames(int(camera[1]), size=size, rate=rate)
@@ -66,7 +66,7 @@ def open_frames(
         raise UserError(f"{str(source)!r}: there is no such video, picture or folder")
     if not paths:
         raise UserError(f"{str(source)!r}: there is no such picture")
-    return Frames(str(source), shots_of_files(paths, usual), rate=usual, count=len(paths))
+    return Frames(str(source), images_of_files(paths, usual), rate=usual, count=len(paths))
 
 
 class VideoWriter:

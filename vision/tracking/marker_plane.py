@@ -138,10 +138,10 @@ class CameraView:
         pose = _pose(parameters)
         matrix, by_rotation = cv2.Rodrigues(pose.rotation)
         raised = self._raised(points)
-        seen = self.camera.see(raised @ matrix.T + pose.translation)
+        seen = self.camera.project_with_jacobians(raised @ matrix.T + pose.translation)
         turned = np.einsum("kij,nj->nik", by_rotation.reshape(3, 3, 3), raised)
-        by_all = [seen.by_place @ turned, seen.by_place, seen.by_intrinsics]
-        return Slopes(seen.by_place @ matrix[:, :2], np.concatenate(by_all, axis=2))
+        by_all = [seen.by_point @ turned, seen.by_point, seen.by_intrinsics]
+        return Slopes(seen.by_point @ matrix[:, :2], np.concatenate(by_all, axis=2))
 
     def _raised(self, points: FloatArray) -> FloatArray:
         return np.column_stack([points, np.full(len(points), self.height)])

@@ -51,7 +51,7 @@ def camera_plane(
     gain, inverse = _gain(slopes[:, :6], covariances)
     # A wrong lens is partly made up for by the pose that is fitted through it.
     follow = np.concatenate([-gain @ slopes[:, 6:], np.eye(slopes.shape[1] - 6)])
-    covariance = follow @ (camera.covariance or np.zeros((len(camera.names),) * 2)) @ follow.T
+    covariance = follow @ (camera.covariance or np.zeros((len(camera.intrinsic_names),) * 2)) @ follow.T
     covariance[:6, :6] += inverse * max(1.0, squares / (2 * len(points) - 6))
     residual = _rms(view.points(pixels, pose) - points)
     return Plane(CameraView(camera, height), np.append(pose, camera.intrinsics), covariance, residual)

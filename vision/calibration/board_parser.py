@@ -7,7 +7,7 @@ from vision.calibration.charuco import CharucoBoard
 from vision.calibration.chessboard import Board
 
 
-def read_board(
+def parse_board(
     text: str, square: float, *, marker: float | None = None, dictionary: str = "5X5_100"
 ) -> Board:
     """The board of a text, with squares and, for ChArUco, markers of these sides, mm.
