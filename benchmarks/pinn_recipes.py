@@ -23,7 +23,7 @@ from benchmarks.optimisers.self_scaled_broyden import self_scaled_broyden
 from benchmarks.optimisers.soap import Soap
 from benchmarks.optimisers.spring import spring
 from benchmarks.random_gates import random_gates
-from benchmarks.trained_ridges import trained_ridges
+from benchmarks.trained_neurons import trained_neurons
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
@@ -64,7 +64,7 @@ def by_gradients(
     Args:
         optimiser: Adam, SOAP, ...
         rate: Learning rate at the start.
-        slope: Slopes of the first layers, 1/mm, whose ridges then go through points of the body.
+        slope: Steepness of the first layers, 1/mm, whose neurons then go through points of the body.
         finish: Whether the output layer is solved for exactly when nine tenths of the budget are spent.
     """
 
@@ -88,7 +88,7 @@ def by_gradients(
 
 
 def through_points(network: FingerNetwork, slope: float) -> torch.Tensor:
-    """Initial weights whose first layers are ridges of a slope, 1/mm, through random quadrature points."""
+    """Initial weights; first-layer neurons of a steepness, 1/mm, pass through random quadrature points."""
     generator = torch.Generator().manual_seed(SEED)
     parameters = network.initial(SEED)
     first = network.shape.weights(parameters.view(2, -1)).first
@@ -166,9 +166,9 @@ def dense_gates(problem: Problem, clock: Clock) -> Fields:
     yield from random_gates(Problem(finger_mesh(Design()), problem.material, problem.load), SEED)
 
 
-def ridges_by_l_bfgs(problem: Problem, clock: Clock) -> Fields:
+def neurons_by_l_bfgs(problem: Problem, clock: Clock) -> Fields:
     """Variable projection: the output layer is exact at every step; on the shared mesh."""
-    yield from trained_ridges(Problem(finger_mesh(Design()), problem.material, problem.load), SEED)
+    yield from trained_neurons(Problem(finger_mesh(Design()), problem.material, problem.load), SEED)
 
 
 def whole(solver: Solver) -> Recipe:
@@ -190,7 +190,7 @@ RECIPES: dict[str, Recipe] = {
     "SPRING, 300 random points": natural_gradient,
     "Levenberg-Marquardt, width 16": gauss_newton,
     "random gates that do not sum to one, dense exact output layer": dense_gates,
-    "pinn-std at twice the spacing, ridges trained by L-BFGS": ridges_by_l_bfgs,
+    "pinn-std at twice the spacing, neurons trained by L-BFGS": neurons_by_l_bfgs,
     "pinn-std, preset fast": whole(PinnStdSolver()),
     "pinn-local": whole(PinnLocalSolver()),
 }
@@ -211,7 +211,7 @@ REMARKS = {
     "random gates that do not sum to one, dense exact output layer": (
         "exact output layer, no training: a dense system limits the number of units"
     ),
-    "pinn-std at twice the spacing, ridges trained by L-BFGS": (
+    "pinn-std at twice the spacing, neurons trained by L-BFGS": (
         "variable projection works, and pays less than twice the units"
     ),
     "pinn-std, preset fast": "gates that sum to one, sparse exact output layer",

@@ -1,6 +1,6 @@
 """What `pinn-std` was before its gates became a tree: random gates whose windows do not sum to one.
 
-Unit j is (1 - Z_j) A_j + Z_j B_j with a ridge A_j, its negative B_j, and a gate that opens where two crossed
+Unit j is (1 - Z_j) A_j + Z_j B_j with a neuron A_j, its negative B_j, and a gate that opens where two crossed
 strips around a random point of the body meet. The output layer is solved for exactly, as a dense system.
 """
 
@@ -18,7 +18,7 @@ from solvers.pinn.finite_basis.hard_constraint import BaseFactor
 from solvers.problem import Problem, contact_functional
 
 WIDTH, SLOPE, STEEPNESS = 3.0, 0.3, 2.0
-"""Half width of the strips, mm; slope of the ridges, 1/mm; steepness of the gates."""
+"""Half width of the strips, mm; steepness of the neurons, 1/mm; steepness of the gates."""
 
 ROUND = 500
 """Units that are added at a time."""
@@ -26,10 +26,10 @@ ROUND = 500
 
 @dataclass(frozen=True, eq=False)
 class RandomGates:
-    """U units: ridges (3, U), strips (4, 3, U) and output layer (U, 2)."""
+    """U units: neurons (3, U), strips (4, 3, U) and output layer (U, 2)."""
 
     factor: BaseFactor
-    ridges: torch.Tensor
+    neurons: torch.Tensor
     strips: torch.Tensor
     output: torch.Tensor
 
@@ -49,13 +49,14 @@ class RandomGates:
         signs = STEEPNESS * torch.tensor([1.0, -1.0, 1.0, -1.0], dtype=points.dtype)
         hidden = torch.tanh(torch.einsum("nx,kxu->knu", points, self.strips[:, :2]) + self.strips[:, 2:])
         gate = torch.tanh(torch.einsum("k,knu->nu", signs, hidden) - 1.35 * STEEPNESS * 2 * np.tanh(1.0))
-        ridge = torch.tanh(points @ self.ridges[:2] + self.ridges[2])
-        mixed = ridge * (1 - 2 * gate)
+        neuron = torch.tanh(points @ self.neurons[:2] + self.neurons[2])
+        mixed = neuron * (1 - 2 * gate)
         factor, slope = self.factor.at(points)
         found = [mixed * factor]
         for axis in range(2):
             opening = torch.einsum("k,knu,ku->nu", signs, 1 - hidden**2, self.strips[:, axis])
-            along = (1 - ridge**2) * self.ridges[axis] * (1 - 2 * gate) - 2 * ridge * (1 - gate**2) * opening
+            along = (1 - neuron**2) * self.neurons[axis] * (1 - 2 * gate)
+            along -= 2 * neuron * (1 - gate**2) * opening
             found.append(along * factor + (mixed * slope if axis == 0 else 0))
         return found[0], found[1], found[2]
 
@@ -67,15 +68,15 @@ def random_gates(problem: Problem, seed: int = 0) -> Iterator[RandomGates]:
     rule = body_quadrature(mesh)
     points, weights = (torch.from_numpy(np.array(a)) for a in (rule.location.points, rule.weights))
     contact, shares = (torch.from_numpy(np.array(a)) for a in contact_functional(problem))
-    ridges, strips = torch.empty(3, 0).double(), torch.empty(4, 3, 0).double()
+    neurons, strips = torch.empty(3, 0).double(), torch.empty(4, 3, 0).double()
     while True:
         chosen = rng.choice(len(mesh.areas), ROUND, p=mesh.areas / mesh.areas.sum())
         drawn = np.einsum("nc,ncx->nx", rng.dirichlet(np.ones(3), ROUND), mesh.points[mesh.triangles[chosen]])
-        new_ridges, new_strips = _drawn(drawn, rng)
-        ridges, strips = torch.cat([ridges, new_ridges], -1), torch.cat([strips, new_strips], -1)
-        network = RandomGates(factor, ridges, strips, torch.zeros(ridges.shape[1], 2).double())
+        new_neurons, new_strips = _drawn(drawn, rng)
+        neurons, strips = torch.cat([neurons, new_neurons], -1), torch.cat([strips, new_strips], -1)
+        network = RandomGates(factor, neurons, strips, torch.zeros(neurons.shape[1], 2).double())
         output = _least_energy(network, points, weights, contact, shares, problem)
-        yield RandomGates(factor, ridges, strips, output)
+        yield RandomGates(factor, neurons, strips, output)
 
 
 def _drawn(centres: FloatArray, rng: np.random.Generator) -> tuple[torch.Tensor, torch.Tensor]:
@@ -83,10 +84,10 @@ def _drawn(centres: FloatArray, rng: np.random.Generator) -> tuple[torch.Tensor,
         return np.concatenate([slopes, (offset - (centres.T * slopes).sum(axis=0))[None]])
 
     angles = rng.uniform(0, 2 * np.pi, (2, len(centres)))
-    across, ridge = (np.stack([np.cos(angle), np.sin(angle)]) for angle in angles)
+    across, normal = (np.stack([np.cos(angle), np.sin(angle)]) for angle in angles)
     directions = (across, np.stack([-across[1], across[0]]))
     strips = [through(direction / WIDTH, offset) for direction in directions for offset in (1.0, -1.0)]
-    encoders = through(SLOPE * ridge, rng.uniform(-1, 1, len(centres)))
+    encoders = through(SLOPE * normal, rng.uniform(-1, 1, len(centres)))
     return torch.from_numpy(encoders), torch.from_numpy(np.stack(strips))
 
 
@@ -98,7 +99,7 @@ def _least_energy(
     shares: torch.Tensor,
     problem: Problem,
 ) -> torch.Tensor:
-    count = network.ridges.shape[1]
+    count = network.neurons.shape[1]
     matrix = torch.zeros(2 * count, 2 * count).double()
     for part, share in zip(points.split(4000), weights.split(4000), strict=True):
         x, y = (along * share.sqrt()[:, None] for along in network.units(part)[1:])

@@ -27,6 +27,9 @@ PRESETS = {
 }
 """Presets of our solvers, the usual one first. Each is a class with settings of its own."""
 
+RENAMED = {"ridges": "neurons", "slope": "steepness"}
+"""Former names of settings, and their present names."""
+
 BUILT_IN = {
     "fem": "solvers.fem.linear:FemSolver",
     "fem-nonlinear": "solvers.fem.finite_strain.solver:FemNonlinearSolver",
@@ -111,6 +114,8 @@ def _typed(name: str, factory: Any, settings: Mapping[str, Any]) -> dict[str, An
     known = [entry.name for entry in fields(factory) if entry.init]
     typed = {}
     for key, value in settings.items():
+        if RENAMED.get(key) in known:
+            raise UserError(f"{name}: the setting {key!r} is now called {RENAMED[key]!r}")
         if key not in known:
             raise UserError(f"{name} has no setting {key!r}; it has {', '.join(known)}")
         try:

@@ -175,7 +175,7 @@ class SolverOptions:
         Parameter(
             negative="",
             show_default=False,
-            help="Change a solver's setting, as in --solver-set pinn-std.ridges=7; may be repeated.",
+            help="Change a solver's setting, as in --solver-set pinn-std.neurons=7; may be repeated.",
         ),
     ] = ()
     device: Annotated[
@@ -211,13 +211,13 @@ class SolverOptions:
 
 
 def _settings(names: list[str], texts: tuple[str, ...]) -> dict[str, dict[str, object]]:
-    """The settings of each solver from texts such as `pinn-std.ridges=7`."""
+    """The settings of each solver from texts such as `pinn-std.neurons=7`."""
     given: dict[str, dict[str, object]] = {name: {} for name in names}
     for text in texts:
         target, dot, rest = text.partition(".")
         key, equals, value = rest.partition("=")
         if not (dot and equals and key and value):
-            raise UserError(f"cannot read {text!r}; write solver.setting=value, such as pinn-std.ridges=7")
+            raise UserError(f"cannot read {text!r}; write solver.setting=value, such as pinn-std.neurons=7")
         if target not in given:
             raise UserError(f"{text!r} is for {target!r}, which is not among the solvers {', '.join(names)}")
         if key in given[target]:

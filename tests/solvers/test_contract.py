@@ -15,10 +15,10 @@ from solvers.solver import Solver, with_law
 from tests.solvers.conftest import bar_mesh
 
 QUICK = {
-    "pinn-std": {"wall_spacing": 1.0, "corner_spacing": 0.2, "ridges": 4},
-    "pinn-local": {"wall_spacing": 0.8, "corner_spacing": 0.2, "ridges": 4},
-    "pinn-asm": {"wall_spacing": 1.0, "corner_spacing": 0.3, "ridges": 4, "tolerance": 1.0},
-    "pinn-local-asm": {"wall_spacing": 0.9, "corner_spacing": 0.3, "ridges": 4, "tolerance": 1.0},
+    "pinn-std": {"wall_spacing": 1.0, "corner_spacing": 0.2, "neurons": 4},
+    "pinn-local": {"wall_spacing": 0.8, "corner_spacing": 0.2, "neurons": 4},
+    "pinn-asm": {"wall_spacing": 1.0, "corner_spacing": 0.3, "neurons": 4, "tolerance": 1.0},
+    "pinn-local-asm": {"wall_spacing": 0.9, "corner_spacing": 0.3, "neurons": 4, "tolerance": 1.0},
 }
 """Settings that make a solver quick enough for the tests."""
 

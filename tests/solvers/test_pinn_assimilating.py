@@ -24,7 +24,7 @@ from solvers.training import TrainedSolver
 from tests.solvers.autograd_reference import PlainPinn
 from tests.solvers.conftest import bar_mesh
 
-QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "ridges": 3, "tolerance": 0.05}
+QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3, "tolerance": 0.05}
 PINN_ASM = PinnAsmSolver(**QUICK)
 
 
@@ -92,7 +92,7 @@ def test_it_has_the_least_energy_plus_misfit(problem, weights):
 
 
 def test_finite_strain_has_the_least_energy_plus_misfit_nearby(bent):
-    solver = PinnLocalAsmSolver(wall_spacing=0.8, corner_spacing=0.2, ridges=3, asm_weight=0.1)
+    solver = PinnLocalAsmSolver(wall_spacing=0.8, corner_spacing=0.2, neurons=3, asm_weight=0.1)
     solution = solver.solve(bent)
     assert solution.status.converged, solution.status.message
     level, misfit = solver.level(bent, 1.0), solver.misfit(bent)
@@ -326,7 +326,7 @@ def test_the_papers_preset_is_trained_and_takes_the_centres():
         ({"preset": "paper", "asm_weight": -1.0}, "asm_weight must be zero or more, got -1"),
         ({"contact_deviation": -1.0}, "contact_deviation must be zero or more, got -1"),
         ({"choose": "evidence"}, "choose=evidence needs weights=precision"),
-        ({"slope": 0.0}, "slope must be positive, got 0"),
+        ({"steepness": 0.0}, "steepness must be positive, got 0"),
     ],
 )
 def test_bad_settings_are_refused(settings, said):

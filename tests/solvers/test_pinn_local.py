@@ -47,7 +47,7 @@ def units(coarse_mesh, spacing) -> LocalUnits:
         ShepardWindows(torch.from_numpy(centres), torch.from_numpy(1.8 * distances)),
         centres,
         0.4 / distances,
-        ridges=3,
+        neurons=3,
         factor=BaseFactor.of(coarse_mesh, 5.0),
         rng=np.random.default_rng(0),
     )
@@ -83,7 +83,7 @@ def test_sides_that_meet_in_a_corner_are_no_narrow_cavity(coarse_mesh):
 
 
 def test_there_is_a_third_level_only_where_two_are_not_enough(coarse_mesh):
-    small = {"wall_spacing": 1.2, "corner_spacing": 0.3, "ridges": 3}
+    small = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3}
     levels = [
         len(PinnLocalSolver(**small, tolerance=tolerance).solve(Problem(coarse_mesh)).history["units"])
         for tolerance in (1e-9, 1.0)
@@ -249,7 +249,7 @@ def test_displacement_and_stress_are_those_of_finite_elements():
     assert np.abs(network.displacement(mesh.markers) - reference.displacement(mesh.markers)).mean() < 0.01
 
 
-FAST = PinnLocalSolver(wall_spacing=0.8, corner_spacing=0.05, ridges=4)
+FAST = PinnLocalSolver(wall_spacing=0.8, corner_spacing=0.05, neurons=4)
 """Within 0.2 % of finite elements where the default is within 0.03 %."""
 
 
@@ -308,7 +308,7 @@ def test_a_load_that_cannot_be_followed_is_reported(monkeypatch):
 
 
 def test_too_few_windows_are_reported_as_not_converged(coarse_mesh):
-    solution = PinnLocalSolver(wall_spacing=1.2, corner_spacing=0.5, ridges=2).solve(Problem(coarse_mesh))
+    solution = PinnLocalSolver(wall_spacing=1.2, corner_spacing=0.5, neurons=2).solve(Problem(coarse_mesh))
     assert not solution.status.converged
     assert "take a smaller spacing" in solution.status.message
 
@@ -316,7 +316,7 @@ def test_too_few_windows_are_reported_as_not_converged(coarse_mesh):
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"ridges": 1}, "ridges >= 2"),  # one ridge and a constant cannot follow a linear field
+        ({"neurons": 1}, "neurons >= 2"),  # one neuron and a constant cannot follow a linear field
         ({"wall_spacing": 0.0}, "wall_spacing must be positive, got 0"),
         ({"coarser": 1.0}, "coarser > 1"),  # two equal levels would always agree
     ],

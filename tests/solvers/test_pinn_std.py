@@ -19,7 +19,7 @@ from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.problem import Load, Problem
 from solvers.solution import Solution
 
-QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "ridges": 3}
+QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3}
 
 
 @pytest.fixture(scope="module")
@@ -171,7 +171,7 @@ def test_energy_falls_from_level_to_level(coarse_mesh):
 
 
 def test_too_few_encoders_are_reported_as_not_converged(coarse_mesh):
-    solution = PinnStdSolver(wall_spacing=5.0, corner_spacing=5.0, ridges=2).solve(Problem(coarse_mesh))
+    solution = PinnStdSolver(wall_spacing=5.0, corner_spacing=5.0, neurons=2).solve(Problem(coarse_mesh))
     assert not solution.status.converged
     assert "take a smaller spacing" in solution.status.message
 
@@ -184,7 +184,7 @@ def test_point_load_of_the_paper_is_met(coarse_mesh):
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"ridges": 1}, "ridges >= 2"),  # a ridge and a constant cannot follow a linear field
+        ({"neurons": 1}, "neurons >= 2"),  # a neuron and a constant cannot follow a linear field
         ({"seed": -1}, "seed >= 0"),  # NumPy's generators refuse it with a traceback
         ({"gate_width": -1.0}, "gate_width must be positive, got -1"),
     ],

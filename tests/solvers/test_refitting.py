@@ -13,7 +13,7 @@ from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Problem
 from solvers.registry import make_solver
 
-QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "ridges": 3, "tolerance": 0.05}
+QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3, "tolerance": 0.05}
 SOLVERS: dict[str, dict[str, object]] = {
     "fem-asm": {"degree": 1},
     "fem-asm, weights chosen": {"degree": 1, "weights": "precision", "choose": "left-out"},

@@ -19,7 +19,10 @@ def test_settings_are_converted_from_text():
         ("fem", {"order": 2}, "fem has no setting 'order'; it has degree"),
         ("skfem-p1", {"mesh": 2}, "solver 'skfem-p1' cannot be made with "),  # no dataclass
         ("fem", {"degree": "two"}, "fem: degree = 'two': input should be a valid integer"),
-        ("pinn-std", {"ridges": 1.5}, "pinn-std: ridges = 1.5: "),
+        ("pinn-std", {"ridges": 7}, "pinn-std: the setting 'ridges' is now called 'neurons'"),
+        ("pinn-local-asm", {"slope": 0.4}, "pinn-local-asm: the setting 'slope' is now called 'steepness'"),
+        ("fem", {"slope": 0.4}, "fem has no setting 'slope'"),  # it never had one
+        ("pinn-std", {"neurons": 1.5}, "pinn-std: neurons = 1.5: "),
         ("pinn-std", {"preset": "quick"}, "pinn-std has no preset 'quick'; it has fast, paper"),
         ("pinn-std", {"preset": "paper", "units": 9}, "pinn-std has no setting 'units'; it has epochs, "),
         ("fem", {"preset": "paper"}, "fem has no setting 'preset'; it has degree"),

@@ -24,7 +24,7 @@ class PinnLocalSolver(FiniteBasisSolver):
     corner_spacing: float = 0.006
     growth: float = 0.5
     radius: float = 1.8
-    slope: float = 0.4
+    steepness: float = 0.4
     cell: float = 0.45
     name: ClassVar[str] = "pinn-local"
 

@@ -1,9 +1,9 @@
-"""A finite-basis network: hidden units that live in overlapping windows which sum to one.
+"""A finite-basis network: basis functions in overlapping windows that sum to one.
 
-In every window there are m + 1 units: a constant, and m ridges tanh(X w + b) of the input X = (x, y). Because
-the windows are a partition of unity, the network can be any constant, and any smooth function that the ridges
-follow within a window. After B. Moseley, A. Markham and T. Nissen-Meyer, Finite basis physics-informed neural
-networks, Adv. Comput. Math. 49 (2023).
+Every window has m + 1 basis functions: a constant, and m neurons tanh(X w + b) of the input X = (x, y). Since
+the windows are a partition of unity, the network reproduces constants, and approximates smooth functions as
+its neurons do within a window. After B. Moseley, A. Markham and T. Nissen-Meyer, Finite basis
+physics-informed neural networks, Adv. Comput. Math. 49 (2023).
 """
 
 from collections.abc import Callable
@@ -26,18 +26,18 @@ class LocalUnits:
 
     Attributes:
         windows: The windows.
-        ridges: Slopes along x and y, 1/mm, and bias of the ridges, shape (3, m, c).
+        neurons: Slopes along x and y, 1/mm, and bias of the neurons, shape (3, m, c).
         factor: The hard condition on the base.
     """
 
     windows: Windows
-    ridges: torch.Tensor
+    neurons: torch.Tensor
     factor: BaseFactor
 
     @property
     def per_window(self) -> int:
         """Number of units in a window, m + 1."""
-        return self.ridges.shape[1] + 1
+        return self.neurons.shape[1] + 1
 
     @classmethod
     def around(
@@ -46,22 +46,22 @@ class LocalUnits:
         centres: FloatArray,
         slopes: FloatArray,
         *,
-        ridges: int,
+        neurons: int,
         factor: BaseFactor,
         rng: np.random.Generator,
     ) -> "LocalUnits":
-        """Ridges near every centre, in directions spread over the half circle, turned and shifted at random.
+        """Neurons near every centre, in directions spread over the half circle, turned and shifted at random.
 
         Args:
             windows: The windows.
             centres: Of the windows, shape (c, 2), mm.
-            slopes: Slope of their ridges, shape (c,), 1/mm.
-            ridges: Ridges in a window, m.
+            slopes: Slope of their neurons, shape (c,), 1/mm.
+            neurons: Neurons in a window, m.
             factor: The hard condition.
             rng: Draws turns and shifts.
         """
-        shape = (ridges, len(centres))
-        angle = rng.uniform(0, np.pi, shape[1]) + np.pi * np.arange(ridges)[:, None] / ridges
+        shape = (neurons, len(centres))
+        angle = rng.uniform(0, np.pi, shape[1]) + np.pi * np.arange(neurons)[:, None] / neurons
         angle += rng.uniform(-0.2, 0.2, shape)
         along = slopes * np.stack([np.cos(angle), np.sin(angle)])
         bias = rng.uniform(-1, 1, shape) - np.einsum("xmc,cx->mc", along, centres)
@@ -83,7 +83,7 @@ class LocalUnits:
         rate = (1 - unit[:, 1:].square()).mul_(share[:, None])
         found = unit * slopes[:, :, None]
         for axis in range(2):
-            found[axis, :, 1:].addcmul_(rate, self.ridges[axis, :, near])
+            found[axis, :, 1:].addcmul_(rate, self.neurons[axis, :, near])
         return found.transpose(2, 3).contiguous()
 
     def functionals(self, points: FloatArray, weights: FloatArray) -> FloatArray:
@@ -97,13 +97,13 @@ class LocalUnits:
         return np.asarray(found)
 
     def _units(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
-        """One and the ridges, (n, m + 1, w)."""
+        """One and the neurons, (n, m + 1, w)."""
         unit = points.new_ones(len(points), self.per_window, len(near))
-        slope_x, slope_y, bias = self.ridges[:, :, near]
-        ridge = torch.addcmul(bias, points[:, :1, None], slope_x, out=unit[:, 1:])
-        ridge.addcmul_(points[:, 1:, None], slope_y)
+        slope_x, slope_y, bias = self.neurons[:, :, near]
+        hidden = torch.addcmul(bias, points[:, :1, None], slope_x, out=unit[:, 1:])
+        hidden.addcmul_(points[:, 1:, None], slope_y)
         # tanh(t) = 2 σ(2 t) - 1: torch's logistic function was measured to be ten times as fast as its tanh.
-        ridge.mul_(2).sigmoid_().mul_(2).sub_(1)
+        hidden.mul_(2).sigmoid_().mul_(2).sub_(1)
         return unit
 
 
@@ -130,12 +130,12 @@ class LocalField:
     def displacement_of_patch(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
         """Displacement at a few points (n, 2), mm, that only the windows `near` (w,) reach: (n, 2), mm."""
         share = self.units.windows.shares(points, near).mul_(self.units.factor.at(points)[0])
-        constant, ridges = self.output[near].split([1, self.output.shape[2] - 1], dim=2)
-        slopes, bias = self.units.ridges[:, :, near].flatten(1).split([2, 1])
+        constant, neurons = self.output[near].split([1, self.output.shape[2] - 1], dim=2)
+        slopes, bias = self.units.neurons[:, :, near].flatten(1).split([2, 1])
         # c tanh(t) = 2 c σ(2 t) - c, see `LocalUnits`; the constant takes the -c.
         logistic = torch.addmm(2 * bias, points, 2 * slopes).sigmoid_().view(len(points), -1, len(near))
-        found: torch.Tensor = share @ (constant[:, :, 0] - ridges.sum(dim=2))
-        weights = ridges.permute(2, 0, 1).flatten(0, 1)
+        found: torch.Tensor = share @ (constant[:, :, 0] - neurons.sum(dim=2))
+        weights = neurons.permute(2, 0, 1).flatten(0, 1)
         found.addmm_(logistic.mul_(share[:, None]).flatten(1), weights, alpha=2)
         return found
 

@@ -42,7 +42,7 @@ FINEST = 0.75
 
 @dataclass(frozen=True, kw_only=True)
 class FiniteBasisSolver(Observing, ABC):
-    """Windows spread over the body, denser at its re-entrant corners, each with a few random tanh ridges.
+    """Windows spread over the body, denser at its re-entrant corners, each with a few random tanh neurons.
 
     The energy of the linear law is quadratic in the output layer, which is found by one sparse factorisation;
     the neo-Hookean one is minimised by Newton's method. The hidden weights stay as they were drawn. It is
@@ -54,8 +54,8 @@ class FiniteBasisSolver(Observing, ABC):
         wall_spacing: Spacing of the windows in the width of a wall or cavity, at most the mean thickness.
         corner_spacing: Spacing at sharp corners in mean thicknesses of the body.
         growth: Growth of the spacing per distance from them.
-        ridges: Ridges in a window.
-        slope: Slope of the ridges per spacing.
+        neurons: Neurons in a window.
+        steepness: Steepness of the neurons per spacing.
         coarser: How many times larger the spacings of the first level are.
         tolerance: Estimated relative L2 error of the displacement below which it has converged.
         thinning: Smallest distance of two windows in spacings.
@@ -67,8 +67,8 @@ class FiniteBasisSolver(Observing, ABC):
     wall_spacing: float
     corner_spacing: float
     growth: float
-    ridges: int = 5
-    slope: float
+    neurons: int = 5
+    steepness: float
     coarser: float = 1.7
     tolerance: float = 0.01
     thinning: float = 0.75
@@ -82,8 +82,8 @@ class FiniteBasisSolver(Observing, ABC):
         for setting, value in asdict(self).items():
             if setting not in ("seed", "growth", *ASSIMILATION) and not value > 0:
                 raise UserError(f"{self.name}: {setting} must be positive, got {value}")
-        if self.seed < 0 or self.ridges < 2 or self.coarser <= 1 or self.growth < 0:
-            raise UserError(f"{self.name} needs seed >= 0, ridges >= 2, coarser > 1 and growth >= 0")
+        if self.seed < 0 or self.neurons < 2 or self.coarser <= 1 or self.growth < 0:
+            raise UserError(f"{self.name} needs seed >= 0, neurons >= 2, coarser > 1 and growth >= 0")
 
     @abstractmethod
     def windows(self, centres: FloatArray, spacing: FloatArray, rng: np.random.Generator) -> Windows:
@@ -96,7 +96,7 @@ class FiniteBasisSolver(Observing, ABC):
         """
 
     def settings(self) -> dict[str, object]:
-        """Spacing, windows, ridges, criterion and seed."""
+        """Spacing, windows, neurons, criterion and seed."""
         return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
@@ -175,8 +175,8 @@ class FiniteBasisSolver(Observing, ABC):
         units = LocalUnits.around(
             self.windows(centres, distances, rng),
             centres,
-            self.slope / distances,
-            ridges=self.ridges,
+            self.steepness / distances,
+            neurons=self.neurons,
             factor=BaseFactor.of(mesh, self.base_length),
             rng=rng,
         )

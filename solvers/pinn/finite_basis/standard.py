@@ -26,7 +26,7 @@ class PinnStdSolver(FiniteBasisSolver):
     corner_spacing: float = 0.02
     growth: float = 0.55
     gate_width: float = 1.0
-    slope: float = 0.5
+    steepness: float = 0.5
     cell: float = 0.5
     name: ClassVar[str] = "pinn-std"
 

@@ -1,20 +1,20 @@
-"""Variable projection: the derivative of the least energy by the ridges."""
+"""Variable projection: the derivative of the least energy by the neurons."""
 
 import pytest
 import torch
 
-from benchmarks.trained_ridges import lagrangian_gradient, with_ridges
+from benchmarks.trained_neurons import lagrangian_gradient, with_neurons
 from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.problem import Problem
 
 
 def test_gradient_is_that_of_the_least_energy(coarse_mesh):
     problem = Problem(coarse_mesh)
-    level = PinnStdSolver(corner_spacing=0.2, ridges=2).level(problem, 2.0)
-    drawn = level.energy.units.ridges
+    level = PinnStdSolver(corner_spacing=0.2, neurons=2).level(problem, 2.0)
+    drawn = level.energy.units.neurons
 
-    def least_energy(ridges: torch.Tensor) -> float:
-        now = with_ridges(level, problem, ridges)
+    def least_energy(neurons: torch.Tensor) -> float:
+        now = with_neurons(level, problem, neurons)
         return now.energy.total(now.step(now.rest).output)
 
     solved = level.step(level.rest)

@@ -1,6 +1,6 @@
-"""The ridges of `pinn-std` trained by L-BFGS, with the output layer solved for exactly at each step.
+"""The neurons of `pinn-std` trained by L-BFGS, with the output layer solved for exactly at each step.
 
-This is variable projection: the output layer c(r) of least energy is a function of the ridges r, and by the
+This is variable projection: the output layer c(r) of least energy is a function of the neurons r, and by the
 envelope theorem the derivative of E(c(r), r) is that of the Lagrangian at fixed c and forces.
 """
 
@@ -21,25 +21,25 @@ SCALE = 2.0
 """Spacing, in that of the solver's settings: few units, so that there is something to gain."""
 
 
-def trained_ridges(problem: Problem, seed: int = 0) -> Iterator[LocalField]:
-    """The field after each evaluation of the energy; the first has the ridges as drawn."""
+def trained_neurons(problem: Problem, seed: int = 0) -> Iterator[LocalField]:
+    """The field after each evaluation of the energy; the first has the neurons as drawn."""
     level = PinnStdSolver(seed=seed).level(problem, SCALE)
-    drawn = level.energy.units.ridges
+    drawn = level.energy.units.neurons
     scale = drawn[:2].norm(dim=0)  # so that all variables are of the same size
     variable = (drawn / scale).requires_grad_()
     stepper = torch.optim.LBFGS([variable], max_iter=1, history_size=50, line_search_fn="strong_wolfe")
     fields = []
 
     def closure() -> float:
-        now = with_ridges(level, problem, (variable * scale).detach())
+        now = with_neurons(level, problem, (variable * scale).detach())
         solved = now.step(now.rest)
         if solved is None:
             return float("inf")
         field = now.field(solved.output)
         fields.append(field)
         stepper.zero_grad()
-        ridges = variable * scale
-        lagrangian_gradient(now, ridges, field, torch.from_numpy(now.reaction(solved.forces)), problem)
+        neurons = variable * scale
+        lagrangian_gradient(now, neurons, field, torch.from_numpy(now.reaction(solved.forces)), problem)
         return now.energy.total(solved.output)
 
     while True:
@@ -47,9 +47,9 @@ def trained_ridges(problem: Problem, seed: int = 0) -> Iterator[LocalField]:
         yield fields[-1]
 
 
-def with_ridges(level: Level, problem: Problem, ridges: torch.Tensor) -> Level:
-    """The level with other ridges, shape (3, m, c)."""
-    units = replace(level.energy.units, ridges=ridges)
+def with_neurons(level: Level, problem: Problem, neurons: torch.Tensor) -> Level:
+    """The level with other neurons, shape (3, m, c)."""
+    units = replace(level.energy.units, neurons=neurons)
     conditions = load_conditions(problem)
     shape = (*level.load, units.windows.count, 2, units.per_window)
     functionals = level.functionals.reshape(shape).copy()
@@ -63,10 +63,10 @@ def with_ridges(level: Level, problem: Problem, ridges: torch.Tensor) -> Level:
 
 
 def lagrangian_gradient(
-    level: Level, ridges: torch.Tensor, field: LocalField, forces: torch.Tensor, problem: Problem
+    level: Level, neurons: torch.Tensor, field: LocalField, forces: torch.Tensor, problem: Problem
 ) -> None:
-    """Add the gradient of E - forces · load to the variables behind the ridges, patch by patch."""
-    leaf = ridges.detach().requires_grad_()
+    """Add the gradient of E - forces · load to the variables behind the neurons, patch by patch."""
+    leaf = neurons.detach().requires_grad_()
     material = level.energy.material
     for patch in level.energy.patches:
         _, gradient = _field_and_gradient(field, leaf, patch.points, patch.near)
@@ -77,23 +77,23 @@ def lagrangian_gradient(
     displacement, _ = _field_and_gradient(field, leaf, points, near)
     work = torch.from_numpy(conditions.weights[0].copy()) @ displacement[:, problem.load.prescribed] @ forces
     (-work).backward()
-    ridges.backward(leaf.grad)
+    neurons.backward(leaf.grad)
 
 
 def _field_and_gradient(
-    field: LocalField, ridges: torch.Tensor, points: torch.Tensor, near: torch.Tensor
+    field: LocalField, neurons: torch.Tensor, points: torch.Tensor, near: torch.Tensor
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Displacement (n, 2) and its gradient (n, 2, 2), written plainly for automatic differentiation."""
     share, slopes = field.units.windows.shares_with_slopes(points, near)
     factor, factor_slope = field.units.factor.at(points)
-    weights = ridges[:, :, near]
-    ridge = torch.tanh(torch.einsum("nx,xmw->nmw", points, weights[:2]) + weights[2])
+    weights = neurons[:, :, near]
+    neuron = torch.tanh(torch.einsum("nx,xmw->nmw", points, weights[:2]) + weights[2])
     output = field.output[near]
-    encoder = torch.einsum("nmw,wim->nwi", ridge, output[:, :, 1:]) + output[:, :, 0]
+    encoder = torch.einsum("nmw,wim->nwi", neuron, output[:, :, 1:]) + output[:, :, 0]
     value = torch.einsum("nw,nwi->ni", share, encoder)
     columns = []
     for axis in range(2):
-        inner = torch.einsum("nmw,mw,wim->nwi", 1 - ridge**2, weights[axis], output[:, :, 1:])
+        inner = torch.einsum("nmw,mw,wim->nwi", 1 - neuron**2, weights[axis], output[:, :, 1:])
         along = torch.einsum("nw,nwi->ni", slopes[axis], encoder) + torch.einsum("nw,nwi->ni", share, inner)
         columns.append(factor * along + (factor_slope * value if axis == 0 else 0))
     return factor * value, torch.stack(columns, dim=-1)
