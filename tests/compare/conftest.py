@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_pages import Page, watching
 
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.uncertainty import evaluated
@@ -15,6 +14,7 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Problem
 from solvers.solution import ErrorEstimate, Solution, Status
+from tests.compare.drawn_pages import Page, watching
 
 COLUMNS, ROWS = 24, 8
 

@@ -2,9 +2,9 @@
 
 import cv2
 import numpy as np
-from drawn_pages import Page
 
 from compare.camera.calibration_chart import draw_calibration, undistorted
+from tests.compare.drawn_pages import Page
 from vision.calibration.camera import Camera
 from vision.calibration.camera_calibration import Calibration
 from vision.calibration.chessboard import Board

@@ -1,12 +1,12 @@
 from pathlib import Path
 
 import pytest
-from drawn_pages import Page
 
 from compare.figures.design_drawing import draw_design
 from geometry.finger.design import Design
 from geometry.finger.parameters import Parameters
 from geometry.finger.presets import load_design, preset_names
+from tests.compare.drawn_pages import Page
 
 DESIGNS = {
     **{name: load_design(name) for name in preset_names()},

@@ -7,7 +7,6 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
-from drawn_pages import Page
 from PIL import Image
 
 from compare.evaluation.convergence import certified
@@ -25,6 +24,7 @@ from geometry.finger.design import Design
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Load, Problem
+from tests.compare.drawn_pages import Page
 
 
 def with_certificate(evaluation: Evaluation, mesh: TriangleMesh) -> Evaluation:

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_pages import Page
 
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.force_displacement import ForceCurve, force_curves, write_force_displacement
 from compare.figures.force_chart import draw_force_displacement
 from solvers.problem import Load
+from tests.compare.drawn_pages import Page
 
 STEPS = np.array([0.0, 0.5, 1.0])
 

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from drawn_pages import Page
 from matplotlib.patches import Rectangle
 
 from compare.gridsearch.chart import draw_grid
 from compare.gridsearch.training_run import DIVERGED, TRAINED, Measured, Point, Run
+from tests.compare.drawn_pages import Page
 
 
 def run_of(rate: float, weight: float, distance: float | None) -> Run:

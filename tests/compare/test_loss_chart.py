@@ -4,10 +4,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from drawn_pages import Page
 
 from compare.evaluation.evaluation import Evaluation
 from compare.figures.loss_chart import draw_losses
+from tests.compare.drawn_pages import Page
 
 EPOCHS = np.array([1.0, 2.0, 3.0])
 PLAIN = {"epoch": EPOCHS, "PDE": 1 / EPOCHS**4, "BC": EPOCHS, "total": EPOCHS, "energy": EPOCHS}

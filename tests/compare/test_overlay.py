@@ -4,8 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import BendingField
-from drawn_pages import Page
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
@@ -15,6 +13,8 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Load, Problem
 from solvers.solution import Solution, Status
+from tests.compare.conftest import BendingField
+from tests.compare.drawn_pages import Page
 
 
 def test_crosses_are_at_the_observed_points_even_if_they_are_not_the_meshs_markers(

@@ -4,7 +4,6 @@ import os
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -29,9 +28,7 @@ def entry_of(folder: Path) -> Path:
 
 def test_second_call_is_read_from_the_cache(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("geometry.cache.run_task", None)  # a second run would fail
-    begin = time.perf_counter()
     mesh = finger_mesh(Design(name="another-name"), settings=COARSE, cache_dir=folder)
-    assert time.perf_counter() - begin < 0.2
     assert len(mesh.markers) == 9
 
 
@@ -87,10 +84,8 @@ def test_key_follows_everything_the_mesh_depends_on(monkeypatch: pytest.MonkeyPa
 
 
 def test_time_limit_ends_the_worker_with_advice(tmp_path: Path) -> None:
-    begin = time.perf_counter()
     with pytest.raises(UserError, match=r"meshing design 'default' was ended after 0\.5 s; use larger"):
         finger_mesh(Design(), settings=MeshSettings(size=0.02), cache_dir=tmp_path, timeout_s=0.5)
-    assert time.perf_counter() - begin < 5
     assert list(tmp_path.iterdir()) == []
 
 
@@ -173,9 +168,9 @@ def test_cad_files_come_from_the_cache_the_second_time(
     assert sorted(path.name for path in (tmp_path / "two").iterdir()) == ["section.svg"]
 
 
-def test_import_is_quick_and_needs_neither_cadquery_nor_gmsh() -> None:
+def test_import_needs_neither_cadquery_nor_gmsh() -> None:
     code = (
-        "import sys, time; begin = time.perf_counter(); import geometry; print(time.perf_counter() - begin)\n"
+        "import sys, geometry\n"
         "geometry.load_design('stiff'); geometry.finger_mesh\n"
         "print(*({'cadquery', 'gmsh', 'OCP'} & set(sys.modules)))"
     )
@@ -186,9 +181,7 @@ def test_import_is_quick_and_needs_neither_cadquery_nor_gmsh() -> None:
         text=True,
         check=True,
     )
-    seconds, heavy = done.stdout.split("\n")[:2]
-    assert float(seconds) < 0.3
-    assert heavy == ""
+    assert done.stdout.strip() == ""
 
 
 def test_every_public_name_can_be_imported() -> None:

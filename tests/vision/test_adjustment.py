@@ -5,11 +5,11 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from chessboards import BOARD, CAMERA, poses, views
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
+from tests.vision.chessboards import BOARD, CAMERA, poses, views
 from vision.calibration.bundle_adjustment import CornerObservations, Poses, adjust
 
 VIEWS = list(views(6, noise=0.3).values())

@@ -3,9 +3,9 @@
 import cv2
 import numpy as np
 import pytest
-from chessboards import drawn
 
 from geometry.errors import UserError
+from tests.vision.chessboards import drawn
 from vision.calibration.board_parser import parse_board
 from vision.calibration.charuco import CharucoBoard
 from vision.calibration.chessboard import Board

@@ -6,11 +6,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from chessboards import BOARD, CAMERA, drawn, views
 from scipy.spatial.transform import Rotation
 
 from compare.cli import main
 from geometry.errors import UserError
+from tests.vision.chessboards import BOARD, CAMERA, drawn, views
 from vision.calibration.camera import Camera, Pose
 from vision.calibration.camera_calibration import better_lens, calibrate, calibrate_views
 from vision.calibration.camera_file import load_camera

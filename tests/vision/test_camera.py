@@ -7,9 +7,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from chessboards import BOARD, CAMERA, poses, projected
 
 from geometry.errors import UserError
+from tests.vision.chessboards import BOARD, CAMERA, poses, projected
 from vision.calibration.camera import Camera
 from vision.calibration.camera_file import load_camera, save_camera
 

@@ -3,9 +3,9 @@
 import cv2
 import numpy as np
 import pytest
-from chessboards import photographed
 from scipy.spatial.transform import Rotation
 
+from tests.vision.chessboards import photographed
 from vision.calibration.camera import Pose
 from vision.calibration.charuco import CharucoBoard
 from vision.calibration.chessboard import Board

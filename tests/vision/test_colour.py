@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from dots import dots
 
 from geometry.errors import UserError
+from tests.vision.dots import dots
 from vision.discs.colour import DARK, ColourRange, Darker, read_colour
 
 WHITE = (0.95047, 1.0, 1.08883)

@@ -5,10 +5,10 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from disc_images import DiscImage, Edge
 from scipy.stats import chi2
 
 from geometry.errors import ShapeError, UserError
+from tests.vision.disc_images import DiscImage, Edge
 from vision.discs.sub_pixel import Discs, fit_discs
 
 COUNT = 60

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from films import DESIGN, bent
 
 from benchmarks.tracker_films import Finger, Score, coverage
 from benchmarks.tracker_scenes import random_recording, scored
 from benchmarks.tracker_stress import CASES, JUMP, filmed, seen
 from geometry.cache import finger_mesh
 from geometry.mesh.settings import MeshSettings
+from tests.vision.films import DESIGN, bent
 from vision.calibration.camera import Camera
 from vision.calibration.camera_calibration import calibrate_views
 from vision.calibration.chessboard import Board

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from fingers import MARKERS
 from scipy.spatial.transform import Rotation
 
 from geometry.errors import UserError
 from geometry.finger.parameters import Parameters
+from tests.vision.fingers import MARKERS
 from vision.calibration.camera import Camera, Pose
 from vision.tracking.fiducials import identify_fiducials
 from vision.tracking.workspace import Workspace, default_workspace

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from fingers import MARKERS, PRESSED, pressed
 
+from tests.vision.fingers import MARKERS, PRESSED, pressed
 from vision.tracking.data_association import NOISE, filled, identify, moved, placed
 
 FRONT = MARKERS["front"]

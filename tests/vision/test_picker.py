@@ -3,9 +3,9 @@
 import cv2
 import numpy as np
 import pytest
-from dots import Dots, dots
 
 from geometry.errors import UserError
+from tests.vision.dots import Dots, dots
 from vision.discs.colour import ColourRange, read_colour
 from vision.discs.colour_picker import pick_colour
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from chessboards import projected
-from fingers import MARKERS, PRESSED
-from test_fiducials import pose_of
 
 from geometry.finger.parameters import Parameters
+from tests.vision.chessboards import projected
+from tests.vision.fingers import MARKERS, PRESSED
+from tests.vision.test_fiducials import pose_of
 from vision.calibration.camera import Camera
 from vision.discs.disc_detector import Spots
 from vision.rig.shapes import centroid, circle, closed

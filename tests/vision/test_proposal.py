@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from dots import Dots, dots, draw_disc, exposed, step
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.finger.design import Design
+from tests.vision.dots import Dots, dots, draw_disc, exposed, step
 from vision.discs.circle_proposals import highlighted, propose
 from vision.discs.colour import DARK, ColourRange
 from vision.rig.bench import Bench

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from fingers import MARKERS, PRESSED
 
 from geometry.errors import UserError
+from tests.vision.fingers import MARKERS, PRESSED
 from vision.tracking.rest_detection import Rest, find_rest
 
 WHOLE = np.array(PRESSED["front"])[0]

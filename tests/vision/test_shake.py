@@ -3,10 +3,10 @@
 import cv2
 import numpy as np
 import pytest
-from films import CAMERA, DESIGN, WORKSPACE, bent, frames_of, images
 
 from geometry.errors import UserError
 from geometry.finger.markers import marker_positions
+from tests.vision.films import CAMERA, DESIGN, WORKSPACE, bent, frames_of, images
 from vision.calibration.camera import Pose
 from vision.discs.disc_detector import Spots
 from vision.rig.view import view

@@ -5,11 +5,11 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from films import CAMERA, DESIGN, WORKSPACE, bent, frames_of, images, recording
 
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.finger.markers import marker_positions
+from tests.vision.films import CAMERA, DESIGN, WORKSPACE, bent, frames_of, images, recording
 from vision.calibration.camera import Camera
 from vision.rig.motion import Motion
 from vision.rig.occluders import cables
