@@ -14,8 +14,8 @@ from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.dolfinx_compat import Factorisation
-from solvers.fem.least_energy import LeastEnergy, LinearSystem
 from solvers.fem.linear import FemSolver, Prepared
+from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Problem, contact_functional
 
@@ -44,17 +44,19 @@ def scikit_fem_energy(problem: Problem, degree: int) -> float:
 
 def factorisation_and_solves(problem: Problem, degree: int) -> float:
     """Time that MUMPS needs for the factorisation and two back-substitutions, s."""
-    least = LeastEnergy.of(LinearSystem.of(problem, LagrangeSpace(problem.mesh, degree), "direct"))
-    system, times = least.system, []
+    equilibrium = LinearEquilibrium.of(
+        LinearElasticity.of(problem, LagrangeSpace(problem.mesh, degree), "direct")
+    )
+    elasticity, times = equilibrium.elasticity, []
     for _ in range(REPEATS):
-        matrix = system.assemble(least.held)
+        matrix = elasticity.assemble(equilibrium.held)
         started = time.perf_counter()
-        factors = Factorisation(system.distributed, matrix, least.held, positive_definite=True)
-        for functional in least.functionals:
+        factors = Factorisation(elasticity.distributed, matrix, equilibrium.held, positive_definite=True)
+        for functional in equilibrium.functionals:
             factors.solve(functional)
         times.append(time.perf_counter() - started)
         factors.destroy()
-    least.factors.destroy()
+    equilibrium.factors.destroy()
     return min(times)
 
 

@@ -42,7 +42,7 @@ from geometry.observations import Observations
 from solvers.adaptation import Adaptation, check_adaptable
 from solvers.assimilation.misfit import assimilates
 from solvers.problem import Load, Material, Problem
-from solvers.solver import Solver, UnfitError, with_law
+from solvers.solver import Solver, UnsupportedProblemError, with_law
 from solvers.training import TrainedSolver, TrainingContext
 from vision.measurements import read_measurements, write_measurements
 
@@ -147,7 +147,7 @@ def run(job: Job, stages: Stages) -> Outcome:
             known = _in_context(solver, job, folder, evaluations)
             try:
                 evaluations.append(_evaluate(job, known, problem, observations, folder, stages))
-            except UnfitError as error:
+            except UnsupportedProblemError as error:
                 if solver.name not in job.spare:
                     raise
                 left_out[solver.name] = str(error)

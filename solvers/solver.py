@@ -17,7 +17,7 @@ def silent(fraction: float, text: str) -> None:
     """A progress report that nobody reads."""
 
 
-class UnfitError(UserError):
+class UnsupportedProblemError(UserError):
     """A problem is not one that a solver is made for."""
 
 
@@ -47,7 +47,7 @@ class Solver(Protocol):
         """Solve `problem`.
 
         Raises:
-            UnfitError: If the problem is of a kind that the solver does not have.
+            UnsupportedProblemError: If the problem is of a kind that the solver does not have.
         """
         ...
 
@@ -57,16 +57,18 @@ class Solver(Protocol):
 
 
 def check_problem(solver: Solver, problem: Problem) -> None:
-    """Raise an `UnfitError` if the problem's law or kind of load is not one that the solver has."""
+    """Raise an `UnsupportedProblemError` for a law or kind of load that the solver lacks."""
     if problem.material.law not in solver.laws:
-        raise UnfitError(f"{solver.name} has the law {' or '.join(solver.laws)}, not {problem.material.law}")
+        raise UnsupportedProblemError(
+            f"{solver.name} has the law {' or '.join(solver.laws)}, not {problem.material.law}"
+        )
     check_load(solver, problem.load)
 
 
 def check_load(solver: Solver, load: Load) -> None:
-    """Raise an `UnfitError` if the kind of load is not one that the solver takes."""
+    """Raise an `UnsupportedProblemError` if the kind of load is not one that the solver takes."""
     if load.kind not in solver.loads:
-        raise UnfitError(
+        raise UnsupportedProblemError(
             f"{solver.name} takes the loads {', '.join(solver.loads)}, not {load.kind!r}; "
             "`pinnray solvers` lists the loads of each"
         )
@@ -76,10 +78,12 @@ def with_law(material: Material, solver: Solver) -> Material:
     """The material with a law that the solver has: its own if it can, else the solver's usual one.
 
     Raises:
-        UnfitError: If that law does not exist for the material's plane state.
+        UnsupportedProblemError: If that law does not exist for the material's plane state.
     """
     law = material.law if material.law in solver.laws else solver.laws[0]
     try:
         return Material(**{**material.model_dump(), "law": law})
     except ValidationError as error:
-        raise UnfitError(f"{solver.name}: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from None
+        raise UnsupportedProblemError(
+            f"{solver.name}: {error.errors()[0]['msg'].removeprefix('Value error, ')}"
+        ) from None

@@ -15,7 +15,7 @@ from geometry.arrays import BoolArray, FloatArray
 from geometry.mesh.point_location import Location
 from geometry.mesh.quadrature import Quadrature, edge_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.fem.least_energy import LinearSystem
+from solvers.fem.linear_equilibrium import LinearElasticity
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Material, Problem
 from solvers.solution import State
@@ -61,9 +61,9 @@ class BoundaryValue:
         """The finite-element solution."""
         space = LagrangeSpace(self.mesh, degree)
         held, nodal = self._given(space)
-        system = LinearSystem.of(Problem(self.mesh, self.material), space)
-        factors = system.factorise(held)
-        nodal = nodal + factors.solve(self._forces(space) - system.residual(nodal))
+        elasticity = LinearElasticity.of(Problem(self.mesh, self.material), space)
+        factors = elasticity.factorise(held)
+        nodal = nodal + factors.solve(self._forces(space) - elasticity.internal_force(nodal))
         factors.destroy()
         return LagrangeField(space, nodal)
 

@@ -35,7 +35,7 @@ def weigh(task: Task, progress: Progress = silent) -> dict[str, list[float]]:
     sampler, truth = Sampler.of(mesh, observations.points, task.radius), Truth.load(task.truths[0])
     solution = solver.solve(problem)
     finger, misfit = solver.prepare(problem)
-    forces, space = finger.forces(misfit), finger.least.system.distributed.space
+    forces, space = finger.forces(misfit), finger.equilibrium.elasticity.distributed.space
     columns: dict[str, list[float]] = {
         name: [] for name in ("factor", "in_sample_mm", "left_out_mm", *FIELDS)
     }
@@ -47,5 +47,5 @@ def weigh(task: Task, progress: Progress = silent) -> dict[str, list[float]]:
         row = (factor, root_mean_square(fit.residual), root_mean_square(fit.left_out), *distances.values())
         for column, value in zip(columns.values(), row, strict=True):
             column.append(value)
-    finger.least.factors.destroy()
+    finger.equilibrium.factors.destroy()
     return columns

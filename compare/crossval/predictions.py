@@ -20,7 +20,7 @@ from solvers.assimilation.refitting import Carrying, refitter
 from solvers.problem import Material, Problem
 from solvers.registry import make_solver
 from solvers.solution import Solution
-from solvers.solver import Progress, Solver, UnfitError, silent, with_law
+from solvers.solver import Progress, Solver, UnsupportedProblemError, silent, with_law
 
 
 @dataclass(frozen=True)
@@ -256,7 +256,7 @@ class _Judge:
             try:
                 solution = solver.solve(self._at(condition))
                 self._priors[condition] = self._sampler.of_solution(solution, self._problem.mesh)
-            except UnfitError:
+            except UnsupportedProblemError:
                 self._priors[condition] = None
         return self._priors[condition]
 

@@ -9,8 +9,8 @@ from compare.evaluation.regions import body_regions
 from geometry.arrays import FloatArray
 from geometry.mesh.quadrature import body_quadrature
 from solvers.elasticity import linear_energy_density
-from solvers.fem.conditions import reaction_by_residual_work
-from solvers.fem.least_energy import LeastEnergy, LinearSystem
+from solvers.fem.boundary_conditions import reaction_by_residual_work
+from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import State
@@ -22,11 +22,11 @@ class Certifier:
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
         self._space = LagrangeSpace(problem.mesh, 2)
-        self._system = LinearSystem.of(problem, self._space)
-        self._least = LeastEnergy.of(self._system)
+        self._elasticity = LinearElasticity.of(problem, self._space)
+        self._equilibrium = LinearEquilibrium.of(self._elasticity)
         self._rule = body_quadrature(problem.mesh, QUADRATURE_DEGREE)
         self._derivatives = self._space.shape_gradients(self._rule.location)
-        self._solution = self._least.solution()
+        self._solution = self._equilibrium.solution()
         field = LagrangeField(self._space, self._solution)
         self._displacement = field.displacement(self._rule.location)
         self._von_mises = State.from_gradient(self._gradient(self._solution), problem).von_mises
@@ -39,8 +39,8 @@ class Certifier:
             RuntimeError: If a displacement in the finite-element space has less energy than the least one.
         """
         nodal = np.concatenate([evaluation.node_displacement, evaluation.edge_displacement])
-        values = self._least.values(nodal)
-        least = self._least.minimiser(nodal, values)
+        values = self._equilibrium.values(nodal)
+        least = self._equilibrium.minimiser(nodal, values)
         rest = nodal - least
         energy, least_energy, excess, violation, fem_energy = (
             self._energy(field) for field in (nodal, least, rest, least - self._solution, self._solution)
@@ -51,7 +51,7 @@ class Certifier:
                 f"{least_energy:.10g}: the stiffness or its factorisation is wrong"
             )
         balance, weak_residual = self._imbalance(evaluation.stress)
-        reaction = reaction_by_residual_work(self._space, self._system.residual(self._solution))
+        reaction = reaction_by_residual_work(self._space, self._elasticity.internal_force(self._solution))
         density = linear_energy_density(self._gradient(rest), self._problem.material.lame)
         return Certificate(
             energy=energy,
@@ -70,7 +70,7 @@ class Certifier:
 
     def _energy(self, nodal: FloatArray) -> float:
         """Elastic energy of nodal displacements, N mm / mm."""
-        return 0.5 * float((nodal * self._system.residual(nodal)).sum())
+        return 0.5 * float((nodal * self._elasticity.internal_force(nodal)).sum())
 
     def _gradient(self, nodal: FloatArray) -> FloatArray:
         """Displacement gradient at the quadrature points, shape (q, 2, 2)."""
@@ -88,7 +88,7 @@ class Certifier:
         """
         weighted = self._rule.weights[:, None, None] * stress
         forces = sum(derivative.T @ weighted[:, :, axis] for axis, derivative in enumerate(self._derivatives))
-        balance, rest = self._least.unbalanced(forces)
+        balance, rest = self._equilibrium.unbalanced(forces)
         dual = float((balance * rest).sum())
         return balance, float(np.sqrt(dual / (2 * self._energy(self._solution))))
 

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 
 from solvers.problem import Load, Material
-from solvers.solver import Solver, UnfitError, check_load, with_law
+from solvers.solver import Solver, UnsupportedProblemError, check_load, with_law
 
 
 def able(
@@ -12,7 +12,7 @@ def able(
     """The solvers that take a material and a load, and by name why others are left out.
 
     Raises:
-        UnfitError: If one does not that is not among the spare ones, or none does.
+        UnsupportedProblemError: If one does not that is not among the spare ones, or none does.
     """
     chosen: list[Solver] = []
     left_out: dict[str, str] = {}
@@ -21,7 +21,7 @@ def able(
             check_load(solver, load)
             with_law(material, solver)
             chosen.append(solver)
-        except UnfitError as error:
+        except UnsupportedProblemError as error:
             left_out[solver.name] = f"no load {load.kind!r}" if load.kind not in solver.loads else str(error)
             if solver.name not in spare or len(left_out) == len(solvers):
                 raise

@@ -18,7 +18,7 @@ from rich.progress import (
 from rich.table import Column
 
 from solvers.solver import Progress as Report
-from solvers.solver import UnfitError
+from solvers.solver import UnsupportedProblemError
 
 
 class Stages:
@@ -75,7 +75,7 @@ class Stages:
 
         try:
             yield report
-        except UnfitError:
+        except UnsupportedProblemError:
             self._progress.remove_task(task)
             raise
         self._progress.update(task, completed=1.0)

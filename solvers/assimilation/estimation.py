@@ -39,7 +39,7 @@ Prediction = tuple[FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
-class Unknown:
+class Parameter:
     """A parameter that is to be found.
 
     Attributes:
@@ -82,7 +82,7 @@ class Estimate:
     """Values of p parameters and how well n observations determine them.
 
     Attributes:
-        unknowns: The parameters.
+        parameters: The parameters.
         z: Where they are in their priors, shape (p,).
         sensitivities: A, shape (n, p).
         residuals: Predicted minus observed over φ σ, shape (n,).
@@ -91,7 +91,7 @@ class Estimate:
         converged: Whether the minimum was found.
     """
 
-    unknowns: Sequence[Unknown]
+    parameters: Sequence[Parameter]
     z: FloatArray
     sensitivities: FloatArray
     residuals: FloatArray
@@ -133,12 +133,12 @@ class Estimate:
     @property
     def values(self) -> FloatArray:
         """Values of the parameters, shape (p,)."""
-        return np.array([float(u.value(z)) for u, z in zip(self.unknowns, self.z, strict=True)])
+        return np.array([float(u.value(z)) for u, z in zip(self.parameters, self.z, strict=True)])
 
     @property
     def deviations(self) -> FloatArray:
         """Standard deviations of the values, shape (p,); to first order where the prior is logarithmic."""
-        slopes = [u.slope(z) for u, z in zip(self.unknowns, self.z, strict=True)]
+        slopes = [u.slope(z) for u, z in zip(self.parameters, self.z, strict=True)]
         return np.sqrt(np.diagonal(self.covariance)) * slopes
 
     @property
@@ -148,7 +148,7 @@ class Estimate:
         times = norm.ppf(upper) if self.inflation == 1 else t.ppf(upper, self.freedom)
         ends = self.z[:, None] + times * np.sqrt(np.diagonal(self.covariance))[:, None] * [-1, 1]
         return np.array(
-            [np.clip(u.value(e), u.low, u.high) for u, e in zip(self.unknowns, ends, strict=True)]
+            [np.clip(u.value(e), u.low, u.high) for u, e in zip(self.parameters, ends, strict=True)]
         )
 
     @property
@@ -178,7 +178,7 @@ def estimate(
     model: Callable[[FloatArray], Prediction],
     observed: FloatArray,
     deviations: FloatArray,
-    unknowns: Sequence[Unknown],
+    parameters: Sequence[Parameter],
 ) -> Estimate:
     """Find the parameters by Gauss-Newton steps in a trust region.
 
@@ -186,11 +186,11 @@ def estimate(
         model: Predictions and derivatives at parameters of shape (p,).
         observed: Shape (n,).
         deviations: Their standard deviations σ, shape (n,), all positive.
-        unknowns: The p parameters.
+        parameters: The p parameters.
     """
-    whitened = _Whitened(model, observed, deviations, unknowns)
-    count, one = len(unknowns), np.eye(len(unknowns))
-    bounds = np.array([unknown.bounds for unknown in unknowns]).T
+    whitened = _Whitened(model, observed, deviations, parameters)
+    count, one = len(parameters), np.eye(len(parameters))
+    bounds = np.array([parameter.bounds for parameter in parameters]).T
     z = np.clip(np.zeros(count), *bounds)
     inflation = _inflation(whitened(z)[0], len(observed))
     for _ in range(ROUNDS):
@@ -210,7 +210,7 @@ def estimate(
         if settled := abs(inflation / used - 1) < SETTLED:
             break
     return Estimate(
-        unknowns=unknowns,
+        parameters=parameters,
         z=z,
         sensitivities=weight * slopes,
         residuals=weight * residuals,
@@ -234,17 +234,17 @@ class _Whitened:
         model: Callable[[FloatArray], Prediction],
         observed: FloatArray,
         deviations: FloatArray,
-        unknowns: Sequence[Unknown],
+        parameters: Sequence[Parameter],
     ) -> None:
         self._model, self._observed, self._deviations = model, observed, deviations
-        self._unknowns = unknowns
+        self._parameters = parameters
         self._last: tuple[bytes, Prediction] | None = None
         self.evaluations = 0
 
     def __call__(self, z: FloatArray) -> Prediction:
         key = z.tobytes()
         if self._last is None or self._last[0] != key:
-            pairs = list(zip(self._unknowns, z, strict=True))
+            pairs = list(zip(self._parameters, z, strict=True))
             predicted, slopes = self._model(np.array([float(u.value(place)) for u, place in pairs]))
             slopes = slopes * [u.slope(place) for u, place in pairs] / self._deviations[:, None]
             self._last = key, ((predicted - self._observed) / self._deviations, slopes)

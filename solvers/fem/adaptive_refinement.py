@@ -18,7 +18,7 @@ from geometry.finger.section import Section
 from geometry.mesh.refinement import refined
 from solvers.adaptation import Adaptation, Round, check_adaptable
 from solvers.fem.error_estimate import ErrorEstimator
-from solvers.fem.least_energy import LeastEnergy, LinearSystem
+from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 from solvers.solver import Progress, silent
@@ -84,13 +84,13 @@ def largest(shares: FloatArray, part: float) -> BoolArray:
 def _solve(problem: Problem, degree: int, tolerance: float) -> tuple[Round, FloatArray]:
     """One solution: its estimate, and what every triangle adds to the error of the unknown markers, (t,)."""
     mesh, space = problem.mesh, LagrangeSpace(problem.mesh, degree)
-    least = LeastEnergy.of(LinearSystem.of(problem, space))
-    nodal, estimator = least.solution(), ErrorEstimator(problem, space)
-    error = estimator.estimate(nodal, lambda force: least.unbalanced(force)[1])
+    equilibrium = LinearEquilibrium.of(LinearElasticity.of(problem, space))
+    nodal, estimator = equilibrium.solution(), ErrorEstimator(problem, space)
+    error = estimator.estimate(nodal, equilibrium.response)
     functional = np.zeros_like(nodal)
     functional[mesh.marker_nodes] = np.sign(error.markers) * (np.abs(error.markers) > tolerance)
-    shares = estimator.shares(nodal, least.unbalanced(functional)[1])
-    least.factors.destroy()
+    shares = estimator.shares(nodal, equilibrium.response(functional))
+    equilibrium.factors.destroy()
     found = Round(len(mesh.triangles), len(mesh.points), error.at_markers, error.energy_norm)
     return found, shares
 

@@ -21,11 +21,11 @@ from solvers.assimilation.misfit import (
     misfit_of,
     without_each,
 )
-from solvers.fem.compliance import MarkerCompliance
-from solvers.fem.conditions import reaction_by_residual_work
+from solvers.fem.boundary_conditions import reaction_by_residual_work
 from solvers.fem.finite_strain.assimilation import assimilated
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
+from solvers.fem.marker_compliance import MarkerCompliance
 from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField
 from solvers.problem import Problem
@@ -174,7 +174,7 @@ class FemAsmSolver:
         finger, misfit = self.prepare(problem)
         progress(0.9, "solved for the forces at the markers")
         solution = self._fitted(problem, finger, misfit)
-        finger.least.factors.destroy()
+        finger.equilibrium.factors.destroy()
         return replace(solution, stats={**solution.stats, "seconds": time.perf_counter() - started})
 
     def _fitted(self, problem: Problem, finger: MarkerCompliance, misfit: Misfit) -> Solution:
@@ -182,9 +182,9 @@ class FemAsmSolver:
         forces = finger.forces(misfit)
         factor = self.choice.factor(forces)
         fit = forces.fit(factor)
-        nodal, system = finger.under(fit.forces), finger.least.system
-        space = system.distributed.space
-        residual = system.residual(nodal)
+        nodal, elasticity = finger.under(fit.forces), finger.equilibrium.elasticity
+        space = elasticity.distributed.space
+        residual = elasticity.internal_force(nodal)
         return Solution(
             solver=self.name,
             problem=problem,
@@ -197,7 +197,7 @@ class FemAsmSolver:
                 "unknowns": nodal.size,
                 "triangles": len(problem.mesh.triangles),
                 "degree": self.degree,
-                "ranks": system.distributed.comm.size,
+                "ranks": elasticity.distributed.comm.size,
                 "weight_factor": factor,
                 "misfit": misfit.scaled(factor).value(misfit.observed - fit.residual),
                 "marker_force": float(np.linalg.norm(fit.forces, axis=1).max()),

@@ -27,7 +27,7 @@ from geometry.arrays import FloatArray
 from geometry.mesh.point_location import Location
 from geometry.mesh.quadrature import Quadrature, body_quadrature
 from solvers.elasticity import deformation_jacobian
-from solvers.fem.recovery import GradientRecovery
+from solvers.fem.gradient_recovery import GradientRecovery
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import ErrorEstimate, State

@@ -6,9 +6,9 @@ from functools import cached_property
 from typing import ClassVar, get_args
 
 from geometry.errors import UserError
-from solvers.fem.conditions import reaction_by_residual_work
+from solvers.fem.boundary_conditions import reaction_by_residual_work
 from solvers.fem.error_estimate import ErrorEstimator
-from solvers.fem.least_energy import LeastEnergy, LinearSolver, LinearSystem
+from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium, LinearSolver
 from solvers.fem.locking import locking_advice
 from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
@@ -63,7 +63,7 @@ class FemSolver:
         """
         check_problem(self, problem)
         space = LagrangeSpace(problem.mesh, self.degree)
-        return Prepared(self, LeastEnergy.of(LinearSystem.of(problem, space, self.linear_solver)))
+        return Prepared(self, LinearEquilibrium.of(LinearElasticity.of(problem, space, self.linear_solver)))
 
     def _solve(self, problem: Problem, progress: Progress) -> Solution:
         started = time.perf_counter()
@@ -85,12 +85,12 @@ class Prepared:
 
     Args:
         solver: Whose solutions they are.
-        least: The factorisation, and the responses for one load.
+        equilibrium: The factorisation, and the responses for one load.
     """
 
-    def __init__(self, solver: FemSolver, least: "LeastEnergy") -> None:
+    def __init__(self, solver: FemSolver, equilibrium: "LinearEquilibrium") -> None:
         self._solver = solver
-        self._least = least
+        self._equilibrium = equilibrium
 
     def solve(self, load: Load) -> Solution:
         """Solve for a load; `seconds` of the solution's `stats` is the time of this call.
@@ -99,19 +99,19 @@ class Prepared:
             UserError: If the load is of a kind that the solver does not have.
         """
         started = time.perf_counter()
-        problem = replace(self._least.system.problem, load=load)
+        problem = replace(self._equilibrium.elasticity.problem, load=load)
         check_problem(self._solver, problem)
-        self._least = self._least.of_problem(problem)
-        system = self._least.system
-        nodal = self._least.solution()
-        residual = system.residual(nodal)
+        self._equilibrium = self._equilibrium.of_problem(problem)
+        elasticity = self._equilibrium.elasticity
+        nodal = self._equilibrium.solution()
+        residual = elasticity.internal_force(nodal)
         solved = time.perf_counter()
         error = None
         if self._solver.estimate and load.kind != "point":
-            error = self._estimator.estimate(nodal, lambda force: self._least.unbalanced(force)[1])
-        space = system.distributed.space
+            error = self._estimator.estimate(nodal, self._equilibrium.response)
+        space = elasticity.distributed.space
         sentence = [
-            self._least.factors.message,
+            self._equilibrium.factors.message,
             _uncertainty(problem, error),
             locking_advice(space.degree, problem.material),
         ]
@@ -128,19 +128,21 @@ class Prepared:
                 "unknowns": nodal.size,
                 "triangles": len(problem.mesh.triangles),
                 "degree": space.degree,
-                "ranks": system.distributed.comm.size,
-                **self._least.factors.stats,
+                "ranks": elasticity.distributed.comm.size,
+                **self._equilibrium.factors.stats,
             },
             error=error,
         )
 
     @cached_property
     def _estimator(self) -> ErrorEstimator:
-        return ErrorEstimator(self._least.system.problem, self._least.system.distributed.space)
+        return ErrorEstimator(
+            self._equilibrium.elasticity.problem, self._equilibrium.elasticity.distributed.space
+        )
 
     def destroy(self) -> None:
         """Free the factors."""
-        self._least.factors.destroy()
+        self._equilibrium.factors.destroy()
 
 
 def _uncertainty(problem: Problem, error: ErrorEstimate | None) -> str:

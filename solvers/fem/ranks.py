@@ -1,6 +1,6 @@
 """MPI ranks that serve a command: rank 0 runs it, the others take part in its solves and nothing else.
 
-Without a `Crew` every rank runs the whole program, and its finite-element spaces are distributed over all
+Without a `RankPool` every rank runs the whole program, and its finite-element spaces are distributed over all
 ranks. With one (`mpirun -n 2 compare ...`) a space is rank 0's own, but for those made `on_all_ranks`.
 """
 
@@ -38,23 +38,23 @@ Answer = TypeVar("Answer")
 
 
 def communicator() -> MPI.Comm:
-    """The ranks that share a new finite-element space: all, or this one alone if the crew is idle."""
-    crew = _crew.get()
-    return MPI.COMM_WORLD if crew is None or crew.at_work else MPI.COMM_SELF
+    """The ranks that share a new finite-element space: all, or this one alone if the pool is idle."""
+    pool = _pool.get()
+    return MPI.COMM_WORLD if pool is None or pool.at_work else MPI.COMM_SELF
 
 
 def on_all_ranks(task: Callable[[Problem, Progress], Answer], problem: Problem, progress: Progress) -> Answer:
-    """Do a collective task; rank 0 of a crew has the others do it too.
+    """Do a collective task; rank 0 of a pool has the others do it too.
 
     Args:
         task: A method of an object that can be pickled, or a function of a module.
         problem: Its argument, the same on all ranks.
         progress: Called on this rank.
     """
-    crew = _crew.get()
-    if crew is None or crew.at_work:
+    pool = _pool.get()
+    if pool is None or pool.at_work:
         return task(problem, progress)
-    return crew.call(task, problem, progress)
+    return pool.call(task, problem, progress)
 
 
 def lead(command: Callable[[], Any], guarded: Callable[[Callable[[], Any]], int]) -> int:
@@ -65,35 +65,35 @@ def lead(command: Callable[[], Any], guarded: Callable[[Callable[[], Any]], int]
         guarded: Runs it and says what went wrong, in one line where a user can mend it.
     """
     petsc4py.init()  # on all ranks together: one alone would wait for the others when it first solves
-    crew = Crew(MPI.COMM_WORLD.Dup())
+    pool = RankPool(MPI.COMM_WORLD.Dup())
     # What this process starts from now on must not take itself for a rank of this run.
     for name in set(os.environ) - set(child_environment(os.environ)):
         del os.environ[name]
-    leads = crew.comm.rank == 0
+    leads = pool.comm.rank == 0
     # After Ctrl-C the launcher sends SIGTERM to all: rank 0 ends as if it were interrupted itself.
     if leads:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
     else:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-    token = _crew.set(crew)
+    token = _pool.set(pool)
     try:
-        code = guarded(command if leads else crew.serve)
+        code = guarded(command if leads else pool.serve)
     except Exception:
         traceback.print_exc()
         code = FAULT
     finally:
-        _crew.reset(token)
+        _pool.reset(token)
     sys.stdout.flush()
     sys.stderr.flush()
-    if crew.broken:
+    if pool.broken:
         MPI.COMM_WORLD.Abort(code)
     if leads:
-        crew.dismiss(code)
+        pool.dismiss(code)
     return code
 
 
 @dataclass
-class Crew:
+class RankPool:
     """The ranks that serve a command.
 
     Attributes:
@@ -162,4 +162,4 @@ class Crew:
             time.sleep(POLL_S)
 
 
-_crew: ContextVar[Crew | None] = ContextVar("crew", default=None)
+_pool: ContextVar[RankPool | None] = ContextVar("pool", default=None)

@@ -23,7 +23,7 @@ from solvers.elasticity import linear_energy_density
 from solvers.problem import Problem
 from solvers.section_force import section_force
 from solvers.solution import Solution, Status
-from solvers.solver import Progress, UnfitError, check_problem, silent
+from solvers.solver import Progress, UnsupportedProblemError, check_problem, silent
 from solvers.statistics.kernel_field import SMOOTHNESS, Kernel, KernelField
 
 FEWEST = 3
@@ -63,7 +63,7 @@ class GaussianProcessSolver:
         """Fit the processes to the problem's observations; see `Solver`.
 
         Raises:
-            UnfitError: If there are fewer markers than `FEWEST` and one that can be left out.
+            UnsupportedProblemError: If there are fewer markers than `FEWEST` and one that can be left out.
         """
         check_problem(self, problem)
         started = time.perf_counter()
@@ -91,7 +91,9 @@ class GaussianProcessSolver:
         misfit = misfit_of(problem, marker_radius=0.0)
         count = 0 if misfit is None else len(misfit.points)
         if misfit is None or problem.observations is None or count < least:
-            raise UnfitError(f"gp goes through markers: it needs {least} that were seen, not {count}")
+            raise UnsupportedProblemError(
+                f"gp goes through markers: it needs {least} that were seen, not {count}"
+            )
         deviations = standard_deviations(problem.observations)
         field = _fit(misfit, deviations, self._base(problem), self.kernel)
         rule = body_quadrature(problem.mesh, 4)

@@ -20,9 +20,9 @@ from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.fem.conditions import load_functionals
-from solvers.fem.least_energy import LeastEnergy
+from solvers.fem.boundary_conditions import load_functionals
 from solvers.fem.linear import FemSolver
+from solvers.fem.linear_equilibrium import LinearEquilibrium
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, Status
@@ -276,8 +276,8 @@ def test_energy_below_the_least_is_a_fault_of_the_program(
     problem = Problem(finger)
     evaluation = Evaluation.of(FemSolver().solve(problem), finger)
     certifier = Certifier(problem)
-    least = LeastEnergy.minimiser
-    monkeypatch.setattr(LeastEnergy, "minimiser", lambda *arguments: 1.001 * least(*arguments))
+    least = LinearEquilibrium.minimiser
+    monkeypatch.setattr(LinearEquilibrium, "minimiser", lambda *arguments: 1.001 * least(*arguments))
     with pytest.raises(RuntimeError, match="below the least"):
         certifier.certificate(evaluation)
 

@@ -6,7 +6,7 @@ import pytest
 from compare.evaluation.solver_selection import able, left_out_remarks
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution
-from solvers.solver import Progress, UnfitError, silent
+from solvers.solver import Progress, UnsupportedProblemError, silent
 
 
 @dataclass
@@ -39,12 +39,12 @@ def test_a_spare_solver_that_cannot_is_left_out():
 
 
 def test_a_solver_that_was_asked_for_is_not():
-    with pytest.raises(UnfitError, match="c takes the loads mean, not 'patch'"):
+    with pytest.raises(UnsupportedProblemError, match="c takes the loads mean, not 'patch'"):
         able(SOLVERS, ("a", "b"), Material(), PATCH)
 
 
 def test_a_job_that_no_solver_can_do_is_refused():
-    with pytest.raises(UnfitError, match="c takes the loads mean, not 'patch'"):
+    with pytest.raises(UnsupportedProblemError, match="c takes the loads mean, not 'patch'"):
         able([SOLVERS[0], SOLVERS[2]], ("a", "c"), Material(), PATCH)
 
 

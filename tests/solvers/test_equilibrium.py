@@ -3,23 +3,25 @@
 import numpy as np
 import pytest
 
-from solvers.fem.finite_strain.equilibrium import Equilibrium, Stage
-from solvers.fem.finite_strain.newton import Balance, BorderedNewton
+from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium, LoadStage
+from solvers.fem.finite_strain.newton import ConstrainedNewton, NewtonResult
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
 from tests.solvers.conftest import bar_mesh
 
 LAWS = ("neo-hookean", "st-venant-kirchhoff")
 STEPS = 0.1 * 0.5 ** np.arange(4)
-REST = Stage(0.0, np.zeros(0))
+REST = LoadStage(0.0, np.zeros(0))
 
 
-def equilibrium(law, load=Load(kind="patch")) -> Equilibrium:
+def equilibrium(law, load=Load(kind="patch")) -> FiniteStrainEquilibrium:
     mesh = bar_mesh(8.0, 2.0, 8, 2, contact=(3.0, 5.0))
-    return Equilibrium(Problem(mesh, Material(law=law, poisson=0.3), load), LagrangeSpace(mesh, 2))
+    return FiniteStrainEquilibrium(
+        Problem(mesh, Material(law=law, poisson=0.3), load), LagrangeSpace(mesh, 2)
+    )
 
 
-def fields(problem: Equilibrium, *seeds: int, size: float = 0.02) -> list[np.ndarray]:
+def fields(problem: FiniteStrainEquilibrium, *seeds: int, size: float = 0.02) -> list[np.ndarray]:
     """Random displacements that are zero where clamped, smooth enough to turn no element inside out."""
     return [
         np.where(problem.clamped, 0.0, np.random.default_rng(seed).normal(size=problem.clamped.shape)) * size
@@ -27,7 +29,7 @@ def fields(problem: Equilibrium, *seeds: int, size: float = 0.02) -> list[np.nda
     ]
 
 
-def times_tangent(problem: Equilibrium, direction: np.ndarray) -> np.ndarray:
+def times_tangent(problem: FiniteStrainEquilibrium, direction: np.ndarray) -> np.ndarray:
     vector, product = problem.matrix.createVecs()
     problem.distributed.distribute(direction, vector)
     problem.matrix.mult(vector, product)
@@ -56,7 +58,7 @@ def test_balance_with_a_cylinder_has_its_tangent_as_derivative():
     """With some nodes in contact and the cylinder shifted, so that its normals turn."""
     load = Load(kind="cylinder", radius=3.0, displacement=(0.1, -0.2))
     problem = equilibrium("neo-hookean", load)
-    stage = Stage(1.0, np.full(len(problem.contact.nodes), 0.05))
+    stage = LoadStage(1.0, np.full(len(problem.contact.nodes), 0.05))
     start, direction = fields(problem, 0, 1, size=0.01)
     pressed = problem.contact.forces(start, stage.fraction, stage.multipliers) > 0
     assert 0 < pressed.sum() < len(pressed)
@@ -85,14 +87,14 @@ def test_a_rotated_body_has_the_same_energy_and_rotated_forces(law):
     )
 
 
-def newton(problem: Equilibrium, iterations: int = 12) -> BorderedNewton:
-    return BorderedNewton(problem, scale=11.4, tolerance=1e-8, max_iterations=iterations)
+def newton(problem: FiniteStrainEquilibrium, iterations: int = 12) -> ConstrainedNewton:
+    return ConstrainedNewton(problem, scale=11.4, tolerance=1e-8, max_iterations=iterations)
 
 
-def started(solver: BorderedNewton, problem: Equilibrium) -> Balance:
+def started(solver: ConstrainedNewton, problem: FiniteStrainEquilibrium) -> NewtonResult:
     """From the linear guess to the full load."""
     nodal, forces, pressed = problem.linear_guess(1.0)
-    return solver.solve(nodal, forces, Stage(1.0, pressed))
+    return solver.solve(nodal, forces, LoadStage(1.0, pressed))
 
 
 def test_newton_meets_constraints_and_balance_and_converges_quadratically():
@@ -100,7 +102,7 @@ def test_newton_meets_constraints_and_balance_and_converges_quadratically():
     balance = started(newton(problem), problem)
     assert (balance.converged, balance.reason) == (True, "converged_fnorm_relative")
     assert balance.iterations <= 5
-    left, size = problem.unbalanced(balance.nodal, balance.forces, Stage(1.0, np.zeros(0)))
+    left, size = problem.unbalanced(balance.nodal, balance.forces, LoadStage(1.0, np.zeros(0)))
     assert np.abs(left).max() < 1e-8 * size
     np.testing.assert_allclose(problem.constraints.missing(balance.nodal, balance.forces, 1.0), 0, atol=1e-10)
 
@@ -114,14 +116,14 @@ def test_newton_says_that_it_takes_too_long():
 def test_newton_does_not_start_from_an_element_turned_inside_out():
     problem = equilibrium("neo-hookean", Load(kind="mean", displacement=(0.1, -0.4)))
     (torn,) = fields(problem, 0, size=2.0)
-    balance = newton(problem).solve(torn, np.zeros(2), Stage(1.0, np.zeros(0)))
+    balance = newton(problem).solve(torn, np.zeros(2), LoadStage(1.0, np.zeros(0)))
     assert (balance.converged, balance.reason) == (False, "diverged_function_domain")
 
 
 def test_newton_meets_constraints_that_its_start_misses():
     problem = equilibrium("neo-hookean", Load(kind="mean", displacement=(0.02, -0.05)))
     expected = started(newton(problem), problem)
-    found = newton(problem).solve(0 * expected.nodal, np.zeros(2), Stage(1.0, np.zeros(0)))
+    found = newton(problem).solve(0 * expected.nodal, np.zeros(2), LoadStage(1.0, np.zeros(0)))
     assert found.converged
     np.testing.assert_allclose(found.nodal, expected.nodal, atol=1e-8)
     np.testing.assert_allclose(found.forces, expected.forces, rtol=1e-6)

@@ -10,8 +10,8 @@ from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.error_estimate import ErrorEstimator
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.least_energy import LeastEnergy, LinearSystem
 from solvers.fem.linear import FemSolver
+from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, State
@@ -73,7 +73,7 @@ def test_the_estimate_of_a_smooth_problem_is_exact_in_the_limit(degree):
     mesh = bar_mesh(8.0, 3.0, 32, 12, contact=(2.0, 6.0))
     problem, space = Problem(mesh), LagrangeSpace(mesh, degree)
     estimator = ErrorEstimator(problem, space)
-    system, rule = LinearSystem.of(problem, space), estimator.rule
+    elasticity, rule = LinearElasticity.of(problem, space), estimator.rule
 
     def exact(points):
         x, y = points.T
@@ -90,8 +90,8 @@ def test_the_estimate_of_a_smooth_problem_is_exact_in_the_limit(degree):
     edge = ((np.abs(space.nodes - low) < 1e-9) | (np.abs(space.nodes - high) < 1e-9)).any(axis=1)
     held = np.stack([edge, edge], axis=1)
     given = np.where(held, exact(space.nodes), 0.0)
-    factors = system.factorise(held)
-    nodal = given + factors.solve(force - system.residual(given))
+    factors = elasticity.factorise(held)
+    nodal = given + factors.solve(force - elasticity.internal_force(given))
     error = estimator.estimate(nodal, factors.solve)
     state = State.from_gradient(gradient, problem)
     off = State.from_gradient(gradient - LagrangeField(space, nodal).gradient(rule.location), problem)
@@ -102,14 +102,14 @@ def test_the_estimate_of_a_smooth_problem_is_exact_in_the_limit(degree):
 def test_one_solve_gives_what_the_dual_problem_of_each_marker_gives(coarse_mesh):
     """c(R u, R z) with the dual solution z of the functional, against the estimated error at the marker."""
     problem, space = Problem(coarse_mesh), LagrangeSpace(coarse_mesh, 2)
-    least = LeastEnergy.of(LinearSystem.of(problem, space))
-    nodal, estimator = least.solution(), ErrorEstimator(problem, space)
-    error = estimator.estimate(nodal, lambda force: least.unbalanced(force)[1])
+    equilibrium = LinearEquilibrium.of(LinearElasticity.of(problem, space))
+    nodal, estimator = equilibrium.solution(), ErrorEstimator(problem, space)
+    error = estimator.estimate(nodal, equilibrium.response)
     stress = State.from_gradient(estimator.gradient_error(nodal), problem).stress
     for marker, axis in ((0, 0), (4, 1)):
         functional = np.zeros_like(nodal)
         functional[coarse_mesh.marker_nodes[marker], axis] = 1.0
-        dual = estimator.gradient_error(least.unbalanced(functional)[1])
+        dual = estimator.gradient_error(equilibrium.response(functional))
         products = estimator.rule.weights * np.einsum("qij,qij->q", stress, dual)
         assert products.sum() == pytest.approx(error.markers[marker, axis], rel=1e-8)
 

@@ -7,10 +7,10 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import binom
 
-from solvers.assimilation.estimation import Unknown, estimate
+from solvers.assimilation.estimation import Parameter, estimate
 
 COUNT = 12
-UNKNOWNS = [Unknown("a", "mm", 1.0, 2.0), Unknown("b", "", -1.0, 0.5), Unknown("c", "", 3.0, 10.0)]
+PARAMETERS = [Parameter("a", "mm", 1.0, 2.0), Parameter("b", "", -1.0, 0.5), Parameter("c", "", 3.0, 10.0)]
 START, SCALE = np.array([1.0, -1.0, 3.0]), np.array([2.0, 0.5, 10.0])
 
 
@@ -23,8 +23,8 @@ def linear(slopes):
     return lambda values: (slopes @ values, slopes)
 
 
-def fitted(slopes, observed, sigma=0.1, unknowns=UNKNOWNS):
-    return estimate(linear(slopes), observed, np.full(len(observed), sigma), unknowns)
+def fitted(slopes, observed, sigma=0.1, parameters=PARAMETERS):
+    return estimate(linear(slopes), observed, np.full(len(observed), sigma), parameters)
 
 
 def test_a_linear_model_has_the_estimate_of_the_normal_equations(slopes):
@@ -67,14 +67,14 @@ def test_intervals_cover_where_the_standard_deviations_are_ten_times_too_small(s
 def test_what_is_not_observed_is_held_by_its_prior(slopes):
     """Only the sum of the first two is observed."""
     tied = np.column_stack([slopes[:, 0], slopes[:, 0], slopes[:, 2]])
-    unknowns = [replace(unknown, start=0.0, scale=1.0) for unknown in UNKNOWNS]
-    found = fitted(tied, tied @ [0.4, 0.2, 5.0], 1e-4, unknowns)
+    parameters = [replace(parameter, start=0.0, scale=1.0) for parameter in PARAMETERS]
+    found = fitted(tied, tied @ [0.4, 0.2, 5.0], 1e-4, parameters)
     np.testing.assert_allclose(found.values, [0.3, 0.3, 5.0], atol=1e-5)
     np.testing.assert_allclose(found.resolution, [0.5, 0.5, 1.0], atol=1e-5)
     np.testing.assert_allclose(np.abs(found.least_known), [np.sqrt(0.5), np.sqrt(0.5), 0], atol=1e-6)
     assert found.least_known[0] * found.least_known[1] < 0
     assert found.singular_values[-1] < 1e-6
-    nothing = fitted(0 * slopes, np.zeros(COUNT), 1.0, unknowns)
+    nothing = fitted(0 * slopes, np.zeros(COUNT), 1.0, parameters)
     assert not nothing.resolved.any()
     np.testing.assert_allclose(nothing.deviations, 1.0)
 
@@ -100,7 +100,7 @@ def test_what_is_left_out_is_what_a_refit_predicts(slopes):
 def test_a_curved_model_has_the_minimum_that_finite_differences_find():
     """A decay with a logarithmic parameter; the objective is written out here once more."""
     time, sigma = np.linspace(0, 2, 15), 0.02
-    unknowns = [Unknown("size", "", 1.0, 1.0), Unknown("rate", "1/s", 1.0, 0.7, logarithmic=True)]
+    parameters = [Parameter("size", "", 1.0, 1.0), Parameter("rate", "1/s", 1.0, 0.7, logarithmic=True)]
 
     def model(values):
         size, rate = values
@@ -108,7 +108,7 @@ def test_a_curved_model_has_the_minimum_that_finite_differences_find():
         return size * decay, np.column_stack([decay, -size * time * decay])
 
     observed = 1.6 * np.exp(-2.3 * time) + sigma * np.random.default_rng(5).normal(size=15)
-    found = estimate(model, observed, np.full(15, sigma), unknowns)
+    found = estimate(model, observed, np.full(15, sigma), parameters)
 
     def residuals(z):
         return np.append((model((1 + z[0], np.exp(0.7 * z[1])))[0] - observed) / sigma, z)
@@ -120,7 +120,7 @@ def test_a_curved_model_has_the_minimum_that_finite_differences_find():
 
 
 def test_bounds_hold(slopes):
-    unknowns = [*UNKNOWNS[:2], replace(UNKNOWNS[2], high=4.0)]
-    found = fitted(slopes, slopes @ [1.0, -1.0, 9.0], 1.0, unknowns)
+    parameters = [*PARAMETERS[:2], replace(PARAMETERS[2], high=4.0)]
+    found = fitted(slopes, slopes @ [1.0, -1.0, 9.0], 1.0, parameters)
     assert found.values[2] == pytest.approx(4.0, abs=1e-3)
     assert found.intervals[2, 1] <= 4.0

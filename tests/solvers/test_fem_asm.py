@@ -10,8 +10,8 @@ from geometry.observations import Observations
 from solvers.assimilation.marker_weight import FACTORS
 from solvers.assimilation.misfit import misfit_of
 from solvers.fem.assimilating import FemAsmSolver
-from solvers.fem.least_energy import LinearSystem
 from solvers.fem.linear import FemSolver
+from solvers.fem.linear_equilibrium import LinearElasticity
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Problem, contact_functional
 
@@ -42,12 +42,12 @@ SOFT = FemAsmSolver(weights="precision", scale=0.05)
 def dense(problem, solver):
     """The minimiser by Lagrange multipliers on the whole stiffness, without the solver's algebra."""
     space = LagrangeSpace(problem.mesh, solver.degree)
-    system = LinearSystem.of(problem, space)
+    elasticity = LinearElasticity.of(problem, space)
     free = np.zeros((len(space.nodes), 2), dtype=bool)
-    matrix = system.assemble(free)
+    matrix = elasticity.assemble(free)
     matrix.convert("dense")
     size = free.size
-    node_of_dof = np.repeat(system.distributed._node_of_dof, 2) * 2 + np.tile([0, 1], len(space.nodes))
+    node_of_dof = np.repeat(elasticity.distributed._node_of_dof, 2) * 2 + np.tile([0, 1], len(space.nodes))
     stiffness = np.zeros((size, size))
     stiffness[np.ix_(node_of_dof, node_of_dof)] = matrix.getDenseArray()
     misfit = misfit_of(problem, weights=solver.weights, scale=solver.scale)
@@ -159,11 +159,11 @@ def test_energy_plus_misfit_is_least(problem):
     misfit = misfit_of(problem, weights="precision", scale=SOFT.scale)
     points, weights = misfit.sampling()
     space = solution.field.space
-    system = LinearSystem.of(problem, space)
+    elasticity = LinearElasticity.of(problem, space)
     at = weights @ space.shape_functions(problem.mesh.locate(points)).toarray()
 
     def total(nodal):
-        return 0.5 * (nodal * system.residual(nodal)).sum() + misfit.value(at @ nodal)
+        return 0.5 * (nodal * elasticity.internal_force(nodal)).sum() + misfit.value(at @ nodal)
 
     least = total(solution.field.values)
     plain = FemSolver(estimate=False).solve(replace(problem, observations=None))

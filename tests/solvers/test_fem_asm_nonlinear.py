@@ -10,8 +10,8 @@ from geometry.mesh.quadrature import body_quadrature
 from geometry.observations import Observations
 from solvers.assimilation.misfit import misfit_of
 from solvers.fem.assimilating import FemAsmSolver
-from solvers.fem.finite_strain.constraints import Constraints
-from solvers.fem.finite_strain.equilibrium import Equilibrium, Stage
+from solvers.fem.finite_strain.constraints import DisplacementConstraints
+from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium, LoadStage
 from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.lagrange import LagrangeSpace
@@ -86,10 +86,10 @@ def test_small_displacements_give_the_linear_minimiser(kind):
 
 def functional(problem, space, slack):
     """The misfit's constraints and J of nodal displacements, without any multipliers."""
-    constraints = Constraints.of(problem, space, slack)
+    constraints = DisplacementConstraints.of(problem, space, slack)
     misfit = misfit_of(problem, weights="precision", scale=SOFT.scale)
-    constraints = constraints.joined(Constraints.springs(misfit, space))
-    equilibrium = Equilibrium(problem, space, constraints)
+    constraints = constraints.joined(DisplacementConstraints.springs(misfit, space))
+    equilibrium = FiniteStrainEquilibrium(problem, space, constraints)
     points, weights = misfit.sampling()
     sampling = weights @ space.shape_functions(problem.mesh.locate(points)).toarray()
     contact, average = contact_functional(problem)
@@ -118,11 +118,11 @@ def test_energy_plus_misfit_has_balance_and_tangent_as_derivatives(law):
 
     def gradient(nodal):
         forces = constraints.missing(nodal, np.zeros(len(constraints.targets)), 1.0) / constraints.slacks
-        return equilibrium.unbalanced(nodal, forces, Stage(1.0, np.zeros(0)))[0]
+        return equilibrium.unbalanced(nodal, forces, LoadStage(1.0, np.zeros(0)))[0]
 
     steps = 0.02 * 0.5 ** np.arange(4)
     first = (gradient(start) * direction).sum()
-    equilibrium.factorise(start, Stage(1.0, np.zeros(0)))
+    equilibrium.factorise(start, LoadStage(1.0, np.zeros(0)))
     vector, product = equilibrium.matrix.createVecs()
     equilibrium.distributed.distribute(direction, vector)
     equilibrium.matrix.mult(vector, product)

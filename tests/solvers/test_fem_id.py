@@ -10,7 +10,7 @@ from scipy.stats import binom
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.assimilation.misfit import SMALLEST_DEVIATION, misfit_of
-from solvers.fem.identification.linear_model import LinearFinger
+from solvers.fem.identification.linear_model import LinearModel
 from solvers.fem.identification.solver import FemIdSolver
 from solvers.fem.linear import FemSolver
 from solvers.lagrange import LagrangeField, LagrangeSpace
@@ -28,7 +28,7 @@ def problem(coarse_mesh):
 def twin(problem, truth, *, noise=0.0, deviation=NOISE, seed=0, degree=1):
     """The problem with observations of a finger that has the parameters `truth`; and its force along y."""
     space = LagrangeSpace(problem.mesh, degree)
-    response = LinearFinger(problem, space, tuple(truth)).response(np.array(list(truth.values())))
+    response = LinearModel(problem, space, tuple(truth)).response(np.array(list(truth.values())))
     markers = problem.mesh.markers
     moved = LagrangeField(space, response.nodal).displacement(problem.mesh.locate(markers))
     moved = moved + noise * np.random.default_rng(seed).normal(size=moved.shape)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from solvers.fem import least_energy, multigrid
-from solvers.fem.least_energy import Factorisation, LinearSystem
+from solvers.fem import linear_equilibrium, multigrid
 from solvers.fem.linear import FemSolver
+from solvers.fem.linear_equilibrium import Factorisation, LinearElasticity
 from solvers.problem import Load, Problem
 
 
@@ -14,13 +14,13 @@ from solvers.problem import Load, Problem
 def factorised(monkeypatch):
     """The masks of held components of every factorisation of the test."""
     masks = []
-    factorise = LinearSystem.factorise
+    factorise = LinearElasticity.factorise
 
     def counted(system, clamped):
         masks.append(clamped)
         return factorise(system, clamped)
 
-    monkeypatch.setattr(LinearSystem, "factorise", counted)
+    monkeypatch.setattr(LinearElasticity, "factorise", counted)
     return masks
 
 
@@ -87,7 +87,7 @@ def test_iterations_that_do_not_converge_are_an_error(coarse_mesh, monkeypatch):
 
 
 def test_many_unknowns_are_solved_by_iterations(coarse_mesh, monkeypatch):
-    monkeypatch.setattr(least_energy, "ITERATIVE_BEYOND", 2 * len(coarse_mesh.points))
+    monkeypatch.setattr(linear_equilibrium, "ITERATIVE_BEYOND", 2 * len(coarse_mesh.points))
     chosen = [
         FemSolver(degree, estimate=False).solve(Problem(coarse_mesh)).stats["linear_solver"]
         for degree in (1, 2)

@@ -9,8 +9,8 @@ from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature, edge_quadrature
 from geometry.mesh.walls import walls_and_ribs
 from solvers.elasticity import lame_constants, lame_slopes
-from solvers.fem.identification.linear_model import LinearFinger
-from solvers.fem.identification.parameters import MEANINGS, parse_parameters, problem_with, unknowns_of
+from solvers.fem.identification.linear_model import LinearModel
+from solvers.fem.identification.parameters import MEANINGS, parameters_of, parse_parameters, problem_with
 from solvers.fem.linear import FemSolver
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Material, Problem
@@ -32,14 +32,14 @@ def space(coarse_mesh):
 
 @pytest.fixture(scope="module")
 def finger(problem, space):
-    return LinearFinger(problem, space, NAMES)
+    return LinearModel(problem, space, NAMES)
 
 
 @pytest.fixture(scope="module")
 def place(problem):
     """Parameters away from their priors' middles."""
     return np.array(
-        [float(u.value(-0.4 if u.name == "poisson" else 0.4)) for u in unknowns_of(problem, NAMES)]
+        [float(u.value(-0.4 if u.name == "poisson" else 0.4)) for u in parameters_of(problem, NAMES)]
     )
 
 
@@ -60,7 +60,7 @@ def test_lame_slopes_are_those_of_central_differences(plane):
 )
 def test_without_parameters_it_is_fem(coarse_mesh, load, plane, degree):
     problem = Problem(coarse_mesh, Material(plane=plane), load)
-    response = LinearFinger(problem, LagrangeSpace(coarse_mesh, degree), ()).response(np.zeros(0))
+    response = LinearModel(problem, LagrangeSpace(coarse_mesh, degree), ()).response(np.zeros(0))
     fem = FemSolver(degree=degree, estimate=False).solve(problem)
     np.testing.assert_allclose(response.nodal, fem.field.values, atol=1e-8)
     np.testing.assert_allclose(response.forces, fem.reaction[load.prescribed], rtol=1e-8)
@@ -71,7 +71,7 @@ def test_load_and_material_are_those_of_a_problem_that_has_them(problem, space, 
     """`fem` with the same load and material, where clamp and walls are as usual."""
     names = ("position", "stroke_u", "stroke_v", "poisson", "young")
     values = dict(zip(names, (38.2, 0.7, -8.0, 0.4, 9.0), strict=True))
-    response = LinearFinger(problem, space, names).response(np.array(list(values.values())))
+    response = LinearModel(problem, space, names).response(np.array(list(values.values())))
     fem = FemSolver(degree=1, estimate=False).solve(problem_with(problem, values))
     assert fem.problem.load == Load(position=38.2, displacement=(0.7, -8.0))
     assert fem.problem.material == Material(poisson=0.4, young=9.0)
@@ -83,7 +83,7 @@ def test_load_and_material_are_those_of_a_problem_that_has_them(problem, space, 
 def test_derivatives_pass_the_taylor_test(problem, finger, place, name):
     """What the first-order expansion leaves falls by four when the step is halved, or is rounding."""
     which = NAMES.index(name)
-    scale = unknowns_of(problem, NAMES)[which].slope(0.0)
+    scale = parameters_of(problem, NAMES)[which].slope(0.0)
     here = finger.response(place)
     left = []
     for step in (0.04 * scale, 0.02 * scale):
@@ -104,7 +104,7 @@ def test_derivatives_pass_the_taylor_test(problem, finger, place, name):
 
 
 def test_a_compliant_base_is_in_equilibrium_and_tends_to_the_clamp(problem, space):
-    finger = LinearFinger(problem, space, ("base_compliance",))
+    finger = LinearModel(problem, space, ("base_compliance",))
     compliance = 0.3
     response = finger.response(np.array([compliance]))
     points, weights = edge_quadrature(problem.mesh, "base")
@@ -120,7 +120,7 @@ def test_a_compliant_base_is_in_equilibrium_and_tends_to_the_clamp(problem, spac
 @pytest.mark.parametrize("part", ["front", "back", "rib"])
 def test_stiffening_a_part_costs_the_energy_that_it_holds(problem, space, part):
     """d/ds of the least energy is the energy of the part for s = 1, here by quadrature of its density."""
-    response = LinearFinger(problem, space, (f"{part}_stiffness",)).response(np.ones(1))
+    response = LinearModel(problem, space, (f"{part}_stiffness",)).response(np.ones(1))
     change = 0.5 * response.force_slopes[0] @ problem.load.values
     rule = body_quadrature(problem.mesh)
     gradient = LagrangeField(space, response.nodal).gradient(rule.location)
@@ -147,14 +147,14 @@ def test_a_body_without_cavities_has_no_walls():
     mesh = bar_mesh(20.0, 2.0, 40, 4, contact=(18.0, 20.0))
     assert not any(mask.any() for mask in walls_and_ribs(mesh).values())
     with pytest.raises(UserError, match="no back beside cavities: leave out back_stiffness"):
-        unknowns_of(Problem(mesh), ("back_stiffness",))
+        parameters_of(Problem(mesh), ("back_stiffness",))
 
 
 def test_what_the_load_does_not_have_cannot_be_found(problem):
     free = replace(problem, load=Load(displacement=(None, -10.0)))
     with pytest.raises(UserError, match="u of the load is free, so that there is no stroke_u to find"):
-        unknowns_of(free, ("stroke_u",))
-    assert [u.start for u in unknowns_of(free, ("position", "stroke_v"))] == [35.0, -10.0]
+        parameters_of(free, ("stroke_u",))
+    assert [u.start for u in parameters_of(free, ("position", "stroke_v"))] == [35.0, -10.0]
 
 
 @pytest.mark.parametrize(
@@ -171,6 +171,6 @@ def test_parameters_that_are_none_are_refused(text, said):
 
 
 def test_the_contact_stays_on_the_front_face(problem):
-    (position,) = unknowns_of(problem, ("position",))
+    (position,) = parameters_of(problem, ("position",))
     for value in (position.low, position.high):
         problem_with(problem, {"position": value})  # which would be refused

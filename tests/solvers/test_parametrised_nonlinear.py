@@ -10,8 +10,8 @@ from geometry.observations import Observations
 from solvers.fem.finite_strain.load_path import Steps
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification import finite_strain_model as parametrised_nonlinear
-from solvers.fem.identification.finite_strain_model import PARAMETERS, NonlinearFinger
-from solvers.fem.identification.parameters import problem_with, unknowns_of
+from solvers.fem.identification.finite_strain_model import PARAMETERS, FiniteStrainModel
+from solvers.fem.identification.parameters import parameters_of, problem_with
 from solvers.fem.identification.solver import FemIdSolver
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
@@ -26,7 +26,7 @@ def problem(coarse_mesh):
 
 @pytest.fixture(scope="module")
 def finger(problem):
-    finger = NonlinearFinger(problem, LagrangeSpace(problem.mesh, 1), PARAMETERS)
+    finger = FiniteStrainModel(problem, LagrangeSpace(problem.mesh, 1), PARAMETERS)
     yield finger
     finger.close()
 
@@ -56,7 +56,7 @@ def test_it_is_fem_nonlinear_from_rest_and_from_elsewhere(finger, direct):
 def test_derivatives_pass_the_taylor_test(problem, finger, name):
     """What the first-order expansion leaves falls by four when the step is halved, or is rounding."""
     which = PARAMETERS.index(name)
-    scale = unknowns_of(problem, [name])[0].slope(0.0)
+    scale = parameters_of(problem, [name])[0].slope(0.0)
     here = finger.response(place())
     left = []
     for step in (0.04 * scale, 0.02 * scale):
@@ -99,7 +99,7 @@ def test_a_twin_at_finite_strain_is_found(problem, direct):
 def test_a_load_that_the_finger_cannot_take_is_an_error(problem, monkeypatch):
     """In one step it cannot."""
     monkeypatch.setattr(parametrised_nonlinear, "STEPS", Steps(first=1.0, longest=1.0, shortest=1.0))
-    finger = NonlinearFinger(problem, LagrangeSpace(problem.mesh, 1), ("stroke_v",))
+    finger = FiniteStrainModel(problem, LagrangeSpace(problem.mesh, 1), ("stroke_v",))
     with pytest.raises(UserError, match=r"found no equilibrium beyond .* take a smaller prior or model=fem"):
         finger.response(np.array([-90.0]))
     finger.close()

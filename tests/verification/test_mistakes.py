@@ -10,7 +10,7 @@ from benchmarks.verification.manufactured import MANUFACTURED
 from benchmarks.verification.plate_with_hole import KIRSCH
 from geometry.errors import UserError
 from solvers import elasticity
-from solvers.fem import least_energy
+from solvers.fem import linear_equilibrium
 from solvers.problem import Material
 
 
@@ -40,7 +40,7 @@ def plane_strain_always(young, poisson, plane):
 
 @pytest.mark.parametrize(("mistake", "case"), [(too_much_λ, MANUFACTURED), (half_the_shear, CANTILEVER)])
 def test_wrong_law(mistake, case, monkeypatch):
-    monkeypatch.setattr(least_energy, "linear_energy_density", mistake)
+    monkeypatch.setattr(linear_equilibrium, "linear_energy_density", mistake)
     assert not passes(case.measure(), degree=2)
 
 
@@ -60,6 +60,6 @@ def test_plane_strain_for_plane_stress(case, monkeypatch):
 
 def test_too_few_integration_points(monkeypatch):
     """One point a triangle leaves quadratic elements with motions that cost no energy."""
-    monkeypatch.setattr(least_energy.ufl, "dx", ufl.dx(metadata={"quadrature_degree": 1}))
+    monkeypatch.setattr(linear_equilibrium.ufl, "dx", ufl.dx(metadata={"quadrature_degree": 1}))
     with pytest.raises(UserError, match="cannot factorise"):
         MANUFACTURED.measure()

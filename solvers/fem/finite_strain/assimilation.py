@@ -15,7 +15,7 @@ import numpy as np
 from geometry.arrays import BoolArray, FloatArray
 from solvers.assimilation.marker_forces import missed_phrase
 from solvers.assimilation.misfit import Misfit, without_each
-from solvers.fem.finite_strain.constraints import Constraints
+from solvers.fem.finite_strain.constraints import DisplacementConstraints
 from solvers.fem.finite_strain.load_path import LoadPath, PathPoint
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.lagrange import LagrangeField, LagrangeSpace
@@ -44,8 +44,8 @@ def assimilated(
     """
     started = time.perf_counter()
     space = LagrangeSpace(problem.mesh, degree)
-    springs = Constraints.springs(misfit, space)
-    path = _path(problem, space, Constraints.of(problem, space, slack).joined(springs))
+    springs = DisplacementConstraints.springs(misfit, space)
+    path = _path(problem, space, DisplacementConstraints.of(problem, space, slack).joined(springs))
     path.follow(lambda done, text: progress(PATH_SHARE * done, text))
     steps, iterations, last = len(path.points) - 1, path.iterations, path.points[-1]
     forces = last.forces[-len(springs.targets) :]
@@ -81,11 +81,13 @@ def assimilated(
     )
 
 
-def _path(problem: Problem, space: LagrangeSpace, constraints: Constraints) -> LoadPath:
+def _path(problem: Problem, space: LagrangeSpace, constraints: DisplacementConstraints) -> LoadPath:
     return FemNonlinearSolver(degree=space.degree, min_step=MIN_STEP).path(problem, space, constraints)
 
 
-def _left_out(path: LoadPath, problem: Problem, springs: Constraints, progress: Progress) -> FloatArray:
+def _left_out(
+    path: LoadPath, problem: Problem, springs: DisplacementConstraints, progress: Progress
+) -> FloatArray:
     """What each marker is missed by without it, shape (m, 2), mm; NaN where there is no equilibrium."""
     count = len(springs.targets) // 2
     first = len(path.points[-1].forces) - 2 * count

@@ -6,13 +6,13 @@ import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
 from solvers.assimilation.misfit import Misfit
-from solvers.fem.conditions import load_functionals
+from solvers.fem.boundary_conditions import load_functionals
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)
-class Constraints:
+class DisplacementConstraints:
     """b_k . c + s_k f_k = d_k, with displacements c and forces f_k by which the functionals are held.
 
     Attributes:
@@ -27,7 +27,7 @@ class Constraints:
     slacks: FloatArray
 
     @classmethod
-    def of(cls, problem: Problem, space: LagrangeSpace, slack: float = 0.0) -> "Constraints":
+    def of(cls, problem: Problem, space: LagrangeSpace, slack: float = 0.0) -> "DisplacementConstraints":
         """The load's, all of one slack; none but for a `mean` or `point` load."""
         if problem.load.kind not in ("mean", "point"):
             return cls(np.zeros((0, len(space.nodes), 2)), np.zeros(0), np.zeros(0))
@@ -35,24 +35,24 @@ class Constraints:
         return cls(load_functionals(problem, space), targets, np.full(len(targets), slack))
 
     @classmethod
-    def springs(cls, misfit: Misfit, space: LagrangeSpace) -> "Constraints":
+    def springs(cls, misfit: Misfit, space: LagrangeSpace) -> "DisplacementConstraints":
         """Springs between markers and where they were observed, whose energy is the misfit; u v u v ..."""
         points, weights = misfit.sampling()
         sampling = weights @ space.shape_functions(space.mesh.locate(points)).toarray()
         functionals = np.kron(sampling, np.eye(2)).reshape(-1, len(space.nodes), 2)
         return cls(functionals, misfit.observed.ravel(), 1 / misfit.weights.ravel())
 
-    def joined(self, other: "Constraints") -> "Constraints":
+    def joined(self, other: "DisplacementConstraints") -> "DisplacementConstraints":
         """These and others after them."""
-        return Constraints(
+        return DisplacementConstraints(
             np.concatenate([self.functionals, other.functionals]),
             np.concatenate([self.targets, other.targets]),
             np.concatenate([self.slacks, other.slacks]),
         )
 
-    def only(self, kept: BoolArray) -> "Constraints":
+    def only(self, kept: BoolArray) -> "DisplacementConstraints":
         """Those of a mask of shape (k,)."""
-        return Constraints(self.functionals[kept], self.targets[kept], self.slacks[kept])
+        return DisplacementConstraints(self.functionals[kept], self.targets[kept], self.slacks[kept])
 
     def values(self, nodal: FloatArray) -> FloatArray:
         """b_k . c of displacements of shape (N, 2), mm: shape (k,)."""

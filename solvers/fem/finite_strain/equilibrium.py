@@ -15,10 +15,10 @@ import ufl
 from geometry.arrays import BoolArray, FloatArray
 from geometry.mesh.quadrature import body_quadrature
 from solvers.elasticity import Lame, deformation_jacobian, energy_density_of
-from solvers.fem.conditions import held_components, patch_displacement
+from solvers.fem.boundary_conditions import held_components, patch_displacement
 from solvers.fem.dolfinx_compat import DistributedSpace, Factorisation
-from solvers.fem.finite_strain.constraints import Constraints
-from solvers.fem.finite_strain.contact import CylinderContact
+from solvers.fem.finite_strain.constraints import DisplacementConstraints
+from solvers.fem.finite_strain.cylinder_contact import CylinderContact
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 
@@ -29,7 +29,7 @@ PROBE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class LoadStage:
     """What is given at one stage of the load.
 
     Attributes:
@@ -41,7 +41,7 @@ class Stage:
     multipliers: FloatArray
 
 
-class Equilibrium:
+class FiniteStrainEquilibrium:
     """The discrete problem; nodal arrays of shape (N, 2) are the same on every rank.
 
     Attributes:
@@ -53,14 +53,14 @@ class Equilibrium:
     """
 
     def __init__(
-        self, problem: Problem, space: LagrangeSpace, constraints: Constraints | None = None
+        self, problem: Problem, space: LagrangeSpace, constraints: DisplacementConstraints | None = None
     ) -> None:
         """Compile the forms; the constraints are the load's unless others are given."""
         kind, shape = problem.load.kind, (len(space.nodes), 2)
         self.distributed = DistributedSpace(space)
         self.clamped: BoolArray = held_components(problem, space)
         self.held = patch_displacement(problem, space) if kind == "patch" else np.zeros(shape)
-        self.constraints = constraints or Constraints.of(problem, space)
+        self.constraints = constraints or DisplacementConstraints.of(problem, space)
         self.contact = CylinderContact.of(problem, space) if kind == "cylinder" else None
         self._derivatives = space.shape_gradients(body_quadrature(problem.mesh, QUADRATURE_DEGREE).location)
         lame = problem.material.lame
@@ -83,7 +83,7 @@ class Equilibrium:
 
     def become(self, problem: Problem) -> None:
         """Take another `mean` or `point` load, with the same components prescribed, and other moduli."""
-        self.constraints = Constraints.of(problem, self.distributed.space)
+        self.constraints = DisplacementConstraints.of(problem, self.distributed.space)
         self._set_moduli(problem.material.lame)
 
     def force_slope(self, nodal: FloatArray, moduli: Lame, slopes: Lame) -> FloatArray:
@@ -113,7 +113,7 @@ class Equilibrium:
         self.distributed.set_function(nodal)
         return self.distributed.assemble_nodal(self._residual)
 
-    def unbalanced(self, nodal: FloatArray, forces: FloatArray, stage: Stage) -> tuple[FloatArray, float]:
+    def unbalanced(self, nodal: FloatArray, forces: FloatArray, stage: LoadStage) -> tuple[FloatArray, float]:
         """What is left of equilibrium, shape (N, 2), N/mm, zero where clamped; the largest internal force.
 
         Args:
@@ -127,7 +127,7 @@ class Equilibrium:
             balance[self.contact.nodes] += self.contact.gradient(nodal, stage.fraction, stage.multipliers)
         return np.where(self.clamped, 0.0, balance), float(np.abs(internal).max())
 
-    def factorise(self, nodal: FloatArray, stage: Stage) -> None:
+    def factorise(self, nodal: FloatArray, stage: LoadStage) -> None:
         """Factorise the tangent at displacements of shape (N, 2), mm."""
         self.distributed.set_function(nodal)
         self.distributed.assemble_matrix(self._tangent, self._conditions, into=self.matrix)
@@ -184,7 +184,7 @@ class Equilibrium:
         nearest = gap.argmin()
         functional = rest.copy()
         functional[contact.nodes[nearest]] = normal[nearest]
-        pressing = Constraints(functional[None], np.maximum(-gap[[nearest]], 0.0), np.zeros(1))
+        pressing = DisplacementConstraints(functional[None], np.maximum(-gap[[nearest]], 0.0), np.zeros(1))
         nodal, force = pressing.held(rest, pressing.targets, self.factors.solve(functional)[None])
         pressed = np.zeros(len(gap))
         pressed[nearest] = force[0]

@@ -7,11 +7,11 @@ from functools import partial
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
-from solvers.fem.conditions import reaction_by_residual_work
-from solvers.fem.finite_strain.constraints import Constraints
-from solvers.fem.finite_strain.contact import ContactRegion
-from solvers.fem.finite_strain.equilibrium import Equilibrium, Stage
-from solvers.fem.finite_strain.newton import BorderedNewton
+from solvers.fem.boundary_conditions import reaction_by_residual_work
+from solvers.fem.finite_strain.constraints import DisplacementConstraints
+from solvers.fem.finite_strain.cylinder_contact import ContactRegion
+from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium, LoadStage
+from solvers.fem.finite_strain.newton import ConstrainedNewton
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 from solvers.solver import Progress
@@ -72,7 +72,7 @@ class LoadPath:
         *,
         tolerance: float,
         max_iterations: int,
-        constraints: Constraints | None = None,
+        constraints: DisplacementConstraints | None = None,
     ) -> None:
         """Prepare the path.
 
@@ -80,14 +80,14 @@ class LoadPath:
             problem: With the full load.
             space: The elements.
             steps: Fractions of the load.
-            tolerance: Of `BorderedNewton`.
-            max_iterations: Of `BorderedNewton`.
+            tolerance: Of `ConstrainedNewton`.
+            max_iterations: Of `ConstrainedNewton`.
             constraints: The load's, and others whose targets grow with it; the load's if None.
         """
         self._steps, self._space = steps, space
-        self.equilibrium = Equilibrium(problem, space, constraints)
+        self.equilibrium = FiniteStrainEquilibrium(problem, space, constraints)
         self._begin = partial(
-            BorderedNewton,
+            ConstrainedNewton,
             self.equilibrium,
             scale=problem.material.young,
             tolerance=tolerance,
@@ -125,7 +125,7 @@ class LoadPath:
             step = min(self._longest, step * (2 if hardest <= QUICK else 1))
 
     def continued(self, problem: Problem, nodal: FloatArray, forces: FloatArray) -> PathPoint | None:
-        """Equilibrium at the full load of a problem for which `Equilibrium.become` is; None if none is found.
+        """Equilibrium at the full load of another problem; None if none is found.
 
         Args:
             problem: With another load and moduli.
@@ -133,7 +133,7 @@ class LoadPath:
             forces: Multipliers that are near, shape (k,), N/mm.
         """
         self.equilibrium.become(problem)
-        balance = self._newton.solve(nodal, forces, Stage(1.0, np.zeros(0)))
+        balance = self._newton.solve(nodal, forces, LoadStage(1.0, np.zeros(0)))
         self.iterations += balance.iterations
         if not balance.converged:
             return None
@@ -144,7 +144,7 @@ class LoadPath:
         last, constraints = self.points[-1], self.equilibrium.constraints
         self.equilibrium.constraints = constraints.only(kept)
         newton = self._begin()
-        balance = newton.solve(last.nodal, last.forces[kept], Stage(1.0, last.contact))
+        balance = newton.solve(last.nodal, last.forces[kept], LoadStage(1.0, last.contact))
         newton.close()
         self.equilibrium.constraints = constraints
         self.iterations += balance.iterations
@@ -155,7 +155,7 @@ class LoadPath:
         nodal, forces, pressed = self._guess(fraction)
         hardest = 0
         for _ in range(UPDATES):
-            balance = self._newton.solve(nodal, forces, Stage(fraction, pressed))
+            balance = self._newton.solve(nodal, forces, LoadStage(fraction, pressed))
             self.iterations += balance.iterations
             hardest = max(hardest, balance.iterations)
             if not balance.converged:

@@ -7,7 +7,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from geometry.arrays import FloatArray
-from solvers.fem.finite_strain.equilibrium import Equilibrium, Stage
+from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium, LoadStage
 
 SMALL = 1e-4
 """Least size of the internal forces over Young's modulus, mm: rounding of positions makes forces too."""
@@ -16,7 +16,7 @@ SHORTEST = 2.0**-10
 
 
 @dataclass(frozen=True, eq=False)
-class Balance:
+class NewtonResult:
     """How a Newton iteration ended.
 
     Attributes:
@@ -34,8 +34,8 @@ class Balance:
     iterations: int
 
 
-class BorderedNewton:
-    """SNES on the unknowns [c; f] of an `Equilibrium`.
+class ConstrainedNewton:
+    """SNES on the unknowns [c; f] of a `FiniteStrainEquilibrium`.
 
         R(c, f) = [dΠ/dc - f_k b_k;  s (d_k - b_k . c - s_k f_k)]      J = [K, -b;  -s b^T, -s diag(s_k)]
 
@@ -49,7 +49,7 @@ class BorderedNewton:
     """
 
     def __init__(
-        self, equilibrium: Equilibrium, *, scale: float, tolerance: float, max_iterations: int
+        self, equilibrium: FiniteStrainEquilibrium, *, scale: float, tolerance: float, max_iterations: int
     ) -> None:
         """Prepare the solver.
 
@@ -60,7 +60,7 @@ class BorderedNewton:
             max_iterations: Newton steps.
         """
         self._equilibrium, self._scale, self._tolerance = equilibrium, scale, tolerance
-        self._stage = Stage(0.0, np.zeros(0))
+        self._stage = LoadStage(0.0, np.zeros(0))
         self._size = 0.0
         self._torn = False
         self._part, _ = equilibrium.matrix.createVecs()
@@ -92,18 +92,18 @@ class BorderedNewton:
         for item in (self._snes, self._jacobian, self._residual, self._unknown, self._part):
             item.destroy()
 
-    def solve(self, nodal: FloatArray, forces: FloatArray, stage: Stage) -> Balance:
+    def solve(self, nodal: FloatArray, forces: FloatArray, stage: LoadStage) -> NewtonResult:
         """Find equilibrium at a stage from displacements that meet its constraints."""
         self._stage, self._torn = stage, not self._equilibrium.possible(nodal)
         if self._torn:
-            return Balance(nodal, forces, False, "diverged_function_domain", 0)
+            return NewtonResult(nodal, forces, False, "diverged_function_domain", 0)
         self._join(nodal, forces, self._unknown)
         self._snes.solve(None, self._unknown)
         nodal, forces = self._split(self._unknown)
         reason = self._snes.getConvergedReason()
         words = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if name[0] != "_"}
         word = "diverged_function_domain" if self._torn else words[reason].lower()
-        return Balance(nodal, forces, reason > 0, word, self._snes.getIterationNumber())
+        return NewtonResult(nodal, forces, reason > 0, word, self._snes.getIterationNumber())
 
     def apply(self, preconditioner: PETSc.PC, right: PETSc.Vec, step: PETSc.Vec) -> None:
         """J^-1, as PETSc calls it."""

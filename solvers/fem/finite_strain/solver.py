@@ -10,9 +10,9 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from solvers.fem.error_estimate import ErrorEstimator
-from solvers.fem.finite_strain.constraints import Constraints
-from solvers.fem.finite_strain.contact import ContactRegion
-from solvers.fem.finite_strain.equilibrium import Stage
+from solvers.fem.finite_strain.constraints import DisplacementConstraints
+from solvers.fem.finite_strain.cylinder_contact import ContactRegion
+from solvers.fem.finite_strain.equilibrium import LoadStage
 from solvers.fem.finite_strain.load_path import LoadPath, Steps
 from solvers.fem.locking import locking_advice
 from solvers.fem.ranks import on_all_ranks
@@ -65,7 +65,7 @@ class FemNonlinearSolver:
         return on_all_ranks(self._solve, problem, progress)
 
     def path(
-        self, problem: Problem, space: LagrangeSpace, constraints: Constraints | None = None
+        self, problem: Problem, space: LagrangeSpace, constraints: DisplacementConstraints | None = None
     ) -> LoadPath:
         """The load path that is to be followed, with constraints as `LoadPath` has them."""
         return LoadPath(
@@ -127,7 +127,7 @@ def _error(path: LoadPath, problem: Problem, space: LagrangeSpace) -> ErrorEstim
     untouched = path.equilibrium.contact is not None and not last.contact.any()
     if last.fraction < 1 or problem.load.kind == "point" or untouched:
         return None
-    path.equilibrium.factorise(last.nodal, Stage(last.fraction, last.contact))
+    path.equilibrium.factorise(last.nodal, LoadStage(last.fraction, last.contact))
     return ErrorEstimator(problem, space).estimate(last.nodal, path.equilibrium.response)
 
 

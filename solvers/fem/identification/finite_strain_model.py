@@ -14,7 +14,7 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from solvers.elasticity import Lame, lame_slopes
 from solvers.fem.constrained_solve import Bordered
-from solvers.fem.finite_strain.equilibrium import Stage
+from solvers.fem.finite_strain.equilibrium import LoadStage
 from solvers.fem.finite_strain.load_path import LoadPath, PathPoint, Steps
 from solvers.fem.identification.linear_model import Response
 from solvers.fem.identification.parameters import moved_functionals, problem_with, target_slope
@@ -31,7 +31,7 @@ TOLERANCE = 1e-10
 ITERATIONS = 12
 
 
-class NonlinearFinger:
+class FiniteStrainModel:
     """Responses of a finger at finite strain to a `mean` or `point` load; each starts from the last one.
 
     Args:
@@ -91,7 +91,7 @@ class NonlinearFinger:
         if path is None:
             raise RuntimeError("there is no path to an equilibrium yet")
         equilibrium, nodal, shape = path.equilibrium, point.nodal, point.nodal.shape
-        equilibrium.factorise(nodal, Stage(1.0, np.zeros(0)))
+        equilibrium.factorise(nodal, LoadStage(1.0, np.zeros(0)))
         functionals = equilibrium.constraints.functionals.reshape(len(point.forces), -1)
         bordered = Bordered.of(
             lambda right: equilibrium.factors.solve(right.reshape(shape)).ravel(), functionals

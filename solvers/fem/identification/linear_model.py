@@ -22,7 +22,7 @@ from geometry.arrays import FloatArray
 from geometry.mesh.quadrature import body_quadrature, edge_quadrature
 from geometry.mesh.walls import walls_and_ribs
 from solvers.elasticity import lame_slopes
-from solvers.fem.conditions import load_functionals
+from solvers.fem.boundary_conditions import load_functionals
 from solvers.fem.constrained_solve import Bordered
 from solvers.fem.identification.parameters import STIFFNESS, moved_functionals, problem_with, target_slope
 from solvers.lagrange import LagrangeSpace
@@ -48,7 +48,7 @@ class Response:
     energy: float
 
 
-class LinearFinger:
+class LinearModel:
     """Responses of a finger to a `mean` or `point` load; one factorisation while its stiffness stays.
 
     Args:

@@ -9,10 +9,10 @@ from scipy.sparse import csr_matrix
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.mesh.walls import walls_and_ribs
-from solvers.assimilation.estimation import Unknown
+from solvers.assimilation.estimation import Parameter
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Problem, contact_ends, contact_functional
-from solvers.solver import UnfitError
+from solvers.solver import UnsupportedProblemError
 
 MEANINGS = {
     "position": "abscissa of the contact's middle",
@@ -48,7 +48,7 @@ def parse_parameters(solver: str, text: str) -> tuple[str, ...]:
     return names
 
 
-def unknowns_of(problem: Problem, names: Sequence[str], width: float = 1.0) -> list[Unknown]:
+def parameters_of(problem: Problem, names: Sequence[str], width: float = 1.0) -> list[Parameter]:
     """The parameters with what is assumed of them.
 
     Args:
@@ -68,22 +68,26 @@ def unknowns_of(problem: Problem, names: Sequence[str], width: float = 1.0) -> l
     found = []
     for name in names:
         if name.startswith("stroke") and load.displacement["uv".index(name[-1])] is None:
-            raise UnfitError(f"{name[-1]} of the load is free, so that there is no {name} to find")
+            raise UnsupportedProblemError(
+                f"{name[-1]} of the load is free, so that there is no {name} to find"
+            )
         if name in STIFFNESS and not parts[STIFFNESS[name]].any():
             raise UserError(f"this finger has no {STIFFNESS[name]} beside cavities: leave out {name}")
         if name == "position" and load.kind == "patch":
-            raise UnfitError("a patch lies on whole elements and cannot move: leave out position")
+            raise UnsupportedProblemError(
+                "a patch lies on whole elements and cannot move: leave out position"
+            )
         found.append(
             {
-                "position": Unknown(
+                "position": Parameter(
                     name, "mm", 0.5 * (left + right), 2.0 * width, front.min() + half, front.max() - half
                 ),
-                "stroke_u": Unknown(name, "mm", load.displacement[0] or 0.0, 0.2 * travel * width),
-                "stroke_v": Unknown(name, "mm", load.displacement[1] or 0.0, 0.2 * travel * width),
-                "base_compliance": Unknown(name, "mm", 0.1, log(10) * width, logarithmic=True),
-                "poisson": Unknown(name, "", material.poisson, 0.05 * width, 0.0, 0.499),
-                "young": Unknown(name, "MPa", material.young, 0.3 * width, logarithmic=True),
-            }.get(name, Unknown(name, "", 1.0, 0.3 * width, logarithmic=True))
+                "stroke_u": Parameter(name, "mm", load.displacement[0] or 0.0, 0.2 * travel * width),
+                "stroke_v": Parameter(name, "mm", load.displacement[1] or 0.0, 0.2 * travel * width),
+                "base_compliance": Parameter(name, "mm", 0.1, log(10) * width, logarithmic=True),
+                "poisson": Parameter(name, "", material.poisson, 0.05 * width, 0.0, 0.499),
+                "young": Parameter(name, "MPa", material.young, 0.3 * width, logarithmic=True),
+            }.get(name, Parameter(name, "", 1.0, 0.3 * width, logarithmic=True))
         )
     return found
 

@@ -13,10 +13,10 @@ from geometry.observations import Observations
 from solvers.assimilation.estimation import Estimate, Prediction, estimate
 from solvers.assimilation.misfit import MARKER_RADIUS, without_each
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.identification.finite_strain_model import PARAMETERS, NonlinearFinger
-from solvers.fem.identification.linear_model import LinearFinger, Response
-from solvers.fem.identification.observer import Observer
-from solvers.fem.identification.parameters import parse_parameters, problem_with, unknowns_of
+from solvers.fem.identification.finite_strain_model import PARAMETERS, FiniteStrainModel
+from solvers.fem.identification.linear_model import LinearModel, Response
+from solvers.fem.identification.observation_model import ObservationModel
+from solvers.fem.identification.parameters import parameters_of, parse_parameters, problem_with
 from solvers.fem.identification.summary import sentence
 from solvers.fem.linear import FemSolver
 from solvers.lagrange import LagrangeField, LagrangeSpace
@@ -33,7 +33,7 @@ class FemIdSolver:
 
     Attributes:
         model: "fem", or "fem-nonlinear" for finite strain, where the base is rigid and walls are as drawn.
-        parameters: Names of the unknown parameters with commas between them, of
+        parameters: Names of the parameters to find, with commas between them, of
             `solvers.fem.identification.parameters.MEANINGS`.
         prior: Factor of the standard deviations that the parameters have before anything is observed.
         reaction: Measured force of the indenter on the finger along y per depth, N/mm; None if there is none.
@@ -117,7 +117,7 @@ class FemIdSolver:
         names = parse_parameters(self.name, self.parameters)
         share = float(np.linalg.norm(other.load.values) / np.linalg.norm(problem.load.values))
         values = []
-        for before, now in zip(unknowns_of(problem, names), unknowns_of(other, names), strict=True):
+        for before, now in zip(parameters_of(problem, names), parameters_of(other, names), strict=True):
             found = float(solution.stats[before.name])
             off = {"position": 1.0, "stroke_u": share, "stroke_v": share}.get(before.name)
             values.append(found if off is None else now.start + off * (found - before.start))
@@ -136,8 +136,8 @@ class FemIdSolver:
 
     def _finger(
         self, problem: Problem, space: LagrangeSpace, names: tuple[str, ...]
-    ) -> LinearFinger | NonlinearFinger:
-        return (LinearFinger if self.model == "fem" else NonlinearFinger)(problem, space, names)
+    ) -> LinearModel | FiniteStrainModel:
+        return (LinearModel if self.model == "fem" else FiniteStrainModel)(problem, space, names)
 
     def _solve(self, problem: Problem, observations: Observations, progress: Progress) -> Solution:
         space = LagrangeSpace(problem.mesh, self.degree)
@@ -151,13 +151,13 @@ class FemIdSolver:
         problem: Problem,
         observations: Observations,
         space: LagrangeSpace,
-        finger: LinearFinger | NonlinearFinger,
+        finger: LinearModel | FiniteStrainModel,
         progress: Progress,
     ) -> Solution:
         started = time.perf_counter()
         names = parse_parameters(self.name, self.parameters)
-        unknowns = unknowns_of(problem, names, self.prior)
-        observer = Observer.of(problem, space, observations, self.marker_radius)
+        parameters = parameters_of(problem, names, self.prior)
+        observer = ObservationModel.of(problem, space, observations, self.marker_radius)
         if self.reaction is not None:
             observer = observer.with_reaction(
                 problem, self.reaction, self.reaction_error * abs(self.reaction)
@@ -167,7 +167,7 @@ class FemIdSolver:
             progress(0.5, " ".join(f"{name} {value:.4g}" for name, value in zip(names, values, strict=True)))
             return observer.predicted(finger.response(values))
 
-        found = estimate(model, observer.observed, observer.deviations, unknowns)
+        found = estimate(model, observer.observed, observer.deviations, parameters)
         response = finger.response(found.values)
         own = problem_with(problem, dict(zip(names, found.values.tolist(), strict=True)))
         missed = observer.missed(found)
@@ -200,15 +200,15 @@ def statistics(found: Estimate) -> dict[str, float | int | str]:
     """The estimate for tables: each parameter, how well it is known, and the singular values."""
     numbers: dict[str, float | int | str] = {"evaluations": found.evaluations, "inflation": found.inflation}
     columns = zip(
-        found.unknowns, found.values, found.deviations, found.intervals, found.resolution, strict=True
+        found.parameters, found.values, found.deviations, found.intervals, found.resolution, strict=True
     )
-    for unknown, value, deviation, (low, high), resolution in columns:
+    for parameter, value, deviation, (low, high), resolution in columns:
         numbers |= {
-            unknown.name: float(value),
-            f"{unknown.name}_deviation": float(deviation),
-            f"{unknown.name}_low": float(low),
-            f"{unknown.name}_high": float(high),
-            f"{unknown.name}_resolution": float(resolution),
+            parameter.name: float(value),
+            f"{parameter.name}_deviation": float(deviation),
+            f"{parameter.name}_low": float(low),
+            f"{parameter.name}_high": float(high),
+            f"{parameter.name}_resolution": float(resolution),
         }
     singular = {f"singular_value_{n}": float(value) for n, value in enumerate(found.singular_values, 1)}
     return numbers | singular | {"condition": found.condition}

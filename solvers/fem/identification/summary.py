@@ -17,7 +17,7 @@ def sentence(found: Estimate, missed: FloatArray) -> str:
         missed: Displacements of the markers, computed minus observed, shape (m, 2), mm.
     """
     parts = ["" if found.converged else "the minimum was not found: take fewer parameters or a smaller prior"]
-    columns = zip(found.unknowns, found.values, found.intervals, strict=True)
+    columns = zip(found.parameters, found.values, found.intervals, strict=True)
     parts.append(
         ", ".join(
             f"{u.name} {value:.4g} ({low:.4g} to {high:.4g}) {u.unit}".rstrip()
@@ -33,12 +33,12 @@ def sentence(found: Estimate, missed: FloatArray) -> str:
         )
     unresolved = [
         f"{u.name} ({share:.0%})"
-        for u, share, known in zip(found.unknowns, found.resolution, found.resolved, strict=True)
+        for u, share, known in zip(found.parameters, found.resolution, found.resolved, strict=True)
         if not known
     ]
     if unresolved:
         parts.append(f"NOT DETERMINED by the markers, but held by its prior: {', '.join(unresolved)}")
-    if len(found.unknowns) > 1:
+    if len(found.parameters) > 1:
         parts.append(f"least is known of {combination(found)}")
     return "; ".join(filter(None, parts))
 
@@ -48,6 +48,6 @@ def combination(found: Estimate) -> str:
     direction = found.least_known * np.sign(found.least_known[np.abs(found.least_known).argmax()])
     order = np.argsort(-np.abs(direction))
     text = " ".join(
-        f"{direction[i]:+.2f} {found.unknowns[i].name}" for i in order if abs(direction[i]) >= MENTIONED
+        f"{direction[i]:+.2f} {found.parameters[i].name}" for i in order if abs(direction[i]) >= MENTIONED
     )
     return f"{text.removeprefix('+')}, singular value {found.singular_values[-1]:.2g}"

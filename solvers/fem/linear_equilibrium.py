@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from geometry.arrays import BoolArray, FloatArray
 from solvers.elasticity import Lame, linear_energy_density
-from solvers.fem.conditions import held_components, load_functionals, patch_displacement
+from solvers.fem.boundary_conditions import held_components, load_functionals, patch_displacement
 from solvers.fem.dolfinx_compat import DistributedSpace, Factorisation
 from solvers.fem.multigrid import Multigrid
 from solvers.lagrange import LagrangeSpace
@@ -27,7 +27,7 @@ the iterations (1.4 GB).
 
 
 @dataclass(frozen=True, eq=False)
-class LinearSystem:
+class LinearElasticity:
     """The assembled stiffness with its boundary conditions."""
 
     problem: Problem
@@ -38,7 +38,7 @@ class LinearSystem:
     @classmethod
     def of(
         cls, problem: Problem, space: LagrangeSpace, linear_solver: LinearSolver = "auto"
-    ) -> "LinearSystem":
+    ) -> "LinearElasticity":
         """Compile the forms of a problem."""
         distributed = DistributedSpace(space)
         lame = problem.material.lame
@@ -71,18 +71,18 @@ class LinearSystem:
             return Multigrid(self.distributed, matrix, clamped)
         return Factorisation(self.distributed, matrix, clamped, positive_definite=True)
 
-    def residual(self, nodal: FloatArray) -> FloatArray:
+    def internal_force(self, nodal: FloatArray) -> FloatArray:
         """Internal force K u of nodal displacements, shape (N, 2), N/mm."""
         self.distributed.set_function(nodal)
         return self.distributed.assemble_nodal(self.forms["residual"])
 
 
 @dataclass(frozen=True, eq=False)
-class LeastEnergy:
+class LinearEquilibrium:
     """Displacements of least energy for any values at base and contact, from one factorisation.
 
     Attributes:
-        system: The stiffness.
+        elasticity: The stiffness.
         held: Nodal components whose values are given, mask of shape (N, 2).
         functionals: The load's functionals whose values are given, shape (k, N, 2); none for a `patch`.
         factors: Of the stiffness with the components of `held` clamped.
@@ -91,7 +91,7 @@ class LeastEnergy:
             are rigid.
     """
 
-    system: LinearSystem
+    elasticity: LinearElasticity
     held: BoolArray
     functionals: FloatArray
     factors: Factorisation | Multigrid
@@ -99,24 +99,26 @@ class LeastEnergy:
     slack: float = 0.0
 
     @classmethod
-    def of(cls, system: LinearSystem) -> "LeastEnergy":
+    def of(cls, elasticity: LinearElasticity) -> "LinearEquilibrium":
         """Factorise, and solve once for each functional."""
-        held, functionals = _held_and_functionals(system)
-        factors = system.factorise(held)
-        return cls(system, held, functionals, factors, _responses(factors, functionals))
+        held, functionals = _held_and_functionals(elasticity)
+        factors = elasticity.factorise(held)
+        return cls(elasticity, held, functionals, factors, _responses(factors, functionals))
 
-    def of_problem(self, problem: Problem) -> "LeastEnergy":
+    def of_problem(self, problem: Problem) -> "LinearEquilibrium":
         """The same for another load, with what of this work serves it; what does not is freed."""
-        if problem.load == self.system.problem.load:
+        if problem.load == self.elasticity.problem.load:
             return self
-        system = replace(self.system, problem=problem)
-        held, functionals = _held_and_functionals(system)
+        elasticity = replace(self.elasticity, problem=problem)
+        held, functionals = _held_and_functionals(elasticity)
         if not np.array_equal(held, self.held):
             self.factors.destroy()
-            return LeastEnergy.of(system)
+            return LinearEquilibrium.of(elasticity)
         if np.array_equal(functionals, self.functionals):
-            return replace(self, system=system)
-        return LeastEnergy(system, held, functionals, self.factors, _responses(self.factors, functionals))
+            return replace(self, elasticity=elasticity)
+        return LinearEquilibrium(
+            elasticity, held, functionals, self.factors, _responses(self.factors, functionals)
+        )
 
     @cached_property
     def compliance(self) -> FloatArray:
@@ -130,7 +132,7 @@ class LeastEnergy:
 
     def solution(self) -> FloatArray:
         """The nodal displacements that solve the problem, shape (N, 2), mm."""
-        problem, space = self.system.problem, self.system.distributed.space
+        problem, space = self.elasticity.problem, self.elasticity.distributed.space
         if problem.load.kind == "patch":
             return self.minimiser(patch_displacement(problem, space), np.zeros(0))
         return self.minimiser(np.zeros(self.held.shape), problem.load.values)
@@ -144,9 +146,13 @@ class LeastEnergy:
         """
         nodal = np.where(self.held, given, 0.0)
         if nodal.any():
-            nodal = nodal + self.factors.solve(-self.system.residual(nodal))
+            nodal = nodal + self.factors.solve(-self.elasticity.internal_force(nodal))
         forces = np.linalg.solve(self.compliance, values - self.values(nodal))
         return np.asarray(nodal + np.einsum("k,knx->nx", forces, self.responses))
+
+    def response(self, force: FloatArray) -> FloatArray:
+        """Displacement under nodal forces while all prescribed values are zero, (N, 2) each, N/mm and mm."""
+        return self.unbalanced(force)[1]
 
     def unbalanced(self, internal: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What internal forces, shape (N, 2), N/mm, leave unbalanced under any forces of the functionals.
@@ -162,9 +168,9 @@ class LeastEnergy:
         return balance, response - np.einsum("k,knx->nx", forces, self.responses)
 
 
-def _held_and_functionals(system: LinearSystem) -> tuple[BoolArray, FloatArray]:
+def _held_and_functionals(elasticity: LinearElasticity) -> tuple[BoolArray, FloatArray]:
     """Nodal components that the load and the base hold, (N, 2), and the load's functionals, (k, N, 2)."""
-    problem, space = system.problem, system.distributed.space
+    problem, space = elasticity.problem, elasticity.distributed.space
     held = held_components(problem, space)
     if problem.load.kind == "patch":
         return held, np.zeros((0, *held.shape))

@@ -7,7 +7,7 @@ import numpy as np
 from geometry.arrays import BoolArray, FloatArray
 from solvers.assimilation.marker_forces import MarkerForces
 from solvers.assimilation.misfit import Misfit
-from solvers.fem.least_energy import LeastEnergy, LinearSystem
+from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 
@@ -17,14 +17,14 @@ class MarkerCompliance:
     """Finite-element displacements without and under forces at m markers.
 
     Attributes:
-        least: The factorised problem; its factors are to be destroyed after use.
+        equilibrium: The factorised problem; its factors are to be destroyed after use.
         undisturbed: Nodal displacements without forces at the markers, shape (N, 2), mm.
         sampling: The mean over a marker, by which nodal values give its displacement, shape (m, N).
         responses: Nodal displacements under a unit force at each component of each marker, while base and
             load hold at zero, shape (2 m, N, 2), mm per N/mm.
     """
 
-    least: LeastEnergy
+    equilibrium: LinearEquilibrium
     undisturbed: FloatArray
     sampling: FloatArray
     responses: FloatArray
@@ -40,12 +40,12 @@ class MarkerCompliance:
             slack: Compliance of springs between contact and indenter, mm per N/mm, for `mean` and `point`.
         """
         space = LagrangeSpace(problem.mesh, degree)
-        least = replace(LeastEnergy.of(LinearSystem.of(problem, space)), slack=slack)
+        equilibrium = replace(LinearEquilibrium.of(LinearElasticity.of(problem, space)), slack=slack)
         points, weights = misfit.sampling()
         sampling = weights @ space.shape_functions(problem.mesh.locate(points)).toarray()
-        forces = np.kron(sampling, np.eye(2)).reshape(-1, *least.held.shape)
-        responses = np.array([least.unbalanced(force)[1] for force in forces]).reshape(forces.shape)
-        return cls(least, least.solution(), sampling, responses)
+        forces = np.kron(sampling, np.eye(2)).reshape(-1, *equilibrium.held.shape)
+        responses = np.array([equilibrium.response(force) for force in forces]).reshape(forces.shape)
+        return cls(equilibrium, equilibrium.solution(), sampling, responses)
 
     def of_markers(self, chosen: BoolArray) -> "MarkerCompliance":
         """The same for those markers only that a mask of shape (m,) chooses."""

@@ -16,7 +16,7 @@ from solvers.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)
-class Observer:
+class ObservationModel:
     """Observations of the m markers that were seen, in the order u v u v ..., then of the reaction if any.
 
     Attributes:
@@ -34,7 +34,7 @@ class Observer:
     @classmethod
     def of(
         cls, problem: Problem, space: LagrangeSpace, observations: Observations, radius: float
-    ) -> "Observer":
+    ) -> "ObservationModel":
         """Of the markers alone, each the mean over a disc of the radius, mm."""
         misfit = misfit_of(replace(problem, observations=observations), marker_radius=radius)
         if misfit is None:
@@ -43,7 +43,7 @@ class Observer:
         sampling = weights @ space.shape_functions(problem.mesh.locate(points))
         return cls(sampling, misfit.observed.ravel(), standard_deviations(observations).ravel())
 
-    def with_reaction(self, problem: Problem, reaction: float, deviation: float) -> "Observer":
+    def with_reaction(self, problem: Problem, reaction: float, deviation: float) -> "ObservationModel":
         """The same with the reaction along y and its standard deviation, N/mm.
 
         Raises:
