@@ -49,8 +49,8 @@ def crossval(
     """
     from compare.commands.crossval_options import check_draws, read_entries, read_finger, read_schemes
     from compare.commands.gridsearch_options import read_processes
+    from compare.crossval.cross_validation import cross_validate
     from compare.crossval.folds import LOAD
-    from compare.crossval.run import crossval as judged
     from compare.crossval.study import Study
     from compare.crossval.tables import tables
     from compare.runtime.provenance import machine
@@ -79,7 +79,7 @@ def crossval(
         say(f"warning: {LOAD} needs a truth at other loads, and is left out with --measurements")
     try:
         with Stages(Console(stderr=True)) as stages:
-            result = judged(study, stages)
+            result = cross_validate(study, stages)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"the same command goes on from what {study.out} keeps") from None
     console = Console()

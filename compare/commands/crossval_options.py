@@ -3,8 +3,8 @@
 from math import inf
 
 from compare.commands.options import FingerOptions, SolverOptions
+from compare.crossval.fold_results import SolverVariant
 from compare.crossval.folds import ALL, SCHEMES
-from compare.crossval.predictions import Entry
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
@@ -22,7 +22,7 @@ CHOICES |= {"evidence": {"weights": "precision", "choose": "evidence"}}
 """Variants of a solver that can choose the weights of the markers, beside the paper's weight as it is."""
 
 
-def read_entries(options: SolverOptions, names: str, material: Material) -> list[Entry]:
+def read_entries(options: SolverOptions, names: str, material: Material) -> list[SolverVariant]:
     """The solvers, and those that can choose their weights once more for each way of choosing.
 
     The choice is made inside a fold, by the markers that are given. Where --solver-set says how to choose, or
@@ -32,11 +32,11 @@ def read_entries(options: SolverOptions, names: str, material: Material) -> list
     entries = []
     for solver in options.read(names):
         settings = solver.settings()
-        entries.append(Entry(solver.name, solver.name, settings))
+        entries.append(SolverVariant(solver.name, solver.name, settings))
         chosen = told & {f"{solver.name}.choose", f"{solver.name}.weights"}
         if "choose" in settings and not chosen and with_law(material, solver).law == "linear":
             entries += [
-                Entry(f"{solver.name} {choice}", solver.name, {**settings, **changes})
+                SolverVariant(f"{solver.name} {choice}", solver.name, {**settings, **changes})
                 for choice, changes in CHOICES.items()
             ]
     if not entries:

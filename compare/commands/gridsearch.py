@@ -36,7 +36,7 @@ def gridsearch(
     by their distance from `fem`. Finished runs are kept: the same command again goes on where it was stopped.
     """
     from compare.commands.gridsearch_options import read_processes, read_settings, read_values
-    from compare.gridsearch.run import Search, search
+    from compare.gridsearch.search import GridSearch, search_grid
     from compare.gridsearch.tables import best_of, runs_table
     from compare.gridsearch.training_run import FAILED
     from compare.runtime.provenance import machine
@@ -45,7 +45,7 @@ def gridsearch(
     design, mesh = finger.read(options.preset)
     material, load = physics.read(options.preset)
     count, threads = read_processes(processes, int(machine()["cores"]))
-    job = Search(
+    job = GridSearch(
         design=design,
         mesh=mesh,
         material=material,
@@ -60,7 +60,7 @@ def gridsearch(
     physics.check_law([job.solver(point) for point in job.points])
     try:
         with Stages(Console(stderr=True)) as stages:
-            runs = search(job, stages)
+            runs = search_grid(job, stages)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"the same command goes on from what {job.out} keeps") from None
     Console().print(runs_table(runs))

@@ -30,7 +30,7 @@ CONTACTS = (-5.0, 5.0)
 
 
 @dataclass(frozen=True)
-class Condition:
+class LoadCase:
     """A load at which the finger is looked at.
 
     Attributes:
@@ -68,21 +68,21 @@ class Fold:
         return None if self.condition else self.held
 
 
-def conditions_of(problem: Problem, *, others: bool) -> list[Condition]:
+def load_cases_of(problem: Problem, *, others: bool) -> list[LoadCase]:
     """The full load and, if asked for, others: less stroke, and the contact elsewhere."""
     load, middle = problem.load, float(np.mean(contact_ends(problem)))
-    full = Condition("full", load, 1.0, middle)
+    full = LoadCase("full", load, 1.0, middle)
     if not others:
         return [full]
     stroke = float(np.linalg.norm(load.values))
-    less = [Condition(f"stroke {share * stroke:g}", _scaled(load, share), share, middle) for share in STROKES]
+    less = [LoadCase(f"stroke {share * stroke:g}", _scaled(load, share), share, middle) for share in STROKES]
     if load.kind == "patch":
         raise UserError(
             f"{LOAD} presses elsewhere on the same mesh, which --load patch cannot; take mean, or --schemes "
             f"without {LOAD}"
         )
     moved = [
-        Condition(f"contact {at:g}", load.model_copy(update={"position": at}), 1.0, at)
+        LoadCase(f"contact {at:g}", load.model_copy(update={"position": at}), 1.0, at)
         for at in (middle + by for by in CONTACTS)
     ]
     for condition in moved:
@@ -93,7 +93,7 @@ def conditions_of(problem: Problem, *, others: bool) -> list[Condition]:
     return [full, *less, *moved]
 
 
-def folds_of(schemes: Sequence[str], count: int, conditions: Sequence[Condition]) -> list[Fold]:
+def folds_of(schemes: Sequence[str], count: int, conditions: Sequence[LoadCase]) -> list[Fold]:
     """The folds of schemes for markers that are ordered from base to tip.
 
     Args:
@@ -120,7 +120,7 @@ def folds_of(schemes: Sequence[str], count: int, conditions: Sequence[Condition]
     return folds
 
 
-def training(observations: Observations, held: Sequence[int]) -> Observations:
+def hide_markers(observations: Observations, held: Sequence[int]) -> Observations:
     """The observations without those held out, of which not even the numbers are left."""
     keep = np.ones(len(observations.points), dtype=bool)
     keep[list(held)] = False

@@ -2,9 +2,9 @@
 
 from dataclasses import replace
 
-from compare.crossval.predictions import Task
+from compare.crossval.fold_results import SolverTask
 from compare.crossval.scores import FIELDS
-from compare.crossval.truth import Sampler, Truth
+from compare.crossval.true_fields import FieldSampler, TrueFields
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.assimilation.marker_forces import root_mean_square
 from solvers.assimilation.marker_weight import FACTORS
@@ -17,7 +17,7 @@ CURVED = "fem-asm"
 """The solver whose minimisers for all weights are known at once."""
 
 
-def weigh(task: Task, progress: Progress = silent) -> dict[str, list[float]]:
+def sweep_weights(task: SolverTask, progress: Progress = silent) -> dict[str, list[float]]:
     """The minimisers for all `FACTORS` of the weights, all markers given, for the first seed.
 
     Returns:
@@ -32,7 +32,7 @@ def weigh(task: Task, progress: Progress = silent) -> dict[str, list[float]]:
     problem = Problem(mesh, material, task.conditions[0].load, observations)
     law = task.material.model_copy(update={"law": "neo-hookean", "plane": "strain"})
     finite = replace(problem, material=law)
-    sampler, truth = Sampler.of(mesh, observations.points, task.radius), Truth.load(task.truths[0])
+    sampler, truth = FieldSampler.of(mesh, observations.points, task.radius), TrueFields.load(task.truths[0])
     solution = solver.solve(problem)
     finger, misfit = solver.prepare(problem)
     forces, space = finger.forces(misfit), finger.equilibrium.elasticity.distributed.space

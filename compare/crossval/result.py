@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Self
 
+from compare.crossval.fold_results import FoldResult
 from compare.crossval.folds import SCHEMES, Fold
-from compare.crossval.predictions import Outcome
 from compare.crossval.scores import COMPARED, LEVEL, Difference, Score, difference, of_scheme, score
 from compare.crossval.study import Study
-from compare.crossval.truth import FINER
+from compare.crossval.true_fields import FINER
 from geometry.observations import Observations
 from solvers.assimilation.misfit import assimilates
 
@@ -17,7 +17,7 @@ BASELINES = ("fem", "gp")
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class CrossvalResult:
     """A finished study.
 
     Attributes:
@@ -50,7 +50,7 @@ class Result:
         study: Study,
         observations: Observations,
         folds: Sequence[Fold],
-        outcomes: Mapping[str, list[list[Outcome]]],
+        outcomes: Mapping[str, list[list[FoldResult]]],
         failed: Mapping[str, str],
     ) -> Self:
         """Score what came of every fold."""

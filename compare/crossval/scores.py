@@ -7,7 +7,7 @@ from math import nan, sqrt
 import numpy as np
 from scipy.stats import norm, t
 
-from compare.crossval.predictions import Outcome
+from compare.crossval.fold_results import FoldResult
 from geometry.arrays import FloatArray
 
 LEVEL = 0.95
@@ -105,16 +105,16 @@ class Score:
     converged: float
 
 
-Outcomes = Sequence[Sequence[Outcome]]
+FoldResults = Sequence[Sequence[FoldResult]]
 """Of one solver in one scheme: for each seed its folds."""
 
 
-def of_scheme(outcomes: Outcomes, scheme: str) -> list[list[Outcome]]:
+def of_scheme(outcomes: FoldResults, scheme: str) -> list[list[FoldResult]]:
     """Those of a scheme."""
     return [[outcome for outcome in seed if outcome.fold.scheme == scheme] for seed in outcomes]
 
 
-def score(outcomes: Outcomes) -> Score:
+def score(outcomes: FoldResults) -> Score:
     """The score of a solver in a scheme."""
     ratios = np.concatenate([outcome.ratios for seed in outcomes for outcome in seed])
     inside = np.abs(ratios) <= norm.ppf((1 + LEVEL) / 2)
@@ -140,7 +140,7 @@ def marker_errors(errors: FloatArray) -> dict[str, float]:
     return {"mae_u": u, "mae_v": v, "mae_sum": u + v, "mae_rss": float(np.hypot(u, v))}
 
 
-def difference(outcomes: Outcomes, baseline: Outcomes, what: str) -> Difference | None:
+def difference(outcomes: FoldResults, baseline: FoldResults, what: str) -> Difference | None:
     """How a solver's score differs from a baseline's; None where there is no such score.
 
     Args:
@@ -154,7 +154,7 @@ def difference(outcomes: Outcomes, baseline: Outcomes, what: str) -> Difference 
     return Difference.of(pair[0] - pair[1])
 
 
-def _values(outcomes: Outcomes, what: str) -> FloatArray | None:
+def _values(outcomes: FoldResults, what: str) -> FloatArray | None:
     """A score for each seed and fold, shape (s, f)."""
     if what in FIELDS:
         found = [[outcome.fields.get(what, nan) for outcome in seed] for seed in outcomes]
@@ -167,12 +167,12 @@ def _values(outcomes: Outcomes, what: str) -> FloatArray | None:
     return values if np.isfinite(values).all() else None
 
 
-def _mean_fields(outcomes: Outcomes, name: str) -> list[float]:
+def _mean_fields(outcomes: FoldResults, name: str) -> list[float]:
     """Mean distance over the folds of each seed."""
     return [float(np.mean([outcome.fields[name] for outcome in seed])) for seed in outcomes]
 
 
-def _errors(outcomes: Outcomes, chosen: Callable[[Outcome], FloatArray]) -> dict[str, Interval]:
+def _errors(outcomes: FoldResults, chosen: Callable[[FoldResult], FloatArray]) -> dict[str, Interval]:
     """Intervals of the mean absolute errors over all folds of a seed."""
     by_seed = [np.concatenate([chosen(outcome) for outcome in seed]) for seed in outcomes]
     if not all(map(len, by_seed)):
@@ -181,7 +181,7 @@ def _errors(outcomes: Outcomes, chosen: Callable[[Outcome], FloatArray]) -> dict
     return {name: Interval.of([entry[name] for entry in errors]) for name in MARKERS}
 
 
-def _per_marker(outcomes: Outcomes) -> list[float]:
+def _per_marker(outcomes: FoldResults) -> list[float]:
     count = len(outcomes[0][0].errors)
     sums, times = np.zeros((2, count))
     for seed in outcomes:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.crossval.predictions import Entry
+from compare.crossval.fold_results import SolverVariant
 from compare.runtime.provenance import package_versions, sources_digest
 from geometry.errors import UserError
 from geometry.finger.design import Design
@@ -41,7 +41,7 @@ class Study:
     mesh: MeshSettings
     material: Material
     load: Load
-    entries: Sequence[Entry]
+    entries: Sequence[SolverVariant]
     schemes: Sequence[str]
     seeds: int
     noise: float
@@ -95,9 +95,9 @@ def definition_of(study: Study, given: Observations | None) -> dict[str, Any]:
         "versions": package_versions(),
         "program_sha256": sources_digest(
             [
-                "compare.crossval.predictions",
+                "compare.crossval.fold_results",
                 "compare.crossval.folds",
-                "compare.crossval.truth",
+                "compare.crossval.true_fields",
                 "geometry",
                 "solvers",
             ]

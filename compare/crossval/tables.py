@@ -8,9 +8,9 @@ from pathlib import Path
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from compare.crossval.fold_results import FoldResult
 from compare.crossval.folds import ALL, ONE, SCHEMES
-from compare.crossval.predictions import Outcome
-from compare.crossval.result import BASELINES, Result
+from compare.crossval.result import BASELINES, CrossvalResult
 from compare.crossval.scores import FIELDS, LEVEL, MARKERS, Difference, Interval, Score
 from compare.evaluation.labels import significant
 from compare.runtime.csv_files import Cell, write_csv
@@ -45,7 +45,7 @@ class Grid:
     caption: str = ""
 
 
-def grids(result: Result) -> list[Grid]:
+def grids(result: CrossvalResult) -> list[Grid]:
     """One table of the markers for each scheme, and one of the fields."""
     held = [scheme for scheme in result.schemes if scheme != ALL]
     found = [
@@ -60,12 +60,14 @@ def grids(result: Result) -> list[Grid]:
     return [*found, *([_fields(result)] if has_fields(result) else [])]
 
 
-def tables(result: Result) -> list[Table]:
+def tables(result: CrossvalResult) -> list[Table]:
     """The same for the terminal."""
     return [_rich(grid) for grid in grids(result)]
 
 
-def write_tables(out: Path, result: Result, outcomes: Mapping[str, Sequence[Sequence[Outcome]]]) -> None:
+def write_tables(
+    out: Path, result: CrossvalResult, outcomes: Mapping[str, Sequence[Sequence[FoldResult]]]
+) -> None:
     """Write the CSV files: markers and fields by scheme, and every error of every fold."""
     write_csv(out / "held_out.csv", list(_markers_csv(result)))
     if has_fields(result):
@@ -97,7 +99,7 @@ def _rich(grid: Grid) -> Table:
     return table
 
 
-def _marker_row(result: Result, label: str, scheme: str) -> list[str]:
+def _marker_row(result: CrossvalResult, label: str, scheme: str) -> list[str]:
     score = result.scores[label][scheme]
     against = (result.differences[label].get(baseline, {}).get(scheme, {}) for baseline in BASELINES)
     verdicts = [_verdict(each.get("mae_sum")) for each in against]
@@ -129,12 +131,12 @@ def _half(interval: Interval | None) -> str:
     return significant(interval.high - interval.mean, 1)
 
 
-def has_fields(result: Result) -> bool:
+def has_fields(result: CrossvalResult) -> bool:
     """Whether there is a truth to compare fields with."""
     return any(score.fields for each in result.scores.values() for score in each.values())
 
 
-def _fields(result: Result) -> Grid:
+def _fields(result: CrossvalResult) -> Grid:
     """Relative L2 distances from the truth, a row a solver and scheme."""
     rows = []
     for scheme in result.schemes:
@@ -155,7 +157,7 @@ def _fields(result: Result) -> Grid:
     )
 
 
-def _markers_csv(result: Result) -> list[dict[str, Cell]]:
+def _markers_csv(result: CrossvalResult) -> list[dict[str, Cell]]:
     rows: list[dict[str, Cell]] = []
     for label, scores in result.scores.items():
         for scheme, score in scores.items():
@@ -170,7 +172,7 @@ def _markers_csv(result: Result) -> list[dict[str, Cell]]:
     return rows
 
 
-def _fields_csv(result: Result) -> list[dict[str, Cell]]:
+def _fields_csv(result: CrossvalResult) -> list[dict[str, Cell]]:
     rows: list[dict[str, Cell]] = []
     for label, scores in result.scores.items():
         for scheme, score in scores.items():
@@ -186,7 +188,7 @@ def _interval_cells(name: str, unit: str, interval: Interval | None) -> dict[str
     return {f"{name}{end}{unit}": _cell(getattr(interval, key, None)) for end, key in ends.items()}
 
 
-def _against_cells(result: Result, label: str, scheme: str, what: str, unit: str) -> dict[str, Cell]:
+def _against_cells(result: CrossvalResult, label: str, scheme: str, what: str, unit: str) -> dict[str, Cell]:
     row: dict[str, Cell] = {}
     for baseline in BASELINES:
         found = result.differences[label].get(baseline, {}).get(scheme, {}).get(what)
@@ -200,7 +202,7 @@ def _cell(value: float | None) -> Cell:
     return "" if value is None or isnan(value) else value
 
 
-def _folds_csv(outcomes: Mapping[str, Sequence[Sequence[Outcome]]]) -> list[dict[str, Cell]]:
+def _folds_csv(outcomes: Mapping[str, Sequence[Sequence[FoldResult]]]) -> list[dict[str, Cell]]:
     rows: list[dict[str, Cell]] = []
     for label, seeds in outcomes.items():
         for seed, folds in enumerate(seeds):
@@ -214,7 +216,7 @@ def _folds_csv(outcomes: Mapping[str, Sequence[Sequence[Outcome]]]) -> list[dict
     return rows
 
 
-def per_marker(result: Result) -> dict[str, Sequence[float]]:
+def per_marker(result: CrossvalResult) -> dict[str, Sequence[float]]:
     """Held-out error of every marker by solver, if each was held out in its turn."""
     if ONE not in result.schemes:
         return {}

@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 
 from compare.figures.style import HALO, INK, MUTED, WIDTH, axes_at, figure, heading
 from compare.gridsearch.tables import best_of
-from compare.gridsearch.training_run import Measured, Run
+from compare.gridsearch.training_run import TrainingMetrics, TrainingRun
 
 HEAD, CELL, FOOT, LEFT, GAP = 0.68, 0.34, 0.5, 0.85, 0.25
 """Heights, the left margin and the gap between the maps, inches."""
@@ -20,12 +20,12 @@ SMALLEST = 1e-12
 """Stands for zero on the logarithmic scale of the colours."""
 
 
-def draw_grid(path: Path, *, runs: Sequence[Run]) -> None:
+def draw_grid(path: Path, *, runs: Sequence[TrainingRun]) -> None:
     """Draw both maps over learning rate and weight; the run nearest to `fem` has a frame."""
     weights = sorted({run.point.bc_weight for run in runs})
     height = CELL * len(weights)
     width = (WIDTH - LEFT - GAP - 0.1) / 2
-    maps: dict[str, Callable[[Measured], float]] = {
+    maps: dict[str, Callable[[TrainingMetrics], float]] = {
         "Displacement: relative L² to fem, %": lambda measured: measured.rel_l2_displacement,
         "Violation of base or load, % of stroke": lambda measured: measured.boundary_violation,
     }
@@ -47,7 +47,7 @@ def draw_grid(path: Path, *, runs: Sequence[Run]) -> None:
                 axes.set_ylabel("BC weight\nMPa/mm²")
 
 
-def _map(axes: Axes, runs: Sequence[Run], value: Callable[[Measured], float]) -> None:
+def _map(axes: Axes, runs: Sequence[TrainingRun], value: Callable[[TrainingMetrics], float]) -> None:
     rates = sorted({run.point.learning_rate for run in runs})
     weights = sorted({run.point.bc_weight for run in runs})
     table = np.full((len(weights), len(rates)), np.nan)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.table import Table
 
-from compare.gridsearch.training_run import Measured, Run
+from compare.gridsearch.training_run import TrainingMetrics, TrainingRun
 from compare.runtime.csv_files import Cell, write_csv
 
 UNITS = {
@@ -20,7 +20,7 @@ UNITS = {
 """Of the columns that have one."""
 
 
-def ranked(runs: Sequence[Run]) -> list[Run]:
+def ranked(runs: Sequence[TrainingRun]) -> list[TrainingRun]:
     """The runs by their distance from `fem`, those that were not trained last.
 
     Not by their loss, which is not comparable between weights.
@@ -28,12 +28,12 @@ def ranked(runs: Sequence[Run]) -> list[Run]:
     return sorted(runs, key=lambda run: run.measured.rel_l2_displacement if run.measured else inf)
 
 
-def best_of(runs: Sequence[Run]) -> Run | None:
+def best_of(runs: Sequence[TrainingRun]) -> TrainingRun | None:
     """The run nearest to `fem`; None if none was trained."""
     return next((run for run in ranked(runs) if run.measured), None)
 
 
-def run_note(run: Run) -> str:
+def run_note(run: TrainingRun) -> str:
     """A run in a few words."""
     if run.measured is None:
         return f"{run.status}: {run.message}"
@@ -43,24 +43,24 @@ def run_note(run: Run) -> str:
     )
 
 
-def write_runs(path: Path, runs: Sequence[Run]) -> None:
+def write_runs(path: Path, runs: Sequence[TrainingRun]) -> None:
     """Write a row a run, units in the header; what is not known is empty."""
     write_csv(path, [{"rank": rank, **_row(run)} for rank, run in enumerate(ranked(runs), start=1)])
 
 
-def _row(run: Run) -> dict[str, Cell]:
+def _row(run: TrainingRun) -> dict[str, Cell]:
     values = asdict(run.measured) if run.measured else {}
     row: dict[str, Cell] = {
         "learning_rate": run.point.learning_rate,
         "bc_weight_MPa_per_mm2": run.point.bc_weight,
         "status": run.status,
     }
-    for name in (entry.name for entry in fields(Measured)):
+    for name in (entry.name for entry in fields(TrainingMetrics)):
         row["_".join(filter(None, [name, UNITS.get(name)]))] = values.get(name, "")
     return row | {"message": run.message}
 
 
-def runs_table(runs: Sequence[Run]) -> Table:
+def runs_table(runs: Sequence[TrainingRun]) -> Table:
     """The runs for the terminal."""
     table = Table(
         title="Runs by their distance from fem",

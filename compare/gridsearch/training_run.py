@@ -24,7 +24,7 @@ TRAINED, DIVERGED, FAILED = "trained", "diverged", "failed"
 
 
 @dataclass(frozen=True)
-class Point:
+class GridPoint:
     """A point of the grid.
 
     Attributes:
@@ -42,7 +42,7 @@ class Point:
 
 
 @dataclass(frozen=True, eq=False)
-class Reference:
+class ReferenceSolution:
     """What the runs are compared with: a solution on the shared mesh.
 
     Attributes:
@@ -54,14 +54,14 @@ class Reference:
     displacement: FloatArray
 
     @classmethod
-    def of(cls, solution: Solution) -> "Reference":
+    def of(cls, solution: Solution) -> "ReferenceSolution":
         """Sample a solution on its own mesh."""
         inside = body_quadrature(solution.problem.mesh).location
         return cls(float(solution.energy), solution.displacement(inside))
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class TrainingTask:
     """All that a process needs for one run.
 
     Attributes:
@@ -75,18 +75,18 @@ class Task:
         threads: Of the processor.
     """
 
-    point: Point
+    point: GridPoint
     settings: Mapping[str, object]
     mesh: Path
     material: Material
     load: Load
-    reference: Reference
+    reference: ReferenceSolution
     folder: Path
     threads: int
 
 
 @dataclass(frozen=True)
-class Measured:
+class TrainingMetrics:
     """What a finished training is worth.
 
     Attributes:
@@ -113,7 +113,7 @@ class Measured:
 
 
 @dataclass(frozen=True)
-class Run:
+class TrainingRun:
     """How the training at a point of the grid ended.
 
     Attributes:
@@ -123,20 +123,20 @@ class Run:
         measured: What it is worth; None unless trained.
     """
 
-    point: Point
+    point: GridPoint
     status: str
     message: str
-    measured: Measured | None = None
+    measured: TrainingMetrics | None = None
 
     @classmethod
-    def load(cls, path: Path) -> "Run":
+    def load(cls, path: Path) -> "TrainingRun":
         """Read what `train` wrote."""
         content = json.loads(path.read_text(encoding="utf-8"))
-        measured = content["measured"] and Measured(**content["measured"])
-        return cls(Point(**content["point"]), content["status"], content["message"], measured)
+        measured = content["measured"] and TrainingMetrics(**content["measured"])
+        return cls(GridPoint(**content["point"]), content["status"], content["message"], measured)
 
 
-def train(task: Task, progress: Progress) -> Run:
+def train(task: TrainingTask, progress: Progress) -> TrainingRun:
     """Train at one point of the grid, going on from a checkpoint if there is one, and write the result.
 
     A run that failed for another reason than that it diverged writes none, so that it can be tried again.
@@ -151,22 +151,22 @@ def train(task: Task, progress: Progress) -> Run:
     context = TrainingContext(folder=task.folder, resume=True, reference_energy=task.reference.energy)
     try:
         solution = solver.in_context(context).solve(problem, progress)
-        run = Run(task.point, TRAINED, solution.status.message, measure(solution, task.reference))
+        run = TrainingRun(task.point, TRAINED, solution.status.message, measure(solution, task.reference))
     except TrainingDiverged as error:
-        run = Run(task.point, DIVERGED, str(error))
+        run = TrainingRun(task.point, DIVERGED, str(error))
     except UserError as error:
-        return Run(task.point, FAILED, str(error))
+        return TrainingRun(task.point, FAILED, str(error))
     write_json(task.folder / RESULT_FILE, asdict(run))
     return run
 
 
-def measure(solution: Solution, reference: Reference) -> Measured:
+def measure(solution: Solution, reference: ReferenceSolution) -> TrainingMetrics:
     """Distance of a solution from the reference and from its own conditions."""
     rule = body_quadrature(solution.problem.mesh)
     displacement = solution.displacement(rule.location)
     base, load = boundary_violations(solution)
     stroke = float(np.linalg.norm(solution.problem.load.values))
-    return Measured(
+    return TrainingMetrics(
         rel_l2_displacement=field_difference(displacement, reference.displacement, rule.weights).rel_l2,
         rel_energy=float(solution.energy) / reference.energy - 1,
         boundary_violation=max(base, load) / stroke,

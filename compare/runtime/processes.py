@@ -11,8 +11,8 @@ from typing import Generic, TypeVar
 
 from solvers.solver import Progress
 
-Task = TypeVar("Task")
-Answer = TypeVar("Answer")
+Input = TypeVar("Input")
+Output = TypeVar("Output")
 
 
 @dataclass(frozen=True)
@@ -27,19 +27,19 @@ class ProcessFailed:
 
 
 @dataclass(frozen=True)
-class _Done(Generic[Answer]):
+class _Done(Generic[Output]):
     """The last message of a process."""
 
-    answer: Answer
+    answer: Output
 
 
 def in_processes(
-    work: Callable[[Task, Progress], Answer],
-    tasks: Mapping[str, Task],
+    work: Callable[[Input, Progress], Output],
+    tasks: Mapping[str, Input],
     *,
     processes: int,
     report: Callable[[str, float, str], None],
-) -> Generator[tuple[str, Answer | ProcessFailed], None, None]:
+) -> Generator[tuple[str, Output | ProcessFailed], None, None]:
     """Do tasks in fresh processes, at most so many at a time, and give their answers as they come.
 
     When the iterator is closed, or interrupted, the progress report of every process still at work raises
@@ -84,7 +84,7 @@ def in_processes(
             process.join()
 
 
-def _child(work: Callable[[Task, Progress], Answer], task: Task, connection: Connection) -> None:
+def _child(work: Callable[[Input, Progress], Output], task: Input, connection: Connection) -> None:
     """Do a task and send the answer; Ctrl-C on a terminal reaches this process by way of its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # PETSc would end the process, with a page of text, when nobody listens.

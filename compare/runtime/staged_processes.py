@@ -8,19 +8,19 @@ from compare.runtime.processes import ProcessFailed, in_processes
 from compare.runtime.stages import Stages
 from solvers.solver import Progress
 
-Task = TypeVar("Task")
-Answer = TypeVar("Answer")
+Input = TypeVar("Input")
+Output = TypeVar("Output")
 
 
 def in_stages(
-    work: Callable[[Task, Progress], Answer],
-    tasks: Mapping[str, Task],
+    work: Callable[[Input, Progress], Output],
+    tasks: Mapping[str, Input],
     *,
     processes: int,
     stages: Stages,
     kind: str,
-    note: Callable[[str, Answer | ProcessFailed], str],
-) -> Generator[tuple[str, Answer | ProcessFailed], None, None]:
+    note: Callable[[str, Output | ProcessFailed], str],
+) -> Generator[tuple[str, Output | ProcessFailed], None, None]:
     """As `in_processes`, with a stage for every task and one for all.
 
     Args:

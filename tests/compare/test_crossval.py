@@ -13,7 +13,8 @@ import pytest
 from scipy.stats import t
 
 from compare.cli import main
-from compare.crossval.chart import draw_curve, draw_fields, draw_held_out
+from compare.crossval.charts import draw_curve, draw_fields, draw_held_out
+from compare.crossval.fold_results import FoldResult, SolverTask, SolverVariant, run_folds
 from compare.crossval.folds import (
     ALL,
     DRAWS,
@@ -21,16 +22,15 @@ from compare.crossval.folds import (
     ONE,
     RANDOM,
     TIP,
-    Condition,
     Fold,
-    conditions_of,
+    LoadCase,
     folds_of,
-    training,
+    hide_markers,
+    load_cases_of,
 )
-from compare.crossval.l_curve import weigh
-from compare.crossval.predictions import Entry, Outcome, Task, judge
+from compare.crossval.l_curve import sweep_weights
 from compare.crossval.scores import Difference, Interval, difference, of_scheme, score
-from compare.crossval.truth import Sampler, Truth
+from compare.crossval.true_fields import FieldSampler, TrueFields
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
@@ -64,29 +64,31 @@ def observations(coarse_mesh: TriangleMesh, truth: Solution) -> Observations:
 
 
 @pytest.fixture
-def task(tmp_path: Path, coarse_mesh: TriangleMesh, truth: Solution, observations: Observations) -> Task:
+def task(
+    tmp_path: Path, coarse_mesh: TriangleMesh, truth: Solution, observations: Observations
+) -> SolverTask:
     """`gp` and one fold of each kind, at the full load and half of it."""
     coarse_mesh.save(tmp_path / "mesh.npz")
-    sampler = Sampler.of(coarse_mesh, coarse_mesh.markers, 0.8)
+    sampler = FieldSampler.of(coarse_mesh, coarse_mesh.markers, 0.8)
     sampled = sampler.of_solution(truth, coarse_mesh)
     state = truth.state(sampler.inside)
     paths = []
     for share in (1.0, 0.5):
         paths.append(tmp_path / f"truth-{share}.npz")
-        Truth(
+        TrueFields(
             share * sampled.markers,
             share * sampled.displacement,
             share * state.strain,
             share * state.von_mises,
         ).save(paths[-1])
     half = replace(observations, displacements=0.5 * observations.displacements)
-    return Task(
+    return SolverTask(
         entry=entry("gp"),
         mesh=tmp_path / "mesh.npz",
         material=Material(),
         conditions=[
-            Condition("full", Load(), 1.0, 35.0),
-            Condition("half", Load(displacement=(0.0, -5.0)), 0.5, 35.0),
+            LoadCase("full", Load(), 1.0, 35.0),
+            LoadCase("half", Load(displacement=(0.0, -5.0)), 0.5, 35.0),
         ],
         truths=paths,
         observations=[[observations, half]],
@@ -97,12 +99,12 @@ def task(tmp_path: Path, coarse_mesh: TriangleMesh, truth: Solution, observation
     )
 
 
-def entry(name: str, **settings: object) -> Entry:
-    return Entry(name, name, make_solver(name, **settings).settings())
+def entry(name: str, **settings: object) -> SolverVariant:
+    return SolverVariant(name, name, make_solver(name, **settings).settings())
 
 
-def judged(task: Task) -> list[Outcome]:
-    (outcomes,) = judge(task)
+def judged(task: SolverTask) -> list[FoldResult]:
+    (outcomes,) = run_folds(task)
     return outcomes
 
 
@@ -110,7 +112,7 @@ def judged(task: Task) -> list[Outcome]:
 
 
 def test_folds_hold_out_what_they_say(coarse_mesh):
-    conditions = conditions_of(Problem(coarse_mesh), others=True)
+    conditions = load_cases_of(Problem(coarse_mesh), others=True)
     folds = folds_of([ONE, TIP, RANDOM, LOAD], 9, conditions)
     held = {scheme: [fold.held for fold in folds if fold.scheme == scheme] for scheme in (ONE, TIP, RANDOM)}
     assert held[ONE] == [(marker,) for marker in range(9)]
@@ -129,7 +131,7 @@ def test_folds_hold_out_what_they_say(coarse_mesh):
 
 
 def test_nothing_is_left_of_what_is_held_out(observations):
-    given = training(observations, (2, 5))
+    given = hide_markers(observations, (2, 5))
     assert np.flatnonzero(~given.visible).tolist() == [2, 5]
     for values in (given.displacements, given.standard_deviations):
         assert not values[[2, 5]].any()
@@ -212,7 +214,7 @@ def test_finished_folds_are_kept_and_those_of_other_settings_are_not(task, monke
     def again(*_: object) -> None:
         raise RuntimeError("solved again")
 
-    monkeypatch.setattr("compare.crossval.predictions.refitter", again)
+    monkeypatch.setattr("compare.crossval.fold_results.refitter", again)
     assert [outcome.errors for outcome in judged(task)] == [outcome.errors for outcome in first]
     with pytest.raises(RuntimeError, match="solved again"):
         judged(replace(task, entry=entry("gp", clamp=True)))
@@ -220,7 +222,7 @@ def test_finished_folds_are_kept_and_those_of_other_settings_are_not(task, monke
 
 def test_the_curve_of_weights_is_what_solving_again_with_them_gives(task, coarse_mesh, observations):
     own = replace(task, entry=entry("fem-asm", degree=1))
-    curve = weigh(own)
+    curve = sweep_weights(own)
     number = 24
     assert curve["factor"][number] == pytest.approx(1e-3)
     (outcome,) = judged(
@@ -236,8 +238,8 @@ def test_the_curve_of_weights_is_what_solving_again_with_them_gives(task, coarse
 # Scores
 
 
-def outcome_of(scheme: str, held: tuple[int, ...], errors: object, **more: object) -> Outcome:
-    return Outcome(Fold(scheme, str(held), held), np.array(errors, dtype=float).tolist(), **more)
+def outcome_of(scheme: str, held: tuple[int, ...], errors: object, **more: object) -> FoldResult:
+    return FoldResult(Fold(scheme, str(held), held), np.array(errors, dtype=float).tolist(), **more)
 
 
 def test_scores_by_hand():

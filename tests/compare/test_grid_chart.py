@@ -5,14 +5,14 @@ from pathlib import Path
 from matplotlib.patches import Rectangle
 
 from compare.gridsearch.chart import draw_grid
-from compare.gridsearch.training_run import DIVERGED, TRAINED, Measured, Point, Run
+from compare.gridsearch.training_run import DIVERGED, TRAINED, GridPoint, TrainingMetrics, TrainingRun
 from tests.compare.drawn_pages import Page
 
 
-def run_of(rate: float, weight: float, distance: float | None) -> Run:
+def run_of(rate: float, weight: float, distance: float | None) -> TrainingRun:
     if distance is None:
-        return Run(Point(rate, weight), DIVERGED, "loss became nan")
-    worth = Measured(
+        return TrainingRun(GridPoint(rate, weight), DIVERGED, "loss became nan")
+    worth = TrainingMetrics(
         rel_l2_displacement=distance,
         rel_energy=1.0,
         boundary_violation=distance / 2,
@@ -23,7 +23,7 @@ def run_of(rate: float, weight: float, distance: float | None) -> Run:
         epochs=2000,
         seconds=1.0,
     )
-    return Run(Point(rate, weight), TRAINED, "", worth)
+    return TrainingRun(GridPoint(rate, weight), TRAINED, "", worth)
 
 
 GRID = [

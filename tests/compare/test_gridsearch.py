@@ -16,17 +16,17 @@ from rich.console import Console
 from compare.cli import main
 from compare.commands.gridsearch_options import read_settings
 from compare.commands.options import SolverOptions
-from compare.gridsearch.run import Search, search
+from compare.gridsearch.search import GridSearch, search_grid
 from compare.gridsearch.tables import best_of
 from compare.gridsearch.training_run import (
     DIVERGED,
     FAILED,
     TRAINED,
-    Measured,
-    Point,
-    Reference,
-    Run,
-    Task,
+    GridPoint,
+    ReferenceSolution,
+    TrainingMetrics,
+    TrainingRun,
+    TrainingTask,
     measure,
     train,
 )
@@ -75,8 +75,8 @@ def trained(solution: Solution) -> Solution:
 
 
 @pytest.fixture
-def wanted(tmp_path: Path) -> Search:
-    return Search(
+def wanted(tmp_path: Path) -> GridSearch:
+    return GridSearch(
         design=Design(),
         mesh=COARSE,
         material=Material(),
@@ -90,8 +90,8 @@ def wanted(tmp_path: Path) -> Search:
     )
 
 
-def measured(distance: float, loss: float = 1.0) -> Measured:
-    return Measured(
+def measured(distance: float, loss: float = 1.0) -> TrainingMetrics:
+    return TrainingMetrics(
         rel_l2_displacement=distance,
         rel_energy=0.5,
         boundary_violation=0.02,
@@ -105,16 +105,16 @@ def measured(distance: float, loss: float = 1.0) -> Measured:
 
 
 @pytest.fixture
-def scripted(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Point]]:
+def scripted(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[GridPoint]]:
     """`scripted(end)`: runs end as the function of their point says, one after the other in this process.
 
     It returns the list of points that are trained.
     """
 
-    def prepare(end: Callable[[Point], Any]) -> list[Point]:
-        trained: list[Point] = []
+    def prepare(end: Callable[[GridPoint], Any]) -> list[GridPoint]:
+        trained: list[GridPoint] = []
 
-        def work(task: Task) -> Run | ProcessFailed:
+        def work(task: TrainingTask) -> TrainingRun | ProcessFailed:
             trained.append(task.point)
             answer = end(task.point)
             if isinstance(answer, float):
@@ -122,15 +122,15 @@ def scripted(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Point]]:
             return answer
 
         def inline(
-            _: object, tasks: Mapping[str, Task], **__: object
-        ) -> Generator[tuple[str, Run | ProcessFailed]]:
+            _: object, tasks: Mapping[str, TrainingTask], **__: object
+        ) -> Generator[tuple[str, TrainingRun | ProcessFailed]]:
             for name, task in tasks.items():
                 yield name, work(task)
 
         monkeypatch.setattr("compare.runtime.staged_processes.in_processes", inline)
         return trained
 
-    def train_with(task: Task, worth: Measured) -> Run:
+    def train_with(task: TrainingTask, worth: TrainingMetrics) -> TrainingRun:
         with monkeypatch.context() as patch:
             patch.setattr("compare.gridsearch.training_run.measure", lambda *_: worth)
             return train(task, silent)
@@ -138,12 +138,12 @@ def scripted(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Point]]:
     return prepare
 
 
-def searched(wanted: Search) -> list[Run]:
+def searched(wanted: GridSearch) -> list[TrainingRun]:
     with Stages(Console(file=StringIO()), quiet=True) as stages:
-        return search(wanted, stages)
+        return search_grid(wanted, stages)
 
 
-def distance(point: Point) -> float:
+def distance(point: GridPoint) -> float:
     return 0.1 * point.learning_rate * point.bc_weight
 
 
@@ -152,7 +152,8 @@ def distance(point: Point) -> float:
 
 def test_the_reference_itself_is_at_no_distance(fem):
     worth = measure(
-        replace(fem, history={"total": np.ones(1)}, stats={"epochs": 1, "seconds": 1.0}), Reference.of(fem)
+        replace(fem, history={"total": np.ones(1)}, stats={"epochs": 1, "seconds": 1.0}),
+        ReferenceSolution.of(fem),
     )
     assert worth.rel_l2_displacement == worth.rel_energy == worth.base_violation == 0
     assert worth.load_violation < 1e-9  # rounding of displacements of 10 mm
@@ -160,7 +161,7 @@ def test_the_reference_itself_is_at_no_distance(fem):
 
 def test_a_finger_that_moves_as_a_whole_violates_base_and_load_by_as_much(fem):
     """By (0.3, 0.4) mm, half a millimetre, of a stroke of 10 mm; the energy is that of the strain."""
-    worth = measure(trained(replace(fem, field=Shifted(fem.field, (0.3, 0.4)))), Reference.of(fem))
+    worth = measure(trained(replace(fem, field=Shifted(fem.field, (0.3, 0.4)))), ReferenceSolution.of(fem))
     assert (worth.base_violation, worth.load_violation) == pytest.approx((0.5, 0.5))
     assert worth.boundary_violation == pytest.approx(0.05)
     assert worth.rel_energy == 0
@@ -170,7 +171,7 @@ def test_a_finger_that_moves_as_a_whole_violates_base_and_load_by_as_much(fem):
 def test_a_component_that_is_free_cannot_be_violated(fem):
     problem = replace(fem.problem, load=Load(displacement=(None, -10.0)))
     moved = trained(replace(fem, problem=problem, field=Shifted(fem.field, (7.0, 0.4))))
-    assert measure(moved, Reference.of(fem)).load_violation == pytest.approx(0.4)
+    assert measure(moved, ReferenceSolution.of(fem)).load_violation == pytest.approx(0.4)
 
 
 @pytest.mark.parametrize(
@@ -186,11 +187,18 @@ def test_a_run_without_a_solution_says_why(fem, tmp_path, monkeypatch, error, st
 
     monkeypatch.setattr("solvers.pinn.paper.solver.PaperPinnSolver.solve", refused)
     fem.problem.mesh.save(tmp_path / "mesh.npz")
-    point = Point(1e-2, 1.0)
-    task = Task(
-        point, TINY, tmp_path / "mesh.npz", Material(), Load(), Reference.of(fem), tmp_path / "run", threads=1
+    point = GridPoint(1e-2, 1.0)
+    task = TrainingTask(
+        point,
+        TINY,
+        tmp_path / "mesh.npz",
+        Material(),
+        Load(),
+        ReferenceSolution.of(fem),
+        tmp_path / "run",
+        threads=1,
     )
-    assert train(task, silent) == Run(point, status, str(error))
+    assert train(task, silent) == TrainingRun(point, status, str(error))
     assert (tmp_path / "run" / "result.json").exists() == kept
 
 
@@ -236,8 +244,8 @@ def test_runs_are_ranked_by_their_distance_from_fem_and_not_by_their_loss(wanted
 
 
 def test_a_run_that_diverges_is_recorded_and_the_rest_goes_on(wanted, scripted):
-    bad = Point(1e-2, 10.0)
-    diverged = Run(bad, DIVERGED, "loss became nan in epoch 12; take a smaller learning_rate")
+    bad = GridPoint(1e-2, 10.0)
+    diverged = TrainingRun(bad, DIVERGED, "loss became nan in epoch 12; take a smaller learning_rate")
     scripted(lambda point: diverged if point == bad else distance(point))
     runs = searched(wanted)
     assert runs[-1] == diverged
@@ -247,16 +255,16 @@ def test_a_run_that_diverges_is_recorded_and_the_rest_goes_on(wanted, scripted):
 
 
 def test_a_process_that_fails_is_tried_again_by_the_next_search(wanted, scripted):
-    bad = Point(1e-2, 10.0)
+    bad = GridPoint(1e-2, 10.0)
     scripted(lambda point: ProcessFailed(-9) if point == bad else distance(point))
-    assert searched(wanted)[-1] == Run(bad, FAILED, "its process ended with exit code -9")
+    assert searched(wanted)[-1] == TrainingRun(bad, FAILED, "its process ended with exit code -9")
     trained = scripted(distance)
     assert [run.status for run in searched(wanted)] == [TRAINED] * 4
     assert trained == [bad]
 
 
 def test_an_interrupted_search_goes_on_where_it_was(wanted, scripted):
-    def interrupted(point: Point) -> float:
+    def interrupted(point: GridPoint) -> float:
         if point == wanted.points[2]:
             raise KeyboardInterrupt
         return distance(point)
@@ -275,7 +283,7 @@ def test_a_wider_search_takes_over_what_is_there(wanted, scripted):
     searched(wanted)
     trained = scripted(distance)
     runs = searched(replace(wanted, bc_weights=(*wanted.bc_weights, 100.0)))
-    assert trained == [Point(1e-3, 100.0), Point(1e-2, 100.0)]
+    assert trained == [GridPoint(1e-3, 100.0), GridPoint(1e-2, 100.0)]
     assert len(runs) == 6
 
 
@@ -301,7 +309,7 @@ def test_another_search_in_the_same_folder_is_refused(wanted, scripted, changes,
 def test_results_of_another_program_are_refused(wanted, scripted, monkeypatch):
     scripted(distance)
     searched(wanted)
-    monkeypatch.setattr("compare.gridsearch.run.sources_digest", lambda *_: "another")
+    monkeypatch.setattr("compare.gridsearch.search.sources_digest", lambda *_: "another")
     with pytest.raises(UserError, match=r"other settings \(program_sha256\)"):
         searched(wanted)
 
@@ -316,7 +324,7 @@ def run_on_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_an_interrupted_search_says_how_to_go_on(tmp_path, capsys, monkeypatch, scripted):
-    def interrupted(point: Point) -> float:
+    def interrupted(point: GridPoint) -> float:
         raise KeyboardInterrupt
 
     scripted(interrupted)
@@ -326,14 +334,16 @@ def test_an_interrupted_search_says_how_to_go_on(tmp_path, capsys, monkeypatch, 
 
 
 def test_a_search_whose_runs_all_diverged_says_so_by_its_exit_code(tmp_path, capsys, monkeypatch, scripted):
-    scripted(lambda point: Run(point, DIVERGED, "loss became nan"))
+    scripted(lambda point: TrainingRun(point, DIVERGED, "loss became nan"))
     assert run_on_the_command_line(tmp_path, monkeypatch) == NOT_CONVERGED
     assert capsys.readouterr().out.count("diverged") == 2
 
 
 def test_a_run_that_failed_is_named(tmp_path, capsys, monkeypatch, scripted):
     scripted(
-        lambda point: ProcessFailed(-9) if point.bc_weight == 1 else Run(point, TRAINED, "", measured(0.1))
+        lambda point: (
+            ProcessFailed(-9) if point.bc_weight == 1 else TrainingRun(point, TRAINED, "", measured(0.1))
+        )
     )
     assert run_on_the_command_line(tmp_path, monkeypatch) == NOT_CONVERGED
     last = capsys.readouterr().err.splitlines()[-1]

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from compare.gridsearch.run import Search, search
+from compare.gridsearch.search import GridSearch, search_grid
 from compare.pipeline import Job, run
 from compare.runtime.exits import NOT_CONVERGED
 from compare.runtime.stages import Stages
@@ -147,8 +147,8 @@ def test_a_killed_run_ends_as_if_it_had_not_been(job, tmp_path):
 
 @pytest.mark.slow
 def test_an_interrupted_search_ends_as_if_it_had_not_been(tmp_path):
-    def wanted(name: str) -> Search:
-        return Search(
+    def wanted(name: str) -> GridSearch:
+        return GridSearch(
             design=Design(),
             mesh=COARSE,
             material=Material(),
@@ -162,13 +162,13 @@ def test_an_interrupted_search_ends_as_if_it_had_not_been(tmp_path):
         )
 
     with quiet() as stages:
-        (whole,) = search(wanted("whole"), stages)
+        (whole,) = search_grid(wanted("whole"), stages)
     run_name = wanted("run").points[0].name
     with Interrupting(run_name) as stages, pytest.raises(KeyboardInterrupt):
-        search(wanted("run"), stages)
+        search_grid(wanted("run"), stages)
     before = record(tmp_path / "run" / "runs" / run_name)
     with quiet() as stages:
-        (resumed,) = search(wanted("run"), stages)
+        (resumed,) = search_grid(wanted("run"), stages)
     assert record(tmp_path / "run" / "runs" / run_name)[: len(before)] == before
     assert whole.measured is not None
     assert resumed.measured is not None
@@ -177,7 +177,7 @@ def test_an_interrupted_search_ends_as_if_it_had_not_been(tmp_path):
 
 
 def test_a_run_of_the_search_that_diverges_is_recorded(tmp_path):
-    wanted = Search(
+    wanted = GridSearch(
         design=Design(),
         mesh=COARSE,
         material=Material(),
@@ -190,6 +190,6 @@ def test_a_run_of_the_search_that_diverges_is_recorded(tmp_path):
         threads=1,
     )
     with quiet() as stages:
-        (diverged,) = search(wanted, stages)
+        (diverged,) = search_grid(wanted, stages)
     assert diverged.status == "diverged"
     assert "learning_rate" in diverged.message

@@ -8,7 +8,7 @@ from typing import Any
 from geometry.errors import UserError
 
 
-def check_kept_folder(file: Path, definition: Mapping[str, Any], *, job: str) -> None:
+def check_resumable_folder(file: Path, definition: Mapping[str, Any], *, job: str) -> None:
     """Refuse a folder that holds another job of the kind, or something else.
 
     Args:

@@ -29,7 +29,7 @@ FINER = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Sampled:
+class SampledField:
     """A displacement field at m markers and q points of the body; a linear space.
 
     Attributes:
@@ -42,14 +42,14 @@ class Sampled:
     displacement: FloatArray
     gradient: FloatArray
 
-    def plus(self, other: "Sampled", factor: float) -> "Sampled":
+    def plus(self, other: "SampledField", factor: float) -> "SampledField":
         """This one plus another one times a factor."""
         pairs = ((getattr(self, entry.name), getattr(other, entry.name)) for entry in fields(self))
-        return Sampled(*(mine + factor * theirs for mine, theirs in pairs))
+        return SampledField(*(mine + factor * theirs for mine, theirs in pairs))
 
 
 @dataclass(frozen=True, eq=False)
-class Sampler:
+class FieldSampler:
     """Where fields are looked at.
 
     Attributes:
@@ -67,7 +67,7 @@ class Sampler:
     means: FloatArray
 
     @classmethod
-    def of(cls, mesh: TriangleMesh, markers: FloatArray, radius: float) -> "Sampler":
+    def of(cls, mesh: TriangleMesh, markers: FloatArray, radius: float) -> "FieldSampler":
         """On the shared mesh, for markers at (m, 2), mm, of a radius, mm."""
         rule = body_quadrature(mesh)
         zeros, seen = np.zeros_like(markers), np.ones(len(markers), dtype=bool)
@@ -78,12 +78,12 @@ class Sampler:
         points, means = misfit.sampling()
         return cls(rule.location, rule.weights, mesh.locate(markers), mesh.locate(points), means)
 
-    def of_solution(self, solution: Solution, mesh: TriangleMesh) -> Sampled:
+    def of_solution(self, solution: Solution, mesh: TriangleMesh) -> SampledField:
         """Sample a solution, which may have been found on another mesh than the shared one."""
         inside, discs = self.inside, self.discs
         if solution.problem.mesh is not mesh:  # a location belongs to its mesh
             inside, discs = (solution.problem.mesh.locate(place.points) for place in (inside, discs))
-        return Sampled(
+        return SampledField(
             markers=self.means @ solution.field.displacement(discs),
             displacement=solution.field.displacement(inside),
             gradient=solution.field.gradient(inside),
@@ -91,7 +91,7 @@ class Sampler:
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
+class TrueFields:
     """The true fields at one load.
 
     Attributes:
@@ -107,7 +107,7 @@ class Truth:
     von_mises: FloatArray
 
     @classmethod
-    def load(cls, path: Path) -> "Truth":
+    def load(cls, path: Path) -> "TrueFields":
         """Read what `save` wrote."""
         with np.load(path) as archive:
             return cls(**{entry.name: archive[entry.name] for entry in fields(cls)})
@@ -118,7 +118,7 @@ class Truth:
             np.savez(partial, **{entry.name: getattr(self, entry.name) for entry in fields(self)})
 
     def distance(
-        self, sampled: Sampled, own: Problem, finite: Problem, weights: FloatArray
+        self, sampled: SampledField, own: Problem, finite: Problem, weights: FloatArray
     ) -> dict[str, float]:
         """Relative L2 distances of a solver's fields over the body.
 
@@ -173,7 +173,9 @@ class TruthTask:
             self.stroke,
             FINER,
             package_versions(),
-            sources_digest([*SOURCES, "compare.crossval.truth", "compare.evaluation.virtual_experiment"]),
+            sources_digest(
+                [*SOURCES, "compare.crossval.true_fields", "compare.evaluation.virtual_experiment"]
+            ),
         ]
         digest = hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
         return cache_folder() / f"truth-{digest}.npz"
@@ -194,8 +196,8 @@ def find_truth(task: TruthTask, progress: Progress = silent) -> Path:
     mesh = finger_mesh(task.design, settings=finer)
     problem = Problem(mesh, task.material, Load(displacement=(0.0, -task.stroke)))
     solution = simulation(problem, progress)
-    sampler = Sampler.of(shared, shared.markers, task.radius)
+    sampler = FieldSampler.of(shared, shared.markers, task.radius)
     sampled = sampler.of_solution(solution, shared)
     state = State.from_gradient(sampled.gradient, solution.problem)
-    Truth(sampled.markers, sampled.displacement, state.strain, state.von_mises).save(entry)
+    TrueFields(sampled.markers, sampled.displacement, state.strain, state.von_mises).save(entry)
     return entry

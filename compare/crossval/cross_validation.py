@@ -6,19 +6,19 @@ from pathlib import Path
 
 import numpy as np
 
-from compare.crossval.folds import LOAD, Condition, conditions_of, folds_of
-from compare.crossval.l_curve import CURVED, weigh
-from compare.crossval.output import write_results
-from compare.crossval.predictions import Failed, Outcome, Task, judge
-from compare.crossval.result import Result
+from compare.crossval.fold_results import FailedSolver, FoldResult, SolverTask, run_folds
+from compare.crossval.folds import LOAD, LoadCase, folds_of, load_cases_of
+from compare.crossval.l_curve import CURVED, sweep_weights
+from compare.crossval.output_files import write_results
+from compare.crossval.result import CrossvalResult
 from compare.crossval.study import Study, check_study, definition_of, seen_markers
-from compare.crossval.truth import Truth, TruthTask, find_truth
+from compare.crossval.true_fields import TrueFields, TruthTask, find_truth
 from compare.evaluation.shared_mesh import check_inside
 from compare.evaluation.virtual_experiment import said_of
-from compare.runtime.kept_folder import check_kept_folder
 from compare.runtime.output_folder import locked
 from compare.runtime.processes import ProcessFailed
 from compare.runtime.provenance import machine
+from compare.runtime.resumable_folder import check_resumable_folder
 from compare.runtime.staged_processes import in_stages
 from compare.runtime.stages import Stages
 from geometry.atomic import write_json
@@ -32,7 +32,7 @@ from vision.measurements import read_measurements
 DEFINITION = "definition.json"
 
 
-def crossval(study: Study, stages: Stages) -> Result:
+def cross_validate(study: Study, stages: Stages) -> CrossvalResult:
     """Judge the solvers and write the output folder.
 
     Raises:
@@ -42,13 +42,13 @@ def crossval(study: Study, stages: Stages) -> Result:
     check_study(study)
     given = seen_markers(read_measurements(study.measurements)) if study.measurements else None
     definition = definition_of(study, given)
-    check_kept_folder(study.out / DEFINITION, definition, job="cross-validation")
+    check_resumable_folder(study.out / DEFINITION, definition, job="cross-validation")
     with stages.stage("mesh"):
         mesh = finger_mesh(study.design, settings=study.mesh)
         if given:
             check_inside(given, mesh)
         problem = Problem(mesh, study.material, study.load)
-    conditions = conditions_of(problem, others=LOAD in study.schemes and given is None)
+    conditions = load_cases_of(problem, others=LOAD in study.schemes and given is None)
     study.out.mkdir(parents=True, exist_ok=True)
     with locked(study.out):
         write_json(study.out / DEFINITION, definition)
@@ -58,7 +58,7 @@ def crossval(study: Study, stages: Stages) -> Result:
         observations = _observations(study, mesh, given, truths)
         folds = folds_of(study.schemes, len(observations[0][0].points), conditions)
         tasks = {
-            entry.label: Task(
+            entry.label: SolverTask(
                 entry=entry,
                 mesh=shared,
                 material=study.material,
@@ -74,7 +74,7 @@ def crossval(study: Study, stages: Stages) -> Result:
         }
         outcomes, failed = _judged(study, tasks, stages)
         curve = _curve(tasks, outcomes, stages) if truths else {}
-        result = Result.of(study, observations[0][0], folds, outcomes, failed)
+        result = CrossvalResult.of(study, observations[0][0], folds, outcomes, failed)
         provenance = {
             "started": started.isoformat(timespec="seconds"),
             "seconds": {name: round(seconds, 2) for name, seconds in stages.seconds.items()},
@@ -86,7 +86,7 @@ def crossval(study: Study, stages: Stages) -> Result:
     return result
 
 
-def _truths(study: Study, conditions: Sequence[Condition], shared: Path, stages: Stages) -> list[Path]:
+def _truths(study: Study, conditions: Sequence[LoadCase], shared: Path, stages: Stages) -> list[Path]:
     """The true fields at every load, each simulated in a process of its own."""
     stroke = -float(study.load.displacement[1] or 0.0)
     tasks = {
@@ -124,7 +124,7 @@ def _observations(
     if given:
         return [[given] for _ in range(study.seeds)]
     source = f"{said_of(Problem(mesh, study.material, study.load))}, with {study.noise:g} mm of noise"
-    displacements = [Truth.load(path).markers for path in truths]
+    displacements = [TrueFields.load(path).markers for path in truths]
     return [
         [
             Observations(
@@ -142,18 +142,18 @@ def _observations(
 
 
 def _judged(
-    study: Study, tasks: Mapping[str, Task], stages: Stages
-) -> tuple[dict[str, list[list[Outcome]]], dict[str, str]]:
+    study: Study, tasks: Mapping[str, SolverTask], stages: Stages
+) -> tuple[dict[str, list[list[FoldResult]]], dict[str, str]]:
     """The outcomes of every solver, and what went wrong with the others."""
 
-    def note(_: str, answer: list[list[Outcome]] | Failed | ProcessFailed) -> str:
+    def note(_: str, answer: list[list[FoldResult]] | FailedSolver | ProcessFailed) -> str:
         if isinstance(answer, ProcessFailed):
             return f"its process ended with exit code {answer.exit_code}"
-        return answer.message if isinstance(answer, Failed) else "judged"
+        return answer.message if isinstance(answer, FailedSolver) else "judged"
 
     outcomes, failed = {}, {}
     for name, answer in in_stages(
-        judge, tasks, processes=study.processes, stages=stages, kind="solvers", note=note
+        run_folds, tasks, processes=study.processes, stages=stages, kind="solvers", note=note
     ):
         if isinstance(answer, list):
             outcomes[name] = answer
@@ -165,13 +165,13 @@ def _judged(
 
 
 def _curve(
-    tasks: Mapping[str, Task], outcomes: Mapping[str, list[list[Outcome]]], stages: Stages
+    tasks: Mapping[str, SolverTask], outcomes: Mapping[str, list[list[FoldResult]]], stages: Stages
 ) -> dict[str, list[float]]:
-    """What more weight of the markers does to `fem-asm`, if it is there; see `weigh`."""
+    """What more weight of the markers does to `fem-asm`, if it is there; see `sweep_weights`."""
     wanted = {"weights": tasks[CURVED]} if CURVED in outcomes else {}
     curve: dict[str, list[float]] = {}
     for _, answer in in_stages(
-        weigh, wanted, processes=1, stages=stages, kind="curves", note=lambda *_: "weighed"
+        sweep_weights, wanted, processes=1, stages=stages, kind="curves", note=lambda *_: "weighed"
     ):
         curve = {} if isinstance(answer, ProcessFailed) else answer
     return curve

@@ -8,11 +8,19 @@ from pathlib import Path
 from typing import Any
 
 from compare.gridsearch.tables import best_of, ranked, run_note, write_runs
-from compare.gridsearch.training_run import FAILED, RESULT_FILE, Point, Reference, Run, Task, train
-from compare.runtime.kept_folder import check_kept_folder
+from compare.gridsearch.training_run import (
+    FAILED,
+    RESULT_FILE,
+    GridPoint,
+    ReferenceSolution,
+    TrainingRun,
+    TrainingTask,
+    train,
+)
 from compare.runtime.output_folder import locked
 from compare.runtime.processes import ProcessFailed
 from compare.runtime.provenance import machine, package_versions, sources_digest
+from compare.runtime.resumable_folder import check_resumable_folder
 from compare.runtime.staged_processes import in_stages
 from compare.runtime.stages import Stages
 from geometry.atomic import write_json
@@ -27,7 +35,7 @@ SEARCH_FILE = "search.json"
 
 
 @dataclass(frozen=True)
-class Search:
+class GridSearch:
     """What to search, and where to write.
 
     Attributes:
@@ -55,20 +63,20 @@ class Search:
     threads: int
 
     @property
-    def points(self) -> list[Point]:
+    def points(self) -> list[GridPoint]:
         """The points of the grid."""
-        return [Point(*pair) for pair in product(self.learning_rates, self.bc_weights)]
+        return [GridPoint(*pair) for pair in product(self.learning_rates, self.bc_weights)]
 
-    def folder(self, point: Point) -> Path:
+    def folder(self, point: GridPoint) -> Path:
         """Where the run of a point keeps its checkpoints and its result."""
         return self.out / "runs" / point.name
 
-    def solver(self, point: Point) -> Solver:
+    def solver(self, point: GridPoint) -> Solver:
         """The solver of a point."""
         return make_solver("pinn-std", **self.settings, **asdict(point))
 
 
-def search(wanted: Search, stages: Stages) -> list[Run]:
+def search_grid(search: GridSearch, stages: Stages) -> list[TrainingRun]:
     """Train at every point of the grid that has no result yet, and write tables and picture.
 
     Returns:
@@ -78,32 +86,32 @@ def search(wanted: Search, stages: Stages) -> list[Run]:
         UserError: If it cannot be done, or the folder holds something else.
     """
     started = datetime.now(UTC)
-    solver, *_ = (wanted.solver(point) for point in wanted.points)
-    check_load(solver, wanted.load)
-    definition = _definition(wanted, solver)
-    check_kept_folder(wanted.out / SEARCH_FILE, definition, job="grid search")
+    solver, *_ = (search.solver(point) for point in search.points)
+    check_load(solver, search.load)
+    definition = _definition(search, solver)
+    check_resumable_folder(search.out / SEARCH_FILE, definition, job="grid search")
     with stages.stage("mesh"):
-        problem = Problem(finger_mesh(wanted.design, settings=wanted.mesh), wanted.material, wanted.load)
-    wanted.out.mkdir(parents=True, exist_ok=True)
-    with locked(wanted.out):
-        write_json(wanted.out / SEARCH_FILE, definition)
-        finished = {point: wanted.folder(point) / RESULT_FILE for point in wanted.points}
-        results = {point: Run.load(path) for point, path in finished.items() if path.exists()}
-        if missing := [point for point in wanted.points if point not in results]:
-            results |= _trained(wanted, missing, problem, stages)
+        problem = Problem(finger_mesh(search.design, settings=search.mesh), search.material, search.load)
+    search.out.mkdir(parents=True, exist_ok=True)
+    with locked(search.out):
+        write_json(search.out / SEARCH_FILE, definition)
+        finished = {point: search.folder(point) / RESULT_FILE for point in search.points}
+        results = {point: TrainingRun.load(path) for point, path in finished.items() if path.exists()}
+        if missing := [point for point in search.points if point not in results]:
+            results |= _trained(search, missing, problem, stages)
         runs = ranked(list(results.values()))
-        write_runs(wanted.out / "gridsearch.csv", runs)
+        write_runs(search.out / "gridsearch.csv", runs)
         with stages.stage("picture"):
             from compare.gridsearch.chart import draw_grid
 
-            draw_grid(wanted.out / "gridsearch.png", runs=runs)
+            draw_grid(search.out / "gridsearch.png", runs=runs)
         best = best_of(runs)
         write_json(
-            wanted.out / "gridsearch.json",
+            search.out / "gridsearch.json",
             {
                 **definition,
-                "learning_rates": list(wanted.learning_rates),
-                "bc_weights": list(wanted.bc_weights),
+                "learning_rates": list(search.learning_rates),
+                "bc_weights": list(search.bc_weights),
                 "ranked_by": "rel_l2_displacement: relative L2 difference from fem on the same mesh",
                 "best": best and asdict(best),
                 "runs": [asdict(run) for run in runs],
@@ -116,51 +124,53 @@ def search(wanted: Search, stages: Stages) -> list[Run]:
     return runs
 
 
-def _definition(wanted: Search, solver: Solver) -> dict[str, Any]:
+def _definition(search: GridSearch, solver: Solver) -> dict[str, Any]:
     """Everything that the result of a run depends on, but for its point of the grid."""
     searched = {"learning_rate", "bc_weight"}
     return {
         "schema": 1,
-        "design": wanted.design.model_dump(),
-        "mesh": wanted.mesh.model_dump(),
-        "material": wanted.material.model_dump(),
-        "load": wanted.load.model_dump(mode="json"),
+        "design": search.design.model_dump(),
+        "mesh": search.mesh.model_dump(),
+        "material": search.material.model_dump(),
+        "load": search.load.model_dump(mode="json"),
         "solver": {key: value for key, value in solver.settings().items() if key not in searched},
         "versions": package_versions(),
         "program_sha256": sources_digest(["compare.gridsearch.training_run", "geometry", "solvers"]),
     }
 
 
-def _trained(wanted: Search, points: Sequence[Point], problem: Problem, stages: Stages) -> dict[Point, Run]:
+def _trained(
+    search: GridSearch, points: Sequence[GridPoint], problem: Problem, stages: Stages
+) -> dict[GridPoint, TrainingRun]:
     """Train at points of the grid, each in a process of its own."""
     with stages.stage("fem") as progress:
-        reference = Reference.of(make_solver("fem").solve(problem, progress))
-    mesh = wanted.out / "mesh.npz"
+        reference = ReferenceSolution.of(make_solver("fem").solve(problem, progress))
+    mesh = search.out / "mesh.npz"
     problem.mesh.save(mesh)
     tasks = {
-        point.name: Task(
+        point.name: TrainingTask(
             point=point,
-            settings=wanted.settings,
+            settings=search.settings,
             mesh=mesh,
-            material=wanted.material,
-            load=wanted.load,
+            material=search.material,
+            load=search.load,
             reference=reference,
-            folder=wanted.folder(point),
-            threads=wanted.threads,
+            folder=search.folder(point),
+            threads=search.threads,
         )
         for point in points
     }
 
-    def run_of(name: str, answer: Run | ProcessFailed) -> Run:
+    def run_of(name: str, answer: TrainingRun | ProcessFailed) -> TrainingRun:
         if isinstance(answer, ProcessFailed):
             said = f"its process ended with exit code {answer.exit_code}"
-            return Run(tasks[name].point, FAILED, said)
+            return TrainingRun(tasks[name].point, FAILED, said)
         return answer
 
     answers = in_stages(
         train,
         tasks,
-        processes=wanted.processes,
+        processes=search.processes,
         stages=stages,
         kind="runs",
         note=lambda name, answer: run_note(run_of(name, answer)),

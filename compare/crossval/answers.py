@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from compare.crossval.folds import ALL
-from compare.crossval.result import Result
+from compare.crossval.result import CrossvalResult
 from compare.crossval.tables import has_fields, percent
 from solvers.assimilation.misfit import assimilates
 
@@ -11,7 +11,7 @@ NAMES = {"displacement": "displacement", "strain": "strain", "von_mises": "von M
 """Of the fields, for people."""
 
 
-def answers(result: Result) -> Mapping[str, list[str]]:
+def answers(result: CrossvalResult) -> Mapping[str, list[str]]:
     """Sentences on solvers that were given markers, by question; questions that have an answer."""
     found = {
         "Are held-out markers better predicted with the others than without?": _predictions(result),
@@ -20,12 +20,12 @@ def answers(result: Result) -> Mapping[str, list[str]]:
     return {question: sentences for question, sentences in found.items() if sentences}
 
 
-def _given(result: Result) -> list[str]:
+def _given(result: CrossvalResult) -> list[str]:
     given = {entry.label for entry in result.study.entries if assimilates(entry.make(0))}
     return [label for label in result.scores if label in given]
 
 
-def _predictions(result: Result) -> list[str]:
+def _predictions(result: CrossvalResult) -> list[str]:
     """Where each solver's held-out error is below that of every baseline, and where it is not."""
     sentences = []
     for label in _given(result):
@@ -46,7 +46,7 @@ def _grouped(verdicts: Mapping[str, str]) -> str:
     return "; ".join(f"{verdict} in {', '.join(schemes)}" for verdict, schemes in having.items())
 
 
-def _stresses(result: Result) -> list[str]:
+def _stresses(result: CrossvalResult) -> list[str]:
     """Distances of the fields from the truth, all markers given, beside those of `fem`."""
     if not has_fields(result) or "fem" not in result.scores:
         return []

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from compare.crossval.folds import Condition, Fold, training
-from compare.crossval.truth import Sampled, Sampler, Truth
+from compare.crossval.folds import Fold, LoadCase, hide_markers
+from compare.crossval.true_fields import FieldSampler, SampledField, TrueFields
 from geometry.arrays import FloatArray
 from geometry.atomic import write_json
 from geometry.errors import UserError
@@ -24,7 +24,7 @@ from solvers.solver import Progress, Solver, UnsupportedProblemError, silent, wi
 
 
 @dataclass(frozen=True)
-class Entry:
+class SolverVariant:
     """A solver with settings, under the name that tables call it by.
 
     Attributes:
@@ -51,7 +51,7 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class FoldResult:
     """A solver in one fold for one seed.
 
     Attributes:
@@ -96,7 +96,7 @@ class Outcome:
         return np.asarray(self.held_out / np.array(self.deviations)[self.held])
 
     @classmethod
-    def read(cls, content: Mapping[str, Any]) -> "Outcome":
+    def read(cls, content: Mapping[str, Any]) -> "FoldResult":
         """From what `asdict` makes of it."""
         fold = Fold(**{**content["fold"], "held": tuple(content["fold"]["held"])})
         fields = {name: float("nan") if value is None else value for name, value in content["fields"].items()}
@@ -104,7 +104,7 @@ class Outcome:
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class SolverTask:
     """All that a process needs for one solver.
 
     Attributes:
@@ -120,10 +120,10 @@ class Task:
         threads: Of the processor.
     """
 
-    entry: Entry
+    entry: SolverVariant
     mesh: Path
     material: Material
-    conditions: Sequence[Condition]
+    conditions: Sequence[LoadCase]
     truths: Sequence[Path]
     observations: Sequence[Sequence[Observations]]
     folds: Sequence[Fold]
@@ -133,7 +133,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Failed:
+class FailedSolver:
     """A solver that ended without a result.
 
     Attributes:
@@ -143,14 +143,14 @@ class Failed:
     message: str
 
 
-def judge(task: Task, progress: Progress = silent) -> list[list[Outcome]] | Failed:
+def run_folds(task: SolverTask, progress: Progress = silent) -> list[list[FoldResult]] | FailedSolver:
     """Run a solver through all folds for every seed, going on from what is kept.
 
     Returns:
         For every seed the folds' outcomes, in the order of the task's folds.
     """
     try:
-        judged = _Judge(task)
+        judged = _FoldRunner(task)
         outcomes = []
         for seed in range(len(task.observations)):
             done = seed / len(task.observations)
@@ -160,32 +160,32 @@ def judge(task: Task, progress: Progress = silent) -> list[list[Outcome]] | Fail
 
             outcomes.append(judged.seed(seed, report))
     except UserError as error:
-        return Failed(str(error))
+        return FailedSolver(str(error))
     return outcomes
 
 
-class _Judge:
+class _FoldRunner:
     """One solver on one mesh."""
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: SolverTask) -> None:
         self._task = task
         mesh = TriangleMesh.load(task.mesh)
         solver = task.entry.make(0)
         self._problem = Problem(mesh, with_law(task.material, solver), task.conditions[0].load)
         finite = task.material.model_copy(update={"law": "neo-hookean", "plane": "strain"})
         self._finite = replace(self._problem, material=finite)
-        self._sampler = Sampler.of(mesh, task.observations[0][0].points, task.radius)
-        self._truths = [Truth.load(path) for path in task.truths]
-        self._priors: dict[int, Sampled | None] = {}
-        self._plain: dict[int, tuple[Sampled, bool]] = {}
+        self._sampler = FieldSampler.of(mesh, task.observations[0][0].points, task.radius)
+        self._truths = [TrueFields.load(path) for path in task.truths]
+        self._priors: dict[int, SampledField | None] = {}
+        self._plain: dict[int, tuple[SampledField, bool]] = {}
         self._refit: Callable[[Observations], Solution] | None = None
 
-    def seed(self, seed: int, progress: Progress) -> list[Outcome]:
+    def seed(self, seed: int, progress: Progress) -> list[FoldResult]:
         """The outcomes of all folds for a seed."""
         path = self._task.folder / f"seed-{seed}.json"
         settings = json.loads(json.dumps(dict(self._task.entry.make(seed).settings())))
         kept = _kept(path, settings)
-        outcomes: list[Outcome] = []
+        outcomes: list[FoldResult] = []
         fitted: tuple[Fold, Solution] | None = None
         solver = self._task.entry.make(seed)
         if "seed" in solver.settings():
@@ -208,12 +208,12 @@ class _Judge:
 
     def _fit(self, solver: Solver, seed: int, fold: Fold) -> Solution:
         self._refit = self._refit or refitter(solver, self._problem)
-        return self._refit(training(self._task.observations[seed][0], fold.held))
+        return self._refit(hide_markers(self._task.observations[seed][0], fold.held))
 
     def _at(self, condition: int) -> Problem:
         return replace(self._problem, load=self._task.conditions[condition].load)
 
-    def _not_given(self, solver: Solver, seed: int, fold: Fold) -> Outcome:
+    def _not_given(self, solver: Solver, seed: int, fold: Fold) -> FoldResult:
         """A solver that is given no markers: one solution for each load serves all."""
         if fold.condition not in self._plain:
             solution = solver.solve(self._at(fold.condition))
@@ -222,7 +222,7 @@ class _Judge:
         sampled, converged = self._plain[fold.condition]
         return self._outcome(seed, fold, sampled, None, converged, given=False)
 
-    def _assimilated(self, solver: Solver, seed: int, fold: Fold, solution: Solution) -> Outcome:
+    def _assimilated(self, solver: Solver, seed: int, fold: Fold, solution: Solution) -> FoldResult:
         mesh, deviations = self._problem.mesh, None
         if fold.condition == 0:
             sampled = self._sampler.of_solution(solution, mesh)
@@ -237,7 +237,7 @@ class _Judge:
             sampled = self._corrected(solver, solution, fold.condition)
         return self._outcome(seed, fold, sampled, deviations, bool(solution.status.converged), given=True)
 
-    def _corrected(self, solver: Solver, solution: Solution, condition: int) -> Sampled:
+    def _corrected(self, solver: Solver, solution: Solution, condition: int) -> SampledField:
         """The solver without markers at another load, plus its correction at the first one times the stroke.
 
         The correction is what the markers change. Without a solution of its own, it is all of it.
@@ -250,7 +250,7 @@ class _Judge:
             return zero.plus(sampled, share)
         return there.plus(sampled.plus(here, -1.0), share)
 
-    def _prior(self, solver: Solver, condition: int) -> Sampled | None:
+    def _prior(self, solver: Solver, condition: int) -> SampledField | None:
         """What a solver says without markers; None if it says nothing."""
         if condition not in self._priors:
             try:
@@ -264,18 +264,18 @@ class _Judge:
         self,
         seed: int,
         fold: Fold,
-        sampled: Sampled,
+        sampled: SampledField,
         deviations: FloatArray | None,
         converged: bool,
         *,
         given: bool,
-    ) -> Outcome:
+    ) -> FoldResult:
         fields = {}
         if self._truths:
             truth = self._truths[fold.condition]
             fields = truth.distance(sampled, self._problem, self._finite, self._sampler.weights)
         observed = self._task.observations[seed][fold.condition].displacements
-        return Outcome(
+        return FoldResult(
             fold=fold,
             errors=(sampled.markers - observed).tolist(),
             deviations=None if deviations is None else deviations.tolist(),
@@ -285,12 +285,12 @@ class _Judge:
         )
 
 
-def _kept(path: Path, settings: Mapping[str, object]) -> dict[tuple[str, str], Outcome]:
-    """Outcomes of an earlier run with the same settings, by scheme and fold."""
+def _kept(path: Path, settings: Mapping[str, object]) -> dict[tuple[str, str], FoldResult]:
+    """FoldResults of an earlier run with the same settings, by scheme and fold."""
     if not path.exists():
         return {}
     content = json.loads(path.read_text(encoding="utf-8"))
     if content["settings"] != settings:
         return {}
-    outcomes = [Outcome.read(entry) for entry in content["outcomes"]]
+    outcomes = [FoldResult.read(entry) for entry in content["outcomes"]]
     return {(outcome.fold.scheme, outcome.fold.name): outcome for outcome in outcomes}

@@ -7,10 +7,10 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from compare.crossval.chart import draw_curve, draw_fields, draw_held_out
-from compare.crossval.predictions import Outcome
-from compare.crossval.result import Result
-from compare.crossval.summary import answers
+from compare.crossval.answers import answers
+from compare.crossval.charts import draw_curve, draw_fields, draw_held_out
+from compare.crossval.fold_results import FoldResult
+from compare.crossval.result import CrossvalResult
 from compare.crossval.tables import grids, per_marker, write_tables
 from compare.runtime.csv_files import write_csv
 from compare.runtime.provenance import file_digest
@@ -21,8 +21,8 @@ HELD_OUT, FIELDS, CURVE = "held_out.png", "fields.png", "l_curve.png"
 
 def write_results(
     out: Path,
-    result: Result,
-    outcomes: Mapping[str, Sequence[Sequence[Outcome]]],
+    result: CrossvalResult,
+    outcomes: Mapping[str, Sequence[Sequence[FoldResult]]],
     curve: Mapping[str, Sequence[float]],
     provenance: Mapping[str, Any],
 ) -> None:
@@ -54,7 +54,7 @@ def write_results(
     )
 
 
-def _write_report(path: Path, result: Result, pictures: Sequence[Path]) -> None:
+def _write_report(path: Path, result: CrossvalResult, pictures: Sequence[Path]) -> None:
     environment = Environment(
         loader=PackageLoader("compare"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
