@@ -155,8 +155,8 @@ def test_the_reference_itself_is_at_no_distance(fem):
         replace(fem, history={"total": np.ones(1)}, stats={"epochs": 1, "seconds": 1.0}),
         ReferenceSolution.of(fem),
     )
-    assert worth.rel_l2_displacement == worth.rel_energy == worth.base_violation == 0
-    assert worth.load_violation < 1e-9  # rounding of displacements of 10 mm
+    assert worth.rel_l2_displacement == worth.rel_energy == 0
+    assert max(worth.base_violation, worth.load_violation) < 1e-9  # rounding of displacements of 10 mm
 
 
 def test_a_finger_that_moves_as_a_whole_violates_base_and_load_by_as_much(fem):
