@@ -14,18 +14,18 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 MODULES = (
-    "overlay",
-    "marker_chart",
-    "fields",
-    "energy_chart",
-    "loss_chart",
-    "force_chart",
-    "excess",
-    "design_drawing",
-    "mesh_drawing",
-    "grid_chart",
-    "calibration_picture",
-    "crossval_chart",
+    "figures.overlay",
+    "figures.marker_chart",
+    "figures.fields",
+    "figures.energy_chart",
+    "figures.loss_chart",
+    "figures.force_chart",
+    "figures.excess",
+    "figures.design_drawing",
+    "figures.mesh_drawing",
+    "gridsearch.chart",
+    "camera.calibration_chart",
+    "crossval.charts",
 )
 
 
@@ -69,7 +69,7 @@ def watching() -> Iterator[dict[Path, Page]]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Text, "draw", noted)
-        for module in map(import_module, (f"compare.figures.{name}" for name in MODULES)):
+        for module in map(import_module, (f"compare.{name}" for name in MODULES)):
 
             @contextmanager
             def watched(
