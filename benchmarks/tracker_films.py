@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.evaluation.virtual_experiment import simulation
+from compare.evaluation.virtual_experiment import simulate
 from geometry.arrays import BoolArray, FloatArray
 from geometry.cache import finger_mesh
 from geometry.finger.parameters import Parameters
@@ -35,7 +35,7 @@ class Finger:
     def pressed(cls, parameters: Parameters) -> "Finger":
         """By the default indenter, at finite strain."""
         mesh = finger_mesh(parameters, settings=MeshSettings(size=ELEMENT))
-        solution = simulation(Problem(mesh))
+        solution = simulate(Problem(mesh))
         return cls(parameters, mesh, solution.displacement(mesh.at_nodes()))
 
 

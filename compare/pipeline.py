@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from compare.camera.film import Film
-from compare.evaluation.convergence import certified
+from compare.evaluation.convergence import with_certificates
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.force_displacement import force_curves, write_force_displacement
 from compare.evaluation.metrics import pick_reference
 from compare.evaluation.shared_mesh import check_inside, shared_mesh, write_rounds
-from compare.evaluation.solver_selection import able, left_out_remarks
+from compare.evaluation.solver_selection import left_out_remarks, supported_solvers
 from compare.evaluation.uncertainty import evaluated
-from compare.evaluation.virtual_experiment import simulated
+from compare.evaluation.virtual_experiment import virtual_experiment
 from compare.figures import Figure, draw_all
 from compare.report.html_report import ReportContent, write_report
 from compare.report.metrics_json import metrics
@@ -112,7 +112,7 @@ def run(job: Job, stages: Stages) -> Outcome:
     """
     started = datetime.now(UTC)
     _check(job)
-    chosen, left_out = able(job.solvers, job.spare, job.material, job.load)
+    chosen, left_out = supported_solvers(job.solvers, job.spare, job.material, job.load)
     given = read_measurements(job.measurements) if isinstance(job.measurements, Path) else None
     shots: list[Figure] = []
     remarks: Sequence[str] = ()
@@ -140,7 +140,7 @@ def run(job: Job, stages: Stages) -> Outcome:
             write_rounds(folder / "adapt.csv", adaptation)
         problem = Problem(mesh, job.material, job.load)
         with stages.stage("measurements") as progress:
-            observations, truth = (given, None) if given else simulated(problem, progress)
+            observations, truth = (given, None) if given else virtual_experiment(problem, progress)
             write_measurements(folder / "observations.csv", observations)
         evaluations: list[Evaluation] = []
         for solver in chosen:
@@ -152,7 +152,7 @@ def run(job: Job, stages: Stages) -> Outcome:
                     raise
                 left_out[solver.name] = str(error)
         with stages.stage("certificate"):
-            evaluations = certified(evaluations, problem)
+            evaluations = with_certificates(evaluations, problem)
         reference = pick_reference(evaluations, job.reference)
         with stages.stage("pictures") as progress:
             figures = draw_all(

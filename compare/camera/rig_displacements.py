@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from compare.evaluation.shared_mesh import shared_mesh
-from compare.evaluation.virtual_experiment import said_of, simulation
+from compare.evaluation.virtual_experiment import experiment_source, simulate
 from compare.runtime.stages import Stages
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
@@ -41,7 +41,7 @@ def filmed(
     if not solvers:
         problem = Problem(mesh, material, load)
         with stages.stage("virtual experiment") as progress:
-            return mesh, simulation(problem, progress).displacement(mesh.at_nodes()), said_of(problem)
+            return mesh, simulate(problem, progress).displacement(mesh.at_nodes()), experiment_source(problem)
     (solver,) = solvers
     problem = Problem(mesh, with_law(material, solver), load)
     with stages.stage(solver.name) as progress:

@@ -63,7 +63,7 @@ def compare(
     - compare --preset paper --device cuda
     """
     from compare.commands.preset_jobs import job_defaults
-    from compare.evaluation.shared_mesh import adapted_enough
+    from compare.evaluation.shared_mesh import tolerance_reached
     from compare.pipeline import Job, run
     from compare.report.terminal import body_table, marker_table
     from compare.runtime.stages import Stages
@@ -105,7 +105,7 @@ def compare(
     unconverged = [evaluation for evaluation in outcome.evaluations if not evaluation.converged]
     for evaluation in unconverged:
         say(f"error: {evaluation.solver} did not converge: {evaluation.message}")
-    return NOT_CONVERGED if unconverged or not adapted_enough(outcome.adaptation) else 0
+    return NOT_CONVERGED if unconverged or not tolerance_reached(outcome.adaptation) else 0
 
 
 def _nobodys(solvers: Sequence[Solver], options: SolverOptions, reference: str | None) -> list[str]:

@@ -22,7 +22,7 @@ def mesh(
 
     Material and load matter for --adapt only.
     """
-    from compare.evaluation.shared_mesh import adapted_enough, shared_mesh, write_rounds
+    from compare.evaluation.shared_mesh import shared_mesh, tolerance_reached, write_rounds
     from compare.figures.mesh_drawing import draw_mesh
     from compare.report.vtu_file import write_mesh
     from compare.runtime.stages import Stages
@@ -45,4 +45,4 @@ def mesh(
     print(f"{nodes} nodes, {len(triangles.triangles)} triangles, area {area:.4f} mm^2")
     for name in ("mesh.vtu", "mesh.npz", "mesh.png", *(["adapt.csv"] if adaptation else [])):
         print(out / name)
-    return 0 if adapted_enough(adaptation) else NOT_CONVERGED
+    return 0 if tolerance_reached(adaptation) else NOT_CONVERGED

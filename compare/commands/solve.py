@@ -26,10 +26,10 @@ def solve(
     out: Annotated[Path, Parameter(help="The VTU file for the fields.")] = Path("out/solution.vtu"),
 ) -> int:
     """Solve one finger with one solver and write its fields, without comparing anything."""
-    from compare.evaluation.convergence import certified
+    from compare.evaluation.convergence import with_certificates
     from compare.evaluation.force_displacement import force_curves, write_force_displacement
     from compare.evaluation.labels import solver_label
-    from compare.evaluation.shared_mesh import adapted_enough, check_inside, shared_mesh
+    from compare.evaluation.shared_mesh import check_inside, shared_mesh, tolerance_reached
     from compare.evaluation.uncertainty import evaluated
     from compare.figures.force_chart import draw_force_displacement
     from compare.report.vtu_file import write_vtu
@@ -66,7 +66,7 @@ def solve(
             problem = Problem(triangles, with_law(material, made), load, given)
             solution = made.solve(problem, progress)
         with stages.stage("certificate"):
-            (evaluation,) = certified([evaluated(solution, triangles)], problem)
+            (evaluation,) = with_certificates([evaluated(solution, triangles)], problem)
         write_vtu(out, triangles, evaluation)
         written = [out]
         if curves := force_curves([evaluation], load):
@@ -78,4 +78,4 @@ def solve(
     print(f"energy {solution.energy:.6g} N mm/mm, reaction ({u:.6g}, {v:.6g}) N/mm")
     for path in written:
         print(path)
-    return 0 if evaluation.converged and adapted_enough(adaptation) else NOT_CONVERGED
+    return 0 if evaluation.converged and tolerance_reached(adaptation) else NOT_CONVERGED

@@ -4,7 +4,8 @@ from collections.abc import Mapping
 
 from compare.crossval.folds import ALL
 from compare.crossval.result import CrossvalResult
-from compare.crossval.tables import has_fields, percent
+from compare.crossval.tables import has_fields
+from compare.evaluation.number_format import percent
 from solvers.assimilation.misfit import assimilates
 
 NAMES = {"displacement": "displacement", "strain": "strain", "von_mises": "von Mises stress"}
@@ -58,6 +59,6 @@ def _stresses(result: CrossvalResult) -> list[str]:
         for name, words in NAMES.items():
             verdict = result.differences[label]["fem"][ALL].get(name)
             said = verdict.verdict if verdict else "not told apart"
-            parts.append(f"{words} {percent(plain[name].mean)} % to {percent(own[name].mean)} % ({said})")
+            parts.append(f"{words} {percent(plain[name].mean, 2)} to {percent(own[name].mean, 2)} ({said})")
         sentences.append(f"{label}, given every marker, against fem: {', '.join(parts)} away from the truth.")
     return sentences

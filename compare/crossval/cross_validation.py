@@ -14,7 +14,7 @@ from compare.crossval.result import CrossvalResult
 from compare.crossval.study import Study, check_study, definition_of, seen_markers
 from compare.crossval.true_fields import TrueFields, TruthTask, find_truth
 from compare.evaluation.shared_mesh import check_inside
-from compare.evaluation.virtual_experiment import said_of
+from compare.evaluation.virtual_experiment import experiment_source
 from compare.runtime.output_folder import locked
 from compare.runtime.processes import ProcessFailed
 from compare.runtime.provenance import machine
@@ -123,7 +123,9 @@ def _observations(
     """What markers do, for each seed at each load: the truth with noise, or what was measured."""
     if given:
         return [[given] for _ in range(study.seeds)]
-    source = f"{said_of(Problem(mesh, study.material, study.load))}, with {study.noise:g} mm of noise"
+    source = (
+        f"{experiment_source(Problem(mesh, study.material, study.load))}, with {study.noise:g} mm of noise"
+    )
     displacements = [TrueFields.load(path).markers for path in truths]
     return [
         [

@@ -12,10 +12,9 @@ from compare.crossval.fold_results import FoldResult
 from compare.crossval.folds import ALL, ONE, SCHEMES
 from compare.crossval.result import BASELINES, CrossvalResult
 from compare.crossval.scores import FIELDS, LEVEL, MARKERS, Difference, Interval, Score
-from compare.evaluation.labels import significant
+from compare.evaluation.number_format import NONE, percent, significant
 from compare.runtime.csv_files import Cell, write_csv
 
-NONE = "–"
 SHORT = {"not told apart": "≈"}
 """Of verdicts, where there is no room."""
 
@@ -73,11 +72,6 @@ def write_tables(
     if has_fields(result):
         write_csv(out / "fields.csv", list(_fields_csv(result)))
     write_csv(out / "folds.csv", list(_folds_csv(outcomes)))
-
-
-def percent(value: float) -> str:
-    """A share in per cent, two or three digits."""
-    return NONE if isnan(value) else significant(100 * value, 3 if value >= 1 else 2)
 
 
 def _rich(grid: Grid) -> Table:
@@ -143,7 +137,7 @@ def _fields(result: CrossvalResult) -> Grid:
         for label, scores in result.scores.items():
             against = result.differences[label].get("fem", {}).get(scheme, {})
             verdicts = [_verdict(against.get(name)) for name in FIELDS[:3]]
-            values = [percent(scores[scheme].fields[name].mean) for name in FIELDS]
+            values = [percent(scores[scheme].fields[name].mean, 2, sign=False) for name in FIELDS]
             pairs = [text for pair in zip(values, verdicts, strict=False) for text in pair]
             rows.append([scheme, label, *pairs, values[-1]])
     headings = ["held out", "solver", "displ.", "vs\nfem", "strain", "vs\nfem", "v.\nMises", "vs\nfem"]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from compare.evaluation.differences import field_difference
-from compare.evaluation.virtual_experiment import SOURCES, simulation
+from compare.evaluation.virtual_experiment import SOURCES, simulate
 from compare.runtime.provenance import package_versions, sources_digest
 from geometry.arrays import FloatArray
 from geometry.atomic import atomic_path
@@ -195,7 +195,7 @@ def find_truth(task: TruthTask, progress: Progress = silent) -> Path:
     finer = task.settings.model_copy(update={"size": FINER * task.settings.size})
     mesh = finger_mesh(task.design, settings=finer)
     problem = Problem(mesh, task.material, Load(displacement=(0.0, -task.stroke)))
-    solution = simulation(problem, progress)
+    solution = simulate(problem, progress)
     sampler = FieldSampler.of(shared, shared.markers, task.radius)
     sampled = sampler.of_solution(solution, shared)
     state = State.from_gradient(sampled.gradient, solution.problem)

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from compare.evaluation.number_format import percent
 from geometry.arrays import FloatArray
 
 ENERGY_LIMIT = 0.02
@@ -123,15 +124,16 @@ class Certificate:
         found = []
         if not self.weak_residual <= limit:
             found.append(
-                f"its stress is out of balance by {self.weak_residual:.0%} in the energy norm "
-                f"(limit {limit:.0%})"
+                f"its stress is out of balance by {percent(self.weak_residual, 2)} in the energy norm "
+                f"(limit {percent(limit, 2)})"
             )
         off, most = max(self.base, self.off_at_contact), CONDITION_LIMIT * self.stroke
         if not off <= most:
             found.append(f"it misses the conditions by up to {off:.2g} mm (limit {most:.2g} mm)")
         if not self.rel_excess <= INTERPOLANT_LIMIT:
             found.append(
-                f"its energy is {self.rel_excess:.1%} above that of fem (limit {INTERPOLANT_LIMIT:.0%})"
+                f"its energy is {percent(self.rel_excess, 2)} above that of fem "
+                f"(limit {percent(INTERPOLANT_LIMIT, 1)})"
             )
         return found
 

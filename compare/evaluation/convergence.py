@@ -12,7 +12,7 @@ CERTIFIED_LAW = "linear"
 """Only there does the least energy settle the question: it is quadratic."""
 
 
-def certified(evaluations: Sequence[Evaluation], problem: Problem) -> list[Evaluation]:
+def with_certificates(evaluations: Sequence[Evaluation], problem: Problem) -> list[Evaluation]:
     """The evaluations, those of the linear law with a certificate and the verdict that follows from it.
 
     A solver that was given observations pays energy for them, so that least energy does not judge it.
@@ -32,7 +32,7 @@ def certified(evaluations: Sequence[Evaluation], problem: Problem) -> list[Evalu
     material = problem.material.model_copy(update={"law": CERTIFIED_LAW})
     certifier = Certifier(replace(problem, material=material))
     return [
-        judged(evaluation, certifier.certificate(evaluation) if evaluation.finite else None)
+        with_certificate(evaluation, certifier.certificate(evaluation) if evaluation.finite else None)
         if _certifiable(evaluation)
         else evaluation
         for evaluation in evaluations
@@ -43,7 +43,7 @@ def _certifiable(evaluation: Evaluation) -> bool:
     return evaluation.law == CERTIFIED_LAW and not evaluation.in_sample
 
 
-def judged(evaluation: Evaluation, certificate: Certificate | None) -> Evaluation:
+def with_certificate(evaluation: Evaluation, certificate: Certificate | None) -> Evaluation:
     """The evaluation with its certificate; not converged if that finds a fault, whatever the solver says.
 
     A result that is not finite has no certificate, which is a fault of its own.

@@ -21,8 +21,3 @@ def solver_at_markers(evaluation: Evaluation) -> str:
 def markers_label(observations: Observations) -> str:
     """`markers, measured` or `markers, simulated`."""
     return f"markers, {observations.label}"
-
-
-def significant(value: float, digits: int) -> str:
-    """A number with so many significant digits, without an exponent below a million."""
-    return f"{float(f'{value:.{digits}g}'):g}"

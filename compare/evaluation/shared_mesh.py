@@ -88,8 +88,8 @@ def write_rounds(path: Path, adaptation: Adaptation) -> None:
     )
 
 
-def adapted_enough(adaptation: Adaptation | None) -> bool:
-    """Whether the tolerance of --adapt was reached, if there is one; a line on standard error if not."""
+def tolerance_reached(adaptation: Adaptation | None) -> bool:
+    """True if --adapt was not given or its tolerance was reached; else a line on standard error."""
     if adaptation is None or adaptation.reached:
         return True
     say(f"error: --adapt {adaptation.tolerance:g}: {adaptation.message}")

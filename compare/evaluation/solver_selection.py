@@ -6,7 +6,7 @@ from solvers.problem import Load, Material
 from solvers.solver import Solver, UnsupportedProblemError, check_load, with_law
 
 
-def able(
+def supported_solvers(
     solvers: Sequence[Solver], spare: Collection[str], material: Material, load: Load
 ) -> tuple[list[Solver], dict[str, str]]:
     """The solvers that take a material and a load, and by name why others are left out.

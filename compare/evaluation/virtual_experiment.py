@@ -26,7 +26,7 @@ SOURCE = (
     "simulated by fem-nonlinear (neo-Hookean, finite strain, plane strain, contact patch that is "
     "pressed in by {:.4g} mm and slides along x); no camera was involved"
 )
-"""What is said of the numbers wherever they appear; the number is -v of the indenter."""
+"""Provenance that is shown with the numbers; the number is -v of the indenter."""
 
 SOURCES = (
     "compare.evaluation.evaluation",
@@ -39,17 +39,10 @@ SOURCES = (
 """Modules whose change makes a new simulation."""
 
 
-def virtual_experiment(problem: Problem, progress: Progress = silent) -> Observations:
-    """Simulate what a camera would have measured at the mesh's markers; kept in the cache folder.
+def virtual_experiment(problem: Problem, progress: Progress = silent) -> tuple[Observations, Evaluation]:
+    """Marker displacements as a camera would measure them, and the true fields on the problem's mesh.
 
-    Raises:
-        UserError: If the simulation cannot be run or does not reach the full load.
-    """
-    return simulated(problem, progress)[0]
-
-
-def simulated(problem: Problem, progress: Progress = silent) -> tuple[Observations, Evaluation]:
-    """The virtual experiment: what a camera would have measured, and the true fields on the problem's mesh.
+    Both are kept in the cache folder.
 
     Raises:
         UserError: If the simulation cannot be run or does not reach the full load.
@@ -61,14 +54,14 @@ def simulated(problem: Problem, progress: Progress = silent) -> tuple[Observatio
         displacements=truth.marker_displacement,
         standard_deviations=np.zeros_like(markers),
         visible=np.ones(len(markers), dtype=bool),
-        source=said_of(problem),
+        source=experiment_source(problem),
         simulated=True,
     )
     return observations, truth
 
 
 def _truth(problem: Problem, progress: Progress) -> Evaluation:
-    """The true fields; kept in the cache folder."""
+    """The true fields, from the cache where they are there."""
     try:
         solver, richer = _richer(problem)
         key = _key(solver, richer)
@@ -85,8 +78,8 @@ def _truth(problem: Problem, progress: Progress) -> Evaluation:
     return evaluation
 
 
-def simulation(problem: Problem, progress: Progress = silent) -> Solution:
-    """The solution whose displacements `virtual_experiment` gives at the markers; it is not kept.
+def simulate(problem: Problem, progress: Progress = silent) -> Solution:
+    """The solution behind `virtual_experiment`, solved anew.
 
     Raises:
         UserError: If it cannot be run or does not reach the full load.
@@ -94,8 +87,8 @@ def simulation(problem: Problem, progress: Progress = silent) -> Solution:
     return _solved(*_richer(problem), progress)
 
 
-def said_of(problem: Problem) -> str:
-    """One sentence on where the numbers of the simulation come from."""
+def experiment_source(problem: Problem) -> str:
+    """Provenance of the simulated numbers, one sentence."""
     return SOURCE.format(-(problem.load.displacement[1] or 0.0))
 
 
@@ -107,7 +100,7 @@ def _solved(solver: Solver, richer: Problem, progress: Progress) -> Solution:
 
 
 def _richer(problem: Problem) -> tuple[Solver, Problem]:
-    """What simulates, and the problem that it solves."""
+    """The finite-strain solver and its problem."""
     normal = problem.load.displacement[1]
     if normal is None:
         raise UserError("the virtual experiment presses on the finger: prescribe v")
@@ -129,6 +122,6 @@ def _richer(problem: Problem) -> tuple[Solver, Problem]:
 
 
 def _key(solver: Solver, problem: Problem) -> str:
-    """SHA-256 over all that the simulation depends on."""
+    """SHA-256 over solver, problem, sources and versions."""
     parts = [problem.digest, solver.settings(), package_versions(), sources_digest(SOURCES), SOURCE]
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()

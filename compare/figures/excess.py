@@ -9,7 +9,8 @@ import numpy as np
 from compare.evaluation.certificate import Certificate
 from compare.evaluation.differences import weighted_percentile
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.labels import significant, solver_label
+from compare.evaluation.labels import solver_label
+from compare.evaluation.number_format import percent
 from compare.figures import body
 from compare.figures.canvas import Canvas
 from compare.figures.colours import PERCENT, Scale
@@ -67,7 +68,7 @@ def draw_excess(path: Path, *, canvas: Canvas, mesh: TriangleMesh, evaluations: 
             body.show(axes, canvas.picture(colours), canvas.extent)
             body.outline(axes, edges, mesh.points, width=0.35)
             axes.set_title(label, size=8.5, pad=2, weight="bold")
-            note = f"{significant(100 * certificate.rel_excess, 2)} % of the energy"
+            note = f"{percent(certificate.rel_excess, 2)} of the energy"
             axes.text(0.99, 0.33, note, ha="right", size=7, color=MUTED, transform=axes.transAxes)
         body.scale_bar(axes, canvas.extent)
         bar = axes_at(drawn, (0.2 * WIDTH, total - FOOT + 0.1, 0.6 * WIDTH, 0.09))

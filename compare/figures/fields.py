@@ -10,8 +10,9 @@ from matplotlib.figure import Figure as MplFigure
 
 from compare.evaluation.differences import field_difference
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.labels import significant, solver_label
+from compare.evaluation.labels import solver_label
 from compare.evaluation.metrics import COMPONENTS
+from compare.evaluation.number_format import percent, significant
 from compare.figures import body
 from compare.figures.canvas import Canvas, Extent
 from compare.figures.colours import PERCENT, Scale, sequential, symmetric
@@ -139,7 +140,7 @@ def draw_field(
                 axes = panel(row, 1, differences, values - base, evaluation)
                 norm = field_difference(values, base, reference.weights).rel_l2
                 axes.set_title(f"minus {solver_label(reference)}", size=8.5, pad=2)
-                _remark(axes, f"rel. $L^2$ {significant(100 * norm, 3)} %")
+                _remark(axes, f"rel. $L^2$ {percent(norm)}")
             elif columns == 2:
                 _explain(drawn, (2 * MARGIN + width, HEAD + PANEL_TITLE, width, height), reference)
         body.scale_bar(axes, canvas.extent)

@@ -4,8 +4,8 @@ from compare.evaluation.certificate import Certificate
 from compare.evaluation.convergence import CERTIFIED_LAW
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.labels import solver_label
+from compare.evaluation.number_format import distance, percent
 from compare.evaluation.regions import REGIONS
-from compare.report.text import distance, percent
 
 
 def certificate_sentences(evaluation: Evaluation) -> str:
@@ -22,7 +22,7 @@ def certificate_sentences(evaluation: Evaluation) -> str:
         return f"{label} is the finite-element solution itself: nothing is left out of balance."
     sentences = [_verdict(label, evaluation.converged, certificate), _where(certificate)]
     sentences += [_conditions(certificate), _reported(certificate)]
-    return " ".join(filter(None, sentences)).replace(" %", "\N{NO-BREAK SPACE}%")
+    return " ".join(filter(None, sentences))
 
 
 def _verdict(label: str, converged: bool, certificate: Certificate) -> str:

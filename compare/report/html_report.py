@@ -11,6 +11,7 @@ from compare.evaluation.differences import ReferenceDifferences
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.labels import solver_label
 from compare.evaluation.metrics import TruthDifferences, reference_differences, truth_differences
+from compare.evaluation.number_format import distance, number, percent
 from compare.evaluation.regions import NEAR
 from compare.evaluation.uncertainty import indistinct
 from compare.figures import Figure
@@ -94,9 +95,9 @@ def render(content: ReportContent) -> str:
     )
     environment.filters |= {
         "millimetres": millimetres,
-        "number": text.number,
-        "distance": text.distance,
-        "percent": text.percent,
+        "number": number,
+        "distance": distance,
+        "percent": percent,
         "png": text.embedded,
         "sentence": text.sentence,
         "stat": text.stat,

@@ -6,13 +6,12 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.labels import significant, solver_label
+from compare.evaluation.labels import solver_label
 from compare.evaluation.metrics import reference_differences, truth_differences
+from compare.evaluation.number_format import NONE, percent
 from compare.report.table_one import MEANS, PAPER, PRINTED, Row, millimetres, table_one
 from compare.report.tables import seconds
 from geometry.observations import Observations
-
-NONE = "–"
 
 
 def marker_table(evaluations: Sequence[Evaluation], observations: Observations) -> Table:
@@ -62,7 +61,7 @@ def body_table(
         cells += [f"{evaluation.energy:.4g}", above_fem(evaluation)]
         if truth is not None:
             found = truth_differences(evaluation, truth)
-            cells += [percent(found.displacement.rel_l2), percent(found.von_mises.rel_l2)]
+            cells += [percent(field.rel_l2, 2, sign=False) for field in (found.displacement, found.von_mises)]
         style = None if evaluation.converged else "yellow"
         table.add_row(_name(evaluation), *cells, seconds(evaluation), style=style)
     return table
@@ -73,13 +72,7 @@ def above_fem(evaluation: Evaluation) -> str:
     certificate = evaluation.certificate
     if certificate is None:
         return NONE
-    percent = 100 * certificate.rel_excess if certificate.has_excess else 0.0
-    return f"{percent:.1f}" if percent >= 1 else f"{percent:.1g}"
-
-
-def percent(share: float) -> str:
-    """A share in per cent, two digits, or all before the point."""
-    return f"{100 * share:.0f}" if share >= 1 else significant(100 * share, 2)
+    return percent(certificate.rel_excess if certificate.has_excess else 0.0, 2, sign=False)
 
 
 def _table(title: str, caption: str) -> Table:
@@ -108,5 +101,5 @@ def _with_own_error(distance: float, reference: Evaluation) -> str:
     """The relative difference in %, and that of the reference from the exact solution."""
     own = reference.uncertainty
     if own is None:
-        return significant(100 * distance, 3)
-    return f"{percent(distance)}±{100 * own.displacement.rel_l2:.1g}"
+        return percent(distance, sign=False)
+    return f"{percent(distance, 2, sign=False)}±{percent(own.displacement.rel_l2, 1, sign=False)}"

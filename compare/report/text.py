@@ -8,6 +8,7 @@ import numpy as np
 from markupsafe import Markup
 
 from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.number_format import distance, number, percent
 from geometry.arrays import FloatArray
 from geometry.finger.parameters import Parameters, fact
 from geometry.observations import Observations
@@ -123,24 +124,11 @@ def sentence(text: str) -> str:
     return text[:1].upper() + text[1:].rstrip(". ") + "."
 
 
-def number(value: float, digits: int = 4) -> str:
-    """A number with so many significant digits, with a typographic minus; no exponent from 1 to a million."""
-    text = f"{value:#.{digits}g}"
-    if 1 <= abs(value) < 1e6:
-        text = f"{float(text):.0f}" if "e" in text else text
-    return text.rstrip(".").replace("-", "−")
-
-
 def without_rounding(force: FloatArray) -> tuple[float, float]:
     """A force of shape (2,) without the component that rounding left, 1e-9 of the other or less."""
     size = np.abs(force).max()
     u, v = (float(component) if abs(component) > 1e-9 * size else 0.0 for component in force)
     return u, v
-
-
-def percent(value: float) -> str:
-    """A share as a percentage with three significant digits."""
-    return f"{number(100 * value, 3)} %"
 
 
 def beside(value: float, own: float | None) -> Markup:
@@ -166,7 +154,7 @@ def own_error_sentence(label: str, evaluation: Evaluation) -> str:
         f"displacement, {percent(own.von_mises.rel_l2)} in the von Mises stress (relative L²), "
         f"{percent(np.sqrt(abs(own.energy)))} in the energy norm, {distance(markers.max())} mm at most at a "
         "marker."
-    ).replace(" %", "\N{NO-BREAK SPACE}%")
+    )
 
 
 def indistinct_sentence(label: str, reference: str, names: Sequence[str]) -> str:
@@ -178,8 +166,3 @@ def indistinct_sentence(label: str, reference: str, names: Sequence[str]) -> str
         f"{label} differs from {reference} by less than the own error of {reference} in: {said}. There the "
         "comparison does not say which of the two is nearer to the exact solution."
     )
-
-
-def distance(value: float) -> str:
-    """A small length, mm, with two significant digits; a dash where it is NaN, zero where it is rounding."""
-    return "–" if np.isnan(value) else f"{value if value > 1e-9 else 0:.2g}".replace("-", "−")

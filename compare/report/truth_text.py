@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.labels import significant, solver_label
+from compare.evaluation.labels import solver_label
 from compare.evaluation.metrics import TruthDifferences, truth_differences
+from compare.evaluation.number_format import percent
 
 
 def truth_sentences(
@@ -30,8 +31,8 @@ def truth_sentences(
 
 def _sizes(differences: TruthDifferences) -> str:
     return (
-        f"displacement {_percent(differences.displacement.rel_l2)}, "
-        f"von Mises stress {_percent(differences.von_mises.rel_l2)}"
+        f"displacement {percent(differences.displacement.rel_l2)}, "
+        f"von Mises stress {percent(differences.von_mises.rel_l2)}"
     )
 
 
@@ -39,7 +40,7 @@ def _changes(plain: TruthDifferences, own: TruthDifferences) -> str:
     words = []
     for name, title in (("displacement", "displacement"), ("von_mises", "von Mises stress")):
         before, after = getattr(plain, name).rel_l2, getattr(own, name).rel_l2
-        words.append(f"{title} {_percent(after)} ({'nearer' if after < before else 'farther'})")
+        words.append(f"{title} {percent(after)} ({'nearer' if after < before else 'farther'})")
     return ", ".join(words)
 
 
@@ -47,7 +48,3 @@ def _nearer(field: str, plain: TruthDifferences, found: dict[str, TruthDifferenc
     limit = getattr(plain, field).rel_l2
     names = [name for name, own in found.items() if getattr(own, field).rel_l2 < limit]
     return ", ".join(names) or "none"
-
-
-def _percent(share: float) -> str:
-    return f"{significant(100 * share, 3)}\N{NO-BREAK SPACE}%"

@@ -10,7 +10,7 @@ from skfem.models.elasticity import linear_elasticity
 
 from compare.evaluation.certificate import CONDITION_LIMIT, ENERGY_LIMIT, INTERPOLANT_LIMIT, Certificate
 from compare.evaluation.certification import Certifier
-from compare.evaluation.convergence import certified, judged
+from compare.evaluation.convergence import with_certificate, with_certificates
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import reference_differences
 from compare.evaluation.regions import REGIONS, body_regions
@@ -67,7 +67,7 @@ def disturbed(problem: Problem, size: float, *, at_base: bool = False) -> FloatA
 @pytest.mark.parametrize("load", LOADS.values(), ids=LOADS)
 def test_fem_itself_has_no_excess_and_nothing_out_of_balance(finger: TriangleMesh, load: Load) -> None:
     problem = Problem(finger, load=load)
-    (own,) = certified([Evaluation.of(FemSolver().solve(problem), finger)], problem)
+    (own,) = with_certificates([Evaluation.of(FemSolver().solve(problem), finger)], problem)
     certificate = own.certificate
     assert own.converged
     assert own.message == FemSolver().solve(problem).status.message
@@ -156,7 +156,7 @@ def test_a_wrong_law_shows(finger: TriangleMesh, poisson: float) -> None:
 
 def test_linear_elements_do_not_pass_on_a_coarse_mesh(finger: TriangleMesh) -> None:
     problem = Problem(finger)
-    (linear,) = certified([Evaluation.of(FemSolver(degree=1).solve(problem), finger)], problem)
+    (linear,) = with_certificates([Evaluation.of(FemSolver(degree=1).solve(problem), finger)], problem)
     assert not linear.converged
     assert "its energy is" in linear.message
 
@@ -195,22 +195,22 @@ def test_least_energy_does_not_judge_a_solver_that_was_given_the_markers(
     fem: Evaluation, finger: TriangleMesh
 ) -> None:
     given = replace(fem, in_sample=True)
-    assert certified([given], Problem(finger)) == [given]
+    assert with_certificates([given], Problem(finger)) == [given]
 
 
 def test_only_the_linear_law_is_certified(finger: TriangleMesh) -> None:
     problem = Problem(finger)
     evaluation = Evaluation.of(FemSolver().solve(problem), finger)
     other = replace(evaluation, law="neo-hookean")
-    first, second = certified([evaluation, other], problem)
+    first, second = with_certificates([evaluation, other], problem)
     assert first.certificate is not None
     assert second is other
 
 
 def test_a_verdict_can_only_take_convergence_away(fem: Evaluation, failed: Evaluation) -> None:
     good = perfect()
-    assert judged(fem, good).converged
-    assert not judged(failed, good).converged
+    assert with_certificate(fem, good).converged
+    assert not with_certificate(failed, good).converged
     for fault in (
         {"weak_residual": 1.01 * np.sqrt(ENERGY_LIMIT)},
         {"base": 1.01 * CONDITION_LIMIT},
@@ -218,7 +218,7 @@ def test_a_verdict_can_only_take_convergence_away(fem: Evaluation, failed: Evalu
         {"excess": 1.01 * INTERPOLANT_LIMIT},
         {"excess": np.nan},
     ):
-        bad = judged(fem, replace(good, **fault))
+        bad = with_certificate(fem, replace(good, **fault))
         assert not bad.converged
         assert bad.message.startswith("solved directly; it")
 
@@ -285,7 +285,7 @@ def test_energy_below_the_least_is_a_fault_of_the_program(
 def test_a_result_that_is_not_finite_is_not_converged(finger: TriangleMesh) -> None:
     problem = Problem(finger)
     nodal = np.full((len(LagrangeSpace(finger, 2).nodes), 2), np.nan)
-    (lost,) = certified([sampled(problem, nodal)], problem)
+    (lost,) = with_certificates([sampled(problem, nodal)], problem)
     assert not lost.converged
     assert lost.message == "a given displacement; its displacement is not finite everywhere"
     assert certificate_sentences(lost) == "given (not converged) has no certificate: it is not finite."

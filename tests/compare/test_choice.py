@@ -3,7 +3,7 @@ from typing import ClassVar
 
 import pytest
 
-from compare.evaluation.solver_selection import able, left_out_remarks
+from compare.evaluation.solver_selection import left_out_remarks, supported_solvers
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution
 from solvers.solver import Progress, UnsupportedProblemError, silent
@@ -29,23 +29,23 @@ PATCH = Load(kind="patch")
 
 
 def test_every_solver_that_can_stays_in_its_place():
-    assert able(SOLVERS, (), Material(), Load()) == (SOLVERS, {})
+    assert supported_solvers(SOLVERS, (), Material(), Load()) == (SOLVERS, {})
 
 
 def test_a_spare_solver_that_cannot_is_left_out():
-    chosen, left_out = able(SOLVERS, ("a", "b", "c"), Material(), PATCH)
+    chosen, left_out = supported_solvers(SOLVERS, ("a", "b", "c"), Material(), PATCH)
     assert [solver.name for solver in chosen] == ["b"]
     assert left_out == {"a": "no load 'patch'", "c": "no load 'patch'"}
 
 
 def test_a_solver_that_was_asked_for_is_not():
     with pytest.raises(UnsupportedProblemError, match="c takes the loads mean, not 'patch'"):
-        able(SOLVERS, ("a", "b"), Material(), PATCH)
+        supported_solvers(SOLVERS, ("a", "b"), Material(), PATCH)
 
 
 def test_a_job_that_no_solver_can_do_is_refused():
     with pytest.raises(UnsupportedProblemError, match="c takes the loads mean, not 'patch'"):
-        able([SOLVERS[0], SOLVERS[2]], ("a", "c"), Material(), PATCH)
+        supported_solvers([SOLVERS[0], SOLVERS[2]], ("a", "c"), Material(), PATCH)
 
 
 def test_solvers_with_the_same_reason_share_a_line():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from compare.evaluation.certificate import Certificate, Region
-from compare.evaluation.convergence import judged
+from compare.evaluation.convergence import with_certificate
 from compare.evaluation.evaluation import Evaluation
 from compare.figures.canvas import Canvas
 from compare.figures.excess import DECADES, draw_excess, excess_scale
@@ -36,7 +36,7 @@ def certificate(mesh: TriangleMesh) -> Certificate:
 
 
 def words(evaluation: Evaluation, certificate: Certificate) -> str:
-    return certificate_sentences(judged(evaluation, certificate)).replace("\N{NO-BREAK SPACE}", " ")
+    return certificate_sentences(with_certificate(evaluation, certificate)).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def test_a_good_result_in_words(pinn: Evaluation, certificate: Certificate) -> None:
@@ -84,10 +84,12 @@ def test_one_scale_for_all_that_ends_at_the_larger_excess(mesh: TriangleMesh) ->
 def test_without_an_excess_there_is_no_picture(
     mesh: TriangleMesh, fem: Evaluation, certificate: Certificate, tmp_path: Path
 ) -> None:
-    exact = judged(fem, replace(certificate, excess=0.0))
+    exact = with_certificate(fem, replace(certificate, excess=0.0))
     path = tmp_path / "excess.png"
     with Canvas(mesh, field_extent(mesh), width=100) as canvas:
         assert not draw_excess(path, canvas=canvas, mesh=mesh, evaluations=[fem, exact])
         assert not path.exists()
-        assert draw_excess(path, canvas=canvas, mesh=mesh, evaluations=[fem, judged(fem, certificate)])
+        assert draw_excess(
+            path, canvas=canvas, mesh=mesh, evaluations=[fem, with_certificate(fem, certificate)]
+        )
     assert path.exists()

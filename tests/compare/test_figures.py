@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from compare.evaluation.convergence import certified
+from compare.evaluation.convergence import with_certificates
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.force_displacement import force_curves
 from compare.figures import Figure, draw_all
@@ -29,7 +29,7 @@ from tests.compare.drawn_pages import Page
 
 def with_certificate(evaluation: Evaluation, mesh: TriangleMesh) -> Evaluation:
     """The evaluation with its certificate, but not with the verdict."""
-    (judged,) = certified([evaluation], Problem(mesh))
+    (judged,) = with_certificates([evaluation], Problem(mesh))
     return replace(evaluation, certificate=judged.certificate)
 
 

@@ -8,7 +8,7 @@ from numbers import Real
 import numpy as np
 import pytest
 
-from compare.evaluation.convergence import certified
+from compare.evaluation.convergence import with_certificates
 from compare.evaluation.metrics import marker_errors, reference_differences
 from compare.report.metrics_json import metrics
 from geometry.finger.design import Design
@@ -86,7 +86,7 @@ def numbers(estimated, pinn, observations, mesh):
             "material": Material(),
             "load": Load(),
             "observations": observations,
-            "evaluations": certified([estimated, pinn], Problem(mesh)),
+            "evaluations": with_certificates([estimated, pinn], Problem(mesh)),
             "reference": estimated,
         }
         return metrics(**{**arguments, **changes})

@@ -58,7 +58,7 @@ def test_distances_over_the_body(estimated: Evaluation, pinn: Evaluation):
 
 def test_measured_markers_know_no_truth(fem: Evaluation, pinn: Evaluation):
     text = printed(body_table([fem, pinn], fem))
-    assert cells(text, "pinn-std") == ["10", "2.42", "–", "1.25"]
+    assert cells(text, "pinn-std") == ["10.0", "2.42", "–", "1.25"]
     assert "truth" not in text
 
 

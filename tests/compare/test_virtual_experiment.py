@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.evaluation.virtual_experiment import simulated, virtual_experiment
+from compare.evaluation.virtual_experiment import virtual_experiment
 from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
@@ -55,7 +55,7 @@ def test_a_sliding_patch_presses_on_a_neo_hookean_finger(problem, solutions):
 
 
 def test_the_markers_of_the_mesh_are_observed_and_said_to_be_simulated(problem, solutions):
-    observations = virtual_experiment(problem)
+    observations, _ = virtual_experiment(problem)
     markers = problem.mesh.markers
     np.testing.assert_array_equal(observations.points, markers)
     np.testing.assert_array_equal(observations.displacements, solutions[0].displacement(markers))
@@ -68,9 +68,9 @@ def test_the_markers_of_the_mesh_are_observed_and_said_to_be_simulated(problem, 
 
 
 def test_the_second_time_it_is_read_from_the_cache(problem, solutions):
-    first = virtual_experiment(problem)
+    first, _ = virtual_experiment(problem)
     notes: list[str] = []
-    second = virtual_experiment(problem, lambda _, note: notes.append(note))
+    second, _ = virtual_experiment(problem, lambda _, note: notes.append(note))
     assert (len(solutions), notes) == (1, ["from the cache"])
     np.testing.assert_array_equal(second.displacements, first.displacements)
     assert (second.source, second.simulated) == (first.source, first.simulated)
@@ -128,14 +128,14 @@ def test_a_damaged_file_in_the_cache_is_made_again(problem, solutions, cache, co
     entry.write_bytes(content)
     virtual_experiment(problem)
     assert len(solutions) == 2
-    assert virtual_experiment(problem).simulated
+    assert virtual_experiment(problem)[0].simulated
     assert len(solutions) == 2
 
 
 def test_the_truth_is_the_simulated_field_on_the_mesh(problem, solutions):
     """Also when it comes from the cache."""
     for _ in range(2):
-        observations, truth = simulated(problem)
+        observations, truth = virtual_experiment(problem)
         np.testing.assert_array_equal(truth.node_displacement, solutions[0].displacement(problem.mesh.points))
         np.testing.assert_array_equal(truth.marker_displacement, observations.displacements)
         assert truth.law == "neo-hookean"
