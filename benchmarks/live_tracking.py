@@ -25,9 +25,9 @@ from vision.rig.bench import Bench
 from vision.rig.exposure import Exposure
 from vision.rig.motion import Motion
 from vision.rig.recording import Recording
-from vision.rig.view import default_camera, view
-from vision.tracking.frame_tracker import Follower
-from vision.tracking.scene import Setup
+from vision.rig.virtual_camera import default_camera, viewing_pose
+from vision.tracking.frame_tracker import FrameTracker
+from vision.tracking.scene import FilmedScene
 from vision.tracking.workspace import default_workspace
 
 FRAMES = 240
@@ -38,7 +38,7 @@ def main() -> Table:
     table = Table(title="Tracking at 1280x720 pixels, nine markers and seven fiducials")
     for column in ("method", "frames from", "frames a second", "median, ms", "95 %, ms", "lost markers"):
         table.add_column(column, justify="left" if column in ("method", "frames from") else "right")
-    setup, images = _film()
+    scene, images = _film()
     to_and_fro = [*images, *images[-2:0:-1]]
     whole = list(islice(chain.from_iterable(repeat(to_and_fro)), FRAMES))
     grey = [cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in whole]
@@ -50,7 +50,7 @@ def main() -> Table:
                 for image in whole:
                     writer.write(image)
         for method in METHODS:
-            known = Setup(setup.design, setup.workspace, setup.camera, method=method)
+            known = FilmedScene(scene.design, scene.workspace, scene.camera, method=method)
             table.add_row(method, "memory, coloured", *_timed(known, whole))
             table.add_row(method, "memory, grey", *_timed(known, grey))
             for name, path in sources.items():
@@ -59,7 +59,7 @@ def main() -> Table:
     return table
 
 
-def _film() -> tuple[Setup, list[Image]]:
+def _film() -> tuple[FilmedScene, list[Image]]:
     """A finger that is bent by 10 mm in 24 frames."""
     design, camera = Design(), default_camera()
     workspace = default_workspace(design)
@@ -69,22 +69,22 @@ def _film() -> tuple[Setup, list[Image]]:
         bench=Bench(mesh, design, workspace),
         displacement=-10 * np.column_stack([0.2 * x**2, x**2]),
         camera=camera,
-        pose=view(camera, workspace, tilt=3),
+        pose=viewing_pose(camera, workspace, tilt=3),
         exposure=Exposure(noise=2),
         motion=Motion(rest=1, moving=22, held=1, shutter=0),
     )
-    return Setup(design, workspace, camera), [image for image, _ in recording.frames()]
+    return FilmedScene(design, workspace, camera), [image for image, _ in recording.frames()]
 
 
-def _timed(setup: Setup, images: Iterable[Image]) -> tuple[str, ...]:
+def _timed(scene: FilmedScene, images: Iterable[Image]) -> tuple[str, ...]:
     """Cells of a row; the first frame, in which the markers are found, does not count."""
-    follower, spent, lost = None, [], 0
+    tracker, spent, lost = None, [], 0
     before = time.perf_counter()
     for image in images:
-        if follower is None:
-            follower = Follower(setup, image, live=True)
+        if tracker is None:
+            tracker = FrameTracker(scene, image, live=True)
         else:
-            lost += int(np.isnan(follower.see(image).markers.radii).sum())
+            lost += int(np.isnan(tracker.see(image).markers.radii).sum())
             spent.append(time.perf_counter() - before)
         before = time.perf_counter()
     times = 1000 * np.array(spent)

@@ -19,8 +19,8 @@ from rich.table import Table
 
 from geometry.arrays import FloatArray
 from tests.vision.disc_images import DiscImage, Edge
-from vision.discs.circle_proposals import propose
-from vision.discs.sub_pixel import KNOWN_RADIUS, Discs, fit_discs
+from vision.discs.circle_proposals import propose_circles
+from vision.discs.disc_fit import KNOWN_RADIUS, FittedDiscs, fit_discs
 from vision.frames.frame import GreyImage
 
 REPORT = Path("benchmarks/localisation.md")
@@ -116,7 +116,7 @@ def _measured(case: Case) -> tuple[str, ...]:
         wrong = (discs.centres - centres)[discs.found]
         errors.append(wrong)
         scores.append(wrong / _deviations(discs))
-        circles.append(_nearest(propose(picture, radii=(0.8 * radius, 1.2 * radius)), centres))
+        circles.append(_nearest(propose_circles(picture, radii=(0.8 * radius, 1.2 * radius)), centres))
     error, score, circle = (np.concatenate(part) for part in (errors, scores, circles))
     rms, bound = _rms(error), _bound(case)
     blur = np.hypot(case.image.blur, 12**-0.5)
@@ -222,7 +222,7 @@ def _nearest(circles: FloatArray, centres: FloatArray) -> FloatArray:
     return errors[best, each][away[best, each] < 3]
 
 
-def _deviations(discs: Discs) -> FloatArray:
+def _deviations(discs: FittedDiscs) -> FloatArray:
     return np.sqrt(np.diagonal(discs.covariances[discs.found], axis1=1, axis2=2))
 
 

@@ -13,7 +13,7 @@ from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.problem import Problem
 from vision.frames.frame import CapturedImage, Frames, Image
-from vision.rig.recording import Truth
+from vision.rig.recording import FrameTruth
 from vision.tracking.trajectories import Tracking
 
 ELEMENT = 1.0
@@ -63,7 +63,7 @@ class Score:
     overall: float
 
     @classmethod
-    def of(cls, tracking: Tracking, truths: Sequence[Truth]) -> "Score":
+    def of(cls, tracking: Tracking, truths: Sequence[FrameTruth]) -> "Score":
         """Compare what was tracked in a film with the truth of its frames."""
         first, last = truths[0], truths[-1]
         seen = tracking.visible

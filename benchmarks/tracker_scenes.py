@@ -26,15 +26,15 @@ from geometry.finger.design import Design
 from vision.calibration.camera import Camera
 from vision.calibration.camera_calibration import calibrate
 from vision.calibration.chessboard import Board
-from vision.discs.disc_detector import grey_of
+from vision.discs.disc_detector import luma_of
 from vision.rig.bench import Bench
 from vision.rig.boards import board_poses, board_scene
 from vision.rig.exposure import Exposure
 from vision.rig.motion import Motion
 from vision.rig.recording import Recording
 from vision.rig.render import render
-from vision.rig.view import default_camera, view
-from vision.tracking.scene import Setup
+from vision.rig.virtual_camera import default_camera, viewing_pose
+from vision.tracking.scene import FilmedScene
 from vision.tracking.tracker import track
 from vision.tracking.workspace import default_workspace
 
@@ -95,7 +95,7 @@ def calibrated(camera: Camera, exposure: Exposure, seed: int) -> Camera:
     scene = board_scene(BOARD)
     poses = board_poses(BOARD, camera, PHOTOGRAPHS, seed=seed)
     images = (
-        (str(number), grey_of(render(scene, camera, pose, exposure, seed=seed, frame=number)))
+        (str(number), luma_of(render(scene, camera, pose, exposure, seed=seed, frame=number)))
         for number, pose in enumerate(poses)
     )
     return calibrate(images, BOARD).camera
@@ -105,7 +105,7 @@ def random_recording(finger: Finger, camera: Camera, rng: np.random.Generator, s
     """A film of the finger in random circumstances."""
     workspace = default_workspace(finger.parameters)
     workspace = workspace.model_copy(update={"marker_plane": rng.uniform(0, 8)})
-    pose = view(
+    pose = viewing_pose(
         camera,
         workspace,
         tilt=rng.uniform(0, 5),
@@ -126,9 +126,9 @@ def random_recording(finger: Finger, camera: Camera, rng: np.random.Generator, s
 def scored(recording: Recording, camera: Camera) -> Score:
     """Track a film with a camera that is nearly the one that took it."""
     bench = recording.bench
-    setup = Setup(bench.parameters, bench.workspace, camera)
+    scene = FilmedScene(bench.parameters, bench.workspace, camera)
     pictures, truths = zip(*recording.frames(), strict=True)
-    return Score.of(track(film_of(pictures), setup), truths)
+    return Score.of(track(film_of(pictures), scene), truths)
 
 
 def _alone() -> None:

@@ -28,18 +28,18 @@ from geometry.errors import UserError
 from geometry.finger.design import Design
 from vision.discs.colour import DARK
 from vision.discs.colour_picker import pick_colour
-from vision.discs.disc_detector import METHODS, Method
+from vision.discs.disc_detector import METHODS, DetectionMethod
 from vision.frames.frame import Frames
 from vision.frames.video import open_frames
 from vision.rig.bench import BENCH, Bench
 from vision.rig.exposure import Exposure
 from vision.rig.motion import Motion
 from vision.rig.occluders import cable, cables
-from vision.rig.recorder import FILES, record
-from vision.rig.recording import Recording, Truth
+from vision.rig.recording import FrameTruth, Recording
+from vision.rig.recording_files import FILES, record
 from vision.rig.shapes import Shape, rectangle
-from vision.rig.view import default_camera, view
-from vision.tracking.scene import Setup
+from vision.rig.virtual_camera import default_camera, viewing_pose
+from vision.tracking.scene import FilmedScene
 from vision.tracking.tracker import track
 from vision.tracking.workspace import default_workspace
 
@@ -151,7 +151,7 @@ SHOWN = 8
 class Outcome(NamedTuple):
     """The scores of methods, or why there is none, and how many markers were hidden at rest or held."""
 
-    scores: Mapping[Method, Score | str]
+    scores: Mapping[DetectionMethod, Score | str]
     hidden: int
     count: int
 
@@ -182,7 +182,7 @@ def filmed(case: Case, finger: Finger, number: int) -> Recording:
         bench=Bench(finger.mesh, finger.parameters, workspace, case.paint),
         displacement=finger.displacement,
         camera=camera,
-        pose=view(camera, workspace, tilt=case.tilt, direction=direction, turn=case.turn + number),
+        pose=viewing_pose(camera, workspace, tilt=case.tilt, direction=direction, turn=case.turn + number),
         exposure=Exposure(**{"noise": 2.0} | dict(case.exposure)),
         motion=case.motion,
         seed=number,
@@ -190,24 +190,24 @@ def filmed(case: Case, finger: Finger, number: int) -> Recording:
     return replace(recording, occluders=case.hide(recording))
 
 
-def seen(case: Case, recording: Recording, methods: Sequence[Method] = METHODS) -> Outcome:
+def seen(case: Case, recording: Recording, methods: Sequence[DetectionMethod] = METHODS) -> Outcome:
     """What methods make of a film; one line where one refuses."""
-    scores: dict[Method, Score | str] = {}
+    scores: dict[DetectionMethod, Score | str] = {}
     with _film(case, recording) as (frames, truths):
         with frames() as film:
             first = next(iter(film)).image
         for method in methods:
-            setup = Setup(
+            scene = FilmedScene(
                 design=recording.bench.parameters,
                 workspace=recording.bench.workspace,
                 camera=recording.camera if case.fiducials else None,
                 colour=pick_colour(first, truths[0].pixels[0].tolist()) if case.picked else DARK,
                 method=method,
-                alone=not case.fiducials,
+                markers_only=not case.fiducials,
             )
             try:
                 with frames() as film:
-                    scores[method] = Score.of(track(film, setup), truths)
+                    scores[method] = Score.of(track(film, scene), truths)
             except UserError as error:
                 scores[method] = str(error)
     least = np.minimum(truths[0].seen, truths[-1].seen)
@@ -215,7 +215,7 @@ def seen(case: Case, recording: Recording, methods: Sequence[Method] = METHODS) 
 
 
 @contextmanager
-def _film(case: Case, recording: Recording) -> Iterator[tuple[Callable[[], Frames], Sequence[Truth]]]:
+def _film(case: Case, recording: Recording) -> Iterator[tuple[Callable[[], Frames], Sequence[FrameTruth]]]:
     """What opens the film, and its truth."""
     if not case.codec:
         pictures, truths = zip(*recording.frames(), strict=True)
@@ -243,7 +243,7 @@ def _row(outcomes: Sequence[Outcome]) -> list[str]:
     return [*precise[:2], str(hidden), *precise[2:], hough[0], *hough[2:5]]
 
 
-def _summary(outcomes: Sequence[Outcome], method: Method) -> list[str]:
+def _summary(outcomes: Sequence[Outcome], method: DetectionMethod) -> list[str]:
     """Error, worst, missed, swapped, invented, deviation, coverage; in a refused film all are missed."""
     scores = [outcome.scores[method] for outcome in outcomes]
     known = [score for score in scores if isinstance(score, Score)]

@@ -8,7 +8,7 @@ from compare.runtime.provenance import file_digest
 from geometry.finger.parameters import Parameters
 
 if TYPE_CHECKING:  # OpenCV comes with it, and `--help` has to be quick
-    from vision.tracking.scene import Setup
+    from vision.tracking.scene import FilmedScene
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Film:
     colour: str = "dark"
     method: Literal["precise", "hough"] = "precise"
 
-    def setup(self, design: Parameters) -> "Setup":
+    def scene(self, design: Parameters) -> "FilmedScene":
         """The filmed scene of a finger.
 
         Raises:
@@ -37,17 +37,17 @@ class Film:
         """
         from vision.calibration.camera_file import load_camera
         from vision.discs.colour import read_colour
-        from vision.tracking.scene import Setup
+        from vision.tracking.scene import FilmedScene
         from vision.tracking.workspace import default_workspace
         from vision.tracking.workspace_file import load_workspace
 
-        return Setup(
+        return FilmedScene(
             design=design,
             workspace=load_workspace(self.workspace) if self.workspace else default_workspace(design),
             camera=load_camera(self.camera) if self.camera else None,
             colour=read_colour(self.colour),
             method=self.method,
-            alone=self.workspace is None,
+            markers_only=self.workspace is None,
         )
 
     def provenance(self) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from geometry.arrays import FloatArray
 from vision.frames.frame import Frame
-from vision.tracking.frame_tracker import Sighting
+from vision.tracking.frame_tracker import FrameDetections
 
 
 class LiveLine:
@@ -31,13 +31,13 @@ class LiveLine:
         if self._live is not None:
             self._live.stop()
 
-    def __call__(self, frame: Frame, sighting: Sighting) -> None:
+    def __call__(self, frame: Frame, detections: FrameDetections) -> None:
         """Show a frame."""
         if self._live is None:
             return
         if self._start is None:
-            self._start = sighting.places
-        moved = (sighting.places - self._start).tolist()
-        seen = np.isfinite(sighting.markers.radii)
+            self._start = detections.places
+        moved = (detections.places - self._start).tolist()
+        seen = np.isfinite(detections.markers.radii)
         cells = [f"{u:+.2f},{v:+.2f}" if known else "–" for (u, v), known in zip(moved, seen, strict=True)]
         self._live.update(Text(f"{frame.time:8.2f} s  {'  '.join(cells)}", no_wrap=True, overflow="ellipsis"))

@@ -20,12 +20,12 @@ from vision.frames.pictures import write_picture
 from vision.frames.video import VideoWriter, open_frames
 from vision.measurements import write_measurements
 from vision.tracking.annotation import annotated
-from vision.tracking.frame_tracker import Sighting
+from vision.tracking.frame_tracker import FrameDetections
 from vision.tracking.tracker import track
 from vision.tracking.trajectories import Tracking
 
 Report = Callable[[float, str], None]
-Watch = Callable[[Frame, Sighting], None]
+Watch = Callable[[Frame, FrameDetections], None]
 
 
 def track_film(
@@ -50,33 +50,33 @@ def track_film(
     Raises:
         UserError: If the film does not show what it should.
     """
-    setup = film.setup(design)
-    kept: dict[str, tuple[Image, Sighting]] = {}
+    scene = film.scene(design)
+    kept: dict[str, tuple[Image, FrameDetections]] = {}
     with open_frames(film.source) as frames, ExitStack() as stack:
         writer = None
         if video:
             writer = stack.enter_context(VideoWriter(folder / "annotated.mp4", frames.size, frames.rate))
 
-        def see(frame: Frame, sighting: Sighting) -> None:
-            kept.setdefault("initial", (frame.image, sighting))
-            kept["final"] = (frame.image, sighting)
-            seen = int(np.isfinite(sighting.markers.radii).sum())
-            status = f"{seen} of {len(sighting.places)} markers"
+        def see(frame: Frame, detections: FrameDetections) -> None:
+            kept.setdefault("initial", (frame.image, detections))
+            kept["final"] = (frame.image, detections)
+            seen = int(np.isfinite(detections.markers.radii).sum())
+            status = f"{seen} of {len(detections.places)} markers"
             if writer is not None:
                 lines = [f"frame {frame.number}, {frame.time:.3f} s", status]
-                writer.write(annotated(frame.image, sighting, lines))
+                writer.write(annotated(frame.image, detections, lines))
             if watch is not None:
-                watch(frame, sighting)
+                watch(frame, detections)
             share = (frame.number + 1) / frames.count if frames.count else 0.0
             report(min(share, 1.0), f"frame {frame.number + 1}, {status}")
 
-        tracking = track(frames, setup, see)
+        tracking = track(frames, scene, see)
     observations = tracking.observations(_sentence(film, tracking))
     for name, end in (("initial", tracking.rest.initial), ("final", tracking.rest.final)):
-        image, sighting = kept[name]
-        ways = list(tracking.pixels.swapaxes(0, 1)) if name == "final" else []
+        image, detections = kept[name]
+        trajectories = list(tracking.pixels.swapaxes(0, 1)) if name == "final" else []
         lines = [f"{name}: frames {end.start} to {end.stop - 1} are at rest", *tracking.warnings]
-        write_picture(folder / f"{name}.png", annotated(image, sighting, lines, ways=ways))
+        write_picture(folder / f"{name}.png", annotated(image, detections, lines, trajectories=trajectories))
     write_measurements(folder / "observations.csv", observations)
     write_csv(folder / "tracks.csv", track_rows(tracking))
     write_json(folder / "track.json", track_summary(tracking, observations) | film.provenance())

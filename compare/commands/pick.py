@@ -39,7 +39,7 @@ def pick(
 
     Prints the colour as --colour takes it, and writes a picture in which the pixels that have it are magenta.
     """
-    from vision.discs.circle_proposals import highlighted, propose
+    from vision.discs.circle_proposals import highlight_colour, propose_circles
     from vision.discs.colour import read_colour
     from vision.discs.colour_picker import pick_colour
     from vision.frames.pictures import SUFFIXES, write_picture
@@ -56,8 +56,8 @@ def pick(
         if image is None:
             raise UserError(f"{source} has no frame {frame}")
     chosen = read_colour(colour) if colour is not None else pick_colour(image, place)
-    circles = propose(image, chosen, radii=(limits[0], limits[1])) if limits else None
-    picture, share = highlighted(image, chosen, circles, radius=limits[1] if limits else 25.0)
+    circles = propose_circles(image, chosen, radii=(limits[0], limits[1])) if limits else None
+    picture, share = highlight_colour(image, chosen, circles, radius=limits[1] if limits else 25.0)
     write_picture(out, picture)
     print(f"--colour {chosen}")
     print(f"{share:.2%} of the image" + ("" if circles is None else f", {len(circles)} circles"))

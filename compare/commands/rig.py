@@ -51,8 +51,8 @@ def rig(
     from vision.rig.bench import Bench
     from vision.rig.boards import board_poses, board_scene
     from vision.rig.occluders import cables
-    from vision.rig.recorder import check_codec, photograph, record
     from vision.rig.recording import Recording
+    from vision.rig.recording_files import check_codec, photograph, record
     from vision.tracking.workspace import default_workspace
 
     design, mesh_settings = finger.read(options.preset)

@@ -45,7 +45,7 @@ class CameraOptions:
     def read(self, workspace: Workspace) -> "tuple[Camera, Pose]":
         """The camera, and where it has the workspace."""
         from vision.calibration.camera_file import load_camera
-        from vision.rig.view import default_camera, view
+        from vision.rig.virtual_camera import default_camera, viewing_pose
 
         if not (found := re.fullmatch(r"(\d{2,4})x(\d{2,4})", self.size.strip())):
             raise UserError(f"--size {self.size}: give width and height in pixels, such as 1280x720")
@@ -57,7 +57,7 @@ class CameraOptions:
                 f"frames of {camera.width}x{camera.height} pixels; the rig makes up to "
                 f"{MOST_PIXELS // 1_000_000} million"
             )
-        pose = view(camera, workspace, tilt=self.tilt, direction=self.tilt_direction, turn=self.turn)
+        pose = viewing_pose(camera, workspace, tilt=self.tilt, direction=self.tilt_direction, turn=self.turn)
         return camera, pose
 
 

@@ -15,7 +15,7 @@ from vision.rig.exposure import Exposure
 from vision.rig.motion import Motion
 from vision.rig.occluders import cable
 from vision.rig.recording import Recording
-from vision.rig.view import default_camera, view
+from vision.rig.virtual_camera import default_camera, viewing_pose
 from vision.tracking.workspace import default_workspace
 
 DESIGN = Design()
@@ -39,7 +39,7 @@ def recording(*, hidden: int | None = None, tilt: float = 5.0) -> Recording:
         bench=Bench(mesh, DESIGN, WORKSPACE),
         displacement=bent(mesh.points),
         camera=CAMERA,
-        pose=view(CAMERA, WORKSPACE, tilt=tilt),
+        pose=viewing_pose(CAMERA, WORKSPACE, tilt=tilt),
         exposure=Exposure(noise=2),
         motion=Motion(rest=3, moving=0, held=3),
         occluders=lambda frame: cover if frame >= 3 else [],

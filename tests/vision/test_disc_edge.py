@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from geometry.errors import ShapeError, UserError
 from tests.vision.disc_images import DiscImage, Edge
-from vision.discs.sub_pixel import Discs, fit_discs
+from vision.discs.disc_fit import FittedDiscs, fit_discs
 
 COUNT = 60
 
@@ -40,14 +40,14 @@ def guessed(centres: np.ndarray, radius: float, *, off: float = 0.6) -> np.ndarr
 
 def measured(
     image: DiscImage, *, noise: float = 2.0, off: float = 0.6, **options
-) -> tuple[Discs, np.ndarray]:
+) -> tuple[FittedDiscs, np.ndarray]:
     """What was found of `COUNT` such discs, and the errors."""
     picture, centres = sheet(scattered(image), noise=noise)
     discs = fit_discs(picture, guessed(centres, image.radius, off=off), **options)
     return discs, discs.centres - centres
 
 
-def assert_covered(discs: Discs, errors: np.ndarray) -> None:
+def assert_covered(discs: FittedDiscs, errors: np.ndarray) -> None:
     """The errors are what the covariances say, as far as their number can tell (99.8 % of cases)."""
     assert discs.found.all()
     scores = np.einsum("ni,nij,nj->", errors, np.linalg.inv(discs.covariances), errors)

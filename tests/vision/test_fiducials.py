@@ -8,7 +8,7 @@ from geometry.errors import UserError
 from geometry.finger.parameters import Parameters
 from tests.vision.fingers import MARKERS
 from vision.calibration.camera import Camera, Pose
-from vision.tracking.fiducials import identify_fiducials
+from vision.tracking.fiducial_matching import identify_fiducials
 from vision.tracking.workspace import Workspace, default_workspace
 
 CAMERA = Camera(1280, 720, 1200.0, 1200.0, 640.0, 360.0)

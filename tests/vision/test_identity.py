@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from tests.vision.fingers import MARKERS, PRESSED, pressed
-from vision.tracking.data_association import NOISE, filled, identify, moved, placed
+from vision.tracking.data_association import (
+    NOISE,
+    associate_markers,
+    rest_covariances,
+    step_covariances,
+    with_predictions,
+)
 
 FRONT = MARKERS["front"]
 
@@ -16,7 +22,7 @@ def names_after(step, *, layout="front", hidden=(), false=(), start=None, seed=0
     found = np.concatenate([(points + step)[seen], np.reshape(false, (-1, 2))])
     label = np.concatenate([seen, np.full(len(found) - len(seen), -2)])
     order = np.random.default_rng(seed).permutation(len(found))
-    chosen = identify(found[order], points, moved(MARKERS[layout]))
+    chosen = associate_markers(found[order], points, step_covariances(MARKERS[layout]))
     return np.where(chosen >= 0, label[order][chosen], -1)
 
 
@@ -55,7 +61,7 @@ def test_markers_that_were_hidden_in_a_jump_are_mostly_named_in_the_next_frame()
         hidden = generator.choice(9, 3, replace=False)
         first = names_after(step, layout="joints", hidden=hidden, start=start, seed=case)
         known = np.where((first >= 0)[:, None], start + step - MARKERS["joints"], np.nan)
-        expected = MARKERS["joints"] + filled(MARKERS["joints"], known)
+        expected = MARKERS["joints"] + with_predictions(MARKERS["joints"], known)
         names = names_after(start + step - expected, layout="joints", start=expected, seed=case)
         assert ((names == np.arange(9)) | (names == -1)).all()
         before, after = before + (first >= 0).sum(), after + (names >= 0).sum()
@@ -87,13 +93,15 @@ def test_what_moves_with_the_finger_is_told_from_what_lies_still():
 
 
 def test_no_detection_means_no_marker():
-    assert (identify(np.empty((0, 2)), FRONT, moved(FRONT)) == -1).all()
+    assert (associate_markers(np.empty((0, 2)), FRONT, step_covariances(FRONT)) == -1).all()
 
 
 def test_at_rest_markers_are_named_within_a_millimetre_and_a_degree_and_not_at_another_place():
     near = FRONT @ np.array([[1, 0.017], [-0.017, 1]]) + (1, -1)
-    np.testing.assert_array_equal(identify(near[::-1], FRONT, placed(FRONT)), np.arange(9)[::-1])
-    assert (identify(FRONT + np.array([0, 12]), FRONT, placed(FRONT)) == -1).all()
+    np.testing.assert_array_equal(
+        associate_markers(near[::-1], FRONT, rest_covariances(FRONT)), np.arange(9)[::-1]
+    )
+    assert (associate_markers(FRONT + np.array([0, 12]), FRONT, rest_covariances(FRONT)) == -1).all()
 
 
 def test_hidden_markers_are_expected_near_where_they_are():
@@ -102,11 +110,13 @@ def test_hidden_markers_are_expected_near_where_they_are():
         whole = pressed("front", generator)
         shown = whole.copy()
         shown[[3, 6]] = np.nan
-        np.testing.assert_allclose(filled(FRONT, shown), whole, rtol=0, atol=1.2)
-        np.testing.assert_array_equal(filled(FRONT, shown)[[0, 8]], whole[[0, 8]])
+        np.testing.assert_allclose(with_predictions(FRONT, shown), whole, rtol=0, atol=1.2)
+        np.testing.assert_array_equal(with_predictions(FRONT, shown)[[0, 8]], whole[[0, 8]])
 
 
 def test_covariances_are_positive():
     for layout in MARKERS.values():
-        for field in np.concatenate([moved(layout).reshape(-1, 9, 9), placed(layout)[0]]):
+        for field in np.concatenate(
+            [step_covariances(layout).reshape(-1, 9, 9), rest_covariances(layout)[0]]
+        ):
             assert np.linalg.eigvalsh(field + NOISE**2 * np.eye(9)).min() > NOISE**2 / 2

@@ -10,10 +10,10 @@ from tests.vision.chessboards import projected
 from tests.vision.fingers import MARKERS, PRESSED
 from tests.vision.test_fiducials import pose_of
 from vision.calibration.camera import Camera
-from vision.discs.disc_detector import Spots
+from vision.discs.disc_detector import DiscDetections
 from vision.rig.shapes import centroid, circle, closed
 from vision.tracking.plane_fit import camera_plane, homography_plane, similarity_plane
-from vision.tracking.scene import Fiducials, Setup
+from vision.tracking.scene import FilmedScene, FoundFiducials
 from vision.tracking.workspace import default_workspace
 
 CAMERA = Camera(1280, 720, 1200.0, 1195.0, 652.0, 349.0, distortion=(-0.12, 0.05, 1e-3, -5e-4, 0.0))
@@ -96,14 +96,14 @@ def views():
 @pytest.mark.parametrize(("name", "camera", "fit"), views())
 def test_slopes_are_those_of_differences(name, camera, fit):
     plane = fit(seen(FIDUCIALS, camera))
-    slopes = plane.view.slopes(AFTER, plane.parameters)
+    slopes = plane.projection.jacobians(AFTER, plane.parameters)
     for axis in range(2):
         step = 1e-4 * np.eye(2)[axis]
         difference = (plane.pixels(AFTER + step) - plane.pixels(AFTER - step)) / 2e-4
         np.testing.assert_allclose(slopes.point[:, :, axis], difference, rtol=0, atol=1e-5)
     for number in range(6 if name == "camera" else len(plane.parameters)):  # the intrinsics: see test_camera
         step = 1e-6 * np.eye(len(plane.parameters))[number] * max(1, abs(plane.parameters[number]))
-        up, down = (plane.view.pixels(AFTER, plane.parameters + sign * step) for sign in (1, -1))
+        up, down = (plane.projection.pixels(AFTER, plane.parameters + sign * step) for sign in (1, -1))
         difference = (up - down) / (2 * step[number])
         np.testing.assert_allclose(slopes.parameters[:, :, number], difference, rtol=1e-4, atol=1e-3)
 
@@ -169,9 +169,9 @@ def test_a_lens_moves_the_middles_of_discs_which_is_undone():
 
 
 def test_the_plane_of_fiducials_is_that_of_their_discs():
-    setup = Setup(Parameters(), default_workspace(Parameters()), CAMERA)
-    spots = Spots(pictured(FIDUCIALS, 2.0, CAMERA), noise(7), np.full(7, 16.0), np.full(7, 180.0))
-    plane = setup.plane(Fiducials(np.arange(7), spots))
+    scene = FilmedScene(Parameters(), default_workspace(Parameters()), CAMERA)
+    discs = DiscDetections(pictured(FIDUCIALS, 2.0, CAMERA), noise(7), np.full(7, 16.0), np.full(7, 180.0))
+    plane = scene.plane(FoundFiducials(np.arange(7), discs))
     assert plane.residual < 1e-4
     np.testing.assert_allclose(
         plane.points(seen(AFTER)) - plane.points(seen(BEFORE)), AFTER - BEFORE, atol=1e-4

@@ -7,12 +7,12 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from tests.vision.dots import Dots, dots, draw_disc, exposed, step
-from vision.discs.circle_proposals import highlighted, propose
+from vision.discs.circle_proposals import highlight_colour, propose_circles
 from vision.discs.colour import DARK, ColourRange
 from vision.rig.bench import Bench
 from vision.rig.exposure import Exposure
 from vision.rig.render import render
-from vision.rig.view import default_camera, view
+from vision.rig.virtual_camera import default_camera, viewing_pose
 from vision.tracking.workspace import default_workspace
 
 
@@ -40,7 +40,7 @@ def test_every_disc_is_proposed(radius, other, grey):
     """Noise 6, blur 1.5, shading 30 % if not said otherwise; sixteen discs."""
     scene = dots(radius, **other)
     image = scene.image[:, :, 1] if grey else scene.image
-    found = propose(image, radii=(0.7 * radius, 1.3 * min(2.5 * radius, 25)))
+    found = propose_circles(image, radii=(0.7 * radius, 1.3 * min(2.5 * radius, 25)))
     assert missed(scene, found) == 0
     assert len(found) < 45
     if radius > 5:
@@ -51,14 +51,14 @@ def test_every_disc_is_proposed(radius, other, grey):
 def test_markers_on_a_thin_wall_before_a_dark_background_are_proposed():
     """Two pixels of wall, blurred by 1.5, part marker and background."""
     scene = dots(7.6, background=90.0)
-    found = propose(scene.image, radii=(5, 10))
+    found = propose_circles(scene.image, radii=(5, 10))
     assert missed(Dots(scene.image, scene.discs[:9]), found) == 0
 
 
 def test_coloured_discs_are_proposed_alone():
     """Red ones by their colour: not the seven dark ones."""
     scene = dots(7.6, colour=(40, 40, 200))
-    found = propose(scene.image, ColourRange((20, 25, 5), (80, 90, 80)), radii=(5, 11))
+    found = propose_circles(scene.image, ColourRange((20, 25, 5), (80, 90, 80)), radii=(5, 11))
     assert missed(Dots(scene.image, scene.discs[:9]), found) == 0
     assert len(found) == 9
 
@@ -71,12 +71,12 @@ def test_all_markers_and_fiducials_of_the_rig_are_proposed(paint, monochrome, co
     bench = Bench(coarse_mesh, Design(), workspace, paint=paint)
     x = coarse_mesh.points[:, 0] / 90
     pressed = -10 * np.column_stack([0.2 * x**2, x**2])
-    pose = view(camera, workspace, tilt=5.0)
+    pose = viewing_pose(camera, workspace, tilt=5.0)
     exposure = Exposure(noise=6, blur=1.5, gradient=0.3, monochrome=monochrome)
     image = render(bench.scene(pressed), camera, pose, exposure)
     fiducials = np.column_stack([workspace.points, np.zeros(7)])
     for points, radius in ((bench.markers(pressed), 7.6), (fiducials, 19.0)):  # pixels
-        found = propose(image, radii=(0.7 * radius, 1.3 * radius))
+        found = propose_circles(image, radii=(0.7 * radius, 1.3 * radius))
         apart = np.linalg.norm(found[:, None, :2] - camera.project(points, pose), axis=2)
         assert apart.min(axis=0).max() < 3
         assert len(found) <= len(points) + 3
@@ -86,9 +86,9 @@ def test_a_window_gives_what_the_whole_image_gives_there():
     scene = dots(7.6)
     x, y, _ = scene.discs[4]
     window = (int(x) - 40, int(y) - 30, int(x) + 40, int(y) + 30)
-    found = propose(scene.image, radii=(5, 10), window=window)
+    found = propose_circles(scene.image, radii=(5, 10), window=window)
     assert np.abs(found[0] - scene.discs[4]).max() < 2
-    whole = propose(scene.image, radii=(5, 10))
+    whole = propose_circles(scene.image, radii=(5, 10))
     assert np.abs(whole - found[0]).max(axis=1).min() <= 1
 
 
@@ -96,12 +96,12 @@ def test_a_window_gives_what_the_whole_image_gives_there():
     "window", [(-50, -50, 10, 10), (1270, 0, 1300, 2), (2000, 0, 2100, 90), (9, 9, 9, 9)]
 )
 def test_a_window_beyond_the_image_gives_nothing(window):
-    assert propose(dots(7.6).image, radii=(5, 10), window=window).shape == (0, 3)
+    assert propose_circles(dots(7.6).image, radii=(5, 10), window=window).shape == (0, 3)
 
 
 @pytest.mark.parametrize(("shape", "level"), [((200, 300), 128), ((200, 300, 3), 0), ((3, 3), 255)])
 def test_an_empty_image_gives_nothing(shape, level):
-    assert propose(np.full(shape, level, np.uint8), radii=(4, 25)).shape == (0, 3)
+    assert propose_circles(np.full(shape, level, np.uint8), radii=(4, 25)).shape == (0, 3)
 
 
 @pytest.mark.parametrize(("level", "hidden"), [(215, 5.0), (120, 5.0), (45, 2.5)])
@@ -115,7 +115,7 @@ def test_a_partly_hidden_disc_is_proposed(level, hidden, turn):
     angle = np.deg2rad(turn)
     beyond = (columns - disc[0]) * np.cos(angle) + (rows - disc[1]) * np.sin(angle) - (7.6 - hidden)
     canvas += step(beyond, 1.0)[:, :, None] * (level - canvas)
-    found = propose(exposed(canvas, shading=0.1, noise=3.0, seed=turn), radii=(5.3, 9.9))
+    found = propose_circles(exposed(canvas, shading=0.1, noise=3.0, seed=turn), radii=(5.3, 9.9))
     assert np.hypot(*(found[:, :2] - disc[:2]).T).min() < 3
 
 
@@ -124,7 +124,7 @@ def test_discs_that_touch_are_told_apart_and_none_is_proposed_twice():
     discs = np.array([(50.0, 60.0, 10.0), (71.0, 60.0, 10.0)])
     for disc in discs:
         draw_disc(canvas, disc, (40, 40, 40), 0.8)
-    found = propose(canvas.astype(np.uint8), DARK, radii=(6, 14))
+    found = propose_circles(canvas.astype(np.uint8), DARK, radii=(6, 14))
     assert len(found) == 2
     assert np.abs(found[np.argsort(found[:, 0])] - discs).max() < 2
 
@@ -132,12 +132,14 @@ def test_discs_that_touch_are_told_apart_and_none_is_proposed_twice():
 @pytest.mark.parametrize("radii", [(0, 5), (9, 5), (3, np.inf)])
 def test_impossible_radii_are_refused(radii):
     with pytest.raises(UserError, match="they must go from above 0 upwards"):
-        propose(np.zeros((20, 20), np.uint8), radii=radii)
+        propose_circles(np.zeros((20, 20), np.uint8), radii=radii)
 
 
 def test_the_picture_to_check_by_eye_shows_what_has_the_colour_and_the_circles():
     scene = dots(7.6, noise=0.0, blur=0.5, shading=0.0, size=(640, 360))
-    picture, share = highlighted(scene.image, ColourRange((0, -128, -128), (40, 127, 127)), scene.discs[:1])
+    picture, share = highlight_colour(
+        scene.image, ColourRange((0, -128, -128), (40, 127, 127)), scene.discs[:1]
+    )
     magenta = (picture == (200, 0, 200)).all(axis=2)
     assert magenta.mean() == pytest.approx(share)
     assert share == pytest.approx(np.pi * (scene.discs[:, 2] ** 2).sum() / (640 * 360), rel=0.05)

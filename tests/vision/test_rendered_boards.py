@@ -9,7 +9,7 @@ from vision.calibration.chessboard import Board
 from vision.rig.boards import board_poses, board_scene
 from vision.rig.exposure import Exposure
 from vision.rig.render import render
-from vision.rig.view import default_camera
+from vision.rig.virtual_camera import default_camera
 
 CAMERA = default_camera(640, 360)
 EXPOSURE = Exposure(monochrome=True, blur=0.8, noise=2.0)

@@ -5,7 +5,7 @@ import pytest
 
 from geometry.errors import UserError
 from tests.vision.fingers import MARKERS, PRESSED
-from vision.tracking.rest_detection import Rest, find_rest
+from vision.tracking.rest_detection import RestIntervals, find_rest_intervals
 
 WHOLE = np.array(PRESSED["front"])[0]
 
@@ -22,7 +22,7 @@ RAMP = np.concatenate([np.zeros(12), np.linspace(0, 1, 30)[1:-1], np.ones(20)])
 @pytest.mark.parametrize("noise", [0.0, 0.002, 0.01, 0.05])
 @pytest.mark.parametrize("seed", range(5))
 def test_rest_is_found_to_the_frame_or_two_however_noisy(noise, seed):
-    rest = find_rest(film(RAMP, noise=noise, seed=seed))
+    rest = find_rest_intervals(film(RAMP, noise=noise, seed=seed))
     assert 11 <= rest.initial.stop <= 13
     assert 39 <= rest.final.start <= 41
     assert (rest.initial.start, rest.final.stop) == (0, 60)
@@ -31,24 +31,24 @@ def test_rest_is_found_to_the_frame_or_two_however_noisy(noise, seed):
 def test_hidden_markers_do_not_matter():
     positions = film(RAMP, noise=0.002)
     positions[np.random.default_rng(1).uniform(size=(60, 9)) < 0.3] = np.nan
-    rest = find_rest(positions)
+    rest = find_rest_intervals(positions)
     assert (rest.initial.stop, rest.final.start) == (12, 40)
 
 
 def test_a_finger_that_swings_rests_when_it_has_stopped():
     swing = 1 + 0.2 * np.exp(-np.arange(60) / 8) * np.cos(np.arange(60))
-    rest = find_rest(film([*np.zeros(10), *np.linspace(0, 1, 10), *swing, *np.ones(10)]))
+    rest = find_rest_intervals(film([*np.zeros(10), *np.linspace(0, 1, 10), *swing, *np.ones(10)]))
     assert rest.final.start > 45
 
 
 def test_one_stray_frame_is_no_motion():
     positions = film(RAMP, noise=0.002)
     positions[5] += 1
-    assert find_rest(positions).initial == range(12)
+    assert find_rest_intervals(positions).initial == range(12)
 
 
 def test_two_pictures_are_before_and_after():
-    assert find_rest(film([0, 1])) == Rest(range(1), range(1, 2))
+    assert find_rest_intervals(film([0, 1])) == RestIntervals(range(1), range(1, 2))
 
 
 @pytest.mark.parametrize(
@@ -63,5 +63,5 @@ def test_two_pictures_are_before_and_after():
 )
 def test_films_that_show_no_displacement_are_one_line(shares, said):
     with pytest.raises(UserError, match=said) as caught:
-        find_rest(film(shares, noise=0.003))
+        find_rest_intervals(film(shares, noise=0.003))
     assert "\n" not in str(caught.value)

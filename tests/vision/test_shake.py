@@ -8,32 +8,32 @@ from geometry.errors import UserError
 from geometry.finger.markers import marker_positions
 from tests.vision.films import CAMERA, DESIGN, WORKSPACE, bent, frames_of, images
 from vision.calibration.camera import Pose
-from vision.discs.disc_detector import Spots
-from vision.rig.view import view
-from vision.tracking.camera_motion import find_shake
-from vision.tracking.scene import Setup
+from vision.discs.disc_detector import DiscDetections
+from vision.rig.virtual_camera import viewing_pose
+from vision.tracking.camera_motion import find_camera_motion
+from vision.tracking.scene import FilmedScene
 from vision.tracking.tracker import track
 
 MARKERS = marker_positions(DESIGN)
-SETUP = Setup(design=DESIGN, workspace=WORKSPACE, camera=CAMERA)
+SCENE = FilmedScene(design=DESIGN, workspace=WORKSPACE, camera=CAMERA)
 NOISE = 0.01
-POSE = view(CAMERA, WORKSPACE, tilt=5)
+POSE = viewing_pose(CAMERA, WORKSPACE, tilt=5)
 NUDGED = Pose(POSE.rotation + np.array([3e-4, -2e-4, 5e-4]), POSE.translation + np.array([0.05, -0.04, 0.1]))
 
 
-def spots(points, pose, rng, *, hidden=()):
+def discs(points, pose, rng, *, hidden=()):
     """Discs where a camera with noise sees points of the plane (n, 2), mm; nan for hidden ones."""
     pixels = CAMERA.project(np.column_stack([points, np.zeros(len(points))]), pose)
     pixels += rng.normal(scale=NOISE, size=pixels.shape)
     covariances = np.tile(NOISE**2 * np.eye(2), (len(points), 1, 1))
     radii = np.full(len(points), 8.0)
     pixels[list(hidden)] = covariances[list(hidden)] = radii[list(hidden)] = np.nan
-    return Spots(pixels, covariances, radii, np.full(len(points), 100.0))
+    return DiscDetections(pixels, covariances, radii, np.full(len(points), 100.0))
 
 
 def shaken(rng, after, **changes):
-    return find_shake(
-        SETUP, spots(WORKSPACE.points, POSE, rng), spots(WORKSPACE.points, after, rng, **changes)
+    return find_camera_motion(
+        SCENE, discs(WORKSPACE.points, POSE, rng), discs(WORKSPACE.points, after, rng, **changes)
     )
 
 
@@ -45,7 +45,7 @@ def test_noise_is_no_way_of_the_camera():
 
 def test_a_nudge_is_undone_and_what_is_left_is_as_large_as_the_standard_deviations_say():
     rng = np.random.default_rng(2)
-    exact = spots(MARKERS, POSE, rng)._replace(covariances=np.zeros((len(MARKERS), 2, 2)))
+    exact = discs(MARKERS, POSE, rng)._replace(covariances=np.zeros((len(MARKERS), 2, 2)))
     truth = CAMERA.project(np.column_stack([MARKERS, np.zeros(len(MARKERS))]), POSE)
     there = CAMERA.project(np.column_stack([MARKERS, np.zeros(len(MARKERS))]), NUDGED)
     assert np.linalg.norm(there - truth, axis=1).min() > 20 * NOISE
@@ -53,7 +53,7 @@ def test_a_nudge_is_undone_and_what_is_left_is_as_large_as_the_standard_deviatio
     for _ in range(100):
         shake = shaken(rng, NUDGED)
         assert shake.planes is not None
-        assert shake.way > 20 * NOISE
+        assert shake.shift > 20 * NOISE
         undone = shake.undone(exact._replace(centres=there))
         variances = np.diagonal(undone.covariances, axis1=1, axis2=2)
         squares.append(((undone.centres - truth) ** 2 / variances).mean())
@@ -64,7 +64,7 @@ def test_too_few_fiducials_tell_of_a_nudge_but_do_not_undo_it():
     rng = np.random.default_rng(3)
     shake = shaken(rng, NUDGED, hidden=range(len(WORKSPACE.points) - 3))
     assert shake.planes is None
-    assert shake.way > 20 * NOISE
+    assert shake.shift > 20 * NOISE
 
 
 def test_no_fiducial_where_it_was_is_an_error():
@@ -76,9 +76,9 @@ def test_a_film_whose_camera_was_nudged_measures_the_same_with_a_warning():
     start, end = images()[:3], images()[3:]
     turn = cv2.getRotationMatrix2D((640, 360), 0.1, 1.0) + np.array([[0, 0, 1.3], [0, 0, -0.8]])
     nudged = [cv2.warpAffine(image, turn, (1280, 720), flags=cv2.INTER_LANCZOS4) for image in end]
-    tracking = track(frames_of([*start, *nudged]), SETUP)
+    tracking = track(frames_of([*start, *nudged]), SCENE)
     assert any("the camera was not at rest, which they undo" in line for line in tracking.warnings)
     errors = tracking.observations("rig").displacements - bent(MARKERS)
     assert np.abs(errors).sum(axis=1).mean() < 0.02  # 0.3 mm if it is not undone
-    still = track(frames_of(images()), SETUP)
+    still = track(frames_of(images()), SCENE)
     assert not any("not at rest" in line for line in still.warnings)

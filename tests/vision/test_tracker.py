@@ -13,7 +13,7 @@ from tests.vision.films import CAMERA, DESIGN, WORKSPACE, bent, frames_of, image
 from vision.calibration.camera import Camera
 from vision.rig.motion import Motion
 from vision.rig.occluders import cables
-from vision.tracking.scene import Setup
+from vision.tracking.scene import FilmedScene
 from vision.tracking.tracker import track
 from vision.tracking.workspace import Workspace
 
@@ -23,7 +23,8 @@ TRUE = bent(MARKERS)
 
 def tracked(pictures, **changes):
     return track(
-        frames_of(pictures), Setup(**{"design": DESIGN, "workspace": WORKSPACE, "camera": CAMERA} | changes)
+        frames_of(pictures),
+        FilmedScene(**{"design": DESIGN, "workspace": WORKSPACE, "camera": CAMERA} | changes),
     )
 
 
@@ -212,7 +213,7 @@ def without_fiducials(turns=0):
 
 @pytest.mark.parametrize("turns", [0, 1, 2, 3])
 def test_without_fiducials_the_markers_give_the_plane_and_their_motion_the_way_up(turns):
-    tracking = tracked(without_fiducials(turns), camera=None, alone=True)
+    tracking = tracked(without_fiducials(turns), camera=None, markers_only=True)
     observations = tracking.observations("rig")
     assert observations.visible.sum() >= 7  # a jump of 10 mm is harder to follow from the wrong end
     assert error_of(observations) < 0.3  # the lens and a tilt of 5 degrees are not undone
@@ -228,4 +229,4 @@ def test_without_fiducials_and_markers_there_is_one_line():
     with pytest.raises(
         UserError, match="neither the fiducials nor the markers can be made out among 0 discs"
     ):
-        tracked(blank, camera=None, alone=True)
+        tracked(blank, camera=None, markers_only=True)

@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from vision.discs.disc_detector import FLOOR, Spots
-from vision.tracking.trajectories import mean_spots
+from vision.discs.disc_detector import FLOOR, DiscDetections
+from vision.tracking.trajectories import mean_detections
 
 DISCS, REPEATS = 9, 200
 DEVIATION = 0.01
@@ -16,7 +16,7 @@ DEVIATION = 0.01
 def squares(errors):
     """Mean square of the means' errors over their variances; errors of the frames (f, n, 2)."""
     frames = [
-        Spots(
+        DiscDetections(
             centres=100 + DEVIATION * frame,
             covariances=np.repeat(DEVIATION**2 * np.eye(2)[None], len(frame), axis=0),
             radii=8.0 + 0 * frame[:, 0],
@@ -24,7 +24,7 @@ def squares(errors):
         )
         for frame in errors
     ]
-    mean = mean_spots(frames, "precise")
+    mean = mean_detections(frames, "precise")
     variances = np.diagonal(mean.covariances, axis1=1, axis2=2)
     assert (variances > FLOOR["precise"] ** 2).all()
     return ((mean.centres - 100) ** 2 / variances).mean()
@@ -89,14 +89,14 @@ def test_a_disc_that_scatters_more_than_the_others_has_a_larger_standard_deviati
     errors = rng.normal(size=(12, DISCS, 2))
     errors[:, 0] *= 4
     frames = [
-        Spots(
+        DiscDetections(
             100 + DEVIATION * frame,
             np.tile(DEVIATION**2 * np.eye(2), (DISCS, 1, 1)),
             *np.full((2, DISCS), 8.0),
         )
         for frame in errors
     ]
-    deviations = np.sqrt(np.diagonal(mean_spots(frames, "precise").covariances, axis1=1, axis2=2)).mean(
+    deviations = np.sqrt(np.diagonal(mean_detections(frames, "precise").covariances, axis1=1, axis2=2)).mean(
         axis=1
     )
     assert deviations[0] > 2.5 * deviations[1:].max()

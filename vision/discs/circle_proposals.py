@@ -16,7 +16,7 @@ from geometry.errors import UserError
 from vision.discs.colour import DARK, Colour
 from vision.frames.frame import Image
 
-Window = tuple[int, int, int, int]
+PixelBox = tuple[int, int, int, int]
 """x0, y0, x1, y1, pixels; x1 and y1 are outside."""
 
 VOTES = (5.0, 8.0)
@@ -27,12 +27,12 @@ LEAST_FILL = 0.4
 """Share of the colour within a circle minus that around it: 1 for a whole marker, about 0 for a corner."""
 
 
-def propose(
+def propose_circles(
     image: Image,
     colour: Colour = DARK,
     *,
     radii: tuple[float, float],
-    window: Window | None = None,
+    window: PixelBox | None = None,
 ) -> FloatArray:
     """Circles that may be markers.
 
@@ -78,7 +78,7 @@ def propose(
     return found[order][_first_of_overlapping(found[order])] + (x0, y0, 0)
 
 
-def highlighted(
+def highlight_colour(
     image: Image, colour: Colour, circles: FloatArray | None = None, *, radius: float = 25.0
 ) -> tuple[Image, float]:
     """A picture to check a colour by eye, and the share of the image that has it.

@@ -7,13 +7,13 @@ import cv2
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
-from vision.discs.circle_proposals import Window, propose
+from vision.discs.circle_proposals import PixelBox, propose_circles
 from vision.discs.colour import Colour
-from vision.discs.sub_pixel import fit_discs
+from vision.discs.disc_fit import fit_discs
 from vision.frames.frame import GreyImage, Image
 
-Method = Literal["precise", "hough"]
-METHODS: tuple[Method, ...] = ("precise", "hough")
+DetectionMethod = Literal["precise", "hough"]
+METHODS: tuple[DetectionMethod, ...] = ("precise", "hough")
 
 FLOOR = {"precise": 0.0005, "hough": 0.45}
 """Standard deviation of what a mean over frames keeps of the error of a coordinate, pixels. Fits: as seen on
@@ -24,7 +24,7 @@ REACH = 0.8
 """How far from its guess a circle is looked for, in radii."""
 
 
-class Spots(NamedTuple):
+class DiscDetections(NamedTuple):
     """Discs.
 
     Attributes:
@@ -40,80 +40,84 @@ class Spots(NamedTuple):
     contrasts: FloatArray
 
     @staticmethod
-    def none() -> "Spots":
+    def none() -> "DiscDetections":
         """No disc."""
-        return Spots(np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0), np.empty(0))
+        return DiscDetections(np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0), np.empty(0))
 
-    def where(self, kept: BoolArray | IntArray) -> "Spots":
+    def where(self, kept: BoolArray | IntArray) -> "DiscDetections":
         """Some of them."""
-        return Spots(*(part[kept] for part in self))
+        return DiscDetections(*(part[kept] for part in self))
 
-    def numbered(self, discs: IntArray) -> "Spots":
+    def numbered(self, discs: IntArray) -> "DiscDetections":
         """The disc with each of the numbers `discs`; nan for the number -1."""
         known = np.where(discs >= 0, 1.0, np.nan)
         if not len(self.radii):
-            return Spots(np.full((len(discs), 2), np.nan), np.full((len(discs), 2, 2), np.nan), known, known)
+            return DiscDetections(
+                np.full((len(discs), 2), np.nan), np.full((len(discs), 2, 2), np.nan), known, known
+            )
         centres, covariances, radii, contrasts = (part[discs] for part in self)
-        return Spots(
+        return DiscDetections(
             centres * known[:, None], covariances * known[:, None, None], radii * known, contrasts * known
         )
 
-    def together(self, others: "Spots") -> "Spots":
+    def together(self, others: "DiscDetections") -> "DiscDetections":
         """These, and those of the others that are not among them."""
         away = np.linalg.norm(others.centres[:, None] - self.centres, axis=2)
         new = others.where((away > others.radii[:, None]).all(axis=1))
-        return Spots(*(np.concatenate(parts) for parts in zip(self, new, strict=True)))
+        return DiscDetections(*(np.concatenate(parts) for parts in zip(self, new, strict=True)))
 
 
-def look(
+def detect_discs(
     image: Image,
     colour: Colour,
     limits: tuple[float, float],
-    method: Method,
-    window: Window | None = None,
+    method: DetectionMethod,
+    window: PixelBox | None = None,
     radii: Callable[[FloatArray], FloatArray] | None = None,
-) -> Spots:
+) -> DiscDetections:
     """All discs of a colour whose radii, pixels, lie between two limits.
 
     If it is known which radii, shape (n,), discs at points of the image, shape (n, 2), have, those that are
     partly hidden are found too.
     """
-    circles = propose(image, colour, radii=limits, window=window)
+    circles = propose_circles(image, colour, radii=limits, window=window)
     if method == "hough":
         return _circles(circles)
     return _fitted(image, circles, radii(circles[:, :2]) if radii else None)
 
 
-def follow(image: Image, colour: Colour, guesses: FloatArray, radii: FloatArray, method: Method) -> Spots:
+def detect_discs_near(
+    image: Image, colour: Colour, guesses: FloatArray, radii: FloatArray, method: DetectionMethod
+) -> DiscDetections:
     """The discs with known radii, shape (n,), that are near guesses, shape (n, 2), pixels; perhaps fewer."""
     if not len(guesses):
-        return Spots.none()
+        return DiscDetections.none()
     if method == "precise":
         return _fitted(image, np.column_stack([guesses, radii]), radii)
     low = np.floor(guesses.min(axis=0) - 2.5 * radii.max()).astype(int)
     high = np.ceil(guesses.max(axis=0) + 2.5 * radii.max()).astype(int) + 1
     limits = (0.75 * radii.min(), 1.35 * radii.max())
-    found = propose(image, colour, radii=limits, window=(low[0], low[1], high[0], high[1]))
+    found = propose_circles(image, colour, radii=limits, window=(low[0], low[1], high[0], high[1]))
     away = np.linalg.norm(found[:, None, :2] - guesses, axis=2) / radii
     return _circles(found[(away < REACH).any(axis=1)])
 
 
-def grey_of(image: Image) -> GreyImage:
+def luma_of(image: Image) -> GreyImage:
     """Luma: chroma has fewer pixels in most videos."""
     return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
 
 
-def _fitted(image: Image, circles: FloatArray, radii: FloatArray | None) -> Spots:
+def _fitted(image: Image, circles: FloatArray, radii: FloatArray | None) -> DiscDetections:
     """What the fit finds at circles, shape (n, 3), each disc once."""
-    discs = fit_discs(grey_of(image), circles, radii=radii)
+    discs = fit_discs(luma_of(image), circles, radii=radii)
     kept = discs.found.copy()
     apart = np.linalg.norm(discs.centres[:, None] - discs.centres, axis=2)
     for number in np.nonzero(kept)[0]:
         kept[number + 1 :] &= ~(apart[number, number + 1 :] < circles[number, 2])
-    return Spots(discs.centres, discs.covariances, discs.radii, discs.contrast).where(kept)
+    return DiscDetections(discs.centres, discs.covariances, discs.radii, discs.contrast).where(kept)
 
 
-def _circles(circles: FloatArray) -> Spots:
+def _circles(circles: FloatArray) -> DiscDetections:
     """Circles as they are: their error is not seen from one frame."""
     covariances = np.repeat(FLOOR["hough"] ** 2 * np.eye(2)[None], len(circles), axis=0)
-    return Spots(circles[:, :2], covariances, circles[:, 2], np.full(len(circles), np.nan))
+    return DiscDetections(circles[:, :2], covariances, circles[:, 2], np.full(len(circles), np.nan))

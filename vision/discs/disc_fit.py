@@ -1,151 +1,137 @@
-"""The fit of discs of about one size: votes for the centres, edges beside the discs, then least squares."""
+"""Sub-pixel centres of disc markers, with covariances: a parametric fit to the grey levels around the edge.
+
+The grey levels follow `vision.discs.disc_image_model`; `vision.discs.least_squares` fits all discs at
+once. Occlusions and neighbours get little weight, and the covariance follows from the noise of the residuals.
+Units: pixels, grey levels.
+"""
+
+from dataclasses import dataclass, fields
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from geometry.arrays import BoolArray, FloatArray
-from vision.discs.edge_model import (
-    BLUR,
-    CONTRAST,
-    COUNT,
-    LIGHT,
-    RADIUS,
-    SHADE_X,
-    SHADE_Y,
-    SLANT,
-    STRETCH,
-    X,
-    Y,
-)
-from vision.discs.hough import Election, elect, sector
-from vision.discs.least_squares import Adjusted, Fit, Prior, adjust, coherent, correlation
-from vision.discs.neighbouring_edges import with_edges
-from vision.discs.pixel_window import Window, median_where
+from geometry.arrays import BoolArray, FloatArray, frozen_array
+from geometry.errors import UserError
+from vision.discs.disc_image_model import BLUR, CONTRAST, RADIUS, SHADE_X, SHADE_Y, SLANT, STRETCH, X, Y
+from vision.discs.fit_stages import fit_alike
+from vision.discs.least_squares import DiscFit
 from vision.frames.frame import GreyImage
 
-MARGIN = 6
-"""Pixels used on either side of the edge."""
+KNOWN_RADIUS = 0.01
+"""Relative standard deviation of a radius that is called known: a marker turns and comes nearer a little."""
 
-DEVIATIONS = {STRETCH: 0.05, SLANT: 0.05, BLUR: 5.0, SHADE_X: 0.05, SHADE_Y: 0.05}
-"""What is assumed of a disc: standard deviations, about zero but for the blur. They matter only where little
-of the edge is seen."""
+LEAST_SEEN, LEAST_SEEN_UNKNOWN = 0.25, 0.7
+"""Share of the edge below which a disc is not found, with a known radius and without."""
 
-TYPICAL_BLUR = 1.0
-"""Width of the edge, pixels, to start with."""
+LARGEST_DEVIATION = 0.5
+"""Standard deviation of the centre, pixels, above which a disc is not found."""
 
-LEAST_REACH = 4.0
-"""How far from its guess a disc is sought, pixels; or a radius, if that is more."""
+LARGEST_RESIDUAL = 0.25
+"""Root mean square residual, over the contrast, above which a disc is not found."""
 
-STEPS = {X: 1.0, Y: 1.0, STRETCH: 0.3, SLANT: 0.3, BLUR: 0.7, SHADE_X: 0.02, SHADE_Y: 0.02}
-"""Longest steps of an iteration."""
-
-EDGE_DEVIATIONS, EDGE_STEPS, MISSING = (0.5, 1.5, 100.0), (0.3, 1.0, 1e3), 1e-3
-"""The same for straight edges: rad, pixels, grey levels; and the deviation of all where there is none."""
-
-LENIENT = 2
-"""First steps, in which the noise may be as large as the residuals say."""
-
-REFINEMENTS = 3
-"""How often the pixels to use are chosen anew, at most."""
-
-NEAR = 2.0
-"""Pixels from the edge within which the noise matters most."""
-
-LOOSE, STRICT = 0.25, 0.45
-"""Votes that a sector of the edge must have, over those of the better sectors, to be trusted: at first, and
-where that led to a picture that does not agree with the image."""
-
-CHANGED = 0.03
-"""Share of the pixels near the edge that disagree, from which on a disc is fitted again."""
+RADII = (0.6, 1.6)
+"""Radius found over radius guessed."""
 
 
-def fit_alike(grey: GreyImage, guesses: FloatArray, radii: FloatArray, tolerance: float) -> Fit:
-    """Fit discs of about one size.
+@dataclass(frozen=True)
+class FittedDiscs:
+    """Fitted discs; where `found` is false, all but `seen` is NaN.
+
+    Attributes:
+        centres: x, y, shape (n, 2), pixels.
+        covariances: Of the centres, shape (n, 2, 2), pixels². Correlated noise, such as a codec's, counts, by
+            its mean over the discs of about a size.
+        radii: Square root of the product of the semi-axes, shape (n,), pixels.
+        shapes: Stretch and slant as in `vision.discs.disc_image_model`, shape (n, 2); zero for circles.
+        contrast: Level around the disc less level within, shape (n,), grey levels; negative for light discs.
+        blur: Width of the edge, with the pixels' own width, shape (n,), pixels.
+        residual: Root mean square of the weighted residuals, shape (n,), grey levels.
+        seen: Share of the edge that supports the fit, shape (n,).
+        found: Shape (n,).
+    """
+
+    centres: FloatArray
+    covariances: FloatArray
+    radii: FloatArray
+    shapes: FloatArray
+    contrast: FloatArray
+    blur: FloatArray
+    residual: FloatArray
+    seen: FloatArray
+    found: BoolArray
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            getattr(self, field.name).setflags(write=False)
+
+
+def fit_discs(grey: GreyImage, guesses: ArrayLike, *, radii: ArrayLike | None = None) -> FittedDiscs:
+    """Fit discs to an image, each from a guess that may be off by several pixels.
 
     Args:
         grey: Shape (height, width).
-        guesses: x and y, shape (n, 2), pixels.
-        radii: Known or guessed, shape (n,), pixels.
-        tolerance: Relative standard deviation of the radii; infinite if they are guessed.
+        guesses: x, y and radius of every disc, shape (n, 3), pixels.
+        radii: Known radii, one for all or shape (n,), pixels. They serve discs that are partly hidden, whose
+            size and place cannot be told apart; without them such discs are found only if most is seen.
+
+    Returns:
+        As many discs as guesses, in their order. A disc is found if the fit came to rest near the guess and
+        agrees with enough of the edge.
+
+    Raises:
+        UserError: If the image is not grey in eight bits, or a radius is not above zero.
+        ShapeError: If the guesses or radii have another shape.
     """
-    reach = max(radii.max(), LEAST_REACH)
-    election = elect(grey, guesses, radii, reach, known=tolerance < np.inf)
-    smallest, largest = election.radii.min(), election.radii.max()
-    window = Window.of(grey, election.centres, smallest - MARGIN, largest + MARGIN)
-    trusted = _trusted(window, election, LOOSE)
-    first = _first(window, election, trusted, tolerance)
-    chosen = coherent(window, first)
-    near = np.abs(_outside(window, first.parameters)) < NEAR
-    (again,) = np.nonzero(((chosen != trusted) & near).sum(axis=1) > CHANGED * near.sum(axis=1))
-    inflation = correlation(window, first, chosen & trusted, near)
-    if len(again):
-        window, election = window.at(again), election.at(again)
-        anew = _first(window, election, _trusted(window, election, STRICT), tolerance)
-        either, other = (_refined(window, now, election.radii, tolerance) for now in (first.at(again), anew))
-        first.fit.put(again, either)
-        (better,) = np.nonzero(_deviation(other) < _deviation(either))
-        first.fit.put(again[better], other.at(better))
-    first.fit.covariances *= inflation
-    return first.fit
+    guesses = frozen_array(guesses, dtype=np.float64, shape=(None, 3), name="guesses")
+    if grey.ndim != 2 or grey.dtype != np.uint8:
+        raise UserError(
+            f"discs are fitted in grey images of eight bits; this one is {grey.dtype} {grey.shape}"
+        )
+    known = guesses[:, 2] if radii is None else radii
+    known = frozen_array(
+        np.broadcast_to(known, (len(guesses),)), dtype=np.float64, shape=(None,), name="radii"
+    )
+    if not (guesses[:, 2] > 0).all() or not (known > 0).all():
+        raise UserError("the radius of a disc must be above zero")
+    tolerance = np.inf if radii is None else KNOWN_RADIUS
+    fit = DiscFit.empty(len(guesses))
+    sizes = np.rint(np.log(known) / np.log(1.4))
+    for size in np.unique(sizes):  # discs of a size share their window
+        (alike,) = np.nonzero(sizes == size)
+        fit.put(alike, fit_alike(grey, guesses[alike, :2], known[alike], tolerance))
+    return _judged(fit, guesses, LEAST_SEEN_UNKNOWN if radii is None else LEAST_SEEN)
 
 
-def _deviation(fit: Fit) -> FloatArray:
-    """Root mean square standard deviation of the centres, shape (n,), pixels; infinite if not settled."""
-    variance = np.trace(fit.covariances, axis1=1, axis2=2) / 2
-    return np.asarray(np.sqrt(np.where(fit.settled, variance, np.inf)))
-
-
-def _trusted(window: Window, election: Election, least: float) -> BoolArray:
-    """The pixels in sectors of the edge that have enough support, and whose neighbours have, shape (n, p)."""
-    good = election.support >= least
-    good &= np.roll(good, 1, axis=1) & np.roll(good, -1, axis=1)
-    x, y = (window.origins - election.centres).T[:, :, None]
-    sectors = sector(window.x + x, window.y + y)
-    return np.asarray(window.within & np.take_along_axis(good, sectors, axis=1))
-
-
-def _first(window: Window, election: Election, trusted: BoolArray, tolerance: float) -> Adjusted:
-    """Adjust to the trusted pixels, from the elected centres and the levels on either side of the edge."""
-    start = np.zeros((len(trusted), COUNT))
-    start[:, [X, Y]] = election.centres - window.origins
-    start[:, RADIUS] = election.radii
-    start[:, BLUR] = TYPICAL_BLUR
-    outside = _outside(window, start)
-    start[:, LIGHT] = median_where(window.values, trusted & (outside > 1) & (outside < 3))
-    start[:, CONTRAST] = start[:, LIGHT] - median_where(window.values, trusted & (outside < -1))
-    start, present = with_edges(window, start, trusted)
-    return adjust(window, start, *_prior(start, present, election.radii, tolerance), trusted, LENIENT)
-
-
-def _refined(window: Window, now: Adjusted, radii: FloatArray, tolerance: float) -> Fit:
-    """Adjust again to whatever agrees with the picture, once the edges have been looked for anew."""
-    chosen = coherent(window, now)
-    ground = chosen | window.within & (_outside(window, now.parameters) > 0)
-    start, present = with_edges(window, now.parameters[:, :COUNT], ground)
-    prior, limits = _prior(start, present, radii, tolerance)
-    for _ in range(REFINEMENTS):
-        now = adjust(window, start, prior, limits, chosen, LENIENT)
-        start, chosen = now.parameters, coherent(window, now)
-    return now.fit
-
-
-def _outside(window: Window, parameters: FloatArray) -> FloatArray:
-    """Distance of the pixels from the circles, positive outside, shape (n, p)."""
-    x, y, radius = parameters[:, [X, Y, RADIUS]].T[:, :, None]
-    return np.asarray(np.hypot(window.x - x, window.y - y) - radius, dtype=np.float64)
-
-
-def _prior(
-    start: FloatArray, present: BoolArray, radii: FloatArray, tolerance: float
-) -> tuple[Prior, FloatArray]:
-    """What is assumed of the parameters, and their longest steps; missing edges stay without strength."""
-    mean, deviations, limits = start.copy(), np.full(start.shape, 1e3), np.full(start.shape, 1e3)
-    mean[:, [STRETCH, SLANT, SHADE_X, SHADE_Y]] = 0
-    mean[:, RADIUS] = radii
-    deviations[:, list(DEVIATIONS)] = list(DEVIATIONS.values())
-    deviations[:, RADIUS] = np.minimum(tolerance * radii, 1e3)
-    edges = np.where(present[:, :, None], EDGE_DEVIATIONS, MISSING)
-    deviations[:, COUNT:] = edges.reshape(len(start), -1)
-    limits[:, list(STEPS)] = list(STEPS.values())
-    limits[:, RADIUS] = np.maximum(0.5, 0.2 * radii)
-    limits[:, COUNT:] = EDGE_STEPS * present.shape[1]
-    return Prior(mean, deviations**-2.0), limits
+def _judged(fit: DiscFit, guesses: FloatArray, least_seen: float) -> FittedDiscs:
+    """What the fit says of the discs, those that it did not find struck out."""
+    parameters = fit.parameters
+    shade, blur, radii = parameters[:, [SHADE_X, SHADE_Y]], parameters[:, BLUR], parameters[:, RADIUS]
+    centres = fit.origins + parameters[:, [X, Y]]
+    centres = (
+        centres + blur[:, None] ** 2 * shade
+    )  # the light is blurred as well, which moves the picture back
+    deviations = np.sqrt(np.linalg.eigvalsh(fit.covariances)[:, 1])
+    contrast = parameters[:, CONTRAST]
+    residual = np.sqrt(fit.variance)
+    ratio = radii / guesses[:, 2]
+    found = (
+        fit.settled
+        & (fit.seen >= least_seen)
+        & (deviations <= LARGEST_DEVIATION)
+        & (residual <= LARGEST_RESIDUAL * np.abs(contrast))
+        & (np.hypot(*(centres - guesses[:, :2]).T) <= np.maximum(guesses[:, 2], 3))
+        & (ratio >= RADII[0])
+        & (ratio <= RADII[1])
+    )
+    kept = np.where(found, 1.0, np.nan)
+    return FittedDiscs(
+        centres=centres * kept[:, None],
+        covariances=fit.covariances * kept[:, None, None],
+        radii=radii * kept,
+        shapes=parameters[:, [STRETCH, SLANT]] * kept[:, None],
+        contrast=contrast * kept,
+        blur=blur * kept,
+        residual=residual * kept,
+        seen=fit.seen,
+        found=found,
+    )

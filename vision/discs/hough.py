@@ -36,7 +36,7 @@ KERNEL = np.arange(-3.0, 4.0)
 Floats = NDArray[np.floating[Any]]
 
 
-class Election(NamedTuple):
+class HoughVotes(NamedTuple):
     """What the votes agree on.
 
     Attributes:
@@ -52,12 +52,14 @@ class Election(NamedTuple):
     dark: BoolArray
     support: FloatArray
 
-    def at(self, places: IntArray) -> "Election":
+    def at(self, places: IntArray) -> "HoughVotes":
         """That of some discs."""
-        return Election(self.centres[places], self.radii[places], self.dark[places], self.support[places])
+        return HoughVotes(self.centres[places], self.radii[places], self.dark[places], self.support[places])
 
 
-def elect(grey: GreyImage, guesses: FloatArray, radii: FloatArray, reach: float, *, known: bool) -> Election:
+def vote_for_centres(
+    grey: GreyImage, guesses: FloatArray, radii: FloatArray, reach: float, *, known: bool
+) -> HoughVotes:
     """The best centres at most `reach` pixels from the guesses along either axis.
 
     Args:
@@ -94,7 +96,7 @@ def elect(grey: GreyImage, guesses: FloatArray, radii: FloatArray, reach: float,
     support = np.bincount(sectors[agree], weights=outward[agree], minlength=count * SECTORS)
     support = support.reshape(count, SECTORS)
     better = np.sort(support, axis=1)[:, -SECTORS // 4, None]
-    return Election(origins + centres, radii, dark, support / np.maximum(better, 1e-9))
+    return HoughVotes(origins + centres, radii, dark, support / np.maximum(better, 1e-9))
 
 
 def sector(x: Floats, y: Floats) -> IntArray:

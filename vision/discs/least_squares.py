@@ -14,8 +14,8 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
-from vision.discs.edge_model import BLUR, CONTRAST, COUNT, RADIUS, Array, X, Y, picture
-from vision.discs.pixel_window import QUANTISATION, SCALE, Window, median_where
+from vision.discs.disc_image_model import BLUR, CONTRAST, COUNT, RADIUS, Array, X, Y, picture
+from vision.discs.pixel_windows import QUANTISATION, SCALE, PixelWindows, median_where
 
 FULL, NONE = 3.0, 6.0
 """Residuals over the noise up to which a pixel has full weight, and from which on it has none."""
@@ -42,23 +42,23 @@ SHARPEST = 0.3
 """Width of an edge without any blur, pixels: that of the pixels themselves."""
 
 
-class Prior(NamedTuple):
+class DiscPrior(NamedTuple):
     """What is known beforehand of the parameters: means and inverse variances, shapes (n, m)."""
 
     mean: FloatArray
     precision: FloatArray
 
-    def at(self, places: IntArray) -> "Prior":
+    def at(self, places: IntArray) -> "DiscPrior":
         """Those of some discs."""
-        return Prior(self.mean[places], self.precision[places])
+        return DiscPrior(self.mean[places], self.precision[places])
 
 
 @dataclass
-class Fit:
+class DiscFit:
     """Where an adjustment stands.
 
     Attributes:
-        parameters: As in `vision.discs.edge_model`, relative to the origins, shape (n, m).
+        parameters: As in `vision.discs.disc_image_model`, relative to the origins, shape (n, m).
         origins: Shape (n, 2), pixels.
         covariances: Of the centres, from the variance of the noise, shape (n, 2, 2), pixels².
         variance: Of the noise, shape (n,), grey levels².
@@ -85,11 +85,11 @@ class Fit:
             settled=np.zeros(count, dtype=bool),
         )
 
-    def at(self, places: IntArray) -> "Fit":
+    def at(self, places: IntArray) -> "DiscFit":
         """That of some discs."""
-        return Fit(**{name: values[places] for name, values in vars(self).items()})
+        return DiscFit(**{name: values[places] for name, values in vars(self).items()})
 
-    def put(self, places: IntArray, part: "Fit") -> None:
+    def put(self, places: IntArray, part: "DiscFit") -> None:
         """Take the discs at some places from another fit."""
         for name, values in vars(part).items():
             getattr(self, name)[places] = values
@@ -100,21 +100,26 @@ FAINT = 1e-5
 nothing else may determine it."""
 
 
-class Adjusted(NamedTuple):
+class DiscAdjustment(NamedTuple):
     """What `adjust` gives: the fit, all parameters, shape (n, m), and the residuals, shape (n, p)."""
 
-    fit: Fit
+    fit: DiscFit
     parameters: FloatArray
     residuals: Array
 
-    def at(self, places: IntArray) -> "Adjusted":
+    def at(self, places: IntArray) -> "DiscAdjustment":
         """That of some discs."""
-        return Adjusted(self.fit.at(places), self.parameters[places], self.residuals[places])
+        return DiscAdjustment(self.fit.at(places), self.parameters[places], self.residuals[places])
 
 
 def adjust(
-    window: Window, start: FloatArray, prior: Prior, limits: FloatArray, chosen: BoolArray, lenient: int
-) -> Adjusted:
+    window: PixelWindows,
+    start: FloatArray,
+    prior: DiscPrior,
+    limits: FloatArray,
+    chosen: BoolArray,
+    lenient: int,
+) -> DiscAdjustment:
     """Least squares from a start, each disc until its centre moves by less than `TOLERANCE`.
 
     Args:
@@ -126,7 +131,7 @@ def adjust(
         lenient: First steps in which the noise may be as large as the residuals say.
     """
     count, width = start.shape
-    fit = Fit.empty(count)
+    fit = DiscFit.empty(count)
     parameters, information = start.copy(), np.tile(np.eye(width), (count, 1, 1))
     left_over = np.empty_like(window.values)
     active = np.arange(count)
@@ -169,10 +174,10 @@ def adjust(
             break
     fit.parameters[:], fit.origins[:] = parameters[:, :COUNT], window.origins
     fit.covariances[:] = np.linalg.inv(information)[:, :2, :2]
-    return Adjusted(fit, parameters, left_over)
+    return DiscAdjustment(fit, parameters, left_over)
 
 
-def coherent(window: Window, adjusted: Adjusted) -> BoolArray:
+def coherent(window: PixelWindows, adjusted: DiscAdjustment) -> BoolArray:
     """Where the picture is that of the model, and all pixels beside are as well, shape (n, p).
 
     Means of nine residuals show what is hidden or unexpected where a single one drowns in noise.
@@ -184,7 +189,7 @@ def coherent(window: Window, adjusted: Adjusted) -> BoolArray:
     return np.asarray(window.within & ~near)
 
 
-def correlation(window: Window, adjusted: Adjusted, chosen: BoolArray, near: BoolArray) -> float:
+def correlation(window: PixelWindows, adjusted: DiscAdjustment, chosen: BoolArray, near: BoolArray) -> float:
     """Variance of means over neighbours times their number, over the variance of the noise; at least 1.
 
     It is 1 for noise that differs from pixel to pixel. Cameras and codecs that smooth, or quantise in blocks,

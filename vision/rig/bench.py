@@ -12,10 +12,10 @@ from geometry.finger.parameters import Parameters
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.point_location import Location
 from geometry.mesh.triangle_mesh import TriangleMesh
-from vision.rig.shapes import Colour, Scene, Shape, circle, closed, rectangle
+from vision.rig.shapes import Paint, Scene, Shape, circle, closed, rectangle
 from vision.tracking.workspace import Workspace
 
-PAINTS: dict[str, Colour] = {
+PAINTS: dict[str, Paint] = {
     "dark": (0.07, 0.065, 0.06),
     "red": (0.10, 0.12, 0.62),
     "green": (0.16, 0.48, 0.12),
@@ -23,10 +23,10 @@ PAINTS: dict[str, Colour] = {
 }
 """What markers can be painted with."""
 
-BENCH: Colour = (0.60, 0.62, 0.61)
-FINGER: Colour = (0.80, 0.86, 0.88)
-CLAMP: Colour = (0.40, 0.37, 0.35)
-INDENTER: Colour = (0.20, 0.42, 0.72)
+BENCH: Paint = (0.60, 0.62, 0.61)
+FINGER: Paint = (0.80, 0.86, 0.88)
+CLAMP: Paint = (0.40, 0.37, 0.35)
+INDENTER: Paint = (0.20, 0.42, 0.72)
 
 CLAMP_SIZE = (7.0, 3.0)
 """Of the clamp: how far it reaches behind the base, and beyond its ends, mm."""

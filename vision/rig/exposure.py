@@ -14,13 +14,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from geometry.errors import UserError
 from geometry.finger.error_messages import one_line
 from geometry.finger.parameters import bounded
+from vision.frames.frame import Image
 
 LUMA = (0.114, 0.587, 0.299)
 """Weights of blue, green and red (ITU-R BT.601)."""
 
 Light = NDArray[np.float32]
 """Shares of the light that reach the pixels, shape (height, width, 3)."""
-Image = NDArray[np.uint8]
 
 
 class Exposure(BaseModel):

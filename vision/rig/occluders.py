@@ -10,11 +10,11 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from vision.calibration.camera import Camera, Pose
 from vision.rig.bench import Bench
-from vision.rig.coverage import coverage
 from vision.rig.motion import Motion
-from vision.rig.shapes import Colour, Shape, area, closed, seen_edges
+from vision.rig.pixel_coverage import pixel_coverage
+from vision.rig.shapes import Paint, Shape, area, closed, seen_edges
 
-CABLES: dict[str, Colour] = {"dark": (0.10, 0.10, 0.11), "light": (0.52, 0.50, 0.50)}
+CABLES: dict[str, Paint] = {"dark": (0.10, 0.10, 0.11), "light": (0.52, 0.50, 0.50)}
 """Paints of cables: one like dark markers, and one unlike."""
 REACH = 75.0
 """Half of the length of a cable, mm."""
@@ -101,11 +101,11 @@ def share_seen(shape: Shape, occluders: Sequence[Shape], camera: Camera, pose: P
     size = (camera.width, camera.height)
     edges = seen_edges(shape, camera, pose) + 0.5
     whole = abs(area(edges))
-    rows, columns, left = coverage(edges, size)
+    rows, columns, left = pixel_coverage(edges, size)
     for occluder in occluders:
         hidden = np.zeros_like(left)
         beside = seen_edges(occluder, camera, pose) + 0.5 - (columns.start, rows.start)
-        where = coverage(beside, (hidden.shape[1], hidden.shape[0]))
+        where = pixel_coverage(beside, (hidden.shape[1], hidden.shape[0]))
         hidden[where.rows, where.columns] = where.share
         left = left * (1 - hidden)
     return float(left.sum() / whole)

@@ -11,8 +11,9 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.observations import Observations
 from vision.calibration.camera import Camera, Pose
+from vision.frames.frame import Image
 from vision.rig.bench import Bench
-from vision.rig.exposure import Exposure, Image, Light
+from vision.rig.exposure import Exposure, Light
 from vision.rig.motion import Motion
 from vision.rig.occluders import share_seen
 from vision.rig.render import mean_light, noise_of
@@ -24,7 +25,7 @@ own width hides such steps."""
 MOST_STEPS = 32
 
 
-class Truth(NamedTuple):
+class FrameTruth(NamedTuple):
     """What is known of a frame.
 
     Attributes:
@@ -69,14 +70,14 @@ class Recording:
     occluders: Callable[[int], Sequence[Shape]] = nothing
     seed: int = 0
 
-    def frames(self) -> Iterator[tuple[Image, Truth]]:
+    def frames(self) -> Iterator[tuple[Image, FrameTruth]]:
         """The frames in order, each with its truth."""
         for state, numbers in groupby(range(len(self.motion)), key=self._state):
             light, truth = self._seen(*state)
             for number in numbers:
                 yield self.exposure.develop(light, noise_of(self.seed, number)), truth
 
-    def frame(self, number: int) -> tuple[Image, Truth]:
+    def frame(self, number: int) -> tuple[Image, FrameTruth]:
         """One frame, the same as among all."""
         light, truth = self._seen(*self._state(number))
         return self.exposure.develop(light, noise_of(self.seed, number)), truth
@@ -119,14 +120,14 @@ class Recording:
         )
         return float(np.linalg.norm(end - start, axis=1).max())
 
-    def _seen(self, loads: Sequence[float], occluders: Sequence[Shape]) -> tuple[Light, Truth]:
+    def _seen(self, loads: Sequence[float], occluders: Sequence[Shape]) -> tuple[Light, FrameTruth]:
         """The mean light of the states with these shares of the load, and their truth."""
         states = [load * self.displacement for load in loads]
         scenes = [self.bench.scene(state, occluders) for state in states]
         light = mean_light(scenes, self.camera, self.pose, self.exposure.blur)
         worlds = [self.bench.markers(state) for state in states]
         discs = self.bench.discs(states[len(states) // 2])
-        truth = Truth(
+        truth = FrameTruth(
             load=float(np.mean(loads)),
             world=np.mean(worlds, axis=0),
             pixels=np.mean([self.camera.project(world, self.pose) for world in worlds], axis=0),

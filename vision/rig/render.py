@@ -6,8 +6,9 @@ import cv2
 import numpy as np
 
 from vision.calibration.camera import Camera, Pose
-from vision.rig.coverage import coverage
-from vision.rig.exposure import Exposure, Image, Light
+from vision.frames.frame import Image
+from vision.rig.exposure import Exposure, Light
+from vision.rig.pixel_coverage import pixel_coverage
 from vision.rig.shapes import Scene, seen_edges
 
 
@@ -61,7 +62,7 @@ def _painted(scene: Scene, camera: Camera, pose: Pose, cells: int, size: tuple[i
     """The light of a scene on the cells of a grid of this width and height."""
     canvas = np.full((*size[::-1], 3), scene.background, dtype=np.float32)
     for shape in scene.shapes:
-        rows, columns, share = coverage((seen_edges(shape, camera, pose) + 0.5) * cells, size)
+        rows, columns, share = pixel_coverage((seen_edges(shape, camera, pose) + 0.5) * cells, size)
         below = canvas[rows, columns]
         below += share[:, :, None].astype(np.float32) * (np.array(shape.colour, dtype=np.float32) - below)
     return canvas

@@ -14,7 +14,7 @@ CORNERS = 512
 CHORD = 1e-3
 """How far the picture of a straight edge may be from the curve that the lens makes of it, pixels."""
 
-Colour = tuple[float, float, float]
+Paint = tuple[float, float, float]
 """Shares of blue, green and red light that a surface sends back."""
 
 
@@ -29,7 +29,7 @@ class Shape:
     """
 
     edges: FloatArray
-    colour: Colour
+    colour: Paint
     z: float = 0.0
 
 
@@ -37,7 +37,7 @@ class Shape:
 class Scene:
     """Shapes before a background; the later ones hide the earlier ones."""
 
-    background: Colour
+    background: Paint
     shapes: Sequence[Shape]
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from geometry.arrays import FloatArray
 from vision.frames.frame import Image
-from vision.tracking.frame_tracker import Sighting
+from vision.tracking.frame_tracker import FrameDetections
 
 SEEN, LOST, FIXED, WAY = (40, 150, 0), (0, 60, 230), (200, 110, 0), (190, 0, 190)
 """Blue, green, red of markers, of markers not seen, of fiducials, and of displacements."""
@@ -17,15 +17,15 @@ SHIFT = 4
 
 
 def annotated(
-    image: Image, sighting: Sighting, text: Sequence[str], *, ways: Sequence[FloatArray] = ()
+    image: Image, detections: FrameDetections, text: Sequence[str], *, trajectories: Sequence[FloatArray] = ()
 ) -> Image:
     """A copy of an image with what was seen in it.
 
     Args:
         image: Grey or coloured.
-        sighting: What it shows; markers that were not seen are crossed where they probably are.
+        detections: What the tracker found in it; undetected markers are crossed at their predicted places.
         text: Lines in the upper left corner.
-        ways: Of markers, each of shape (f, 2), pixels; nan where one was not seen.
+        trajectories: Of markers, each of shape (f, 2), pixels; nan where one was not detected.
 
     Returns:
         Shape (h, w, 3).
@@ -34,16 +34,16 @@ def annotated(
     canvas: Image = np.asarray(coloured, dtype=np.uint8)
     size = max(canvas.shape[1] / 1280, 0.5)
     width = max(1, round(size))
-    for way in ways:
-        known = way[np.isfinite(way).all(axis=1)]
+    for trajectory in trajectories:
+        known = trajectory[np.isfinite(trajectory).all(axis=1)]
         cv2.polylines(canvas, [_fixed(known)], False, WAY, width, cv2.LINE_AA, SHIFT)
-    for spots, colour in ((sighting.fiducials, FIXED), (sighting.markers, SEEN)):
-        for centre, radius in zip(spots.centres, spots.radii, strict=True):
+    for discs, colour in ((detections.fiducials, FIXED), (detections.markers, SEEN)):
+        for centre, radius in zip(discs.centres, discs.radii, strict=True):
             if np.isfinite(radius):
                 whole = round(float(radius) * 2**SHIFT)
                 cv2.circle(canvas, _point(centre), whole, colour, width, cv2.LINE_AA, SHIFT)
     for number, (seen, guess) in enumerate(
-        zip(sighting.markers.radii, sighting.guesses, strict=True), start=1
+        zip(detections.markers.radii, detections.guesses, strict=True), start=1
     ):
         colour = SEEN if np.isfinite(seen) else LOST
         if not np.isfinite(seen):

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from geometry.errors import UserError
-from vision.discs.disc_detector import Spots
-from vision.tracking.marker_plane import Plane
-from vision.tracking.scene import Fiducials, Setup
+from vision.discs.disc_detector import DiscDetections
+from vision.tracking.marker_plane import MarkerPlane
+from vision.tracking.scene import FilmedScene, FoundFiducials
 
 FEWEST = 4
 """Fiducials from which a camera's place is known."""
@@ -17,7 +17,7 @@ UNKNOWNS = 6
 """Of a camera's place, which the fiducials' coordinates have to tell."""
 
 
-class Shake(NamedTuple):
+class CameraMotion(NamedTuple):
     """What the fiducials did between start and end.
 
     Attributes:
@@ -26,11 +26,11 @@ class Shake(NamedTuple):
         deviation: Standard deviation of a coordinate that the planes undo, pixels.
     """
 
-    way: float
-    planes: tuple[Plane, Plane] | None
+    shift: float
+    planes: tuple[MarkerPlane, MarkerPlane] | None
     deviation: float = 0.0
 
-    def undone(self, final: Spots) -> Spots:
+    def undone(self, final: DiscDetections) -> DiscDetections:
         """Discs at the end where the camera would have seen them had it stayed where it was."""
         if self.planes is None:
             return final
@@ -40,7 +40,7 @@ class Shake(NamedTuple):
         return final._replace(centres=centres, covariances=final.covariances + self.deviation**2 * np.eye(2))
 
 
-def find_shake(setup: Setup, before: Spots, after: Spots) -> Shake:
+def find_camera_motion(scene: FilmedScene, before: DiscDetections, after: DiscDetections) -> CameraMotion:
     """How the camera moved, from the fiducials at rest at start and end, nan where one was not seen.
 
     Raises:
@@ -52,13 +52,15 @@ def find_shake(setup: Setup, before: Spots, after: Spots) -> Shake:
             "no fiducial is seen in the end where it was at the start: the camera was moved, or they are "
             "hidden; fix the camera, and show them at both ends"
         )
-    way = float(np.median(np.linalg.norm(after.centres - before.centres, axis=1)[common]))
+    shift = float(np.median(np.linalg.norm(after.centres - before.centres, axis=1)[common]))
     variances = np.diagonal(before.covariances + after.covariances, axis1=1, axis2=2)[common]
     noise, count = float(np.sqrt(np.median(variances))), int(common.sum())
-    if way < STEADY * noise or count < FEWEST:
-        return Shake(way, None)
+    if shift < STEADY * noise or count < FEWEST:
+        return CameraMotion(shift, None)
     numbers = np.nonzero(common)[0]
     # Equal weights let what the lens does to the fiducials cancel, also where it is not known.
     alike = after._replace(covariances=before.covariances)
-    start, end = (setup.plane(Fiducials(numbers, spots.where(common))) for spots in (before, alike))
-    return Shake(way, (start, end), noise * np.sqrt(UNKNOWNS / (2 * count)))
+    start, end = (
+        scene.plane(FoundFiducials(numbers, detections.where(common))) for detections in (before, alike)
+    )
+    return CameraMotion(shift, (start, end), noise * np.sqrt(UNKNOWNS / (2 * count)))

@@ -26,7 +26,7 @@ JUMPS = (1 / 16, 1.0)
 """Steps between frames that are thought possible, as multiples of the finger's usual whole stroke."""
 
 
-def identify(found: FloatArray, expected: FloatArray, fields: FloatArray) -> IntArray:
+def associate_markers(found: FloatArray, expected: FloatArray, fields: FloatArray) -> IntArray:
     """Name the markers among detections.
 
     Args:
@@ -68,7 +68,7 @@ def identify(found: FloatArray, expected: FloatArray, fields: FloatArray) -> Int
     return np.where(agreed >= SURE, names[0], -1)
 
 
-def moved(points: FloatArray, jumps: tuple[float, ...] = JUMPS) -> FloatArray:
+def step_covariances(points: FloatArray, jumps: tuple[float, ...] = JUMPS) -> FloatArray:
     """Covariances of a deformation between two frames, shape (len(jumps), 2, m, m), mm².
 
     The slope of v along the finger is a random walk that starts at a hinge in the base. So is that of u, but
@@ -84,17 +84,17 @@ def moved(points: FloatArray, jumps: tuple[float, ...] = JUMPS) -> FloatArray:
     return np.stack([jump**2 * length**2 * np.stack([u, v]) for jump in jumps])
 
 
-def placed(points: FloatArray) -> FloatArray:
+def rest_covariances(points: FloatArray) -> FloatArray:
     """Covariances at rest, shape (1, 2, m, m), mm²: the finger may be 1 mm and 1 degree off its place."""
     arms = (points[:, 1:], points[:, :1])
     return np.array([[1 + np.radians(1) ** 2 * arm @ arm.T for arm in arms]])
 
 
-def filled(points: FloatArray, displacements: FloatArray) -> FloatArray:
+def with_predictions(points: FloatArray, displacements: FloatArray) -> FloatArray:
     """Displacements with the likeliest values in place of those that are nan, shape (m, 2), mm."""
     known = np.isfinite(displacements).all(axis=1)
     whole = displacements.copy()
-    for axis, field in enumerate(moved(points, (1.0,))[0]):
+    for axis, field in enumerate(step_covariances(points, (1.0,))[0]):
         own = field[np.ix_(known, known)] + NOISE**2 * np.eye(known.sum())
         whole[~known, axis] = field[np.ix_(~known, known)] @ np.linalg.solve(own, displacements[known, axis])
     return whole

@@ -20,14 +20,14 @@ CORNERS = 24
 """Of the polygon that stands for a circle."""
 
 
-class Slopes(NamedTuple):
+class Jacobians(NamedTuple):
     """Derivatives of pixels: by the point in the plane, (n, 2, 2), and by the parameters, (n, 2, k)."""
 
     point: FloatArray
     parameters: FloatArray
 
 
-class View(Protocol):
+class PlaneProjection(Protocol):
     """How a plane is seen; `parameters` has shape (k,)."""
 
     def pixels(self, points: FloatArray, parameters: FloatArray) -> FloatArray:
@@ -38,13 +38,13 @@ class View(Protocol):
         """The inverse of `pixels`."""
         ...
 
-    def slopes(self, points: FloatArray, parameters: FloatArray) -> Slopes:
+    def jacobians(self, points: FloatArray, parameters: FloatArray) -> Jacobians:
         """Derivatives of `pixels`."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
-class Plane:
+class MarkerPlane:
     """A plane in space whose image is known.
 
     Attributes:
@@ -54,18 +54,18 @@ class Plane:
         residual: Root mean square distance of the fiducials from where they should be, mm.
     """
 
-    view: View
+    projection: PlaneProjection
     parameters: FloatArray
     covariance: FloatArray
     residual: float
 
     def points(self, pixels: FloatArray) -> FloatArray:
         """Where in the plane pixels lie; shapes (n, 2), mm."""
-        return self.view.points(pixels, self.parameters)
+        return self.projection.points(pixels, self.parameters)
 
     def pixels(self, points: FloatArray) -> FloatArray:
         """Where points of the plane are seen; shapes (n, 2), pixels."""
-        return self.view.pixels(points, self.parameters)
+        return self.projection.pixels(points, self.parameters)
 
     def circles(self, pixels: FloatArray, radius: float) -> FloatArray:
         """Centres of circles in the plane from the middles of their pictures, shapes (n, 2), mm."""
@@ -88,7 +88,9 @@ class Plane:
 
     def scales(self, points: FloatArray) -> FloatArray:
         """Pixels per mm at points of the plane, shape (n,): the root of the ratio of areas."""
-        return np.asarray(np.sqrt(np.abs(np.linalg.det(self.view.slopes(points, self.parameters).point))))
+        return np.asarray(
+            np.sqrt(np.abs(np.linalg.det(self.projection.jacobians(points, self.parameters).point)))
+        )
 
     def displacement_covariance(
         self, initial: FloatArray, final: FloatArray, initial_noise: FloatArray, final_noise: FloatArray
@@ -105,9 +107,9 @@ class Plane:
         shared = np.zeros((2 * count, len(self.parameters)))
         own = np.zeros((count, 2, 2))
         for sign, points, noise in ((-1, initial, initial_noise), (1, final, final_noise)):
-            slopes = self.view.slopes(points, self.parameters)
-            inverse = np.linalg.inv(slopes.point)
-            shared -= sign * (inverse @ slopes.parameters).reshape(shared.shape)
+            jacobians = self.projection.jacobians(points, self.parameters)
+            inverse = np.linalg.inv(jacobians.point)
+            shared -= sign * (inverse @ jacobians.parameters).reshape(shared.shape)
             own += inverse @ noise @ inverse.transpose(0, 2, 1)
         covariance = shared @ self.covariance @ shared.T
         blocks = covariance.reshape(count, 2, count, 2)
@@ -116,7 +118,7 @@ class Plane:
 
 
 @dataclass(frozen=True)
-class CameraView:
+class CameraProjection:
     """The plane z = `height` through a calibrated camera: rotation vector, translation and its intrinsics."""
 
     camera: Camera
@@ -133,7 +135,7 @@ class CameraView:
         plane = np.column_stack([rotation[:, :2], pose.translation + self.height * rotation[:, 2]])
         return _divided(self.camera.undistort(pixels), np.linalg.inv(self.camera.matrix @ plane))
 
-    def slopes(self, points: FloatArray, parameters: FloatArray) -> Slopes:
+    def jacobians(self, points: FloatArray, parameters: FloatArray) -> Jacobians:
         """See `View`."""
         pose = _pose(parameters)
         matrix, by_rotation = cv2.Rodrigues(pose.rotation)
@@ -141,14 +143,14 @@ class CameraView:
         seen = self.camera.project_with_jacobians(raised @ matrix.T + pose.translation)
         turned = np.einsum("kij,nj->nik", by_rotation.reshape(3, 3, 3), raised)
         by_all = [seen.by_point @ turned, seen.by_point, seen.by_intrinsics]
-        return Slopes(seen.by_point @ matrix[:, :2], np.concatenate(by_all, axis=2))
+        return Jacobians(seen.by_point @ matrix[:, :2], np.concatenate(by_all, axis=2))
 
     def _raised(self, points: FloatArray) -> FloatArray:
         return np.column_stack([points, np.full(len(points), self.height)])
 
 
 @dataclass(frozen=True)
-class HomographyView:
+class HomographyProjection:
     """A plane without a camera: the homography's entries but the last, which is 1, row by row."""
 
     def pixels(self, points: FloatArray, parameters: FloatArray) -> FloatArray:
@@ -159,7 +161,7 @@ class HomographyView:
         """See `View`."""
         return _divided(pixels, np.linalg.inv(np.append(parameters, 1.0).reshape(3, 3)))
 
-    def slopes(self, points: FloatArray, parameters: FloatArray) -> Slopes:
+    def jacobians(self, points: FloatArray, parameters: FloatArray) -> Jacobians:
         """See `View`."""
         homography = np.append(parameters, 1.0).reshape(3, 3)
         pixels = _divided(points, homography)
@@ -169,11 +171,11 @@ class HomographyView:
         by_entries = np.zeros((len(points), 2, 8))
         by_entries[:, 0, :3] = by_entries[:, 1, 3:6] = whole
         by_entries[:, :, 6:] = -pixels[:, :, None] * points[:, None, :]
-        return Slopes(by_point, by_entries / depth)
+        return Jacobians(by_point, by_entries / depth)
 
 
 @dataclass(frozen=True)
-class SimilarityView:
+class SimilarityProjection:
     """The linear transform of the paper: pixel = (a x + b y + c, b x - a y + d), for y is up in the plane."""
 
     def pixels(self, points: FloatArray, parameters: FloatArray) -> FloatArray:
@@ -184,12 +186,12 @@ class SimilarityView:
         """See `View`."""
         return np.asarray((pixels - parameters[2:]) @ np.linalg.inv(self._linear(parameters)).T)
 
-    def slopes(self, points: FloatArray, parameters: FloatArray) -> Slopes:
+    def jacobians(self, points: FloatArray, parameters: FloatArray) -> Jacobians:
         """See `View`."""
         by_point = np.repeat(self._linear(parameters)[None], len(points), axis=0)
         (x, y), one, zero = points.T, np.ones(len(points)), np.zeros(len(points))
         rows = np.stack([[x, y, one, zero], [-y, x, zero, one]])
-        return Slopes(by_point, rows.transpose(2, 0, 1))
+        return Jacobians(by_point, rows.transpose(2, 0, 1))
 
     @staticmethod
     def _linear(parameters: FloatArray) -> FloatArray:

@@ -8,7 +8,13 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from vision.calibration.camera import Camera
-from vision.tracking.marker_plane import CameraView, HomographyView, Plane, SimilarityView, View
+from vision.tracking.marker_plane import (
+    CameraProjection,
+    HomographyProjection,
+    MarkerPlane,
+    PlaneProjection,
+    SimilarityProjection,
+)
 
 STEPS = 50
 CONVERGED = 1e-9
@@ -23,7 +29,7 @@ def camera_plane(
     covariances: FloatArray,
     *,
     height: float = 0.0,
-) -> Plane:
+) -> MarkerPlane:
     """The plane z = `height` from fiducials in the plane z = 0, seen by a calibrated camera.
 
     Args:
@@ -38,69 +44,83 @@ def camera_plane(
     _, rotations, translations, _ = cv2.solvePnPGeneric(
         flat, rays, camera.matrix, np.zeros(5), flags=cv2.SOLVEPNP_IPPE
     )
-    view = CameraView(camera)
+    projection = CameraProjection(camera)
     fits = []
     for start in zip(rotations, translations, strict=True):
         with suppress(UserError):  # behind the camera
-            fits.append(_refined(view, np.ravel(start), points, pixels, covariances))
+            fits.append(_refined(projection, np.ravel(start), points, pixels, covariances))
     if not fits:
         raise UserError(f"{UNDETERMINED}; give the design or workspace, and the camera, of the video")
     # A plane that is seen obliquely looks almost like another one; the better of both is kept.
     pose, squares = min(fits, key=lambda fit: fit[1])
-    slopes = view.slopes(points, pose).parameters.reshape(2 * len(points), -1)
-    gain, inverse = _gain(slopes[:, :6], covariances)
+    jacobians = projection.jacobians(points, pose).parameters.reshape(2 * len(points), -1)
+    gain, inverse = _gain(jacobians[:, :6], covariances)
     # A wrong lens is partly made up for by the pose that is fitted through it.
-    follow = np.concatenate([-gain @ slopes[:, 6:], np.eye(slopes.shape[1] - 6)])
+    follow = np.concatenate([-gain @ jacobians[:, 6:], np.eye(jacobians.shape[1] - 6)])
     covariance = follow @ (camera.covariance or np.zeros((len(camera.intrinsic_names),) * 2)) @ follow.T
     covariance[:6, :6] += inverse * max(1.0, squares / (2 * len(points) - 6))
-    residual = _rms(view.points(pixels, pose) - points)
-    return Plane(CameraView(camera, height), np.append(pose, camera.intrinsics), covariance, residual)
+    residual = _rms(projection.points(pixels, pose) - points)
+    return MarkerPlane(
+        CameraProjection(camera, height), np.append(pose, camera.intrinsics), covariance, residual
+    )
 
 
-def homography_plane(points: FloatArray, pixels: FloatArray, covariances: FloatArray) -> Plane:
+def homography_plane(points: FloatArray, pixels: FloatArray, covariances: FloatArray) -> MarkerPlane:
     """The plane of the fiducials without a camera; arguments as of `camera_plane`."""
     start = cv2.findHomography(points, pixels, 0)[0]
-    return _flat_plane(HomographyView(), (start / start[2, 2]).ravel()[:8], points, pixels, covariances)
+    return _flat_plane(HomographyProjection(), (start / start[2, 2]).ravel()[:8], points, pixels, covariances)
 
 
-def similarity_plane(points: FloatArray, pixels: FloatArray, covariances: FloatArray) -> Plane:
+def similarity_plane(points: FloatArray, pixels: FloatArray, covariances: FloatArray) -> MarkerPlane:
     """The plane whose scale, turn and shift put points at pixels; arguments as of `camera_plane`."""
-    return _flat_plane(SimilarityView(), np.array([1.0, 0.0, 0.0, 0.0]), points, pixels, covariances)
+    return _flat_plane(SimilarityProjection(), np.array([1.0, 0.0, 0.0, 0.0]), points, pixels, covariances)
 
 
 def _flat_plane(
-    view: View, start: FloatArray, points: FloatArray, pixels: FloatArray, covariances: FloatArray
-) -> Plane:
+    projection: PlaneProjection,
+    start: FloatArray,
+    points: FloatArray,
+    pixels: FloatArray,
+    covariances: FloatArray,
+) -> MarkerPlane:
     """The fit of a view that knows no lens; what that leaves is no noise, so it does not shrink in a mean."""
-    parameters, squares = _refined(view, start, points, pixels, covariances)
-    slopes = view.slopes(points, parameters).parameters.reshape(2 * len(points), -1)
+    parameters, squares = _refined(projection, start, points, pixels, covariances)
+    jacobians = projection.jacobians(points, parameters).parameters.reshape(2 * len(points), -1)
     excess = max(0.0, squares / max(2 * len(points) - len(parameters), 1) - 1)
-    residual = _rms(view.points(pixels, parameters) - points)
-    return Plane(view, parameters, _gain(slopes, covariances)[1] * (1 + len(points) * excess), residual)
+    residual = _rms(projection.points(pixels, parameters) - points)
+    return MarkerPlane(
+        projection, parameters, _gain(jacobians, covariances)[1] * (1 + len(points) * excess), residual
+    )
 
 
 def _refined(
-    view: View, parameters: FloatArray, points: FloatArray, pixels: FloatArray, covariances: FloatArray
+    projection: PlaneProjection,
+    parameters: FloatArray,
+    points: FloatArray,
+    pixels: FloatArray,
+    covariances: FloatArray,
 ) -> tuple[FloatArray, float]:
     """Least squares by Gauss and Newton: the parameters and the sum of weighted squares."""
     known = np.linalg.inv(np.linalg.cholesky(covariances))
     count = len(parameters)
     for _ in range(STEPS):
-        missed = (known @ (pixels - view.pixels(points, parameters))[:, :, None]).ravel()
-        slopes = (known @ view.slopes(points, parameters).parameters[:, :, :count]).reshape(-1, count)
-        scale = np.linalg.norm(slopes, axis=0)
-        step = np.linalg.lstsq(slopes / scale, missed, rcond=None)[0] / scale
+        missed = (known @ (pixels - projection.pixels(points, parameters))[:, :, None]).ravel()
+        jacobians = (known @ projection.jacobians(points, parameters).parameters[:, :, :count]).reshape(
+            -1, count
+        )
+        scale = np.linalg.norm(jacobians, axis=0)
+        step = np.linalg.lstsq(jacobians / scale, missed, rcond=None)[0] / scale
         parameters = parameters + step
         if np.abs(step * scale).max() < CONVERGED * (1 + np.abs(parameters * scale).max()):
             return parameters, float(missed @ missed)
     raise UserError(f"{UNDETERMINED}; spread them around the finger")
 
 
-def _gain(slopes: FloatArray, covariances: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _gain(jacobians: FloatArray, covariances: FloatArray) -> tuple[FloatArray, FloatArray]:
     """How parameters follow measurements in weighted least squares, and the parameters' covariance."""
-    blocks = slopes.reshape(-1, 2, slopes.shape[1])
-    weighted = np.linalg.solve(covariances, blocks).reshape(slopes.shape)
-    inverse = np.linalg.inv(slopes.T @ weighted)
+    blocks = jacobians.reshape(-1, 2, jacobians.shape[1])
+    weighted = np.linalg.solve(covariances, blocks).reshape(jacobians.shape)
+    inverse = np.linalg.inv(jacobians.T @ weighted)
     return inverse @ weighted.T, inverse
 
 

@@ -15,14 +15,14 @@ FEWEST = 3
 """Frames that are a rest; fewer if there are only a few pictures."""
 
 
-class Rest(NamedTuple):
+class RestIntervals(NamedTuple):
     """The frames at rest, as ranges: before and after the motion."""
 
     initial: range
     final: range
 
 
-def find_rest(positions: FloatArray, noise: float = 0.0) -> Rest:
+def find_rest_intervals(positions: FloatArray, noise: float = 0.0) -> RestIntervals:
     """Find when the finger rests.
 
     Args:
@@ -45,7 +45,7 @@ def find_rest(positions: FloatArray, noise: float = 0.0) -> Rest:
                 f"the finger does not rest at the {end}: it moves by more than {limit:.2g} mm within "
                 f"{fewest} frames; film it at rest before it is pressed and while it is held"
             )
-    rest = Rest(range(first), range(count - last, count))
+    rest = RestIntervals(range(first), range(count - last, count))
     moved = _distance(_centre(positions[: rest.initial.stop]), _centre(positions[rest.final.start :]))
     if not moved > limit:
         raise UserError(

@@ -11,12 +11,12 @@ from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import Parameters
 from vision.calibration.camera import Camera
 from vision.discs.colour import DARK, Colour
-from vision.discs.disc_detector import Method, Spots, look
+from vision.discs.disc_detector import DetectionMethod, DiscDetections, detect_discs
 from vision.frames.frame import Image
-from vision.tracking.fiducials import identify_fiducials
-from vision.tracking.marker_plane import CameraView, Plane
+from vision.tracking.fiducial_matching import identify_fiducials
+from vision.tracking.layout_matching import match_layout
+from vision.tracking.marker_plane import CameraProjection, MarkerPlane
 from vision.tracking.plane_fit import camera_plane, homography_plane, similarity_plane
-from vision.tracking.plane_without_fiducials import find_markers
 from vision.tracking.workspace import Workspace
 
 SMALLEST_VIEW = 0.25
@@ -31,19 +31,19 @@ LARGEST_WITHOUT_CAMERA = 3.0
 """... and without one, where the lens shows in it."""
 
 
-class Fiducials(NamedTuple):
+class FoundFiducials(NamedTuple):
     """The fiducials that were found: their numbers, shape (k,), and their discs."""
 
     numbers: IntArray
-    spots: Spots
+    detections: DiscDetections
 
-    def where(self, kept: BoolArray) -> "Fiducials":
+    def where(self, kept: BoolArray) -> "FoundFiducials":
         """Some of them."""
-        return Fiducials(self.numbers[kept], self.spots.where(kept))
+        return FoundFiducials(self.numbers[kept], self.detections.where(kept))
 
 
 @dataclass(frozen=True)
-class Setup:
+class FilmedScene:
     """What is filmed and how it is measured.
 
     Attributes:
@@ -59,28 +59,28 @@ class Setup:
     workspace: Workspace
     camera: Camera | None = None
     colour: Colour = DARK
-    method: Method = "precise"
-    alone: bool = False
+    method: DetectionMethod = "precise"
+    markers_only: bool = False
 
-    def plane(self, fiducials: Fiducials) -> Plane:
+    def plane(self, fiducials: FoundFiducials) -> MarkerPlane:
         """The markers' plane from fiducials, as exact as the method and what is known allow."""
         points = self.workspace.points[fiducials.numbers]
-        centres, covariances = fiducials.spots[:2]
+        centres, covariances = fiducials.detections[:2]
         if self.method == "hough":
             return similarity_plane(points, centres, covariances)
         radius = self.workspace.fiducial_diameter / 2
         plane = self._plane(points, centres, covariances)
         plane = self._plane(points, centres - plane.beside(points, radius), covariances)
-        if not isinstance(plane.view, CameraView):
+        if not isinstance(plane.projection, CameraProjection):
             return plane
-        return replace(plane, view=replace(plane.view, height=self.workspace.marker_plane))
+        return replace(plane, projection=replace(plane.projection, height=self.workspace.marker_plane))
 
-    def alone_plane(self, centres: FloatArray, covariances: FloatArray) -> Plane:
+    def plane_from_markers(self, centres: FloatArray, covariances: FloatArray) -> MarkerPlane:
         """The plane without fiducials, from the markers at rest, (m, 2), pixels; nan for hidden ones."""
         seen = np.isfinite(centres).all(axis=1)
         return similarity_plane(marker_positions(self.design)[seen], centres[seen], covariances[seen])
 
-    def find_alone(self, image: Image) -> Plane:
+    def find_plane_from_markers(self, image: Image) -> MarkerPlane:
         """The plane without fiducials, from the markers in the first frame.
 
         Raises:
@@ -88,11 +88,13 @@ class Setup:
         """
         markers, diameter = marker_positions(self.design), self.design.marker_diameter
         largest = float(np.linalg.norm(image.shape[:2])) / self.design.height * diameter / 2
-        spots = look(image, self.colour, (max(SMALLEST_VIEW * largest, 3.0), largest), self.method)
-        discs = spots.numbered(find_markers(spots.centres, spots.radii, markers, diameter))
-        return self.alone_plane(discs.centres, discs.covariances)
+        detections = detect_discs(
+            image, self.colour, (max(SMALLEST_VIEW * largest, 3.0), largest), self.method
+        )
+        discs = detections.numbered(match_layout(detections.centres, detections.radii, markers, diameter))
+        return self.plane_from_markers(discs.centres, discs.covariances)
 
-    def find_fiducials(self, image: Image) -> Fiducials:
+    def find_fiducials(self, image: Image) -> FoundFiducials:
         """Find the fiducials in an image.
 
         Raises:
@@ -100,11 +102,11 @@ class Setup:
         """
         extent = np.linalg.norm(np.ptp(self.workspace.points, axis=0)) + self.workspace.fiducial_diameter
         largest = float(np.linalg.norm(image.shape[:2]) / extent * self.workspace.fiducial_diameter / 2)
-        spots = look(image, DARK, (max(SMALLEST_VIEW * largest, 3.0), largest), self.method)
-        straight = spots.centres if self.camera is None else self.camera.undistort(spots.centres)
-        discs = identify_fiducials(straight, spots.radii, self.workspace)
+        detections = detect_discs(image, DARK, (max(SMALLEST_VIEW * largest, 3.0), largest), self.method)
+        straight = detections.centres if self.camera is None else self.camera.undistort(detections.centres)
+        discs = identify_fiducials(straight, detections.radii, self.workspace)
         numbers = np.nonzero(discs >= 0)[0]
-        found = Fiducials(numbers, Spots(*(part[discs[numbers]] for part in spots)))
+        found = FoundFiducials(numbers, DiscDetections(*(part[discs[numbers]] for part in detections)))
         while len(found.numbers) > FEWEST:
             missed = self._missed(found)
             if missed.max() <= max(ASTRAY, 3 * float(np.median(missed))):
@@ -118,13 +120,13 @@ class Setup:
             )
         return found
 
-    def _missed(self, fiducials: Fiducials) -> FloatArray:
+    def _missed(self, fiducials: FoundFiducials) -> FloatArray:
         """How far fiducials are from their places, shape (k,), mm."""
         points = self.workspace.points[fiducials.numbers]
-        plane = self._plane(points, *fiducials.spots[:2])
-        return np.asarray(np.linalg.norm(plane.points(fiducials.spots.centres) - points, axis=1))
+        plane = self._plane(points, *fiducials.detections[:2])
+        return np.asarray(np.linalg.norm(plane.points(fiducials.detections.centres) - points, axis=1))
 
-    def _plane(self, points: FloatArray, centres: FloatArray, covariances: FloatArray) -> Plane:
+    def _plane(self, points: FloatArray, centres: FloatArray, covariances: FloatArray) -> MarkerPlane:
         """The plane of the fiducials themselves."""
         if self.camera is None:
             return homography_plane(points, centres, covariances)

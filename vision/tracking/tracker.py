@@ -7,14 +7,14 @@ import numpy as np
 
 from geometry.errors import UserError
 from geometry.finger.markers import marker_positions
-from vision.discs.disc_detector import FLOOR, Spots
+from vision.discs.disc_detector import FLOOR, DiscDetections
 from vision.frames.frame import Frame, Frames
-from vision.tracking.camera_motion import Shake, find_shake
-from vision.tracking.frame_tracker import Follower, Sighting
-from vision.tracking.plane_without_fiducials import symmetric
-from vision.tracking.rest_detection import find_rest
-from vision.tracking.scene import Fiducials, Setup, check_size
-from vision.tracking.trajectories import Tracking, mean_spots, placed
+from vision.tracking.camera_motion import CameraMotion, find_camera_motion
+from vision.tracking.frame_tracker import FrameDetections, FrameTracker
+from vision.tracking.layout_matching import has_half_turn_symmetry
+from vision.tracking.rest_detection import find_rest_intervals
+from vision.tracking.scene import FilmedScene, FoundFiducials, check_size
+from vision.tracking.trajectories import Tracking, mean_detections, plane_positions
 
 FAR = 0.5
 """Root mean square distance of the markers at rest from the design's, mm, that is worth a word."""
@@ -22,11 +22,13 @@ SHAKE = 0.3
 """Way of the fiducials between start and end that is worth a word, pixels."""
 
 
-def ignore(frame: Frame, sighting: Sighting) -> None:
+def ignore(frame: Frame, detections: FrameDetections) -> None:
     """Watch nothing."""
 
 
-def track(frames: Frames, setup: Setup, watch: Callable[[Frame, Sighting], None] = ignore) -> Tracking:
+def track(
+    frames: Frames, scene: FilmedScene, watch: Callable[[Frame, FrameDetections], None] = ignore
+) -> Tracking:
     """Track the markers through a video.
 
     The plane comes from the fiducials in all frames at rest; the displacements are those of the markers'
@@ -36,66 +38,70 @@ def track(frames: Frames, setup: Setup, watch: Callable[[Frame, Sighting], None]
 
     Args:
         frames: From the finger at rest until it is held.
-        setup: What they show.
+        scene: What they show.
         watch: Is told what every frame shows, while it is tracked.
 
     Raises:
         UserError: If the frames do not show what they should; one line says what is amiss.
     """
-    check_size(setup.camera, frames.size, frames.name)
+    check_size(scene.camera, frames.size, frames.name)
     times: list[float] = []
-    sightings: list[Sighting] = []
-    follower = None
+    per_frame: list[FrameDetections] = []
+    tracker = None
     try:
         for frame in frames:
-            if follower is None:
-                follower = Follower(setup, frame.image, live=frames.count is None)
-                sighting = follower.first
+            if tracker is None:
+                tracker = FrameTracker(scene, frame.image, live=frames.count is None)
+                detections = tracker.first
             else:
-                sighting = follower.see(frame.image)
+                detections = tracker.see(frame.image)
             times.append(frame.time)
-            sightings.append(sighting)
-            watch(frame, sighting)
+            per_frame.append(detections)
+            watch(frame, detections)
     except KeyboardInterrupt:
         if frames.count is not None:
             raise
-    if follower is None:
+    if tracker is None:
         raise UserError(f"{frames.name} has no frame")
-    pixels = np.stack([sighting.markers.centres for sighting in sightings])
-    positions = placed(follower.plane, pixels, setup.design)
-    scale = follower.plane.scales(marker_positions(setup.design)).mean()
-    rest = find_rest(positions, noise=FLOOR[setup.method] / scale)
-    still = [[sightings[number] for number in end] for end in rest]
-    initial, final = (mean_spots([s.markers for s in end], setup.method) for end in still)
-    anchors = [mean_spots([s.fiducials for s in end], setup.method) for end in (*still, still[0] + still[1])]
+    pixels = np.stack([detections.markers.centres for detections in per_frame])
+    positions = plane_positions(tracker.plane, pixels, scene.design)
+    scale = tracker.plane.scales(marker_positions(scene.design)).mean()
+    rest = find_rest_intervals(positions, noise=FLOOR[scene.method] / scale)
+    still = [[per_frame[number] for number in end] for end in rest]
+    initial, final = (mean_detections([s.markers for s in end], scene.method) for end in still)
+    anchors = [
+        mean_detections([s.fiducials for s in end], scene.method) for end in (*still, still[0] + still[1])
+    ]
     numbers = np.nonzero(np.isfinite(anchors[2].radii))[0]
-    alone = not len(numbers)
-    if alone:
-        plane = setup.alone_plane(initial.centres, initial.covariances)
+    markers_only = not len(numbers)
+    if markers_only:
+        plane = scene.plane_from_markers(initial.centres, initial.covariances)
     else:
-        shake = find_shake(setup, anchors[0], anchors[1])
+        motion = find_camera_motion(scene, anchors[0], anchors[1])
         plane = (
-            shake.planes[0] if shake.planes else setup.plane(Fiducials(numbers, anchors[2].where(numbers)))
+            motion.planes[0]
+            if motion.planes
+            else scene.plane(FoundFiducials(numbers, anchors[2].where(numbers)))
         )
-        final = shake.undone(final)
+        final = motion.undone(final)
     tracking = Tracking(
-        design=setup.design,
-        expected=marker_positions(setup.design),
+        design=scene.design,
+        expected=marker_positions(scene.design),
         times=np.array(times),
         pixels=pixels,
-        covariances=np.stack([sighting.markers.covariances for sighting in sightings]),
+        covariances=np.stack([detections.markers.covariances for detections in per_frame]),
         plane=plane,
         rest=rest,
         initial=initial,
         final=final,
-        method=setup.method,
+        method=scene.method,
     )
-    if alone:
-        return _by_the_motion(setup, tracking)
-    return replace(tracking, warnings=tuple(_remarks(setup, tracking, anchors[1], shake)))
+    if markers_only:
+        return _by_the_motion(scene, tracking)
+    return replace(tracking, warnings=tuple(_remarks(scene, tracking, anchors[1], motion)))
 
 
-def _by_the_motion(setup: Setup, tracking: Tracking) -> Tracking:
+def _by_the_motion(scene: FilmedScene, tracking: Tracking) -> Tracking:
     """What was tracked without fiducials, the right way round: a finger is pressed in on its front face.
 
     Raises:
@@ -103,16 +109,18 @@ def _by_the_motion(setup: Setup, tracking: Tracking) -> Tracking:
     """
     turned = _pressed(tracking) > 0
     if turned:
-        if not symmetric(tracking.expected):
+        if not has_half_turn_symmetry(tracking.expected):
             raise UserError(
                 "the markers move out of the front face: the image is mirrored; flip it, or show fiducials"
             )
-        initial, final = (Spots(*(part[::-1] for part in end)) for end in (tracking.initial, tracking.final))
+        initial, final = (
+            DiscDetections(*(part[::-1] for part in end)) for end in (tracking.initial, tracking.final)
+        )
         tracking = replace(
             tracking,
             pixels=tracking.pixels[:, ::-1],
             covariances=tracking.covariances[:, ::-1],
-            plane=setup.alone_plane(initial.centres, initial.covariances),
+            plane=scene.plane_from_markers(initial.centres, initial.covariances),
             initial=initial,
             final=final,
         )
@@ -130,26 +138,29 @@ def _by_the_motion(setup: Setup, tracking: Tracking) -> Tracking:
 def _pressed(tracking: Tracking) -> float:
     """Mean displacement along y of the visible markers, mm."""
     before, after = (
-        placed(tracking.plane, end.centres, tracking.design) for end in (tracking.initial, tracking.final)
+        plane_positions(tracking.plane, end.centres, tracking.design)
+        for end in (tracking.initial, tracking.final)
     )
     return float(np.nanmean((after - before)[:, 1]))
 
 
-def _remarks(setup: Setup, tracking: Tracking, after: Spots, shake: Shake) -> Iterator[str]:
+def _remarks(
+    scene: FilmedScene, tracking: Tracking, after: DiscDetections, motion: CameraMotion
+) -> Iterator[str]:
     """What a person should know; `after` are the fiducials."""
     residual = tracking.plane.residual
-    if setup.camera is None and setup.method == "precise":
+    if scene.camera is None and scene.method == "precise":
         yield f"no camera: its lens is not undone; the fiducials are {residual:.3f} mm (rms) off their places"
-        if setup.workspace.marker_plane:
+        if scene.workspace.marker_plane:
             yield "no camera: the height of the markers above the fiducials is not accounted for"
-    elif setup.camera is not None and setup.camera.covariance is None:
+    elif scene.camera is not None and scene.camera.covariance is None:
         yield "the camera file has no covariance, so the standard deviations leave the camera's errors out"
     if (hidden := int(np.isnan(after.radii).sum())) > 0:
         yield f"{hidden} of {len(after.radii)} fiducials were not seen"
-    if shake.way > SHAKE:
-        known = "which they undo" if shake.planes else "and too few of them are seen to undo it"
+    if motion.shift > SHAKE:
+        known = "which they undo" if motion.planes else "and too few of them are seen to undo it"
         yield (
-            f"the fiducials moved by {shake.way:.2f} pixels between start and end: the camera was not at "
+            f"the fiducials moved by {motion.shift:.2f} pixels between start and end: the camera was not at "
             f"rest, {known}"
         )
     far = float(np.sqrt(np.nanmean((tracking.offsets**2).sum(axis=1))))

@@ -11,9 +11,9 @@ from geometry.errors import UserError
 from geometry.finger.parameters import Parameters
 from geometry.finger.section import finger_section
 from geometry.observations import Observations
-from vision.discs.disc_detector import FLOOR, Method, Spots
-from vision.tracking.marker_plane import Plane
-from vision.tracking.rest_detection import Rest
+from vision.discs.disc_detector import FLOOR, DetectionMethod, DiscDetections
+from vision.tracking.marker_plane import MarkerPlane
+from vision.tracking.rest_detection import RestIntervals
 
 LEAST_SHARE = 0.2
 """Of the frames at rest; a marker that is seen in fewer counts as not visible."""
@@ -45,11 +45,11 @@ class Tracking:
     times: FloatArray
     pixels: FloatArray
     covariances: FloatArray
-    plane: Plane
-    rest: Rest
-    initial: Spots
-    final: Spots
-    method: Method
+    plane: MarkerPlane
+    rest: RestIntervals
+    initial: DiscDetections
+    final: DiscDetections
+    method: DetectionMethod
     warnings: tuple[str, ...] = ()
 
     @property
@@ -60,12 +60,12 @@ class Tracking:
     @property
     def positions(self) -> FloatArray:
         """Of the markers in every frame, shape (f, m, 2), mm; nan where one was not seen."""
-        return placed(self.plane, self.pixels, self.design)
+        return plane_positions(self.plane, self.pixels, self.design)
 
     @property
     def offsets(self) -> FloatArray:
         """Initial positions minus those of the design, shape (m, 2), mm; nan for markers not visible."""
-        initial = placed(self.plane, self.initial.centres, self.design)
+        initial = plane_positions(self.plane, self.initial.centres, self.design)
         return np.where(self.visible[:, None], initial - self.expected, np.nan)
 
     @property
@@ -73,7 +73,7 @@ class Tracking:
         """Of the displacements of the visible markers, shape (2 v, 2 v), mm², in the order u1, v1, u2, ..."""
         seen = self.visible
         before, after = (
-            placed(self.plane, end.centres[seen], self.design) for end in (self.initial, self.final)
+            plane_positions(self.plane, end.centres[seen], self.design) for end in (self.initial, self.final)
         )
         noise = (self.initial.covariances[seen], self.final.covariances[seen])
         return self.plane.displacement_covariance(before, after, *noise)
@@ -91,7 +91,9 @@ class Tracking:
             raise UserError("no marker was seen both before and after the motion; show them all at rest")
         points = self.expected.copy()
         displacements, deviations = np.zeros_like(points), np.zeros_like(points)
-        initial, final = (placed(self.plane, end.centres, self.design) for end in (self.initial, self.final))
+        initial, final = (
+            plane_positions(self.plane, end.centres, self.design) for end in (self.initial, self.final)
+        )
         if self.method != "hough":
             points[seen] = initial[seen]
         displacements[seen] = (final - initial)[seen]
@@ -107,7 +109,7 @@ class Tracking:
         return Observations(points, displacements, deviations, seen, source, simulated=False)
 
 
-def placed(plane: Plane, pixels: FloatArray, design: Parameters) -> FloatArray:
+def plane_positions(plane: MarkerPlane, pixels: FloatArray, design: Parameters) -> FloatArray:
     """Where markers lie in the plane; shapes (..., 2), mm, nan where the pixels are."""
     flat = pixels.reshape(-1, 2)
     known = np.isfinite(flat).all(axis=1)
@@ -116,7 +118,7 @@ def placed(plane: Plane, pixels: FloatArray, design: Parameters) -> FloatArray:
     return places.reshape(pixels.shape)
 
 
-def mean_spots(frames: Sequence[Spots], method: Method) -> Spots:
+def mean_detections(frames: Sequence[DiscDetections], method: DetectionMethod) -> DiscDetections:
     """Every disc's mean over frames; nan for those hardly seen.
 
     Weights are inverse covariances. Those of most discs are noise, which a mean over independent frames
@@ -133,7 +135,7 @@ def mean_spots(frames: Sequence[Spots], method: Method) -> Spots:
     mean, radius, contrast = (np.full(part.shape[1:], np.nan) for part in (centres, radii, contrasts))
     covariance = np.full(covariances.shape[1:], np.nan)
     if not known.any():
-        return Spots(mean, covariance, radius, contrast)
+        return DiscDetections(mean, covariance, radius, contrast)
     weights = np.zeros_like(covariances)
     weights[seen] = np.linalg.inv(covariances[seen])
     total = np.linalg.inv(weights.sum(axis=0)[known])
@@ -147,7 +149,7 @@ def mean_spots(frames: Sequence[Spots], method: Method) -> Spots:
     away = np.where(seen[:, known, None], centres[:, known] - mean[known], np.nan)
     share = _kept(away, weights[:, known], count[known], noise)
     covariance[known] = share[:, None, None] * usual + FLOOR[method] ** 2 * np.eye(2)
-    return Spots(mean, covariance, radius, contrast)
+    return DiscDetections(mean, covariance, radius, contrast)
 
 
 def _kept(away: FloatArray, weights: FloatArray, count: IntArray, noise: FloatArray) -> FloatArray:

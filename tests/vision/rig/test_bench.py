@@ -9,7 +9,7 @@ from geometry.finger.design import Design
 from vision.rig.bench import Bench
 from vision.rig.render import light_of
 from vision.rig.shapes import Scene
-from vision.rig.view import default_camera, view
+from vision.rig.virtual_camera import default_camera, viewing_pose
 from vision.tracking.workspace import default_workspace
 
 WORKSPACE = default_workspace(Design())
@@ -29,7 +29,7 @@ def bent(mesh):
 
 def test_every_marker_is_drawn_where_the_truth_says_it_is(bench):
     displacement = bent(bench.mesh)
-    pose = view(CAMERA, WORKSPACE)
+    pose = viewing_pose(CAMERA, WORKSPACE)
     scene = bench.scene(displacement)
     drawn = Scene((1.0, 1.0, 1.0), scene.shapes[-9:])
     dark = 1 - light_of(drawn, CAMERA, pose, 0.8)[:, :, 0].astype(np.float64)
@@ -68,14 +68,14 @@ def test_displacements_of_another_mesh_are_refused(bench):
 
 @pytest.mark.parametrize("turn", [20, 90, 200])
 def test_a_turned_camera_still_sees_all_fiducials(turn):
-    pose = view(CAMERA, WORKSPACE, tilt=5, turn=turn)
+    pose = viewing_pose(CAMERA, WORKSPACE, tilt=5, turn=turn)
     seen = CAMERA.project(np.column_stack([WORKSPACE.points, np.zeros(7)]), pose)
     assert ((seen > 20) & (seen < (1260, 700))).all()
 
 
 @pytest.mark.parametrize("tilt", [0.0, 3.0, 10.0])
 def test_the_view_shows_all_fiducials_upright_at_the_tilt(tilt):
-    pose = view(CAMERA, WORKSPACE, tilt=tilt)
+    pose = viewing_pose(CAMERA, WORKSPACE, tilt=tilt)
     seen = CAMERA.project(np.column_stack([WORKSPACE.points, np.zeros(7)]), pose)
     assert ((seen > 30) & (seen < (1250, 690))).all()
     origin, right, up, near = CAMERA.project([[45, -15, 0], [46, -15, 0], [45, -14, 0], [45, -15, 1]], pose)

@@ -10,7 +10,7 @@ from vision.calibration.chessboard import Board
 from vision.rig.boards import INK, PAPER, board_poses, board_scene
 from vision.rig.exposure import Exposure
 from vision.rig.render import light_of, render
-from vision.rig.view import default_camera
+from vision.rig.virtual_camera import default_camera
 
 CAMERA = default_camera(960, 540)
 CHESS = Board(9, 6, 8.0)

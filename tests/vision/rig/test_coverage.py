@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shapely import Polygon, box
 
-from vision.rig.coverage import coverage
+from vision.rig.pixel_coverage import pixel_coverage
 from vision.rig.shapes import circle, closed, rectangle
 
 SIZE = (14, 11)
@@ -13,7 +13,7 @@ STAR = 3.7 + 3.3 * np.array([(0, -1), (0.2, 0.1), (1.4, 0), (0.1, 0.4), (0.3, 1.
 
 def on_grid(edges, size=SIZE):
     share = np.zeros(size[::-1])
-    rows, columns, part = coverage(edges, size)
+    rows, columns, part = pixel_coverage(edges, size)
     share[rows, columns] = part
     return share
 

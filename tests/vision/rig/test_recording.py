@@ -15,15 +15,15 @@ from vision.rig.bench import Bench
 from vision.rig.exposure import Exposure
 from vision.rig.motion import Motion
 from vision.rig.occluders import cable, share_seen
-from vision.rig.recorder import FILES, record
 from vision.rig.recording import Recording
+from vision.rig.recording_files import FILES, record
 from vision.rig.render import render
-from vision.rig.view import default_camera, view
+from vision.rig.virtual_camera import default_camera, viewing_pose
 from vision.tracking.workspace import Workspace, default_workspace
 
 WORKSPACE = default_workspace(Design())
 CAMERA = default_camera(320, 180)
-POSE = view(CAMERA, WORKSPACE, tilt=3)
+POSE = viewing_pose(CAMERA, WORKSPACE, tilt=3)
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +96,7 @@ def test_motion_blur_is_the_mean_of_what_is_seen_while_the_shutter_is_open(bench
 def test_a_cable_hides_the_share_of_a_marker_that_it_is_told_to(bench):
     still = np.zeros_like(bench.mesh.points)
     disc = bench.discs(still)[4]
-    camera, pose = default_camera(), view(default_camera(), WORKSPACE)
+    camera, pose = default_camera(), viewing_pose(default_camera(), WORKSPACE)
 
     def seen(share):
         cover = cable(bench.mesh.markers[4], Design().marker_diameter / 2, share, z=0)

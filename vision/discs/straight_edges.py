@@ -11,8 +11,8 @@ import numpy as np
 from scipy.special import ndtr
 
 from geometry.arrays import BoolArray, FloatArray
-from vision.discs.edge_model import BLUR, COUNT, EDGE, RADIUS, Array, picture
-from vision.discs.pixel_window import QUANTISATION, Window
+from vision.discs.disc_image_model import BLUR, COUNT, EDGE, RADIUS, Array, picture
+from vision.discs.pixel_windows import QUANTISATION, PixelWindows
 
 EDGES = 2
 """At most, beside every disc."""
@@ -25,7 +25,9 @@ GAIN = 30.0
 """Squares that an edge must explain, over the variance of the noise."""
 
 
-def with_edges(window: Window, parameters: FloatArray, trusted: BoolArray) -> tuple[FloatArray, BoolArray]:
+def with_edges(
+    window: PixelWindows, parameters: FloatArray, trusted: BoolArray
+) -> tuple[FloatArray, BoolArray]:
     """Add the parameters of the edges.
 
     Args:

@@ -25,7 +25,7 @@ def default_camera(width: int = 1280, height: int = 720) -> Camera:
     )
 
 
-def view(
+def viewing_pose(
     camera: Camera, workspace: Workspace, *, tilt: float = 0.0, direction: float = 60.0, turn: float = 0.0
 ) -> Pose:
     """Where the workspace is in the frame of a camera that looks at its middle and sees all fiducials.

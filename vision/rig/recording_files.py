@@ -11,11 +11,11 @@ from geometry.atomic import write_json
 from geometry.errors import UserError
 from vision.calibration.camera import Pose
 from vision.calibration.camera_file import save_camera
+from vision.frames.frame import Image
 from vision.frames.pictures import write_picture
 from vision.frames.video import CODECS, VideoWriter
 from vision.measurements import write_measurements
-from vision.rig.exposure import Image
-from vision.rig.recording import Recording, Truth
+from vision.rig.recording import FrameTruth, Recording
 from vision.rig.render import render
 from vision.rig.shapes import Scene
 from vision.tracking.fiducial_sheet import workspace_svg
@@ -117,7 +117,7 @@ def _writer(recording: Recording, place: Path, stack: ExitStack) -> Callable[[Im
     return lambda image: write_picture(next(names), image)
 
 
-def _rows(number: int, time: float, truth: Truth) -> Iterator[tuple[float, ...]]:
+def _rows(number: int, time: float, truth: FrameTruth) -> Iterator[tuple[float, ...]]:
     markers = np.column_stack([truth.world, truth.pixels, truth.discs, truth.seen]).tolist()
     for marker, values in enumerate(markers, start=1):
         yield (number, time, truth.load, marker, *values)

@@ -20,7 +20,7 @@ BETTER = 1.5
 """Markers, above those that a similarity in which x runs to the right explains."""
 
 
-def find_markers(pixels: FloatArray, radii: FloatArray, markers: FloatArray, diameter: float) -> IntArray:
+def match_layout(pixels: FloatArray, radii: FloatArray, markers: FloatArray, diameter: float) -> IntArray:
     """The number of its disc for every marker, shape (m,); -1 where none was found.
 
     Args:
@@ -58,7 +58,7 @@ def find_markers(pixels: FloatArray, radii: FloatArray, markers: FloatArray, dia
     return best
 
 
-def symmetric(markers: FloatArray) -> bool:
+def has_half_turn_symmetry(markers: FloatArray) -> bool:
     """Whether the markers, shape (m, 2), look the same from both ends."""
     middle = markers.mean(axis=0)
     return bool(np.allclose(2 * middle - markers[::-1], markers))

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
-from vision.discs.edge_model import Array
+from vision.discs.disc_image_model import Array
 from vision.frames.frame import GreyImage
 
 QUANTISATION = 1 / 12
@@ -18,7 +18,7 @@ SCALE = 1.4826
 
 
 @dataclass(frozen=True)
-class Window:
+class PixelWindows:
     """The pixels around some discs.
 
     Attributes:
@@ -65,7 +65,7 @@ class Window:
             * median_where(second.reshape(count, -1), within[:, :, 1:-1].reshape(count, -1)),
         )
 
-    def at(self, places: IntArray) -> "Window":
+    def at(self, places: IntArray) -> "PixelWindows":
         """Those of some discs."""
         return replace(
             self,

@@ -32,7 +32,7 @@ class UnseenError(UserError):
     """Too few fiducials are in the image."""
 
 
-class Match(NamedTuple):
+class FiducialMatch(NamedTuple):
     """Discs of the fiducials, shape (f,), -1 for those not found, and how far off all others are, mm."""
 
     discs: IntArray
@@ -71,8 +71,8 @@ def identify_fiducials(pixels: FloatArray, radii: FloatArray, workspace: Workspa
     return straight.discs
 
 
-def _best(pixels: FloatArray, radii: FloatArray, workspace: Workspace, *, mirrored: bool) -> Match:
-    best = Match(np.full(len(workspace.fiducials), -1), np.inf)
+def _best(pixels: FloatArray, radii: FloatArray, workspace: Workspace, *, mirrored: bool) -> FiducialMatch:
+    best = FiducialMatch(np.full(len(workspace.fiducials), -1), np.inf)
     for group in _groups(radii):
         discs = np.nonzero(group)[0]
         for match in _matches(pixels[discs], radii[discs], workspace, mirrored=mirrored):
@@ -87,7 +87,9 @@ def _groups(radii: FloatArray) -> list[BoolArray]:
     return [np.array(group) for group in sorted(groups) if 4 <= sum(group) <= MOST_DISCS]
 
 
-def _matches(pixels: FloatArray, radii: FloatArray, workspace: Workspace, *, mirrored: bool) -> list[Match]:
+def _matches(
+    pixels: FloatArray, radii: FloatArray, workspace: Workspace, *, mirrored: bool
+) -> list[FiducialMatch]:
     """The best match for every four fiducials that span the workspace."""
     world = workspace.points
     chosen = np.array(list(permutations(range(len(pixels)), 4)))
@@ -108,7 +110,7 @@ def _matches(pixels: FloatArray, radii: FloatArray, workspace: Workspace, *, mir
 
 def _match(
     pixels: FloatArray, radii: FloatArray, workspace: Workspace, corners: FloatArray, chosen: IntArray
-) -> Match:
+) -> FiducialMatch:
     """The best of the suggestions that put `corners`, shape (4, 2), mm, at `chosen` discs, (s, 4)."""
     world = workspace.points
     homographies = _homographies(corners, pixels[chosen])
@@ -121,7 +123,7 @@ def _match(
     area = np.abs(np.linalg.det(slopes))
     upright = ((slopes**2).sum(axis=(2, 3)) <= (OBLIQUE + 1 / OBLIQUE) * area).all(axis=1)
     if not upright.any():
-        return Match(np.full(len(world), -1), np.inf)
+        return FiducialMatch(np.full(len(world), -1), np.inf)
     scale = np.sqrt(area[upright, :, None])
     distance = np.linalg.norm(seen[upright, :, None] - pixels, axis=3) / scale
     size = radii / (scale * workspace.fiducial_diameter / 2)
@@ -133,7 +135,7 @@ def _match(
     error = np.where(np.isfinite(missed), missed, 0.0).sum(axis=1)
     best = int(np.lexsort([error, -count])[0])
     found = np.isfinite(missed[best])
-    return Match(np.where(found, nearest[best], -1), float(error[best]))
+    return FiducialMatch(np.where(found, nearest[best], -1), float(error[best]))
 
 
 def _homographies(corners: FloatArray, images: FloatArray) -> FloatArray:

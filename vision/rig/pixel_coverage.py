@@ -12,7 +12,7 @@ import numpy as np
 from geometry.arrays import FloatArray
 
 
-class Coverage(NamedTuple):
+class PixelCoverage(NamedTuple):
     """A part of the grid, and the share of every cell of it that is covered, shape (rows, columns)."""
 
     rows: slice
@@ -20,7 +20,7 @@ class Coverage(NamedTuple):
     share: FloatArray
 
 
-def coverage(edges: FloatArray, size: tuple[int, int]) -> Coverage:
+def pixel_coverage(edges: FloatArray, size: tuple[int, int]) -> PixelCoverage:
     """Share of every cell of a grid that closed polygons cover.
 
     Args:
@@ -45,7 +45,7 @@ def coverage(edges: FloatArray, size: tuple[int, int]) -> Coverage:
     steps += np.bincount(place, rise[seen] * (1 - before), minlength=len(steps))
     steps += np.bincount(place + 1, rise[seen] * before, minlength=len(steps))
     share = np.abs(np.cumsum(steps[:-1].reshape(height, width + 1), axis=1)[:, :width])
-    return Coverage(slice(top, top + height), slice(left, left + width), np.minimum(share, 1.0))
+    return PixelCoverage(slice(top, top + height), slice(left, left + width), np.minimum(share, 1.0))
 
 
 def _pieces(edges: FloatArray) -> tuple[FloatArray, FloatArray]:
