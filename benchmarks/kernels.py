@@ -50,7 +50,7 @@ def main() -> Table:
 def _problem(design: str, layout: str) -> Problem:
     finger = load_design(design, {"marker_layout": layout})
     problem = Problem(finger_mesh(finger, settings=MeshSettings(size=ELEMENT)))
-    exact, _ = virtual_experiment(problem)
+    exact, _ = virtual_experiment(problem, finger.marker_radius)
     noise = np.random.default_rng(0).normal(0, NOISE, exact.displacements.shape)
     observations = replace(
         exact,

@@ -113,7 +113,10 @@ def run(job: Job, stages: Stages) -> Outcome:
     started = datetime.now(UTC)
     _check(job)
     chosen, left_out = supported_solvers(job.solvers, job.spare, job.material, job.load)
-    given = read_measurements(job.measurements) if isinstance(job.measurements, Path) else None
+    radius = job.design.marker_radius
+    given = None
+    if isinstance(job.measurements, Path):
+        given = read_measurements(job.measurements, marker_radius=radius)
     shots: list[Figure] = []
     remarks: Sequence[str] = ()
     with replaced_folder(job.out, keep=_names(job) if job.resume else ()) as folder:
@@ -140,7 +143,7 @@ def run(job: Job, stages: Stages) -> Outcome:
             write_rounds(folder / "adapt.csv", adaptation)
         problem = Problem(mesh, job.material, job.load)
         with stages.stage("measurements") as progress:
-            observations, truth = (given, None) if given else virtual_experiment(problem, progress)
+            observations, truth = (given, None) if given else virtual_experiment(problem, radius, progress)
             write_measurements(folder / "observations.csv", observations)
         evaluations: list[Evaluation] = []
         for solver in chosen:

@@ -1,6 +1,7 @@
 """Displacements measured, or simulated, at the markers."""
 
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
@@ -19,10 +20,11 @@ class Observations:
         visible: Which markers were seen, shape (m,).
         source: One sentence on where the numbers come from; shown wherever they appear.
         simulated: True if no camera was involved.
+        marker_radius: Radius of the markers' discs, over which their displacements are means, mm.
 
     Raises:
         ShapeError: If the arrays do not fit together.
-        UserError: If a standard deviation is negative or no marker is visible.
+        UserError: If a standard deviation or the radius is negative or no marker is visible.
     """
 
     points: FloatArray
@@ -31,6 +33,7 @@ class Observations:
     visible: BoolArray
     source: str
     simulated: bool
+    marker_radius: float
 
     def __post_init__(self) -> None:
         count = len(np.atleast_1d(self.visible))
@@ -46,6 +49,8 @@ class Observations:
             raise UserError("none of the markers is visible; at least one is needed")
         if (self.standard_deviations < 0).any():
             raise UserError("standard deviations must be zero or more (mm)")
+        if not 0 <= self.marker_radius < inf:
+            raise UserError(f"the marker radius must be zero or more, got {self.marker_radius} (mm)")
         if count == 0:
             raise ShapeError("observations need at least one marker")
 

@@ -148,6 +148,7 @@ class Problem:
         if self.observations is not None:
             for name in ("points", "displacements", "standard_deviations", "visible"):
                 sha.update(getattr(self.observations, name).tobytes())
+            sha.update(repr(self.observations.marker_radius).encode())
         return sha.hexdigest()
 
 

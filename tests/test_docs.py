@@ -372,7 +372,7 @@ def test_the_measurements_in_the_guide_can_be_read(tmp_path):
     (block,) = [block for block in blocks(GUIDE) if block.language == "csv"]
     path = tmp_path / "markers.csv"
     path.write_text(block.text, encoding="utf-8")
-    observations = read_measurements(path)
+    observations = read_measurements(path, marker_radius=0.8)
     assert observations.label == "measured"
     assert list(observations.visible) == [True, True, False]
     assert observations.points.tolist() == marker_positions(load_design())[:3].tolist()

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from geometry.atomic import atomic_path
 from geometry.errors import UserError
 from geometry.observations import Observations
 
@@ -19,11 +20,11 @@ SOURCE_MARK = "# source: "
 
 
 def write_measurements(path: Path, observations: Observations) -> None:
-    """Write observations; `read_measurements` gives the same back.
+    """Write observations atomically; `read_measurements` gives the same back.
 
     Markers that were not seen have their position only, and are read back with zeros.
     """
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with atomic_path(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
         if observations.simulated:
             file.write(f"{SIMULATED_MARK}\n")
         file.write(f"{SOURCE_MARK}{' '.join(observations.source.split())}\n")
@@ -41,8 +42,8 @@ def write_measurements(path: Path, observations: Observations) -> None:
             writer.writerow([number, *point, *seen, int(visible)])
 
 
-def read_measurements(path: Path) -> Observations:
-    """Read observations.
+def read_measurements(path: Path, *, marker_radius: float) -> Observations:
+    """Read observations of markers whose discs have a radius, mm: `Design.marker_radius`.
 
     The columns `x_mm, y_mm` (initial position in the finger's frame) and `u_mm, v_mm` (displacement, final
     minus initial) are needed; `std_u_mm, std_v_mm` (standard deviations) and `visible` (1 or 0) may be left
@@ -88,6 +89,7 @@ def read_measurements(path: Path) -> Observations:
             visible=columns["visible"] == 1,
             source=sources[0] if sources else f"measurements from {path.name}",
             simulated=any(re.fullmatch(r"#\s*simulated", comment, re.I) for comment in comments),
+            marker_radius=marker_radius,
         )
     except UserError as error:
         raise UserError(f"{path}: {error}") from None

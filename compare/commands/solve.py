@@ -48,7 +48,9 @@ def solve(
         raise UserError(f"name one solver, not {solver!r}; `compare` takes several")
     physics.check_law(chosen_solvers)
     (made,) = chosen_solvers
-    given = read_measurements(file) if (file := existing(measurements)) else None
+    given = None
+    if file := existing(measurements):
+        given = read_measurements(file, marker_radius=chosen.marker_radius)
     if given and not assimilates(made):
         raise UserError(f"{made.name} does not assimilate markers; `compare` compares it with --measurements")
     with Stages(Console(stderr=True)) as stages:

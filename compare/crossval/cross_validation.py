@@ -40,7 +40,10 @@ def cross_validate(study: Study, stages: Stages) -> CrossvalResult:
     """
     started = datetime.now(UTC)
     check_study(study)
-    given = seen_markers(read_measurements(study.measurements)) if study.measurements else None
+    given = None
+    if study.measurements:
+        radius = study.design.marker_radius
+        given = seen_markers(read_measurements(study.measurements, marker_radius=radius))
     definition = definition_of(study, given)
     check_resumable_folder(study.out / DEFINITION, definition, job="cross-validation")
     with stages.stage("mesh"):
@@ -66,7 +69,6 @@ def cross_validate(study: Study, stages: Stages) -> CrossvalResult:
                 truths=truths,
                 observations=observations,
                 folds=folds,
-                radius=study.design.marker_diameter / 2,
                 folder=study.out / "runs" / entry.file_name,
                 threads=study.threads,
             )
@@ -94,7 +96,6 @@ def _truths(study: Study, conditions: Sequence[LoadCase], shared: Path, stages: 
             design=study.design.replaced(contact_position=condition.contact),
             settings=study.mesh,
             shared=shared,
-            radius=study.design.marker_diameter / 2,
             material=study.material,
             stroke=condition.share * stroke,
         )
@@ -136,6 +137,7 @@ def _observations(
                 visible=np.ones(len(true), dtype=bool),
                 source=source,
                 simulated=True,
+                marker_radius=study.design.marker_radius,
             )
             for at, true in enumerate(displacements)
         ]

@@ -115,7 +115,6 @@ class SolverTask:
         truths: File of the true fields at each load; none with real measurements.
         observations: For each seed, those at every load.
         folds: What to hold out.
-        radius: Of the markers, mm.
         folder: Where finished folds are kept.
         threads: Of the processor.
     """
@@ -127,7 +126,6 @@ class SolverTask:
     truths: Sequence[Path]
     observations: Sequence[Sequence[Observations]]
     folds: Sequence[Fold]
-    radius: float
     folder: Path
     threads: int
 
@@ -174,7 +172,8 @@ class _FoldRunner:
         self._problem = Problem(mesh, with_law(task.material, solver), task.conditions[0].load)
         finite = task.material.model_copy(update={"law": "neo-hookean", "plane": "strain"})
         self._finite = replace(self._problem, material=finite)
-        self._sampler = FieldSampler.of(mesh, task.observations[0][0].points, task.radius)
+        markers = task.observations[0][0]
+        self._sampler = FieldSampler.of(mesh, markers.points, markers.marker_radius)
         self._truths = [TrueFields.load(path) for path in task.truths]
         self._priors: dict[int, SampledField | None] = {}
         self._plain: dict[int, tuple[SampledField, bool]] = {}

@@ -32,7 +32,8 @@ def sweep_weights(task: SolverTask, progress: Progress = silent) -> dict[str, li
     problem = Problem(mesh, material, task.conditions[0].load, observations)
     law = task.material.model_copy(update={"law": "neo-hookean", "plane": "strain"})
     finite = replace(problem, material=law)
-    sampler, truth = FieldSampler.of(mesh, observations.points, task.radius), TrueFields.load(task.truths[0])
+    sampler = FieldSampler.of(mesh, observations.points, observations.marker_radius)
+    truth = TrueFields.load(task.truths[0])
     solution = solver.solve(problem)
     finger, misfit = solver.prepare(problem)
     forces, space = finger.forces(misfit), finger.equilibrium.elasticity.distributed.space

@@ -18,8 +18,7 @@ from geometry.mesh.point_location import Location
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from solvers.assimilation.misfit import misfit_of
+from solvers.assimilation.misfit import disc_quadrature, radius_within
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, State
 from solvers.solver import Progress, silent
@@ -70,12 +69,7 @@ class FieldSampler:
     def of(cls, mesh: TriangleMesh, markers: FloatArray, radius: float) -> "FieldSampler":
         """On the shared mesh, for markers at (m, 2), mm, of a radius, mm."""
         rule = body_quadrature(mesh)
-        zeros, seen = np.zeros_like(markers), np.ones(len(markers), dtype=bool)
-        every = Problem(mesh, observations=Observations(markers, zeros, zeros, seen, "", True))
-        misfit = misfit_of(every, marker_radius=radius)
-        if misfit is None:
-            raise ValueError("there are observations")
-        points, means = misfit.sampling()
+        points, means = disc_quadrature(markers, radius_within(mesh, markers, radius))
         return cls(rule.location, rule.weights, mesh.locate(markers), mesh.locate(points), means)
 
     def of_solution(self, solution: Solution, mesh: TriangleMesh) -> SampledField:
@@ -149,7 +143,6 @@ class TruthTask:
         design: The finger, with the contact where it is pressed.
         settings: Of the shared mesh.
         shared: File of the shared mesh.
-        radius: Of the markers, mm.
         material: Elastic constants.
         stroke: -v of the indenter, mm.
     """
@@ -157,7 +150,6 @@ class TruthTask:
     design: Design
     settings: MeshSettings
     shared: Path
-    radius: float
     material: Material
     stroke: float
 
@@ -168,7 +160,6 @@ class TruthTask:
             self.design.digest,
             self.settings.model_dump(),
             TriangleMesh.load(self.shared).digest,
-            self.radius,
             self.material.model_dump(),
             self.stroke,
             FINER,
@@ -196,7 +187,7 @@ def find_truth(task: TruthTask, progress: Progress = silent) -> Path:
     mesh = finger_mesh(task.design, settings=finer)
     problem = Problem(mesh, task.material, Load(displacement=(0.0, -task.stroke)))
     solution = simulate(problem, progress)
-    sampler = FieldSampler.of(shared, shared.markers, task.radius)
+    sampler = FieldSampler.of(shared, shared.markers, task.design.marker_radius)
     sampled = sampler.of_solution(solution, shared)
     state = State.from_gradient(sampled.gradient, solution.problem)
     TrueFields(sampled.markers, sampled.displacement, state.strain, state.von_mises).save(entry)

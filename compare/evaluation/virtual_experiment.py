@@ -39,10 +39,18 @@ SOURCES = (
 """Modules whose change makes a new simulation."""
 
 
-def virtual_experiment(problem: Problem, progress: Progress = silent) -> tuple[Observations, Evaluation]:
-    """Marker displacements as a camera would measure them, and the true fields on the problem's mesh.
+def virtual_experiment(
+    problem: Problem, marker_radius: float, progress: Progress = silent
+) -> tuple[Observations, Evaluation]:
+    """Simulate what a camera would have measured at the mesh's markers; kept in the cache folder.
 
-    Both are kept in the cache folder.
+    Args:
+        problem: The finger and its load; the simulation has its own law and kind of load.
+        marker_radius: Radius of the design's markers, mm.
+        progress: Told how far the simulation is.
+
+    Returns:
+        The observations, and the true fields on the problem's mesh.
 
     Raises:
         UserError: If the simulation cannot be run or does not reach the full load.
@@ -56,6 +64,7 @@ def virtual_experiment(problem: Problem, progress: Progress = silent) -> tuple[O
         visible=np.ones(len(markers), dtype=bool),
         source=experiment_source(problem),
         simulated=True,
+        marker_radius=marker_radius,
     )
     return observations, truth
 

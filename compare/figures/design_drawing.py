@@ -158,10 +158,8 @@ def _free_abscissa(design: Parameters, shape: Section, em: float) -> float:
 def _markers(pen: Draughtsman, design: Parameters) -> None:
     points = marker_positions(design)
     for number, (x, y) in enumerate(points, start=1):
-        pen.axes.add_patch(
-            Circle((x, y), design.marker_diameter / 2, fc=MEASURED, ec="white", lw=0.4, zorder=4)
-        )
+        pen.axes.add_patch(Circle((x, y), design.marker_radius, fc=MEASURED, ec="white", lw=0.4, zorder=4))
         inward = -1 if y > -design.base_width * (1 - x / design.height) / 2 else 1
-        gap = design.marker_diameter / 2 + 0.75 * pen.em
+        gap = design.marker_radius + 0.75 * pen.em
         if len(points) <= 20:
             pen.text((x, y + inward * gap), str(number), size=6.5, va="center", color=MEASURED)

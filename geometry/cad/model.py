@@ -45,7 +45,7 @@ def solids(parameters: Parameters) -> tuple[cq.Shape, tuple[cq.Solid, ...]]:
     outer, cells = _wires(p)
     markers = tuple(
         cq.Solid.makeCylinder(
-            p.marker_diameter / 2, p.marker_height, pnt=cq.Vector(x, y, p.depth - p.marker_height)
+            p.marker_radius, p.marker_height, pnt=cq.Vector(x, y, p.depth - p.marker_height)
         )
         for x, y in marker_positions(p)
     )
@@ -84,7 +84,7 @@ def write_dxf(parameters: Parameters, folder: Path) -> list[Path]:
     path = folder / "section.dxf"
     outer, cells = _wires(parameters)
     circles = [
-        cq.Wire.makeCircle(parameters.marker_diameter / 2, cq.Vector(x, y, 0), cq.Vector(0, 0, 1))
+        cq.Wire.makeCircle(parameters.marker_radius, cq.Vector(x, y, 0), cq.Vector(0, 0, 1))
         for x, y in marker_positions(parameters)
     ]
     document = DxfDocument(approx=None)

@@ -16,8 +16,7 @@ def section_svg(parameters: Parameters) -> str:
     shape = finger_section(p)
     paths = [_polygon(shape.outer), *(_cell(cell, shape.fillet_radius) for cell in shape.cells)]
     circles = "\n".join(
-        f'    <circle cx="{x:.6f}" cy="{y:.6f}" r="{p.marker_diameter / 2:.6g}"/>'
-        for x, y in marker_positions(p)
+        f'    <circle cx="{x:.6f}" cy="{y:.6f}" r="{p.marker_radius:.6g}"/>' for x, y in marker_positions(p)
     )
     width, height = p.height + 2 * MARGIN, p.base_width + 2 * MARGIN
     return f"""<?xml version="1.0" encoding="UTF-8"?>

@@ -71,6 +71,11 @@ class Parameters(BaseModel):
     marker_height: float = bounded(0.6, 0.05, 50, "mm", "", "How deep a marker is inlaid into the side face")
 
     @property
+    def marker_radius(self) -> float:
+        """Radius of a marker's disc, mm: a marker's displacement is the mean over this disc."""
+        return self.marker_diameter / 2
+
+    @property
     def contact_abscissa(self) -> float:
         """X of the contact's middle on the front face, mm."""
         if self.contact_position is not None:

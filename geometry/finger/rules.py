@@ -129,7 +129,7 @@ def markers_fit(p: Parameters) -> Finding:
     x, y = centres[worst]
     room = 2 * (margins[worst] - MIN_MARKER_WALL)
     return Finding(
-        float(margins[worst] - MIN_MARKER_WALL - p.marker_diameter / 2),
+        float(margins[worst] - MIN_MARKER_WALL - p.marker_radius),
         f"marker {worst + 1} of layout {p.marker_layout!r} at ({x:.4g}, {y:.4g}) mm does not fit into the "
         f"material: marker_diameter is {p.marker_diameter:g} mm, there is room for {max(room, 0):.3g} mm",
     )

@@ -36,9 +36,6 @@ SMALLEST_DEVIATION = 0.005
 Simulated displacements have none at all; a camera that is calibrated well knows a marker to about this.
 """
 
-MARKER_RADIUS = 0.8
-"""Of a printed marker, mm: half the diameter of `geometry.finger.parameters.Parameters`."""
-
 RINGS, ANGLES = 4, 12
 """Points of the rule for the mean over a disc: Gauss's in the squared radius, even ones around."""
 
@@ -61,15 +58,7 @@ class Misfit:
 
     def sampling(self) -> tuple[FloatArray, FloatArray]:
         """Points (q, 2), mm, and the weights (m, q) by which a field's values there give B u."""
-        count = len(self.points)
-        if not self.radius:
-            return self.points, np.eye(count)
-        roots, shares = roots_legendre(RINGS)
-        angles = 2 * np.pi * (np.arange(ANGLES) + 0.5) / ANGLES
-        distance = self.radius * np.sqrt(0.5 * (1 + roots))
-        disc = distance[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        points = self.points[:, None] + disc.reshape(-1, 2)
-        return points.reshape(-1, 2), np.kron(np.eye(count), np.repeat(shares / (2 * ANGLES), ANGLES))
+        return disc_quadrature(self.points, self.radius)
 
     def value(self, displacement: FloatArray) -> float:
         """The misfit of displacements at the markers, shape (m, 2), mm: N mm / mm."""
@@ -96,7 +85,7 @@ def misfit_of(
     weights: Weighting = "paper",
     asm_weight: float = 1000.0,
     scale: float = 1.0,
-    marker_radius: float = MARKER_RADIUS,
+    marker_radius: float | None = None,
 ) -> Misfit | None:
     """The misfit to a problem's observations; None where it has none.
 
@@ -110,8 +99,8 @@ def misfit_of(
         scale: For "precision", the model's own error as an energy per depth, N mm / mm: a typical deviation
             from the model's solution has half of it in every degree of freedom. The less, the more the model
             is believed.
-        marker_radius: Of the discs over which the displacement is averaged, mm; less where a marker is nearer
-            to the boundary of the body.
+        marker_radius: Radius of the discs over which the displacement is averaged, mm; None for the
+            observations' own; less where a marker is nearer to the boundary of the body.
     """
     observations = problem.observations
     if observations is None:
@@ -123,8 +112,22 @@ def misfit_of(
     else:
         diagonal = scale / standard_deviations(observations) ** 2
     points = observations.points[seen]
-    radius = min(marker_radius, _room(problem.mesh, points))
+    radius = observations.marker_radius if marker_radius is None else marker_radius
+    radius = radius_within(problem.mesh, points, radius)
     return Misfit(points, observations.displacements[seen], diagonal, radius)
+
+
+def disc_quadrature(centres: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
+    """Points (q, 2), mm, and weights (m, q) that give a field's means over the discs at m centres."""
+    count = len(centres)
+    if not radius:
+        return centres, np.eye(count)
+    roots, shares = roots_legendre(RINGS)
+    angles = 2 * np.pi * (np.arange(ANGLES) + 0.5) / ANGLES
+    distance = radius * np.sqrt(0.5 * (1 + roots))
+    disc = distance[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    points = centres[:, None] + disc.reshape(-1, 2)
+    return points.reshape(-1, 2), np.kron(np.eye(count), np.repeat(shares / (2 * ANGLES), ANGLES))
 
 
 def standard_deviations(observations: Observations) -> FloatArray:
@@ -146,26 +149,22 @@ def without_each(problem: Problem, missed: FloatArray) -> FloatArray:
     return predicted
 
 
-def _room(mesh: TriangleMesh, points: FloatArray) -> float:
-    """The least distance of points (m, 2), mm, from the boundary of the body, mm."""
+def radius_within(mesh: TriangleMesh, points: FloatArray, radius: float) -> float:
+    """The radius, mm, or the least distance of points (m, 2), mm, from the boundary if that is less."""
     start, end = mesh.points[boundary_edges(mesh.triangles)].transpose(1, 0, 2)
     along, offset = end - start, points[:, None] - start
     share = ((offset * along).sum(axis=2) / (along**2).sum(axis=1)).clip(0, 1)
-    return float(np.linalg.norm(offset - share[..., None] * along, axis=2).min())
+    return min(radius, float(np.linalg.norm(offset - share[..., None] * along, axis=2).min()))
 
 
 def check_weighting(
-    solver: str, weights: str, asm_weight: float, scale: float, marker_radius: float = MARKER_RADIUS
+    solver: str, weights: str, asm_weight: float, scale: float, marker_radius: float | None = None
 ) -> None:
     """Raise a `UserError` if a solver's settings make no misfit."""
     if weights not in get_args(Weighting):
         raise UserError(f"{solver}: weights must be {' or '.join(get_args(Weighting))}, got {weights!r}")
-    for name, value in (
-        ("asm_weight", asm_weight),
-        ("scale", scale),
-        ("marker_radius", marker_radius),
-    ):
-        if not (np.isfinite(value) and value >= 0):
+    for name, value in (("asm_weight", asm_weight), ("scale", scale), ("marker_radius", marker_radius)):
+        if value is not None and not 0 <= value < np.inf:
             raise UserError(f"{solver}: {name} must be zero or more, got {value}")
 
 

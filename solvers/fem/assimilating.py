@@ -14,7 +14,6 @@ from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.assimilation.marker_weight import Choice, WeightChoice
 from solvers.assimilation.misfit import (
-    MARKER_RADIUS,
     Misfit,
     Weighting,
     check_weighting,
@@ -44,7 +43,8 @@ class FemAsmSolver:
         weights: Of the markers, see `misfit_of`: "paper" or "precision".
         asm_weight: λ_ASM for "paper", MPa/mm².
         scale: For "precision", energy of the model's own error, N mm / mm.
-        marker_radius: Of the discs over which the displacement is averaged, mm; zero for the points alone.
+        marker_radius: Radius of the discs over which the displacement is averaged, mm; None: that of the
+            observations; zero: the markers' centres alone.
         contact_deviation: Standard deviation of the contact's displacement about what is prescribed, mm,
             where the prior is exp(-E / scale): a spring of the stiffness scale / contact_deviation² between
             contact and indenter. Zero: the contact moves as prescribed, as it does for other solvers.
@@ -56,7 +56,7 @@ class FemAsmSolver:
     weights: Weighting = "paper"
     asm_weight: float = 1000.0
     scale: float = 1.0
-    marker_radius: float = MARKER_RADIUS
+    marker_radius: float | None = None
     contact_deviation: float = 0.0
     choose: Choice = "given"
     name: ClassVar[str] = "fem-asm"

@@ -47,7 +47,7 @@ class PaperPinnAsmSolver(Assimilating, PaperPinnSolver):
         marker_radius: As in `Assimilating`; the paper takes the displacement of the centre.
     """
 
-    marker_radius: float = 0.0
+    marker_radius: float | None = 0.0
     name: ClassVar[str] = "pinn-asm"
 
 

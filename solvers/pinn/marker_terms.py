@@ -7,7 +7,7 @@ import numpy as np
 
 from geometry.errors import UserError
 from solvers.assimilation.marker_weight import Choice, WeightChoice
-from solvers.assimilation.misfit import MARKER_RADIUS, Misfit, Weighting, check_weighting, misfit_of
+from solvers.assimilation.misfit import Misfit, Weighting, check_weighting, misfit_of
 from solvers.problem import Problem
 
 WEIGHING = ("weights", "asm_weight", "scale", "marker_radius")
@@ -55,13 +55,14 @@ class Assimilating(Observing):
         weights: "paper" or "precision": how the markers are weighed, see `misfit_of`.
         asm_weight: The paper's λ_ASM, MPa/mm², for "paper".
         scale: The model's own error as an energy per depth, N mm/mm, for "precision".
-        marker_radius: Of the disc over which a marker takes the mean displacement, mm; 0 for its centre.
+        marker_radius: Radius of the disc over which a marker takes the mean displacement, mm; None: that of
+            the observations; 0: its centre.
     """
 
     weights: Weighting = "paper"
     asm_weight: float = 1000.0
     scale: float = 1.0
-    marker_radius: float = MARKER_RADIUS
+    marker_radius: float | None = None
     assimilates: ClassVar[bool] = True
 
     def __post_init__(self) -> None:

@@ -143,6 +143,7 @@ def observe(mesh: TriangleMesh) -> Callable[..., Observations]:
             visible=visible,
             source=source or said,
             simulated=simulated,
+            marker_radius=0.8,
         )
 
     return make

@@ -60,6 +60,7 @@ def observations(coarse_mesh: TriangleMesh, truth: Solution) -> Observations:
         np.ones(9, dtype=bool),
         "a test",
         True,
+        0.8,
     )
 
 
@@ -93,7 +94,6 @@ def task(
         truths=paths,
         observations=[[observations, half]],
         folds=[Fold(ALL, "all", ()), Fold(ONE, "marker 4", (3,)), Fold(LOAD, "half", (), 1)],
-        radius=0.8,
         folder=tmp_path / "kept",
         threads=1,
     )

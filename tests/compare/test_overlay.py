@@ -37,6 +37,7 @@ def test_crosses_are_at_the_observed_points_even_if_they_are_not_the_meshs_marke
         visible=np.ones(2, dtype=bool),
         source="a test",
         simulated=True,
+        marker_radius=0.8,
     )
     crosses = []
     plot = Axes.plot

@@ -22,6 +22,7 @@ from compare.runtime.stages import Stages
 from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.finger.design import Design
+from geometry.finger.presets import load_design
 from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
 from solvers.fem.linear import FemSolver
@@ -241,7 +242,8 @@ def test_a_marker_that_was_not_seen(tmp_path):
     assert hidden["visible"] == "0"
     assert [hidden[name] for name in ("observed_u_mm", "fem_ae_u_mm", "fem_ae_v_mm")] == [""] * 3
     assert "2 of 3 markers seen" in (out / "report.html").read_text(encoding="utf-8")
-    assert read_measurements(out / "observations.csv").visible.tolist() == [True, False, True]
+    read = read_measurements(out / "observations.csv", marker_radius=0.8)
+    assert read.visible.tolist() == [True, False, True]
 
 
 @dataclass
@@ -492,6 +494,10 @@ def test_a_job_that_cannot_be_done(job, tmp_path, changes, message):
         compare(job(first, **changes))
     assert not (tmp_path / "out").exists()
     assert first.calls == 0
+
+
+def test_markers_of_a_file_are_as_large_as_the_designs(job):
+    assert compare(job(Scripted("fem"), design=load_design("slender"))).observations.marker_radius == 0.6
 
 
 def test_markers_outside_the_finger(job, tmp_path, measured):

@@ -28,7 +28,7 @@ def filmed(folder):
 
 
 def test_it_films_the_virtual_experiment_that_compare_takes_for_measurements(folder):
-    truth = read_measurements(folder / "observations_true.csv")
+    truth = read_measurements(folder / "observations_true.csv", marker_radius=0.8)
     assert truth.simulated
     assert "fem-nonlinear" in truth.source
     # The patch that the markers 4 and 5 are near is pressed in by 10 mm.

@@ -33,7 +33,8 @@ def tracked(film, tmp_path_factory):
 
 def test_a_video_becomes_measurements_within_hundredths_of_a_millimetre(film, tracked):
     found, true = (
-        read_measurements(path) for path in (tracked / "observations.csv", film / "observations_true.csv")
+        read_measurements(path, marker_radius=0.8)
+        for path in (tracked / "observations.csv", film / "observations_true.csv")
     )
     assert found.label == "measured"
     assert found.visible.all()
@@ -51,7 +52,8 @@ def test_the_same_frames_come_through_a_pipe(film, tracked, tmp_path, monkeypatc
         monkeypatch.setattr("sys.stdin", pipe)
         assert main(["track", "-", *files, "--live", "--out", str(tmp_path / "out")]) == 0
     found, before = (
-        read_measurements(folder / "observations.csv").displacements for folder in (tmp_path / "out", tracked)
+        read_measurements(folder / "observations.csv", marker_radius=0.8).displacements
+        for folder in (tmp_path / "out", tracked)
     )
     np.testing.assert_allclose(found, before, rtol=0, atol=0.001)  # live looks at fewer fiducials
 
@@ -159,7 +161,7 @@ def test_compare_goes_from_pixels_to_the_table(film, tmp_path, capsys):
     video = str(film / "video.mkv")
     assert main(["compare", *options, "--measurements", video, "--out", str(out)]) == 0
     assert "Mean absolute error at 9 markers, mm (measured displacements)" in capsys.readouterr().out
-    assert read_measurements(out / "observations.csv").label == "measured"
+    assert read_measurements(out / "observations.csv", marker_radius=0.8).label == "measured"
     metrics = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
     assert metrics["measurements"]["source"] == "measured"
     assert "standard deviations" in metrics["measurements"]["description"]

@@ -41,7 +41,7 @@ def problem(mesh: TriangleMesh) -> Problem:
 
 
 def test_a_sliding_patch_presses_on_a_neo_hookean_finger(problem, solutions):
-    virtual_experiment(problem)
+    virtual_experiment(problem, 0.8)
     (solution,) = solutions
     solved = solution.problem
     assert (solved.load.kind, solved.load.displacement) == ("patch", (None, -0.5))
@@ -55,10 +55,11 @@ def test_a_sliding_patch_presses_on_a_neo_hookean_finger(problem, solutions):
 
 
 def test_the_markers_of_the_mesh_are_observed_and_said_to_be_simulated(problem, solutions):
-    observations, _ = virtual_experiment(problem)
+    observations, _ = virtual_experiment(problem, 0.8)
     markers = problem.mesh.markers
     np.testing.assert_array_equal(observations.points, markers)
     np.testing.assert_array_equal(observations.displacements, solutions[0].displacement(markers))
+    assert observations.marker_radius == 0.8
     assert observations.visible.all()
     assert not observations.standard_deviations.any()
     assert observations.simulated
@@ -68,9 +69,9 @@ def test_the_markers_of_the_mesh_are_observed_and_said_to_be_simulated(problem, 
 
 
 def test_the_second_time_it_is_read_from_the_cache(problem, solutions):
-    first, _ = virtual_experiment(problem)
+    first, _ = virtual_experiment(problem, 0.8)
     notes: list[str] = []
-    second, _ = virtual_experiment(problem, lambda _, note: notes.append(note))
+    second, _ = virtual_experiment(problem, 0.8, lambda _, note: notes.append(note))
     assert (len(solutions), notes) == (1, ["from the cache"])
     np.testing.assert_array_equal(second.displacements, first.displacements)
     assert (second.source, second.simulated) == (first.source, first.simulated)
@@ -86,14 +87,14 @@ def test_the_second_time_it_is_read_from_the_cache(problem, solutions):
     ids=["stroke", "young", "poisson"],
 )
 def test_another_problem_is_simulated_again(problem, solutions, changes):
-    virtual_experiment(problem)
-    virtual_experiment(replace(problem, **changes))
+    virtual_experiment(problem, 0.8)
+    virtual_experiment(replace(problem, **changes), 0.8)
     assert len(solutions) == 2
 
 
 def test_another_mesh_is_simulated_again(problem, solutions):
-    virtual_experiment(problem)
-    virtual_experiment(replace(problem, mesh=problem.mesh.permuted(1)))
+    virtual_experiment(problem, 0.8)
+    virtual_experiment(replace(problem, mesh=problem.mesh.permuted(1)), 0.8)
     assert len(solutions) == 2
 
 
@@ -107,35 +108,35 @@ def test_another_mesh_is_simulated_again(problem, solutions):
     ids=["load", "free u", "plane"],
 )
 def test_what_has_no_part_in_the_experiment_does_not_repeat_it(problem, solutions, changes):
-    virtual_experiment(problem)
-    virtual_experiment(replace(problem, **changes))
+    virtual_experiment(problem, 0.8)
+    virtual_experiment(replace(problem, **changes), 0.8)
     assert len(solutions) == 1
 
 
 def test_another_version_of_a_package_or_of_our_sources_is_simulated_again(problem, solutions, monkeypatch):
-    virtual_experiment(problem)
+    virtual_experiment(problem, 0.8)
     monkeypatch.setattr("compare.evaluation.virtual_experiment.package_versions", lambda: {"numpy": "9"})
-    virtual_experiment(problem)
+    virtual_experiment(problem, 0.8)
     monkeypatch.setattr("compare.evaluation.virtual_experiment.sources_digest", lambda _: "other")
-    virtual_experiment(problem)
+    virtual_experiment(problem, 0.8)
     assert len(solutions) == 3
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"\xff\x00"])
 def test_a_damaged_file_in_the_cache_is_made_again(problem, solutions, cache, content):
-    virtual_experiment(problem)
+    virtual_experiment(problem, 0.8)
     (entry,) = cache.iterdir()
     entry.write_bytes(content)
-    virtual_experiment(problem)
+    virtual_experiment(problem, 0.8)
     assert len(solutions) == 2
-    assert virtual_experiment(problem)[0].simulated
+    assert virtual_experiment(problem, 0.8)[0].simulated
     assert len(solutions) == 2
 
 
 def test_the_truth_is_the_simulated_field_on_the_mesh(problem, solutions):
     """Also when it comes from the cache."""
     for _ in range(2):
-        observations, truth = virtual_experiment(problem)
+        observations, truth = virtual_experiment(problem, 0.8)
         np.testing.assert_array_equal(truth.node_displacement, solutions[0].displacement(problem.mesh.points))
         np.testing.assert_array_equal(truth.marker_displacement, observations.displacements)
         assert truth.law == "neo-hookean"
@@ -150,19 +151,19 @@ def test_an_experiment_that_stops_halfway_is_refused_and_not_kept(problem, cache
 
     monkeypatch.setattr(FemNonlinearSolver, "solve", stops)
     with pytest.raises(UserError, match=r"experiment stopped at 50% of the load; or give --measurements"):
-        virtual_experiment(problem)
+        virtual_experiment(problem, 0.8)
     assert not cache.exists()
 
 
 def test_without_a_prescribed_v_there_is_no_experiment(problem, solutions):
     with pytest.raises(UserError, match="prescribe v; or give --measurements"):
-        virtual_experiment(replace(problem, load=Load(displacement=(1.0, None))))
+        virtual_experiment(replace(problem, load=Load(displacement=(1.0, None))), 0.8)
     assert not solutions
 
 
 def test_a_load_that_is_not_on_the_meshs_contact_is_refused(problem, solutions):
     with pytest.raises(UserError, match="presses where the mesh has its contact"):
-        virtual_experiment(replace(problem, load=Load(position=5.0)))
+        virtual_experiment(replace(problem, load=Load(position=5.0)), 0.8)
     assert not solutions
 
 
@@ -172,4 +173,4 @@ def test_without_the_finite_element_library_measurements_are_asked_for(problem, 
 
     monkeypatch.setattr("compare.evaluation.virtual_experiment.make_solver", missing)
     with pytest.raises(UserError, match=r"No module named 'dolfinx'; or give --measurements"):
-        virtual_experiment(problem)
+        virtual_experiment(problem, 0.8)

@@ -14,6 +14,7 @@ def observations(**changes: object) -> Observations:
         "visible": [True, False, True],
         "source": "a test",
         "simulated": True,
+        "marker_radius": 0.8,
     }
     return Observations(**{**parts, **changes})  # type: ignore[arg-type]
 
@@ -27,6 +28,8 @@ def observations(**changes: object) -> Observations:
         ({"standard_deviations": np.full((3, 2), -1.0)}, UserError, "zero or more"),
         ({"displacements": np.full((3, 2), np.nan)}, UserError, "not finite"),
         ({"visible": [False] * 3}, UserError, "none of the markers is visible"),
+        ({"marker_radius": -0.1}, UserError, "marker radius must be zero or more, got -0.1"),
+        ({"marker_radius": np.nan}, UserError, "marker radius must be zero or more"),
     ],
 )
 def test_what_does_not_fit_is_refused(changes: dict[str, object], kind: type[UserError], text: str) -> None:

@@ -107,4 +107,4 @@ def test_joint_markers_lie_on_centre_lines_in_order_and_the_last_on_the_bisector
 def test_every_marker_lies_in_the_material(design: Design) -> None:
     body = as_shapely(design)
     for x, y in marker_positions(design):
-        assert body.contains(Point(x, y).buffer(design.marker_diameter / 2))
+        assert body.contains(Point(x, y).buffer(design.marker_radius))

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
+from geometry.finger.presets import load_design
 from geometry.observations import Observations
 from solvers.assimilation.misfit import SMALLEST_DEVIATION, assimilates, check_weighting, misfit_of
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
+from solvers.registry import make_solver
 
 
 @pytest.fixture
@@ -25,7 +27,7 @@ def problem(coarse_mesh):
     deviations[0] = 0.0
     return Problem(
         coarse_mesh,
-        observations=Observations(points, displacements, deviations, visible, "by a test", True),
+        observations=Observations(points, displacements, deviations, visible, "by a test", True, 0.8),
     )
 
 
@@ -118,6 +120,15 @@ def test_a_disc_does_not_reach_beyond_the_body(problem):
     assert misfit_of(problem).radius == 0.8
     assert misfit_of(problem, marker_radius=3.0).radius == pytest.approx(1.0, rel=1e-9)
     assert misfit_of(problem).without(0).radius == 0.8
+
+
+@pytest.mark.parametrize("preset", ["default", "slender"])
+@pytest.mark.parametrize("name", ["fem-asm", "pinn-asm", "pinn-local-asm"])
+def test_the_disc_is_that_of_the_designs_markers(problem, preset, name):
+    radius = load_design(preset).marker_diameter / 2
+    observed = replace(problem, observations=replace(problem.observations, marker_radius=radius))
+    assert make_solver(name).misfit(observed).radius == radius
+    assert make_solver(name, marker_radius=0.3).misfit(observed).radius == 0.3
 
 
 @pytest.mark.parametrize(

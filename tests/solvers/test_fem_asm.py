@@ -27,7 +27,9 @@ def pulled(mesh, load, *, hidden=()):
     visible[list(hidden)] = False
     moved = FemSolver(estimate=False).solve(problem).displacement(points) + random.normal(size=points.shape)
     deviations = random.uniform(0.02, 0.5, points.shape)
-    return replace(problem, observations=Observations(points, moved, deviations, visible, "by a test", True))
+    return replace(
+        problem, observations=Observations(points, moved, deviations, visible, "by a test", True, 0.8)
+    )
 
 
 @pytest.fixture(scope="module", params=LOADS)
@@ -262,7 +264,13 @@ def test_markers_of_a_richer_model_improve_the_displacement_and_not_the_stress(c
     problem = Problem(
         coarse_mesh,
         observations=Observations(
-            points, truth.displacement(points), np.zeros((9, 2)), np.ones(9, dtype=bool), "by a test", True
+            points,
+            truth.displacement(points),
+            np.zeros((9, 2)),
+            np.ones(9, dtype=bool),
+            "by a test",
+            True,
+            0.8,
         ),
     )
     rule = body_quadrature(coarse_mesh)

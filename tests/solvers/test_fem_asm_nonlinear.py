@@ -38,6 +38,7 @@ def pulled(load, *, law="neo-hookean", hidden=(), size=0.3) -> Problem:
         visible,
         "by a test",
         True,
+        0.8,
     )
     return replace(problem, observations=observations)
 
@@ -196,6 +197,7 @@ def test_a_twin_is_met_in_displacement_and_in_stress():
         np.ones(len(MARKERS), dtype=bool),
         "by a twin",
         True,
+        0.8,
     )
     twin = replace(stiff, observations=observations)
     solver = FemAsmSolver(weights="precision", scale=0.001)

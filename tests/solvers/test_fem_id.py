@@ -33,7 +33,7 @@ def twin(problem, truth, *, noise=0.0, deviation=NOISE, seed=0, degree=1):
     moved = LagrangeField(space, response.nodal).displacement(problem.mesh.locate(markers))
     moved = moved + noise * np.random.default_rng(seed).normal(size=moved.shape)
     seen = np.ones(len(markers), dtype=bool)
-    observations = Observations(markers, moved, np.full_like(moved, deviation), seen, "by a twin", True)
+    observations = Observations(markers, moved, np.full_like(moved, deviation), seen, "by a twin", True, 0.8)
     return replace(problem, observations=observations), response.forces[1]
 
 
@@ -146,6 +146,7 @@ def test_markers_that_were_not_seen_change_nothing(problem):
         np.ones(8, dtype=bool),
         "by a twin",
         True,
+        0.8,
     )
     masked = replace(observations, displacements=moved, visible=hidden)
     solutions = [solver().solve(replace(observed, observations=each)) for each in (masked, kept)]

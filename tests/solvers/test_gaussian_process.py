@@ -19,7 +19,7 @@ def observed(mesh, displacement, *, deviation=0.01, hidden=()):
     visible = np.ones(len(points), dtype=bool)
     visible[list(hidden)] = False
     deviations = np.full(points.shape, deviation)
-    return Observations(points, displacement(points), deviations, visible, "by a test", True)
+    return Observations(points, displacement(points), deviations, visible, "by a test", True, 0.8)
 
 
 def bump(points):

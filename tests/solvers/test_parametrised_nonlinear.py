@@ -81,7 +81,7 @@ def test_a_twin_at_finite_strain_is_found(problem, direct):
     markers = problem.mesh.markers
     observations = Observations(
         *(markers, direct.displacement(markers), np.full_like(markers, 0.01), np.ones(9, dtype=bool)),
-        *("by a twin", True),
+        *("by a twin", True, 0.8),
     )
     own = problem_with(problem, {"poisson": PLACE["poisson"]})
     names = ("position", "stroke_u", "stroke_v")

@@ -33,7 +33,8 @@ def observed(problem: Problem, markers: np.ndarray, displacements: np.ndarray) -
     visible = np.ones(len(markers), dtype=bool)
     deviations = np.linspace(0.01, 0.05, 2 * len(markers)).reshape(-1, 2)
     return replace(
-        problem, observations=Observations(markers, displacements, deviations, visible, "by a test", True)
+        problem,
+        observations=Observations(markers, displacements, deviations, visible, "by a test", True, 0.8),
     )
 
 
@@ -210,7 +211,7 @@ def test_simulated_markers_are_met_as_by_finite_elements(solver):
     With the centres in place of the discs the two are 1 % apart, since both have no limit under refinement.
     """
     plain = Problem(finger_mesh(Design()))
-    problem = replace(plain, observations=virtual_experiment(plain)[0])
+    problem = replace(plain, observations=virtual_experiment(plain, 0.8)[0])
     found, exact = solver().solve(problem), FemAsmSolver().solve(problem)
     assert found.status.converged, found.status.message
     assert max(distances(found, exact, problem)) < 0.001
@@ -267,6 +268,7 @@ def test_neither_order_nor_unseen_markers_matter(problem, solution):
         visible,
         "by a test",
         True,
+        0.8,
     )
     found = PINN_ASM.solve(replace(problem, observations=other))
     points = problem.mesh.points
@@ -316,7 +318,7 @@ def test_the_papers_preset_is_trained_and_takes_the_centres():
     assert isinstance(solver, TrainedSolver)
     assert assimilates(solver)
     assert solver.settings()["marker_radius"] == 0
-    assert make_solver("pinn-asm").settings()["marker_radius"] == 0.8
+    assert make_solver("pinn-asm").settings()["marker_radius"] is None
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ def observed(coarse_mesh: TriangleMesh) -> list[Observations]:
     points = coarse_mesh.markers
     true = FemSolver(degree=1, estimate=False).solve(other).displacement(points)
     noise = np.random.default_rng(1).normal(0, 0.05, true.shape)
-    every = Observations(points, true, np.full_like(true, 0.05), np.ones(9, dtype=bool), "a test", True)
+    every = Observations(points, true, np.full_like(true, 0.05), np.ones(9, dtype=bool), "a test", True, 0.8)
     return [
         every,
         replace(every, displacements=true + noise, visible=~np.isin(np.arange(9), (2, 5))),

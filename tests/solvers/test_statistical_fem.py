@@ -26,7 +26,7 @@ def observing(mesh, displacements, *, deviation=0.01, hidden=()):
     visible = np.ones(len(mesh.markers), dtype=bool)
     visible[list(hidden)] = False
     deviations = np.full(mesh.markers.shape, deviation)
-    observations = Observations(mesh.markers, displacements, deviations, visible, "by a test", True)
+    observations = Observations(mesh.markers, displacements, deviations, visible, "by a test", True, 0.8)
     return Problem(mesh, observations=observations)
 
 

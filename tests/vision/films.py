@@ -34,7 +34,7 @@ def recording(*, hidden: int | None = None, tilt: float = 5.0) -> Recording:
     """Three frames at rest and three bent, with a jump between; a cable before one marker, if asked for."""
     mesh = finger_mesh(DESIGN, settings=MeshSettings(size=1.0))
     where = None if hidden is None else (mesh.markers + bent(mesh.markers))[hidden]
-    cover = [] if where is None else [cable(where, DESIGN.marker_diameter / 2, 1.2)]
+    cover = [] if where is None else [cable(where, DESIGN.marker_radius, 1.2)]
     return Recording(
         bench=Bench(mesh, DESIGN, WORKSPACE),
         displacement=bent(mesh.points),

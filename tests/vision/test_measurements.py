@@ -26,13 +26,14 @@ def observations(
         visible=visible,
         source=source,
         simulated=simulated,
+        marker_radius=0.6,
     )
 
 
 def read(folder: Path, content: str | bytes) -> Observations:
     path = folder / "markers.csv"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return read_measurements(path)
+    return read_measurements(path, marker_radius=0.6)
 
 
 @pytest.mark.parametrize("simulated", [True, False])
@@ -49,7 +50,7 @@ def test_what_was_written_is_read_back_to_the_last_digit(tmp_path, source, simul
     path = tmp_path / "markers.csv"
     written = observations(source=source, simulated=simulated)
     write_measurements(path, written)
-    back = read_measurements(path)
+    back = read_measurements(path, marker_radius=0.6)
     for name in ("points", "displacements", "standard_deviations", "visible"):
         np.testing.assert_array_equal(getattr(back, name), getattr(written, name), err_msg=name)
     assert (back.source, back.simulated) == (source, simulated)
@@ -58,7 +59,7 @@ def test_what_was_written_is_read_back_to_the_last_digit(tmp_path, source, simul
 def test_a_source_of_several_lines_stays_a_comment(tmp_path):
     path = tmp_path / "markers.csv"
     write_measurements(path, observations(source="camera A\nsecond\u2028third"))
-    assert read_measurements(path).source == "camera A second third"
+    assert read_measurements(path, marker_radius=0.6).source == "camera A second third"
 
 
 def test_a_marker_that_was_not_seen_has_its_position_only(tmp_path):
@@ -67,7 +68,7 @@ def test_a_marker_that_was_not_seen_has_its_position_only(tmp_path):
     write_measurements(path, written)
     x, y = written.points[1].tolist()
     assert f"2,{x!r},{y!r},,,,,0" in path.read_text().splitlines()
-    back = read_measurements(path)
+    back = read_measurements(path, marker_radius=0.6)
     assert back.visible.tolist() == [True, False, True, True, False]
     np.testing.assert_array_equal(back.points, written.points)
     np.testing.assert_array_equal(back.displacements[written.visible], written.displacements[written.visible])
@@ -156,4 +157,4 @@ def test_a_bad_file_is_named_with_what_is_wrong(tmp_path, content, message):
 @pytest.mark.parametrize("name", ["absent.csv", "."])
 def test_a_file_that_cannot_be_opened_is_named(tmp_path, name):
     with pytest.raises(UserError, match=r"cannot read the measurements .*: (No such file|Is a directory)"):
-        read_measurements(tmp_path / name)
+        read_measurements(tmp_path / name, marker_radius=0.6)

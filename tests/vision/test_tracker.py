@@ -44,6 +44,7 @@ def test_a_tilted_camera_measures_a_jump_of_10_mm_to_hundredths_of_a_millimetre(
     assert error_of(observations) < 0.01  # 0.02 is asked for
     np.testing.assert_allclose(observations.points, MARKERS, rtol=0, atol=0.02)
     assert not observations.simulated
+    assert observations.marker_radius == DESIGN.marker_radius
     assert (tracking.rest.initial, tracking.rest.final) == (range(3), range(3, 6))
 
 

@@ -99,7 +99,7 @@ class Bench:
 
     @cached_property
     def _marker_borders(self) -> Location:
-        radius = self.parameters.marker_diameter / 2
+        radius = self.parameters.marker_radius
         return self.mesh.locate(np.concatenate([circle(centre, radius) for centre in self.mesh.markers]))
 
 

@@ -100,6 +100,7 @@ class Recording:
             visible=np.ones(len(moved), dtype=bool),
             source=source,
             simulated=True,
+            marker_radius=self.bench.parameters.marker_radius,
         )
 
     def _middles(self, displacement: FloatArray) -> FloatArray:

@@ -162,7 +162,7 @@ class FrameTracker:
 
     def _radii(self, places: FloatArray) -> FloatArray:
         """Of the pictures of markers, shape (m,), pixels."""
-        return self._size * self._scene.design.marker_diameter / 2 * self.plane.scales(places)
+        return self._size * self._scene.design.marker_radius * self.plane.scales(places)
 
     def _sighting(self, detections: DiscDetections, names: IntArray, image: Image) -> FrameDetections:
         """Put in order what was found, and remember it."""

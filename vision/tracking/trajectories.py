@@ -106,7 +106,15 @@ class Tracking:
                 f"marker {number + 1} was seen at ({x:.2f}, {y:.2f}) mm, outside the finger; the design has "
                 f"it at ({wanted_x:.2f}, {wanted_y:.2f}) mm: give the design and the workspace of the video"
             )
-        return Observations(points, displacements, deviations, seen, source, simulated=False)
+        return Observations(
+            points,
+            displacements,
+            deviations,
+            seen,
+            source,
+            simulated=False,
+            marker_radius=self.design.marker_radius,
+        )
 
 
 def plane_positions(plane: MarkerPlane, pixels: FloatArray, design: Parameters) -> FloatArray:
@@ -114,7 +122,7 @@ def plane_positions(plane: MarkerPlane, pixels: FloatArray, design: Parameters) 
     flat = pixels.reshape(-1, 2)
     known = np.isfinite(flat).all(axis=1)
     places = np.full_like(flat, np.nan)
-    places[known] = plane.circles(flat[known], design.marker_diameter / 2)
+    places[known] = plane.circles(flat[known], design.marker_radius)
     return places.reshape(pixels.shape)
 
 

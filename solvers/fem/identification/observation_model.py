@@ -33,9 +33,9 @@ class ObservationModel:
 
     @classmethod
     def of(
-        cls, problem: Problem, space: LagrangeSpace, observations: Observations, radius: float
+        cls, problem: Problem, space: LagrangeSpace, observations: Observations, radius: float | None
     ) -> "ObservationModel":
-        """Of the markers alone, each the mean over a disc of the radius, mm."""
+        """Of the markers alone, each the mean over a disc of the radius, mm; None: the observations' own."""
         misfit = misfit_of(replace(problem, observations=observations), marker_radius=radius)
         if misfit is None:
             raise UserError("there are no markers to find parameters by")

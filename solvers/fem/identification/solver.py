@@ -11,7 +11,7 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.assimilation.estimation import Estimate, Prediction, estimate
-from solvers.assimilation.misfit import MARKER_RADIUS, without_each
+from solvers.assimilation.misfit import without_each
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification.finite_strain_model import PARAMETERS, FiniteStrainModel
 from solvers.fem.identification.linear_model import LinearModel, Response
@@ -39,7 +39,8 @@ class FemIdSolver:
         reaction: Measured force of the indenter on the finger along y per depth, N/mm; None if there is none.
         reaction_error: Standard deviation of the reaction over its size.
         degree: Degree of the elements, 1 or 2.
-        marker_radius: Of the discs over which the displacement is averaged, mm; zero for the points alone.
+        marker_radius: Radius of the discs over which the displacement is averaged, mm; None: that of the
+            observations; zero: the markers' centres alone.
     """
 
     model: Model = "fem"
@@ -48,7 +49,7 @@ class FemIdSolver:
     reaction: float | None = None
     reaction_error: float = 0.02
     degree: int = 2
-    marker_radius: float = MARKER_RADIUS
+    marker_radius: float | None = None
     name: ClassVar[str] = "fem-id"
     loads: ClassVar[tuple[str, ...]] = ("mean", "point")
     assimilates: ClassVar[bool] = True
@@ -73,7 +74,7 @@ class FemIdSolver:
             raise UserError(
                 f"fem-id: the reaction must be a force other than zero, N/mm, got {self.reaction}"
             )
-        if not (np.isfinite(self.marker_radius) and self.marker_radius >= 0):
+        if self.marker_radius is not None and not 0 <= self.marker_radius < np.inf:
             raise UserError(f"fem-id: marker_radius must be zero or more, got {self.marker_radius}")
 
     @property

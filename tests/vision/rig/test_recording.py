@@ -60,7 +60,9 @@ def test_the_truth_goes_from_rest_to_the_whole_displacement(bench):
     truths = [truth for _, truth in recording.frames()]
     start, end = truths[0].world, truths[-1].world
     np.testing.assert_array_equal(start[:, :2], bench.mesh.markers)
-    moved = recording.observations("a test").displacements
+    observations = recording.observations("a test")
+    moved = observations.displacements
+    assert observations.marker_radius == recording.bench.parameters.marker_radius
     np.testing.assert_allclose((end - start)[:, :2], moved, atol=1e-12)
     np.testing.assert_allclose(truths[2].world, start + truths[2].load * (end - start), atol=1e-12)
     np.testing.assert_array_equal(truths[-1].pixels, CAMERA.project(end, POSE))
@@ -99,7 +101,7 @@ def test_a_cable_hides_the_share_of_a_marker_that_it_is_told_to(bench):
     camera, pose = default_camera(), viewing_pose(default_camera(), WORKSPACE)
 
     def seen(share):
-        cover = cable(bench.mesh.markers[4], Design().marker_diameter / 2, share, z=0)
+        cover = cable(bench.mesh.markers[4], Design().marker_radius, share, z=0)
         return share_seen(disc, [cover], camera, pose)
 
     assert seen(0) == pytest.approx(1, abs=0.005)
@@ -134,7 +136,7 @@ def test_a_recording_is_read_back(codec, bench, tmp_path):
     assert load_camera(tmp_path / "camera.json") == CAMERA
     workspace = Workspace(**json.loads((tmp_path / "workspace.json").read_text(encoding="utf-8")))
     assert workspace == WORKSPACE
-    truth = read_measurements(tmp_path / "observations_true.csv")
+    truth = read_measurements(tmp_path / "observations_true.csv", marker_radius=0.8)
     np.testing.assert_array_equal(truth.displacements, recording.observations("").displacements)
     with (tmp_path / "truth.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
