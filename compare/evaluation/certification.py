@@ -39,7 +39,7 @@ class Certifier:
             RuntimeError: If a displacement in the finite-element space has less energy than the least one.
         """
         nodal = np.concatenate([evaluation.node_displacement, evaluation.edge_displacement])
-        values = self._equilibrium.values(nodal)
+        values = self._equilibrium.load.values(nodal)
         least = self._equilibrium.minimiser(nodal, values)
         rest = nodal - least
         energy, least_energy, excess, violation, fem_energy = (

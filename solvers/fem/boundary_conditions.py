@@ -1,8 +1,9 @@
-"""The conditions at base and contact in a finite-element space, and the reaction there."""
+"""Conditions at base, contact and markers in a finite-element space, and the reaction."""
 
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
+from solvers.assimilation.misfit import Misfit
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem, contact_functional
 
@@ -16,22 +17,37 @@ def held_components(problem: Problem, space: LagrangeSpace) -> BoolArray:
     return held
 
 
-def patch_displacement(problem: Problem, space: LagrangeSpace) -> FloatArray:
-    """Nodal displacements that are the load on the contact and zero elsewhere, shape (N, 2), mm."""
+def held_displacement(problem: Problem, space: LagrangeSpace) -> FloatArray:
+    """Nodal displacements that the Dirichlet conditions prescribe, zero elsewhere, shape (N, 2), mm."""
     values = np.zeros((len(space.nodes), 2))
-    nodes = space.boundary_nodes("contact")
-    values[np.ix_(nodes, np.array(problem.load.prescribed))] = problem.load.values
+    if problem.load.kind == "patch":
+        nodes = space.boundary_nodes("contact")
+        values[np.ix_(nodes, np.array(problem.load.prescribed))] = problem.load.values
     return values
 
 
+def load_targets(problem: Problem) -> FloatArray:
+    """Prescribed values of `load_functionals`, shape (k,), mm."""
+    return problem.load.values if problem.load.kind in ("mean", "point") else np.zeros(0)
+
+
 def load_functionals(problem: Problem, space: LagrangeSpace) -> FloatArray:
-    """The load's functional on every shape function, one for each prescribed component, shape (k, N, 2)."""
+    """The functionals whose values a `mean` or `point` load prescribes, shape (k, N, 2); else none."""
+    if problem.load.kind not in ("mean", "point"):
+        return np.zeros((0, len(space.nodes), 2))
     points, weights = contact_functional(problem)
     coefficients = space.shape_functions(problem.mesh.locate(points)).T @ weights
     functionals = np.zeros((len(problem.load.prescribed), len(space.nodes), 2))
     for row, axis in enumerate(problem.load.prescribed):
         functionals[row, :, axis] = coefficients
     return functionals
+
+
+def marker_functionals(misfit: Misfit, space: LagrangeSpace) -> FloatArray:
+    """The functionals that give u v u v ... of the m markers, shape (2 m, N, 2)."""
+    points, weights = misfit.sampling()
+    sampling = weights @ space.shape_functions(space.mesh.locate(points)).toarray()
+    return np.kron(sampling, np.eye(2)).reshape(-1, len(space.nodes), 2)
 
 
 def reaction_by_residual_work(space: LagrangeSpace, residual: FloatArray) -> FloatArray:

@@ -1,7 +1,6 @@
 """Linear elasticity as least energy: the stiffness, its factorisation, and minimisers for given values."""
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -9,8 +8,14 @@ import ufl
 from petsc4py import PETSc
 
 from geometry.arrays import BoolArray, FloatArray
+from solvers.constrained_elimination import ConstrainedElimination
 from solvers.elasticity import Lame, linear_energy_density
-from solvers.fem.boundary_conditions import held_components, load_functionals, patch_displacement
+from solvers.fem.boundary_conditions import (
+    held_components,
+    held_displacement,
+    load_functionals,
+    load_targets,
+)
 from solvers.fem.dolfinx_compat import DistributedSpace, Factorisation
 from solvers.fem.multigrid import Multigrid
 from solvers.lagrange import LagrangeSpace
@@ -83,59 +88,47 @@ class LinearEquilibrium:
 
     Attributes:
         elasticity: The stiffness.
-        held: Nodal components whose values are given, mask of shape (N, 2).
-        functionals: The load's functionals whose values are given, shape (k, N, 2); none for a `patch`.
-        factors: Of the stiffness with the components of `held` clamped.
-        responses: Displacement under the unit force of each functional, shape (k, N, 2), mm per N/mm.
-        slack: Compliance of springs through which the functionals' values are given, mm per N/mm; zero: they
-            are rigid.
+        held: Components with a Dirichlet condition, mask of shape (N, 2).
+        factors: Of the stiffness with these components clamped.
+        load: The load's k functionals, none for a `patch`, and the displacements under their unit forces.
     """
 
     elasticity: LinearElasticity
     held: BoolArray
-    functionals: FloatArray
     factors: Factorisation | Multigrid
-    responses: FloatArray
-    slack: float = 0.0
+    load: ConstrainedElimination
 
     @classmethod
-    def of(cls, elasticity: LinearElasticity) -> "LinearEquilibrium":
-        """Factorise, and solve once for each functional."""
-        held, functionals = _held_and_functionals(elasticity)
+    def of(cls, elasticity: LinearElasticity, slack: float = 0.0) -> "LinearEquilibrium":
+        """Factorise, and solve once for each functional.
+
+        Args:
+            elasticity: The stiffness.
+            slack: Compliance of springs through which the functionals' values are given, mm per N/mm.
+        """
+        problem, space = elasticity.problem, elasticity.distributed.space
+        held = held_components(problem, space)
         factors = elasticity.factorise(held)
-        return cls(elasticity, held, functionals, factors, _responses(factors, functionals))
+        load = ConstrainedElimination.of(factors.solve, load_functionals(problem, space), slack)
+        return cls(elasticity, held, factors, load)
 
     def of_problem(self, problem: Problem) -> "LinearEquilibrium":
-        """The same for another load, with what of this work serves it; what does not is freed."""
+        """The equilibrium under another load; keeps the factors and responses that still hold."""
         if problem.load == self.elasticity.problem.load:
             return self
-        elasticity = replace(self.elasticity, problem=problem)
-        held, functionals = _held_and_functionals(elasticity)
-        if not np.array_equal(held, self.held):
+        elasticity, space = replace(self.elasticity, problem=problem), self.elasticity.distributed.space
+        if not np.array_equal(held_components(problem, space), self.held):
             self.factors.destroy()
             return LinearEquilibrium.of(elasticity)
-        if np.array_equal(functionals, self.functionals):
-            return replace(self, elasticity=elasticity)
-        return LinearEquilibrium(
-            elasticity, held, functionals, self.factors, _responses(self.factors, functionals)
-        )
-
-    @cached_property
-    def compliance(self) -> FloatArray:
-        """Values of the functionals, and of their springs, under unit forces, shape (k, k), mm per N/mm."""
-        own = np.einsum("inx,jnx->ij", self.functionals, self.responses)
-        return np.asarray(own + self.slack * np.eye(len(own)))
-
-    def values(self, nodal: FloatArray) -> FloatArray:
-        """The load's functionals of nodal displacements, shape (k,), mm."""
-        return np.asarray(np.einsum("knx,nx->k", self.functionals, nodal))
+        load, functionals = self.load, load_functionals(problem, space)
+        if not np.array_equal(functionals, load.rows):
+            load = ConstrainedElimination.of(self.factors.solve, functionals)
+        return replace(self, elasticity=elasticity, load=load)
 
     def solution(self) -> FloatArray:
         """The nodal displacements that solve the problem, shape (N, 2), mm."""
         problem, space = self.elasticity.problem, self.elasticity.distributed.space
-        if problem.load.kind == "patch":
-            return self.minimiser(patch_displacement(problem, space), np.zeros(0))
-        return self.minimiser(np.zeros(self.held.shape), problem.load.values)
+        return self.minimiser(held_displacement(problem, space), load_targets(problem))
 
     def minimiser(self, given: FloatArray, values: FloatArray) -> FloatArray:
         """The nodal displacements of least energy, shape (N, 2), mm.
@@ -147,36 +140,18 @@ class LinearEquilibrium:
         nodal = np.where(self.held, given, 0.0)
         if nodal.any():
             nodal = nodal + self.factors.solve(-self.elasticity.internal_force(nodal))
-        forces = np.linalg.solve(self.compliance, values - self.values(nodal))
-        return np.asarray(nodal + np.einsum("k,knx->nx", forces, self.responses))
+        return self.load.solution(nodal, values)[0]
 
     def response(self, force: FloatArray) -> FloatArray:
-        """Displacement under nodal forces while all prescribed values are zero, (N, 2) each, N/mm and mm."""
-        return self.unbalanced(force)[1]
+        """Displacement under nodal forces, N/mm, while all given values are zero: both (N, 2), in mm."""
+        return self.load.solution(self.factors.solve(force))[0]
 
     def unbalanced(self, internal: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What internal forces, shape (N, 2), N/mm, leave unbalanced under any forces of the functionals.
 
         Returns:
-            Nodal forces r, shape (N, 2), N/mm, zero where displacements are given, and the displacement
-            K^-1 r, mm, by which every functional is zero: the square root of their product is the dual norm
-            of r.
+            Residual force r, shape (N, 2), N/mm, zero where displacements are given, and `response(r)`: the
+            square root of their product is the dual norm of r.
         """
-        response = self.factors.solve(internal)
-        forces = np.linalg.solve(self.compliance, self.values(response))
-        balance = np.where(self.held, 0.0, internal - np.einsum("k,knx->nx", forces, self.functionals))
-        return balance, response - np.einsum("k,knx->nx", forces, self.responses)
-
-
-def _held_and_functionals(elasticity: LinearElasticity) -> tuple[BoolArray, FloatArray]:
-    """Nodal components that the load and the base hold, (N, 2), and the load's functionals, (k, N, 2)."""
-    problem, space = elasticity.problem, elasticity.distributed.space
-    held = held_components(problem, space)
-    if problem.load.kind == "patch":
-        return held, np.zeros((0, *held.shape))
-    return held, load_functionals(problem, space)
-
-
-def _responses(factors: Factorisation | Multigrid, functionals: FloatArray) -> FloatArray:
-    """Displacement under the unit force of each functional, shape (k, N, 2), mm per N/mm."""
-    return np.array([factors.solve(functional) for functional in functionals]).reshape(functionals.shape)
+        response, forces = self.load.solution(self.factors.solve(internal))
+        return np.where(self.held, 0.0, internal + self.load.weighted(forces)), response

@@ -6,7 +6,7 @@ import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
 from solvers.assimilation.misfit import Misfit
-from solvers.fem.boundary_conditions import load_functionals
+from solvers.fem.boundary_conditions import load_functionals, load_targets, marker_functionals
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 
@@ -29,18 +29,13 @@ class DisplacementConstraints:
     @classmethod
     def of(cls, problem: Problem, space: LagrangeSpace, slack: float = 0.0) -> "DisplacementConstraints":
         """The load's, all of one slack; none but for a `mean` or `point` load."""
-        if problem.load.kind not in ("mean", "point"):
-            return cls(np.zeros((0, len(space.nodes), 2)), np.zeros(0), np.zeros(0))
-        targets = problem.load.values
+        targets = load_targets(problem)
         return cls(load_functionals(problem, space), targets, np.full(len(targets), slack))
 
     @classmethod
     def springs(cls, misfit: Misfit, space: LagrangeSpace) -> "DisplacementConstraints":
         """Springs between markers and where they were observed, whose energy is the misfit; u v u v ..."""
-        points, weights = misfit.sampling()
-        sampling = weights @ space.shape_functions(space.mesh.locate(points)).toarray()
-        functionals = np.kron(sampling, np.eye(2)).reshape(-1, len(space.nodes), 2)
-        return cls(functionals, misfit.observed.ravel(), 1 / misfit.weights.ravel())
+        return cls(marker_functionals(misfit, space), misfit.observed.ravel(), 1 / misfit.weights.ravel())
 
     def joined(self, other: "DisplacementConstraints") -> "DisplacementConstraints":
         """These and others after them."""
@@ -65,17 +60,3 @@ class DisplacementConstraints:
     def missing(self, nodal: FloatArray, forces: FloatArray, fraction: float) -> FloatArray:
         """By how much they are missed at a fraction of the load, shape (k,), mm."""
         return np.asarray(fraction * self.targets - self.values(nodal) - self.slacks * forces)
-
-    def held(
-        self, nodal: FloatArray, missing: FloatArray, responses: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Displacements under more forces, by which the constraints that are missed are met, and these.
-
-        Args:
-            nodal: Displacements, shape (N, 2), mm.
-            missing: d_k - b_k . c, shape (k,), mm.
-            responses: Displacements K^-1 b_k under unit forces, shape (k, N, 2), mm per N/mm.
-        """
-        compliance = np.einsum("inx,jnx->ij", self.functionals, responses) + np.diag(self.slacks)
-        forces = np.linalg.solve(compliance, missing)
-        return nodal + np.einsum("k,knx->nx", forces, responses), forces

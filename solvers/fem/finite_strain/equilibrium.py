@@ -14,8 +14,9 @@ import ufl
 
 from geometry.arrays import BoolArray, FloatArray
 from geometry.mesh.quadrature import body_quadrature
+from solvers.constrained_elimination import ConstrainedElimination
 from solvers.elasticity import Lame, deformation_jacobian, energy_density_of
-from solvers.fem.boundary_conditions import held_components, patch_displacement
+from solvers.fem.boundary_conditions import held_components, held_displacement
 from solvers.fem.dolfinx_compat import DistributedSpace, Factorisation
 from solvers.fem.finite_strain.constraints import DisplacementConstraints
 from solvers.fem.finite_strain.cylinder_contact import CylinderContact
@@ -49,6 +50,7 @@ class FiniteStrainEquilibrium:
         clamped: Components that a Dirichlet condition holds, mask of shape (N, 2).
         held: Their displacement under the full load, shape (N, 2), mm.
         constraints: What holds functionals of the displacements.
+        elimination: Of the constraints, by the tangent that was factorised last.
         contact: The cylinder, if there is one.
     """
 
@@ -56,12 +58,11 @@ class FiniteStrainEquilibrium:
         self, problem: Problem, space: LagrangeSpace, constraints: DisplacementConstraints | None = None
     ) -> None:
         """Compile the forms; the constraints are the load's unless others are given."""
-        kind, shape = problem.load.kind, (len(space.nodes), 2)
         self.distributed = DistributedSpace(space)
         self.clamped: BoolArray = held_components(problem, space)
-        self.held = patch_displacement(problem, space) if kind == "patch" else np.zeros(shape)
+        self.held = held_displacement(problem, space)
         self.constraints = constraints or DisplacementConstraints.of(problem, space)
-        self.contact = CylinderContact.of(problem, space) if kind == "cylinder" else None
+        self.contact = CylinderContact.of(problem, space) if problem.load.kind == "cylinder" else None
         self._derivatives = space.shape_gradients(body_quadrature(problem.mesh, QUADRATURE_DEGREE).location)
         lame = problem.material.lame
         constants = Lame(self.distributed.constant(lame.λ), self.distributed.constant(lame.μ), lame.λ_out)
@@ -80,6 +81,7 @@ class FiniteStrainEquilibrium:
         matrix = self.distributed.assemble_matrix(self._tangent, self._conditions)
         self.matrix = matrix
         self.factors = Factorisation(self.distributed, matrix, self.clamped, positive_definite=False)
+        self.elimination = self._elimination()
 
     def become(self, problem: Problem) -> None:
         """Take another `mean` or `point` load, with the same components prescribed, and other moduli."""
@@ -137,6 +139,13 @@ class FiniteStrainEquilibrium:
             free = ~self.clamped[nodes]
             self.distributed.add_blocks(self.matrix, nodes, blocks * (free[:, :, None] & free[:, None, :]))
         self.factors.update()
+        self.elimination = self._elimination()
+
+    def _elimination(self) -> ConstrainedElimination:
+        """Of the constraints, by the tangent that is factorised."""
+        return ConstrainedElimination.of(
+            self.factors.solve, self.constraints.functionals, self.constraints.slacks
+        )
 
     def response(self, force: FloatArray) -> FloatArray:
         """Change of the displacements under more nodal forces, by the tangent that is factorised, (N, 2), mm.
@@ -144,13 +153,7 @@ class FiniteStrainEquilibrium:
         Args:
             force: Shape (N, 2), N/mm.
         """
-        nodal = self.factors.solve(force)
-        return self.constraints.held(nodal, -self.constraints.values(nodal), self.responses())[0]
-
-    def responses(self) -> FloatArray:
-        """Displacements under the constraints' unit forces, by the tangent that is factorised, (k, N, 2)."""
-        functionals = self.constraints.functionals
-        return np.array([self.factors.solve(one) for one in functionals]).reshape(functionals.shape)
+        return self.elimination.solution(self.factors.solve(force))[0]
 
     def possible(self, nodal: FloatArray) -> bool:
         """Whether the deformation turns no quadrature point inside out."""
@@ -173,8 +176,7 @@ class FiniteStrainEquilibrium:
             nodal = nodal + self.factors.solve(-fraction * stiffness)
         if self.contact is not None:
             return self._pressed_at_one_node(self.contact, fraction)
-        missing = fraction * self.constraints.targets - self.constraints.values(nodal)
-        return *self.constraints.held(nodal, missing, self.responses()), np.zeros(0)
+        return *self.elimination.solution(nodal, fraction * self.constraints.targets), np.zeros(0)
 
     def _pressed_at_one_node(
         self, contact: CylinderContact, fraction: float
@@ -184,8 +186,8 @@ class FiniteStrainEquilibrium:
         nearest = gap.argmin()
         functional = rest.copy()
         functional[contact.nodes[nearest]] = normal[nearest]
-        pressing = DisplacementConstraints(functional[None], np.maximum(-gap[[nearest]], 0.0), np.zeros(1))
-        nodal, force = pressing.held(rest, pressing.targets, self.factors.solve(functional)[None])
+        pressing = ConstrainedElimination.of(self.factors.solve, functional[None])
+        nodal, force = pressing.solution(rest, np.maximum(-gap[[nearest]], 0.0))
         pressed = np.zeros(len(gap))
         pressed[nearest] = force[0]
         return nodal, np.zeros(0), pressed

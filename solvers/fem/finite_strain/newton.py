@@ -39,13 +39,8 @@ class ConstrainedNewton:
 
         R(c, f) = [dΠ/dc - f_k b_k;  s (d_k - b_k . c - s_k f_k)]      J = [K, -b;  -s b^T, -s diag(s_k)]
 
-    The factor s, Young's modulus, makes forces of the constraints. J y = R is solved by elimination: with K
-    factorised, a = K^-1 R_c and x_k = K^-1 b_k,
-
-        (b_i . x_j + s_i δ_ij) y_f = -R_f / s - b . a        y_c = a + x_k y_fk
-
-    A step that would turn an element inside out is halved before the line search begins, which looks at the
-    size of R.
+    The factor s, Young's modulus, makes forces of the constraints. `ConstrainedElimination` solves J y = R.
+    A step that would turn an element inside out is halved before the line search.
     """
 
     def __init__(
@@ -109,9 +104,7 @@ class ConstrainedNewton:
         """J^-1, as PETSc calls it."""
         balance, missed = self._split(right)
         nodal = self._equilibrium.factors.solve(balance)
-        constraints = self._equilibrium.constraints
-        missing = -missed / self._scale - constraints.values(nodal)
-        self._join(*constraints.held(nodal, missing, self._responses), step)
+        self._join(*self._equilibrium.elimination.solution(nodal, -missed / self._scale), step)
 
     def mult(self, matrix: PETSc.Mat, step: PETSc.Vec, product: PETSc.Vec) -> None:
         """J times a step, as the line search calls it."""
@@ -134,7 +127,6 @@ class ConstrainedNewton:
     def _factorise(self, snes: PETSc.SNES, unknown: PETSc.Vec, jacobian: PETSc.Mat, other: PETSc.Mat) -> None:
         nodal, _ = self._split(unknown)
         self._equilibrium.factorise(nodal, self._stage)
-        self._responses = self._equilibrium.responses()
 
     def _shorten(self, unknown: PETSc.Vec, step: PETSc.Vec) -> bool:
         """Halve the step, which will be subtracted, until no element is turned inside out."""

@@ -13,7 +13,6 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from solvers.elasticity import Lame, lame_slopes
-from solvers.fem.constrained_solve import Bordered
 from solvers.fem.finite_strain.equilibrium import LoadStage
 from solvers.fem.finite_strain.load_path import LoadPath, PathPoint, Steps
 from solvers.fem.identification.linear_model import Response
@@ -90,26 +89,21 @@ class FiniteStrainModel:
         path = self._path
         if path is None:
             raise RuntimeError("there is no path to an equilibrium yet")
-        equilibrium, nodal, shape = path.equilibrium, point.nodal, point.nodal.shape
+        equilibrium, nodal = path.equilibrium, point.nodal
         equilibrium.factorise(nodal, LoadStage(1.0, np.zeros(0)))
-        functionals = equilibrium.constraints.functionals.reshape(len(point.forces), -1)
-        bordered = Bordered.of(
-            lambda right: equilibrium.factors.solve(right.reshape(shape)).ravel(), functionals
-        )
-        slopes = []
-        for name in self._names:
-            moved = moved_functionals(name, problem, self._space).reshape(functionals.shape)
+        nodal_slopes = np.empty((len(self._names), *nodal.shape))
+        force_slopes = np.empty((len(self._names), len(point.forces)))
+        for row, name in enumerate(self._names):
+            moved = moved_functionals(name, problem, self._space)
             force = equilibrium.force_slope(nodal, problem.material.lame, _moduli_slope(name, problem))
-            slopes.append(
-                bordered.solution(
-                    point.forces @ moved - force.ravel(), target_slope(name, problem) - moved @ nodal.ravel()
-                )
-            )
+            free = equilibrium.factors.solve(np.tensordot(point.forces, moved, axes=1) - force)
+            targets = target_slope(name, problem) - np.einsum("knx,nx->k", moved, nodal)
+            nodal_slopes[row], force_slopes[row] = equilibrium.elimination.solution(free, targets)
         return Response(
             nodal=nodal,
             forces=point.forces,
-            nodal_slopes=np.array([slope.reshape(shape) for slope, _ in slopes]).reshape(-1, *shape),
-            force_slopes=np.array([force for _, force in slopes]).reshape(-1, len(point.forces)),
+            nodal_slopes=nodal_slopes,
+            force_slopes=force_slopes,
             energy=equilibrium.energy(nodal),
         )
 

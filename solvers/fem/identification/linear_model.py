@@ -21,9 +21,9 @@ from scipy.sparse.linalg import SuperLU, splu
 from geometry.arrays import FloatArray
 from geometry.mesh.quadrature import body_quadrature, edge_quadrature
 from geometry.mesh.walls import walls_and_ribs
+from solvers.constrained_elimination import ConstrainedElimination
 from solvers.elasticity import lame_slopes
 from solvers.fem.boundary_conditions import load_functionals
-from solvers.fem.constrained_solve import Bordered
 from solvers.fem.identification.parameters import STIFFNESS, moved_functionals, problem_with, target_slope
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
@@ -77,15 +77,15 @@ class LinearModel:
         body, layer = self._stiffness(problem, named), self._layer(problem, named)
         self._factorise(body + layer)
         functionals = flat(load_functionals(problem, self._space))
-        bordered = Bordered.of(self._solve, functionals)
-        nodal, forces = bordered.solution(np.zeros(self._free.size), problem.load.values)
+        elimination = ConstrainedElimination.of(self._solve, functionals)
+        nodal, forces = elimination.solution(np.zeros(self._free.size), problem.load.values)
         nodal_slopes = np.empty((len(named), nodal.size))
         force_slopes = np.empty((len(named), len(forces)))
         for row, name in enumerate(self._names):
             moved = flat(moved_functionals(name, problem, self._space))
             change = self._stiffness_slope(name, problem, named, body + layer) @ nodal
-            nodal_slopes[row], force_slopes[row] = bordered.solution(
-                forces @ moved - change, target_slope(name, problem) - moved @ nodal
+            nodal_slopes[row], force_slopes[row] = elimination.solution(
+                self._solve(forces @ moved - change), target_slope(name, problem) - moved @ nodal
             )
         return Response(
             nodal=pairs(nodal),

@@ -1,7 +1,6 @@
 """What is observed of a finger: displacements of its markers and, if it was measured, the reaction."""
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -10,6 +9,7 @@ from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.assimilation.estimation import Estimate, Prediction
 from solvers.assimilation.misfit import misfit_of, standard_deviations
+from solvers.fem.boundary_conditions import marker_functionals
 from solvers.fem.identification.linear_model import Response
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
@@ -20,13 +20,13 @@ class ObservationModel:
     """Observations of the m markers that were seen, in the order u v u v ..., then of the reaction if any.
 
     Attributes:
-        sampling: From nodal displacements to the markers', a matrix (m, N).
+        functionals: From nodal displacements to the markers', shape (2 m, N, 2).
         observed: Shape (2 m,) or (2 m + 1,), mm and N/mm.
         deviations: Their standard deviations, of the same shape.
         axis: Which of the load's prescribed components the reaction belongs to; None if it was not measured.
     """
 
-    sampling: Any
+    functionals: FloatArray
     observed: FloatArray
     deviations: FloatArray
     axis: int | None = None
@@ -39,9 +39,8 @@ class ObservationModel:
         misfit = misfit_of(replace(problem, observations=observations), marker_radius=radius)
         if misfit is None:
             raise UserError("there are no markers to find parameters by")
-        points, weights = misfit.sampling()
-        sampling = weights @ space.shape_functions(problem.mesh.locate(points))
-        return cls(sampling, misfit.observed.ravel(), standard_deviations(observations).ravel())
+        deviations = standard_deviations(observations).ravel()
+        return cls(marker_functionals(misfit, space), misfit.observed.ravel(), deviations)
 
     def with_reaction(self, problem: Problem, reaction: float, deviation: float) -> "ObservationModel":
         """The same with the reaction along y and its standard deviation, N/mm.
@@ -60,8 +59,8 @@ class ObservationModel:
 
     def predicted(self, response: Response) -> Prediction:
         """What a model says of them, with its derivatives."""
-        values = (self.sampling @ response.nodal).ravel()
-        slopes = np.stack([(self.sampling @ slope).ravel() for slope in response.nodal_slopes], axis=1)
+        values = np.tensordot(self.functionals, response.nodal)
+        slopes = np.tensordot(self.functionals, response.nodal_slopes, axes=((1, 2), (1, 2)))
         if self.axis is None:
             return values, slopes
         forces, force_slopes = response.forces[self.axis], response.force_slopes[:, self.axis]
@@ -79,4 +78,4 @@ class ObservationModel:
         return self._markers(residuals * found.inflation * self.deviations)
 
     def _markers(self, values: FloatArray) -> FloatArray:
-        return values[: 2 * self.sampling.shape[0]].reshape(-1, 2)
+        return values[: len(self.functionals)].reshape(-1, 2)

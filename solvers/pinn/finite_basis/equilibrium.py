@@ -9,6 +9,7 @@ import torch
 from geometry.arrays import FloatArray, IntArray
 from solvers.assimilation.marker_forces import MarkerForces
 from solvers.assimilation.marker_weight import WeightChoice
+from solvers.constrained_elimination import ConstrainedElimination
 from solvers.pinn.finite_basis.energy import LocalEnergy
 from solvers.pinn.finite_basis.load_conditions import load_conditions
 from solvers.pinn.finite_basis.network import LocalField, LocalUnits
@@ -164,14 +165,12 @@ class Level:
     def balance(self, output: torch.Tensor, found: Responses, fraction: float = 1.0) -> Equilibrium:
         """The step by the forces of the springs that close their gaps."""
         residual, free, unit = found
-        gap = fraction * self.values - self.functionals @ (output.numpy().ravel() + free)
-        given = self.functionals @ unit.T
-        given[: self.held, : self.held] += np.diag(self.compliance[: self.held])
-        markers = self._markers(given, gap)
+        springs = ConstrainedElimination(self.functionals, unit, self.compliance)
+        values = fraction * self.values - springs.values(output.numpy())
+        markers = self._markers(springs, values - springs.values(free))
         factor = self.choice.factor(markers) if self.choice and markers else 1.0
-        given[self.held :, self.held :] += np.diag(self.compliance[self.held :]) / factor
-        forces = np.linalg.solve(given, gap)
-        change = free + forces @ unit
+        scaled = np.append(self.compliance[: self.held], self.compliance[self.held :] / factor)
+        change, forces = replace(springs, compliance=scaled).solution(free, values)
         decrement = (forces @ self.functionals - residual) @ change
         return Equilibrium(
             output + torch.from_numpy(change).view_as(output),
@@ -192,18 +191,18 @@ class Level:
             choice=given.choice,
         )
 
-    def _markers(self, given: FloatArray, gap: FloatArray) -> MarkerForces | None:
+    def _markers(self, springs: ConstrainedElimination, gap: FloatArray) -> MarkerForces | None:
         """The observed markers, whatever force the load needs.
 
         Args:
-            given: How far functionals and the load's springs give way to unit forces, shape (n, n), mm per
-                N/mm.
-            gap: What the springs have to close, shape (n,), mm.
+            springs: All springs.
+            gap: What they have to close, shape (n,), mm.
         """
         if self.energy.material.law != "linear" or self.choice is None:
             return None
         load, soft = slice(self.held), slice(self.held, None)
-        held = np.linalg.solve(given[load, load], np.column_stack([given[load, soft], gap[load]]))
+        given, stiff = springs.flexibility, springs.schur_complement[load, load]
+        held = np.linalg.solve(stiff, np.column_stack([given[load, soft], gap[load]]))
         rest = np.column_stack([given[soft, soft], gap[soft]]) - given[soft, load] @ held
         compliance = 0.5 * (rest[:, :-1] + rest[:, :-1].T)
         return MarkerForces(compliance, 1 / self.compliance[soft].reshape(-1, 2), rest[:, -1].reshape(-1, 2))

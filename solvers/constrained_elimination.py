@@ -1,0 +1,76 @@
+"""Linear systems under linear constraints, rigid or through springs, by the inverse of the stiffness alone.
+
+    K x - Cᵀ f = r        C x + S f = g
+
+with the constraints' forces f and the diagonal matrix S of the springs' compliances, zero where a constraint
+is rigid. With the free solution K⁻¹ r and the responses K⁻¹ Cᵀ to unit forces,
+
+    (C K⁻¹ Cᵀ + S) f = g - C K⁻¹ r        x = K⁻¹ r + K⁻¹ Cᵀ f
+
+Source: M. Benzi, G. H. Golub, J. Liesen, Numerical solution of saddle point problems, Acta Numerica 14 (2005)
+1-137, section 5 (Schur complement reduction; there with -f and -S).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ConstrainedElimination:
+    """k constraints on a solution x of any array shape.
+
+    Attributes:
+        rows: C, shape (k, *x.shape).
+        responses: K⁻¹ Cᵀ, of the same shape.
+        compliance: Diagonal of S, shape (k,), or one number for all.
+    """
+
+    rows: FloatArray
+    responses: FloatArray
+    compliance: FloatArray | float = 0.0
+
+    @classmethod
+    def of(
+        cls,
+        solve: Callable[[FloatArray], FloatArray],
+        rows: FloatArray,
+        compliance: FloatArray | float = 0.0,
+    ) -> "ConstrainedElimination":
+        """Solve once for each constraint; `solve` is K⁻¹ of an array of the shape of x."""
+        return cls(rows, np.array([solve(row) for row in rows]).reshape(rows.shape), compliance)
+
+    @cached_property
+    def flexibility(self) -> FloatArray:
+        """C K⁻¹ Cᵀ, shape (k, k)."""
+        return _flat(self.rows) @ _flat(self.responses).T
+
+    @cached_property
+    def schur_complement(self) -> FloatArray:
+        """C K⁻¹ Cᵀ + S, shape (k, k)."""
+        return self.flexibility + self.compliance * np.eye(len(self.rows))
+
+    def values(self, x: FloatArray) -> FloatArray:
+        """C x, shape (k,)."""
+        return _flat(self.rows) @ x.ravel()
+
+    def weighted(self, forces: FloatArray) -> FloatArray:
+        """Cᵀ f of forces of shape (k,)."""
+        return np.tensordot(forces, self.rows, axes=1)
+
+    def forces(self, gaps: FloatArray) -> FloatArray:
+        """Forces f that close gaps g - C K⁻¹ r, both of shape (k,)."""
+        return np.linalg.solve(self.schur_complement, gaps)
+
+    def solution(self, free: FloatArray, values: FloatArray | float = 0.0) -> tuple[FloatArray, FloatArray]:
+        """X and f, shape (k,), from the free solution K⁻¹ r and the values g, shape (k,), or one for all."""
+        forces = self.forces(values - self.values(free))
+        return free + (forces @ _flat(self.responses)).reshape(free.shape), forces
+
+
+def _flat(rows: FloatArray) -> FloatArray:
+    return rows.reshape(len(rows), int(np.prod(rows.shape[1:])))
