@@ -47,38 +47,36 @@ def crossval(
     noise. Elements of 0.5 mm, not 0.25, unless --mesh-size is given. Finished folds are kept: the same
     command again goes on where it was stopped.
     """
-    from compare.commands.crossval_options import check_draws, read_entries, read_finger, read_schemes
+    from compare.commands.crossval_options import read_finger, read_schemes, read_variants
     from compare.commands.gridsearch_options import read_processes
     from compare.crossval.cross_validation import cross_validate
     from compare.crossval.folds import LOAD
     from compare.crossval.study import Study
     from compare.crossval.tables import tables
-    from compare.runtime.provenance import machine
     from compare.runtime.stages import Stages
+    from vision.measurements import read_measurements
 
     design, mesh = read_finger(finger, options.preset)
     material, load = physics.read(options.preset)
-    check_draws(seeds, noise)
-    count, threads = read_processes(processes, int(machine()["cores"]))
+    file = existing(measurements)
     study = Study(
         design=design,
         mesh=mesh,
         material=material,
         load=load,
-        entries=read_entries(options, solvers, material),
+        variants=read_variants(options, solvers, material),
         schemes=read_schemes(schemes),
         seeds=seeds,
         noise=noise,
-        measurements=existing(measurements),
+        measurements=read_measurements(file, marker_radius=design.marker_radius) if file else None,
         out=out or Path("out") / f"crossval-{design.name}",
-        processes=count,
-        threads=threads,
+        processes=read_processes(processes),
     )
-    physics.check_law([entry.make(0) for entry in study.entries])
+    physics.check_law([variant.make(0) for variant in study.variants])
     if study.measurements and LOAD in study.schemes:
         say(f"warning: {LOAD} needs a truth at other loads, and is left out with --measurements")
     try:
-        with Stages(Console(stderr=True)) as stages:
+        with Stages() as stages:
             result = cross_validate(study, stages)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"the same command goes on from what {study.out} keeps") from None

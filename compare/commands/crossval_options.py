@@ -1,55 +1,27 @@
-"""What the options of `pinnray crossval` stand for."""
-
-from math import inf
+"""Reading of the options of `pinnray crossval`."""
 
 from compare.commands.options import FingerOptions, SolverOptions
-from compare.crossval.fold_results import SolverVariant
 from compare.crossval.folds import ALL, SCHEMES
+from compare.crossval.study import ELEMENT_SIZE, SolverVariant, solver_variants
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from solvers.problem import Material
-from solvers.solver import with_law
-
-SIZE = 0.5
-"""Of elements unless something else is asked for, mm.
-
-`fem` knows the markers to 0.01 mm on them, a hundredth of what it is wrong by; the truth's are half as large.
-"""
-
-CHOICES = {"left-out": {"weights": "precision", "choose": "left-out"}}
-CHOICES |= {"evidence": {"weights": "precision", "choose": "evidence"}}
-"""Variants of a solver that can choose the weights of the markers, beside the paper's weight as it is."""
-
-
-def read_entries(options: SolverOptions, names: str, material: Material) -> list[SolverVariant]:
-    """The solvers, and those that can choose their weights once more for each way of choosing.
-
-    The choice is made inside a fold, by the markers that are given. Where --solver-set says how to choose, or
-    the law is not linear, there is that one only.
-    """
-    told = {text.partition("=")[0] for text in options.solver_set}
-    entries = []
-    for solver in options.read(names):
-        settings = solver.settings()
-        entries.append(SolverVariant(solver.name, solver.name, settings))
-        chosen = told & {f"{solver.name}.choose", f"{solver.name}.weights"}
-        if "choose" in settings and not chosen and with_law(material, solver).law == "linear":
-            entries += [
-                SolverVariant(f"{solver.name} {choice}", solver.name, {**settings, **changes})
-                for choice, changes in CHOICES.items()
-            ]
-    if not entries:
-        raise UserError("no solver was asked for; name at least one")
-    return entries
 
 
 def read_finger(finger: FingerOptions, preset: str | None) -> tuple[Design, MeshSettings]:
-    """The design and the mesh settings, coarser than usual unless something else is asked for."""
+    """The design and the mesh settings, coarser than usual unless the user chose a size or a preset."""
     design, mesh = finger.read(preset)
     if finger.mesh_size is None and preset is None:
-        mesh = mesh.model_copy(update={"size": SIZE})
+        mesh = mesh.model_copy(update={"size": ELEMENT_SIZE})
     return design, mesh
+
+
+def read_variants(options: SolverOptions, names: str, material: Material) -> list[SolverVariant]:
+    """The solvers and their variants; a single one where --solver-set chooses the weight of the markers."""
+    keys = [text.partition("=")[0].split(".") for text in options.solver_set]
+    fixed = [key[0] for key in keys if key[1:] in (["choose"], ["weights"])]
+    return solver_variants(options.read(names), material, fixed=fixed)
 
 
 def read_schemes(text: str) -> list[str]:
@@ -61,11 +33,3 @@ def read_schemes(text: str) -> list[str]:
     if not names or len(set(names)) < len(names):
         raise UserError(f"--schemes {text}: name at least one of {', '.join(held)}, none twice")
     return names
-
-
-def check_draws(seeds: int, noise: float) -> None:
-    """Refuse numbers that make no sense."""
-    if seeds < 1:
-        raise UserError(f"--seeds {seeds}: give a whole number from 1")
-    if not 0 <= noise < inf:
-        raise UserError(f"--noise {noise:g}: give a standard deviation of zero or more, mm")

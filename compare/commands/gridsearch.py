@@ -39,12 +39,10 @@ def gridsearch(
     from compare.gridsearch.search import GridSearch, search_grid
     from compare.gridsearch.tables import best_of, runs_table
     from compare.gridsearch.training_run import FAILED
-    from compare.runtime.provenance import machine
     from compare.runtime.stages import Stages
 
     design, mesh = finger.read(options.preset)
     material, load = physics.read(options.preset)
-    count, threads = read_processes(processes, int(machine()["cores"]))
     job = GridSearch(
         design=design,
         mesh=mesh,
@@ -54,12 +52,11 @@ def gridsearch(
         bc_weights=read_values("bc-weights", bc_weights),
         settings=read_settings(options, epochs),
         out=out or Path("out") / f"gridsearch-{design.name}",
-        processes=count,
-        threads=threads,
+        processes=read_processes(processes),
     )
     physics.check_law([job.solver(point) for point in job.points])
     try:
-        with Stages(Console(stderr=True)) as stages:
+        with Stages() as stages:
             runs = search_grid(job, stages)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"the same command goes on from what {job.out} keeps") from None

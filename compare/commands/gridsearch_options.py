@@ -4,6 +4,7 @@ from dataclasses import replace
 from math import isfinite
 
 from compare.commands.options import SolverOptions
+from compare.runtime.provenance import cores
 from geometry.errors import UserError
 
 SOLVER = "pinn-std"
@@ -44,9 +45,9 @@ def read_values(option: str, text: str) -> tuple[float, ...]:
     return values
 
 
-def read_processes(processes: int | None, cores: int) -> tuple[int, int]:
-    """Processes at a time, and threads of each."""
-    count = cores if processes is None else processes
+def read_processes(processes: int | None) -> int:
+    """Processes at a time: as many as there are cores if None."""
+    count = cores() if processes is None else processes
     if count < 1:
         raise UserError(f"--processes {count}: give a whole number from 1")
-    return count, max(1, cores // count)
+    return count

@@ -22,7 +22,7 @@ def answers(result: CrossvalResult) -> Mapping[str, list[str]]:
 
 
 def _given(result: CrossvalResult) -> list[str]:
-    given = {entry.label for entry in result.study.entries if assimilates(entry.make(0))}
+    given = {entry.label for entry in result.study.variants if assimilates(entry.make(0))}
     return [label for label in result.scores if label in given]
 
 

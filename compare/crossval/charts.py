@@ -86,7 +86,7 @@ def draw_curve(path: Path, *, curve: Mapping[str, Sequence[float]]) -> None:
 
     Args:
         path: The picture.
-        curve: Columns of `compare.crossval.l_curve.sweep_weights`.
+        curve: Columns of `compare.crossval.weight_sweep.sweep_weights`.
     """
     panels: dict[str, dict[str, str]] = {
         "root mean square, mm": {"in_sample_mm": "markers given", "left_out_mm": "each left out"},

@@ -1,25 +1,23 @@
-"""Cross-validation: solvers judged by markers, loads and fields that they were not given."""
+"""Cross-validation: solvers scored at markers, loads and fields that they were not given."""
 
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
-from compare.crossval.fold_results import FailedSolver, FoldResult, SolverTask, run_folds
+from compare.crossval.fold_result import FoldResult
 from compare.crossval.folds import LOAD, LoadCase, folds_of, load_cases_of
-from compare.crossval.l_curve import CURVED, sweep_weights
 from compare.crossval.output_files import write_results
 from compare.crossval.result import CrossvalResult
-from compare.crossval.study import Study, check_study, definition_of, seen_markers
+from compare.crossval.solver_folds import FailedSolver, SolverTask, run_folds
+from compare.crossval.study import Study, visible_markers
 from compare.crossval.true_fields import TrueFields, TruthTask, find_truth
+from compare.crossval.weight_sweep import SWEPT, sweep_weights
 from compare.evaluation.shared_mesh import check_inside
 from compare.evaluation.virtual_experiment import experiment_source
 from compare.runtime.output_folder import locked
-from compare.runtime.processes import ProcessFailed
-from compare.runtime.provenance import machine
+from compare.runtime.processes import ProcessFailed, in_stages
 from compare.runtime.resumable_folder import check_resumable_folder
-from compare.runtime.staged_processes import in_stages
 from compare.runtime.stages import Stages
 from geometry.atomic import write_json
 from geometry.cache import finger_mesh
@@ -27,79 +25,80 @@ from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Problem
-from vision.measurements import read_measurements
 
 DEFINITION = "definition.json"
 
 
-def cross_validate(study: Study, stages: Stages) -> CrossvalResult:
-    """Judge the solvers and write the output folder.
+def cross_validate(study: Study, stages: Stages | None = None) -> CrossvalResult:
+    """Score the solvers of a study in every fold and write the study's output folder.
+
+    Solvers run in processes of their own. A Python script that calls this must do so below
+    `if __name__ == "__main__":`, because those processes import the script. Finished folds stay in the output
+    folder: the same study again goes on where it was stopped.
+
+    Args:
+        study: The finger, the solvers and what to hold out.
+        stages: Shows the progress; None shows nothing.
 
     Raises:
-        UserError: If it cannot be done, or the folder holds something else.
+        UserError: If the study cannot be done, or the folder holds something else.
     """
-    started = datetime.now(UTC)
-    check_study(study)
-    given = None
-    if study.measurements:
-        radius = study.design.marker_radius
-        given = seen_markers(read_measurements(study.measurements, marker_radius=radius))
-    definition = definition_of(study, given)
+    stages = stages or Stages(quiet=True)
+    study.check()
+    measured = study.measurements and visible_markers(study.measurements)
+    definition = study.definition(measured)
     check_resumable_folder(study.out / DEFINITION, definition, job="cross-validation")
     with stages.stage("mesh"):
         mesh = finger_mesh(study.design, settings=study.mesh)
-        if given:
-            check_inside(given, mesh)
+        if measured:
+            check_inside(measured, mesh)
         problem = Problem(mesh, study.material, study.load)
-    conditions = load_cases_of(problem, others=LOAD in study.schemes and given is None)
+    load_cases = load_cases_of(problem, others=LOAD in study.schemes and measured is None)
     study.out.mkdir(parents=True, exist_ok=True)
     with locked(study.out):
         write_json(study.out / DEFINITION, definition)
         shared = study.out / "mesh.npz"
         mesh.save(shared)
-        truths = [] if given else _truths(study, conditions, shared, stages)
-        observations = _observations(study, mesh, given, truths)
-        folds = folds_of(study.schemes, len(observations[0][0].points), conditions)
+        truths = [] if measured else _truths(study, load_cases, shared, stages)
+        if measured:
+            observations = [[measured]] * study.seeds
+        else:
+            observations = _noisy(study, mesh, truths, experiment_source(problem))
+        folds = folds_of(study.schemes, len(observations[0][0].points), load_cases)
         tasks = {
-            entry.label: SolverTask(
-                entry=entry,
+            variant.label: SolverTask(
+                variant=variant,
                 mesh=shared,
                 material=study.material,
-                conditions=conditions,
+                load_cases=load_cases,
                 truths=truths,
                 observations=observations,
                 folds=folds,
-                folder=study.out / "runs" / entry.file_name,
-                threads=study.threads,
+                folder=study.out / "runs" / variant.folder_name,
             )
-            for entry in study.entries
+            for variant in study.variants
         }
-        outcomes, failed = _judged(study, tasks, stages)
-        curve = _curve(tasks, outcomes, stages) if truths else {}
-        result = CrossvalResult.of(study, observations[0][0], folds, outcomes, failed)
-        provenance = {
-            "started": started.isoformat(timespec="seconds"),
-            "seconds": {name: round(seconds, 2) for name, seconds in stages.seconds.items()},
-            "problem_sha256": problem.digest,
-            "machine": machine(),
-        }
+        results, failed = _results(study, tasks, stages)
+        sweep = _sweep(tasks, results, stages) if truths else {}
+        found = CrossvalResult.of(study, observations[0][0], folds, results, failed)
+        provenance = {**definition, "problem_sha256": problem.digest, **stages.record()}
         with stages.stage("report"):
-            write_results(study.out, result, outcomes, curve, {**definition, **provenance})
-    return result
+            write_results(study.out, found, results, sweep, provenance)
+    return found
 
 
-def _truths(study: Study, conditions: Sequence[LoadCase], shared: Path, stages: Stages) -> list[Path]:
-    """The true fields at every load, each simulated in a process of its own."""
+def _truths(study: Study, load_cases: Sequence[LoadCase], shared: Path, stages: Stages) -> list[Path]:
+    """Files of the true fields at every load, each simulated in a process of its own."""
     stroke = -float(study.load.displacement[1] or 0.0)
     tasks = {
-        f"truth, {condition.name}": TruthTask(
-            design=study.design.replaced(contact_position=condition.contact),
+        f"truth, {case.name}": TruthTask(
+            design=study.design.replaced(contact_position=case.contact),
             settings=study.mesh,
             shared=shared,
             material=study.material,
-            stroke=condition.share * stroke,
+            stroke=case.share * stroke,
         )
-        for condition in conditions
+        for case in load_cases
     }
     found: dict[str, Path] = {}
     for name, answer in in_stages(
@@ -118,15 +117,8 @@ def _truths(study: Study, conditions: Sequence[LoadCase], shared: Path, stages: 
     return [found[name] for name in tasks]
 
 
-def _observations(
-    study: Study, mesh: TriangleMesh, given: Observations | None, truths: Sequence[Path]
-) -> list[list[Observations]]:
-    """What markers do, for each seed at each load: the truth with noise, or what was measured."""
-    if given:
-        return [[given] for _ in range(study.seeds)]
-    source = (
-        f"{experiment_source(Problem(mesh, study.material, study.load))}, with {study.noise:g} mm of noise"
-    )
+def _noisy(study: Study, mesh: TriangleMesh, truths: Sequence[Path], source: str) -> list[list[Observations]]:
+    """The true marker displacements with noise, for each seed at each load."""
     displacements = [TrueFields.load(path).markers for path in truths]
     return [
         [
@@ -135,7 +127,7 @@ def _observations(
                 displacements=true + np.random.default_rng([seed, at]).normal(0, study.noise, true.shape),
                 standard_deviations=np.full_like(true, study.noise),
                 visible=np.ones(len(true), dtype=bool),
-                source=source,
+                source=f"{source}, with {study.noise:g} mm of noise",
                 simulated=True,
                 marker_radius=study.design.marker_radius,
             )
@@ -145,37 +137,34 @@ def _observations(
     ]
 
 
-def _judged(
+def _results(
     study: Study, tasks: Mapping[str, SolverTask], stages: Stages
 ) -> tuple[dict[str, list[list[FoldResult]]], dict[str, str]]:
-    """The outcomes of every solver, and what went wrong with the others."""
+    """The results of every solver, and the error messages of the solvers that failed."""
 
     def note(_: str, answer: list[list[FoldResult]] | FailedSolver | ProcessFailed) -> str:
-        if isinstance(answer, ProcessFailed):
-            return f"its process ended with exit code {answer.exit_code}"
-        return answer.message if isinstance(answer, FailedSolver) else "judged"
+        return "scored" if isinstance(answer, list) else answer.message
 
-    outcomes, failed = {}, {}
+    results, failed = {}, {}
     for name, answer in in_stages(
         run_folds, tasks, processes=study.processes, stages=stages, kind="solvers", note=note
     ):
         if isinstance(answer, list):
-            outcomes[name] = answer
+            results[name] = answer
         else:
-            failed[name] = note(name, answer)
-    if not outcomes:
+            failed[name] = answer.message
+    if not results:
         raise UserError("; ".join(f"{name}: {message}" for name, message in failed.items()))
-    return {name: outcomes[name] for name in tasks if name in outcomes}, failed
+    return {name: results[name] for name in tasks if name in results}, failed
 
 
-def _curve(
-    tasks: Mapping[str, SolverTask], outcomes: Mapping[str, list[list[FoldResult]]], stages: Stages
+def _sweep(
+    tasks: Mapping[str, SolverTask], results: Mapping[str, list[list[FoldResult]]], stages: Stages
 ) -> dict[str, list[float]]:
-    """What more weight of the markers does to `fem-asm`, if it is there; see `sweep_weights`."""
-    wanted = {"weights": tasks[CURVED]} if CURVED in outcomes else {}
-    curve: dict[str, list[float]] = {}
-    for _, answer in in_stages(
-        sweep_weights, wanted, processes=1, stages=stages, kind="curves", note=lambda *_: "weighed"
-    ):
-        curve = {} if isinstance(answer, ProcessFailed) else answer
-    return curve
+    """The sweep of `sweep_weights`, if its solver is there."""
+    swept = {"weights": tasks[SWEPT]} if SWEPT in results else {}
+    answers = dict(
+        in_stages(sweep_weights, swept, processes=1, stages=stages, kind="curves", note=lambda *_: "weighed")
+    )
+    columns = answers.get("weights", {})
+    return {} if isinstance(columns, ProcessFailed) else columns

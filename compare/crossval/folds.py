@@ -1,4 +1,4 @@
-"""Which markers and loads a solver is not given, so that it can be judged by them."""
+"""Folds: the markers and loads that are held out together."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,20 +21,20 @@ SCHEMES = {
 """Every scheme and what it holds out."""
 
 DRAWS = 10
-"""Of `RANDOM`; the same for every seed and solver, so that differences are paired."""
+"""Draws of `RANDOM`; the same for every seed and solver, so that differences are paired."""
 
 STROKES = (0.5, 0.75)
-"""Other loads of `LOAD`: parts of the stroke,"""
+"""Smaller strokes of `LOAD`, as shares of the full one."""
 CONTACTS = (-5.0, 5.0)
-"""and how far along the finger the contact is elsewhere, mm."""
+"""Shifts of the contact along the finger in `LOAD`, mm."""
 
 
 @dataclass(frozen=True)
 class LoadCase:
-    """A load at which the finger is looked at.
+    """A load at which solvers predict the markers.
 
     Attributes:
-        name: For people and files.
+        name: Its name in messages and files.
         load: As the solvers take it.
         share: Its stroke over the full one.
         contact: Abscissa of the contact's middle, mm.
@@ -48,58 +48,54 @@ class LoadCase:
 
 @dataclass(frozen=True)
 class Fold:
-    """What is held out at once.
+    """Markers, or a load, held out together.
 
     Attributes:
         scheme: A key of `SCHEMES`.
-        name: Of the fold, unique in its scheme.
+        name: Unique in its scheme.
         held: Numbers of the markers that are not given, from zero.
-        condition: Number of the load at which is predicted; zero is the one at which markers are given.
+        load_case: Number of the predicted load; markers are given at load case zero.
     """
 
     scheme: str
     name: str
     held: tuple[int, ...]
-    condition: int = 0
-
-    @property
-    def unseen(self) -> tuple[int, ...] | None:
-        """The markers by which is judged; None for all of them, at a load that was not seen."""
-        return None if self.condition else self.held
+    load_case: int = 0
 
 
 def load_cases_of(problem: Problem, *, others: bool) -> list[LoadCase]:
-    """The full load and, if asked for, others: less stroke, and the contact elsewhere."""
+    """The full load and, if asked for, smaller strokes and other contacts."""
     load, middle = problem.load, float(np.mean(contact_ends(problem)))
-    full = LoadCase("full", load, 1.0, middle)
+    cases = [LoadCase("full", load, 1.0, middle)]
     if not others:
-        return [full]
-    stroke = float(np.linalg.norm(load.values))
-    less = [LoadCase(f"stroke {share * stroke:g}", _scaled(load, share), share, middle) for share in STROKES]
+        return cases
     if load.kind == "patch":
         raise UserError(
             f"{LOAD} presses elsewhere on the same mesh, which --load patch cannot; take mean, or --schemes "
             f"without {LOAD}"
         )
-    moved = [
-        LoadCase(f"contact {at:g}", load.model_copy(update={"position": at}), 1.0, at)
-        for at in (middle + by for by in CONTACTS)
-    ]
-    for condition in moved:
+    stroke = float(np.linalg.norm(load.values))
+    for share in STROKES:
+        displacement = tuple(None if value is None else share * value for value in load.displacement)
+        smaller = load.model_copy(update={"displacement": displacement})
+        cases.append(LoadCase(f"stroke {share * stroke:g}", smaller, share, middle))
+    for at in (middle + shift for shift in CONTACTS):
+        moved = load.model_copy(update={"position": at})
         try:
-            replace(problem, load=condition.load)
+            replace(problem, load=moved)
         except UserError as error:
             raise UserError(f"{LOAD}: {error}; take --schemes without it") from None
-    return [full, *less, *moved]
+        cases.append(LoadCase(f"contact {at:g}", moved, 1.0, at))
+    return cases
 
 
-def folds_of(schemes: Sequence[str], count: int, conditions: Sequence[LoadCase]) -> list[Fold]:
+def folds_of(schemes: Sequence[str], count: int, load_cases: Sequence[LoadCase]) -> list[Fold]:
     """The folds of schemes for markers that are ordered from base to tip.
 
     Args:
-        schemes: Keys of `SCHEMES`; `ALL` is there in any case.
+        schemes: Keys of `SCHEMES`; `ALL` is added.
         count: Number of markers.
-        conditions: The full load first.
+        load_cases: The full load first.
     """
     third = max(1, round(count / 3))
     draws = np.random.default_rng(0)
@@ -112,23 +108,14 @@ def folds_of(schemes: Sequence[str], count: int, conditions: Sequence[LoadCase])
         picked = [sorted(draws.choice(count, third, replace=False).tolist()) for _ in range(DRAWS)]
         folds += [Fold(RANDOM, f"draw {number}", tuple(held)) for number, held in enumerate(picked, 1)]
     if LOAD in schemes:
-        folds += [
-            Fold(LOAD, condition.name, (), number)
-            for number, condition in enumerate(conditions)
-            if number > 0
-        ]
+        folds += [Fold(LOAD, case.name, (), number) for number, case in enumerate(load_cases) if number > 0]
     return folds
 
 
 def hide_markers(observations: Observations, held: Sequence[int]) -> Observations:
-    """The observations without those held out, of which not even the numbers are left."""
+    """The observations without the held-out markers: invisible, and their numbers zero."""
     keep = np.ones(len(observations.points), dtype=bool)
     keep[list(held)] = False
-    blank: FloatArray = np.where(keep[:, None], observations.displacements, 0.0)
+    displacements: FloatArray = np.where(keep[:, None], observations.displacements, 0.0)
     deviations: FloatArray = np.where(keep[:, None], observations.standard_deviations, 0.0)
-    return replace(observations, displacements=blank, standard_deviations=deviations, visible=keep)
-
-
-def _scaled(load: Load, share: float) -> Load:
-    moved = tuple(None if value is None else share * value for value in load.displacement)
-    return load.model_copy(update={"displacement": moved})
+    return replace(observations, displacements=displacements, standard_deviations=deviations, visible=keep)

@@ -9,7 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from compare.crossval.answers import answers
 from compare.crossval.charts import draw_curve, draw_fields, draw_held_out
-from compare.crossval.fold_results import FoldResult
+from compare.crossval.fold_result import FoldResult
 from compare.crossval.result import CrossvalResult
 from compare.crossval.tables import grids, per_marker, write_tables
 from compare.runtime.csv_files import write_csv

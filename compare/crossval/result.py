@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Self
 
-from compare.crossval.fold_results import FoldResult
+from compare.crossval.fold_result import FoldResult
 from compare.crossval.folds import SCHEMES, Fold
 from compare.crossval.scores import COMPARED, LEVEL, Difference, Score, difference, of_scheme, score
 from compare.crossval.study import Study
@@ -93,21 +93,26 @@ class CrossvalResult:
             "seeds": self.study.seeds,
             "level": LEVEL,
             "truth": f"elements of {FINER:g} times the size" if self.study.measurements is None else None,
-            "folds": [asdict(fold) for fold in self.folds],
+            "folds": [
+                {"scheme": fold.scheme, "name": fold.name, "held": fold.held, "condition": fold.load_case}
+                for fold in self.folds
+            ],
             "schemes": {scheme: SCHEMES[scheme] for scheme in self.schemes},
             "solvers": {
-                entry.label: {
-                    "solver": entry.solver,
-                    "settings": dict(entry.settings),
-                    "assimilates": assimilates(entry.make(0)),
-                    "schemes": {scheme: asdict(found) for scheme, found in self.scores[entry.label].items()},
+                variant.label: {
+                    "solver": variant.solver,
+                    "settings": dict(variant.settings),
+                    "assimilates": assimilates(variant.make(0)),
+                    "schemes": {
+                        scheme: asdict(found) for scheme, found in self.scores[variant.label].items()
+                    },
                     "against": {
                         baseline: {scheme: _verdicts(each) for scheme, each in by_scheme.items()}
-                        for baseline, by_scheme in self.differences[entry.label].items()
+                        for baseline, by_scheme in self.differences[variant.label].items()
                     },
                 }
-                for entry in self.study.entries
-                if entry.label in self.scores
+                for variant in self.study.variants
+                if variant.label in self.scores
             },
             "failed": dict(self.failed),
         }

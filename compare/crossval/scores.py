@@ -7,7 +7,7 @@ from math import nan, sqrt
 import numpy as np
 from scipy.stats import norm, t
 
-from compare.crossval.fold_results import FoldResult
+from compare.crossval.fold_result import FoldResult
 from geometry.arrays import FloatArray
 
 LEVEL = 0.95

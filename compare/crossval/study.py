@@ -1,106 +1,169 @@
-"""What a cross-validation is asked for."""
+"""A cross-validation study: the finger, the solvers, what is held out, and the output folder."""
 
-import json
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from compare.crossval.fold_results import SolverVariant
-from compare.runtime.provenance import package_versions, sources_digest
+from compare.crossval.folds import ALL, SCHEMES
+from compare.runtime.provenance import cores
+from compare.runtime.resumable_folder import job_definition
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
 from solvers.problem import Load, Material
-from solvers.solver import check_load, with_law
+from solvers.registry import make_solver
+from solvers.solver import Solver, check_load, with_law
+
+ELEMENT_SIZE = 0.5
+"""Usual element size, mm.
+
+The discretisation error of `fem` at the markers is then 0.01 mm, a hundredth of its model error.
+"""
+
+WEIGHT_CHOICES = ("left-out", "evidence")
+"""Rules by which a solver can choose the weight of the markers, beside the paper's fixed weight."""
 
 
 @dataclass(frozen=True)
+class SolverVariant:
+    """A solver with settings.
+
+    Attributes:
+        label: Its name in tables: the solver's name, and how it differs from others of that name.
+        solver: The solver's name.
+        settings: Its settings.
+    """
+
+    label: str
+    solver: str
+    settings: Mapping[str, object]
+
+    @property
+    def folder_name(self) -> str:
+        """Name of the folder of its finished folds."""
+        return self.label.replace(" ", "_")
+
+    def make(self, seed: int) -> Solver:
+        """The solver; `seed` is added to its own seed, if it draws random numbers."""
+        settings = dict(self.settings)
+        if isinstance(first := settings.get("seed"), int):
+            settings["seed"] = first + seed
+        return make_solver(self.solver, **settings)
+
+
+def solver_variants(
+    solvers: Sequence[Solver], material: Material, *, fixed: Sequence[str] = ()
+) -> list[SolverVariant]:
+    """A variant for each solver, and one for each of `WEIGHT_CHOICES` if the solver can choose the weight.
+
+    The weight is chosen inside a fold, from the markers that are given.
+
+    Args:
+        solvers: The solvers.
+        material: The elastic constants; the weight can be chosen under a linear law only.
+        fixed: Names of the solvers whose weight the user has set: one variant only.
+    """
+    variants = []
+    for solver in solvers:
+        settings = solver.settings()
+        variants.append(SolverVariant(solver.name, solver.name, settings))
+        if "choose" in settings and solver.name not in fixed and with_law(material, solver).law == "linear":
+            variants += [
+                SolverVariant(
+                    f"{solver.name} {choice}",
+                    solver.name,
+                    {**settings, "weights": "precision", "choose": choice},
+                )
+                for choice in WEIGHT_CHOICES
+            ]
+    return variants
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Study:
     """What to cross-validate, and where to write.
 
     Attributes:
         design: The finger.
+        variants: The solvers, as `solver_variants` gives them.
+        out: Output folder; folds that an earlier study with the same settings finished there are reused.
         mesh: Element sizes of the mesh that solvers share.
         material: The elastic constants; each solver takes the law that it has.
-        load: What moves the finger.
-        entries: The solvers.
-        schemes: Keys of `SCHEMES`.
-        seeds: How often noise is drawn, and random numbers of solvers.
+        load: The prescribed displacement of the contact.
+        schemes: Keys of `SCHEMES` other than `ALL`.
+        seeds: Number of draws of the noise, and of the solvers' random numbers.
         noise: Standard deviation of a simulated marker's displacement, mm.
-        measurements: CSV file of marker displacements; None for the virtual experiment.
-        out: Output folder; what an earlier study with the same settings finished there is taken over.
-        processes: How many solvers are judged at a time.
-        threads: Threads of each.
+        measurements: Measured marker displacements; None for the virtual experiment.
+        processes: Solvers run at a time.
     """
 
     design: Design
-    mesh: MeshSettings
-    material: Material
-    load: Load
-    entries: Sequence[SolverVariant]
-    schemes: Sequence[str]
-    seeds: int
-    noise: float
-    measurements: Path | None
+    variants: Sequence[SolverVariant]
     out: Path
-    processes: int
-    threads: int
+    mesh: MeshSettings = field(default_factory=lambda: MeshSettings(size=ELEMENT_SIZE))
+    material: Material = field(default_factory=Material)
+    load: Load = field(default_factory=Load)
+    schemes: Sequence[str] = tuple(scheme for scheme in SCHEMES if scheme != ALL)
+    seeds: int = 5
+    noise: float = 0.005
+    measurements: Observations | None = None
+    processes: int = field(default_factory=cores)
+
+    def check(self) -> None:
+        """Raise a `UserError` for what cannot be done, before anything is computed."""
+        labels = [variant.label for variant in self.variants]
+        if not labels:
+            raise UserError("no solver was asked for; name at least one")
+        if len(set(labels)) < len(labels):
+            raise UserError(f"a solver is named twice: {', '.join(labels)}")
+        if self.seeds < 1:
+            raise UserError(f"--seeds {self.seeds}: give a whole number from 1")
+        if not 0 <= self.noise < inf:
+            raise UserError(f"--noise {self.noise:g}: give a standard deviation of zero or more, mm")
+        for variant in self.variants:
+            solver = variant.make(0)
+            check_load(solver, self.load)
+            with_law(self.material, solver)
+        if self.measurements is None and self.load.displacement[1] is None:
+            raise UserError("the virtual experiment presses on the finger: prescribe v")
+
+    def definition(self, measured: Observations | None) -> dict[str, Any]:
+        """Everything that finished folds depend on but the solvers' settings, which are kept with them."""
+        return job_definition(
+            self.design,
+            self.mesh,
+            self.material,
+            self.load,
+            [f"compare.crossval.{name}" for name in ("solver_folds", "folds", "true_fields")],
+        ) | {
+            "noise_mm": None if measured else self.noise,
+            "measured": measured
+            and [
+                values.tolist()
+                for values in (measured.points, measured.displacements, measured.standard_deviations)
+            ],
+        }
 
 
-def check_study(study: Study) -> None:
-    """Refuse what cannot be done before anything is computed."""
-    labels = [entry.label for entry in study.entries]
-    if len(set(labels)) < len(labels):
-        raise UserError(f"a solver is named twice: {', '.join(labels)}")
-    for entry in study.entries:
-        solver = entry.make(0)
-        check_load(solver, study.load)
-        with_law(study.material, solver)
-    if study.measurements is None and study.load.displacement[1] is None:
-        raise UserError("the virtual experiment presses on the finger: prescribe v")
+def visible_markers(observations: Observations) -> Observations:
+    """The visible markers from base to tip.
 
-
-def seen_markers(observations: Observations) -> Observations:
-    """Only the markers that were seen, of which there must be some to hold out and some to give."""
-    seen = observations.visible
-    if (count := int(seen.sum())) < 3:
+    Raises:
+        UserError: If there are fewer than three: some to hold out and some to give.
+    """
+    visible = observations.visible
+    if (count := int(visible.sum())) < 3:
         raise UserError(f"cross-validation needs 3 markers that were seen, not {count}")
-    order = np.flatnonzero(seen)[observations.points[seen, 0].argsort(kind="stable")]
+    order = np.flatnonzero(visible)[observations.points[visible, 0].argsort(kind="stable")]
     return replace(
         observations,
         points=observations.points[order],
         displacements=observations.displacements[order],
         standard_deviations=observations.standard_deviations[order],
-        visible=seen[order],
+        visible=visible[order],
     )
-
-
-def definition_of(study: Study, given: Observations | None) -> dict[str, Any]:
-    """Everything that what is kept depends on, but for the solvers' settings, which are kept with it."""
-    measured = given and [
-        values.tolist() for values in (given.points, given.displacements, given.standard_deviations)
-    ]
-    content = {
-        "schema": 1,
-        "design": study.design.model_dump(),
-        "mesh": study.mesh.model_dump(),
-        "material": study.material.model_dump(),
-        "load": study.load.model_dump(mode="json"),
-        "noise_mm": None if given else study.noise,
-        "measured": measured,
-        "versions": package_versions(),
-        "program_sha256": sources_digest(
-            [
-                "compare.crossval.fold_results",
-                "compare.crossval.folds",
-                "compare.crossval.true_fields",
-                "geometry",
-                "solvers",
-            ]
-        ),
-    }
-    return dict(json.loads(json.dumps(content)))

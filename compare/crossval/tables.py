@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from compare.crossval.fold_results import FoldResult
+from compare.crossval.fold_result import FoldResult
 from compare.crossval.folds import ALL, ONE, SCHEMES
 from compare.crossval.result import BASELINES, CrossvalResult
 from compare.crossval.scores import FIELDS, LEVEL, MARKERS, Difference, Interval, Score

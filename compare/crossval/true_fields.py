@@ -41,10 +41,15 @@ class SampledField:
     displacement: FloatArray
     gradient: FloatArray
 
-    def plus(self, other: "SampledField", factor: float) -> "SampledField":
-        """This one plus another one times a factor."""
-        pairs = ((getattr(self, entry.name), getattr(other, entry.name)) for entry in fields(self))
-        return SampledField(*(mine + factor * theirs for mine, theirs in pairs))
+    def __add__(self, other: "SampledField") -> "SampledField":
+        return SampledField(
+            self.markers + other.markers,
+            self.displacement + other.displacement,
+            self.gradient + other.gradient,
+        )
+
+    def __mul__(self, factor: float) -> "SampledField":
+        return SampledField(factor * self.markers, factor * self.displacement, factor * self.gradient)
 
 
 @dataclass(frozen=True, eq=False)

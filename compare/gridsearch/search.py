@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from datetime import UTC, datetime
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -18,10 +17,9 @@ from compare.gridsearch.training_run import (
     train,
 )
 from compare.runtime.output_folder import locked
-from compare.runtime.processes import ProcessFailed
-from compare.runtime.provenance import machine, package_versions, sources_digest
-from compare.runtime.resumable_folder import check_resumable_folder
-from compare.runtime.staged_processes import in_stages
+from compare.runtime.processes import ProcessFailed, in_stages
+from compare.runtime.provenance import cores
+from compare.runtime.resumable_folder import check_resumable_folder, job_definition
 from compare.runtime.stages import Stages
 from geometry.atomic import write_json
 from geometry.cache import finger_mesh
@@ -42,13 +40,12 @@ class GridSearch:
         design: The finger.
         mesh: Element sizes.
         material: The elastic law.
-        load: What moves the finger.
-        learning_rates: Of the optimiser.
+        load: The prescribed displacement of the contact.
+        learning_rates: Learning rates of the optimiser.
         bc_weights: Weights of the boundary conditions in the loss, MPa/mm².
         settings: The other settings of `pinn-std`, its preset `paper` among them.
-        out: Output folder; what an earlier search with the same settings finished there is taken over.
-        processes: How many runs are trained at a time.
-        threads: Threads of each.
+        out: Output folder; runs that an earlier search with the same settings finished there are reused.
+        processes: Runs trained at a time.
     """
 
     design: Design
@@ -60,7 +57,6 @@ class GridSearch:
     settings: Mapping[str, object]
     out: Path
     processes: int
-    threads: int
 
     @property
     def points(self) -> list[GridPoint]:
@@ -68,7 +64,7 @@ class GridSearch:
         return [GridPoint(*pair) for pair in product(self.learning_rates, self.bc_weights)]
 
     def folder(self, point: GridPoint) -> Path:
-        """Where the run of a point keeps its checkpoints and its result."""
+        """Folder of a point's checkpoints and result."""
         return self.out / "runs" / point.name
 
     def solver(self, point: GridPoint) -> Solver:
@@ -76,16 +72,20 @@ class GridSearch:
         return make_solver("pinn-std", **self.settings, **asdict(point))
 
 
-def search_grid(search: GridSearch, stages: Stages) -> list[TrainingRun]:
+def search_grid(search: GridSearch, stages: Stages | None = None) -> list[TrainingRun]:
     """Train at every point of the grid that has no result yet, and write tables and picture.
+
+    Args:
+        search: The grid and the shared settings.
+        stages: Shows the progress; None shows nothing.
 
     Returns:
         The runs, the one nearest to `fem` first.
 
     Raises:
-        UserError: If it cannot be done, or the folder holds something else.
+        UserError: If the search cannot be done, or the folder holds something else.
     """
-    started = datetime.now(UTC)
+    stages = stages or Stages(quiet=True)
     solver, *_ = (search.solver(point) for point in search.points)
     check_load(solver, search.load)
     definition = _definition(search, solver)
@@ -95,8 +95,8 @@ def search_grid(search: GridSearch, stages: Stages) -> list[TrainingRun]:
     search.out.mkdir(parents=True, exist_ok=True)
     with locked(search.out):
         write_json(search.out / SEARCH_FILE, definition)
-        finished = {point: search.folder(point) / RESULT_FILE for point in search.points}
-        results = {point: TrainingRun.load(path) for point, path in finished.items() if path.exists()}
+        files = {point: search.folder(point) / RESULT_FILE for point in search.points}
+        results = {point: TrainingRun.load(path) for point, path in files.items() if path.exists()}
         if missing := [point for point in search.points if point not in results]:
             results |= _trained(search, missing, problem, stages)
         runs = ranked(list(results.values()))
@@ -115,27 +115,19 @@ def search_grid(search: GridSearch, stages: Stages) -> list[TrainingRun]:
                 "ranked_by": "rel_l2_displacement: relative L2 difference from fem on the same mesh",
                 "best": best and asdict(best),
                 "runs": [asdict(run) for run in runs],
-                "started": started.isoformat(timespec="seconds"),
-                "seconds": {name: round(seconds, 2) for name, seconds in stages.seconds.items()},
                 "problem_sha256": problem.digest,
-                "machine": machine(),
+                **stages.record(),
             },
         )
     return runs
 
 
 def _definition(search: GridSearch, solver: Solver) -> dict[str, Any]:
-    """Everything that the result of a run depends on, but for its point of the grid."""
+    """Everything that the result of a run depends on, except its point of the grid."""
+    modules = ["compare.gridsearch.training_run"]
     searched = {"learning_rate", "bc_weight"}
-    return {
-        "schema": 1,
-        "design": search.design.model_dump(),
-        "mesh": search.mesh.model_dump(),
-        "material": search.material.model_dump(),
-        "load": search.load.model_dump(mode="json"),
-        "solver": {key: value for key, value in solver.settings().items() if key not in searched},
-        "versions": package_versions(),
-        "program_sha256": sources_digest(["compare.gridsearch.training_run", "geometry", "solvers"]),
+    return job_definition(search.design, search.mesh, search.material, search.load, modules) | {
+        "solver": {key: value for key, value in solver.settings().items() if key not in searched}
     }
 
 
@@ -156,15 +148,14 @@ def _trained(
             load=search.load,
             reference=reference,
             folder=search.folder(point),
-            threads=search.threads,
+            threads=max(1, cores() // search.processes),
         )
         for point in points
     }
 
     def run_of(name: str, answer: TrainingRun | ProcessFailed) -> TrainingRun:
         if isinstance(answer, ProcessFailed):
-            said = f"its process ended with exit code {answer.exit_code}"
-            return TrainingRun(tasks[name].point, FAILED, said)
+            return TrainingRun(tasks[name].point, FAILED, answer.message)
         return answer
 
     answers = in_stages(

@@ -1,11 +1,11 @@
 """One run of a grid search: train the paper's networks and measure how far they are from `fem`."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from compare.evaluation.differences import field_difference
 from geometry.arrays import FloatArray
@@ -130,10 +130,8 @@ class TrainingRun:
 
     @classmethod
     def load(cls, path: Path) -> "TrainingRun":
-        """Read what `train` wrote."""
-        content = json.loads(path.read_text(encoding="utf-8"))
-        measured = content["measured"] and TrainingMetrics(**content["measured"])
-        return cls(GridPoint(**content["point"]), content["status"], content["message"], measured)
+        """Read the result that `train` wrote."""
+        return TypeAdapter(cls).validate_json(path.read_bytes())
 
 
 def train(task: TrainingTask, progress: Progress) -> TrainingRun:

@@ -1,14 +1,20 @@
-"""Tasks in processes of their own, some at a time, that end with the program that started them."""
+"""Tasks in processes of their own, a few at a time, that end with the program that started them.
+
+Not `pebble.ProcessPool`: when the program is killed its workers go on until their task is done, when it is
+interrupted they are killed before they can save their state, and they cannot report progress.
+"""
 
 import os
 import signal
 from collections.abc import Callable, Generator, Mapping
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Generic, TypeVar
 
+from compare.runtime.stages import Stages
 from solvers.solver import Progress
 
 Input = TypeVar("Input")
@@ -17,13 +23,18 @@ Output = TypeVar("Output")
 
 @dataclass(frozen=True)
 class ProcessFailed:
-    """A process ended without an answer; its traceback, if it had one, is on standard error.
+    """A process that ended without an answer; its traceback, if it had one, is on standard error.
 
     Attributes:
-        exit_code: As of the operating system; the negative number of the signal that ended it.
+        exit_code: Of the operating system; the negative number of the signal that ended it.
     """
 
     exit_code: int | None
+
+    @property
+    def message(self) -> str:
+        """The end of the process, as a clause."""
+        return f"its process ended with exit code {self.exit_code}"
 
 
 @dataclass(frozen=True)
@@ -40,16 +51,16 @@ def in_processes(
     processes: int,
     report: Callable[[str, float, str], None],
 ) -> Generator[tuple[str, Output | ProcessFailed], None, None]:
-    """Do tasks in fresh processes, at most so many at a time, and give their answers as they come.
+    """Run tasks in fresh processes and yield their answers as they come.
 
-    When the iterator is closed, or interrupted, the progress report of every process still at work raises
-    KeyboardInterrupt there, so that it can save its state. The same happens if this process is killed.
+    When the iterator is closed or interrupted, or this process is killed, the next progress report of every
+    running process raises KeyboardInterrupt there, so that it can save its state.
 
     Args:
-        work: What to do with a task; a function of a module, called with the task and a progress report.
-        tasks: By name; what can be pickled.
-        processes: The most processes.
-        report: Called with the task's name and what its progress report was called with.
+        work: A function of a module, called with a task and a progress report.
+        tasks: Tasks by name; they must be picklable.
+        processes: Largest number of processes at a time.
+        report: Called with the task's name and the arguments of its progress report.
     """
     context = get_context("spawn")
     waiting = dict(tasks)
@@ -84,8 +95,46 @@ def in_processes(
             process.join()
 
 
+def in_stages(
+    work: Callable[[Input, Progress], Output],
+    tasks: Mapping[str, Input],
+    *,
+    processes: int,
+    stages: Stages,
+    kind: str,
+    note: Callable[[str, Output | ProcessFailed], str],
+) -> Generator[tuple[str, Output | ProcessFailed], None, None]:
+    """`in_processes` with a stage for every task and one for all.
+
+    Args:
+        work: A function of a module, called with a task and a progress report.
+        tasks: Tasks by name.
+        processes: Largest number of processes at a time.
+        stages: Shows the progress.
+        kind: Name of the tasks together, such as "runs".
+        note: Text for a task's name and answer.
+    """
+    lines: dict[str, tuple[ExitStack, Progress]] = {}
+
+    def report(name: str, fraction: float, text: str) -> None:
+        if name not in lines:
+            stack = ExitStack()
+            lines[name] = stack, stack.enter_context(stages.stage(name))
+        lines[name][1](fraction, text)
+
+    with (
+        stages.stage(kind) as overall,
+        closing(in_processes(work, tasks, processes=processes, report=report)) as answers,
+    ):
+        for done, (name, answer) in enumerate(answers, start=1):
+            yield name, answer
+            report(name, 1.0, note(name, answer))
+            lines[name][0].close()
+            overall(done / len(tasks), f"{done} of {len(tasks)} {kind}")
+
+
 def _child(work: Callable[[Input, Progress], Output], task: Input, connection: Connection) -> None:
-    """Do a task and send the answer; Ctrl-C on a terminal reaches this process by way of its parent."""
+    """Run a task and send its answer; Ctrl-C on a terminal reaches this process through its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # PETSc would end the process, with a page of text, when nobody listens.
     os.environ["PETSC_OPTIONS"] = f"{os.environ.get('PETSC_OPTIONS', '')} -no_signal_handler"

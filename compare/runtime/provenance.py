@@ -1,4 +1,4 @@
-"""What a result depends on: versions, machine, hashes."""
+"""Provenance of a result: versions, machine, hashes."""
 
 import hashlib
 import os
@@ -43,8 +43,13 @@ def machine() -> dict[str, str | int]:
     return {
         "system": platform.platform(),
         "processor": platform.machine(),
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1,
+        "cores": cores(),
     }
+
+
+def cores() -> int:
+    """Number of processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def sources_digest(modules: Iterable[str]) -> str:

@@ -1,20 +1,49 @@
-"""A folder that keeps what is finished of a long job, for the same job to go on from."""
+"""A folder that keeps the finished parts of a long job, so that the same job can go on from them."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from pydantic_core import to_jsonable_python
+
+from compare.runtime.provenance import package_versions, sources_digest
 from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from solvers.problem import Load, Material
+
+
+def job_definition(
+    design: Design, mesh: MeshSettings, material: Material, load: Load, modules: Iterable[str]
+) -> dict[str, Any]:
+    """Everything that the result of a job on a finger depends on.
+
+    Args:
+        design: The finger.
+        mesh: Element sizes.
+        material: The elastic law.
+        load: The prescribed displacement of the contact.
+        modules: Modules that compute the result, besides `geometry` and `solvers`.
+    """
+    return {
+        "schema": 1,
+        "design": design.model_dump(),
+        "mesh": mesh.model_dump(),
+        "material": material.model_dump(),
+        "load": load.model_dump(mode="json"),
+        "versions": package_versions(),
+        "program_sha256": sources_digest([*modules, "geometry", "solvers"]),
+    }
 
 
 def check_resumable_folder(file: Path, definition: Mapping[str, Any], *, job: str) -> None:
-    """Refuse a folder that holds another job of the kind, or something else.
+    """Refuse a folder that holds a job with another definition, or something else.
 
     Args:
-        file: In the folder, with the definition of the job that wrote there.
-        definition: Of this job: all that what is kept depends on.
-        job: The kind, such as "search".
+        file: The definition of the job in the folder, if there is one.
+        definition: The definition of this job.
+        job: The kind of job, such as "grid search".
     """
     out = file.parent
     if out.exists() and not out.is_dir():
@@ -22,30 +51,23 @@ def check_resumable_folder(file: Path, definition: Mapping[str, Any], *, job: st
     if not out.exists() or not any(out.iterdir()):
         return
     try:
-        before = json.loads(file.read_text(encoding="utf-8"))
+        before = _flat(json.loads(file.read_text(encoding="utf-8")))
     except (OSError, ValueError):
         raise UserError(
             f"{out} holds files that are not of a {job}; name another folder with --out"
         ) from None
-    if differing := _differing(before, definition):
+    now = _flat(to_jsonable_python(definition))
+    if differing := [name for name in {**before, **now} if before.get(name) != now.get(name)]:
         raise UserError(
             f"{out} holds a {job} with other settings ({', '.join(differing)}); "
             "name another folder with --out, or remove that one"
         )
 
 
-def _differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
-    """Names of the entries that differ."""
-    flat_before, flat_now = _flat(before), _flat(now)
-    return [name for name in {**flat_before, **flat_now} if flat_before.get(name) != flat_now.get(name)]
-
-
 def _flat(content: Mapping[str, Any]) -> dict[str, Any]:
+    """The entries, those of inner dictionaries as `key.name`."""
     entries: dict[str, Any] = {}
     for key, value in content.items():
-        entries |= (
-            {f"{key}.{name}": inner for name, inner in value.items()}
-            if isinstance(value, dict)
-            else {key: value}
-        )
+        inner = {f"{key}.{name}": each for name, each in value.items()} if isinstance(value, dict) else {}
+        entries |= inner or {key: value}
     return entries

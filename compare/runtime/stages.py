@@ -3,8 +3,9 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from rich.console import Console
 from rich.progress import (
@@ -17,6 +18,7 @@ from rich.progress import (
 )
 from rich.table import Column
 
+from compare.runtime.provenance import machine
 from solvers.solver import Progress as Report
 from solvers.solver import UnsupportedProblemError
 
@@ -27,10 +29,13 @@ class Stages:
     Where there is no terminal, each stage is a plain line when it is done.
 
     Attributes:
+        started: Time when the run began.
         seconds: Duration of every finished stage, s.
     """
 
-    def __init__(self, console: Console, *, quiet: bool = False) -> None:
+    def __init__(self, console: Console | None = None, *, quiet: bool = False) -> None:
+        console = console or Console(stderr=True)
+        self.started = datetime.now(UTC)
         self.seconds: dict[str, float] = {}
         self._console = console
         self._log = not (quiet or console.is_terminal)
@@ -60,6 +65,14 @@ class Stages:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._progress.stop()
+
+    def record(self) -> dict[str, Any]:
+        """Start, durations so far and machine, for the provenance of a result."""
+        return {
+            "started": self.started.isoformat(timespec="seconds"),
+            "seconds": {name: round(seconds, 2) for name, seconds in self.seconds.items()},
+            "machine": machine(),
+        }
 
     @contextmanager
     def stage(self, name: str) -> Iterator[Report]:

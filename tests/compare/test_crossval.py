@@ -14,7 +14,7 @@ from scipy.stats import t
 
 from compare.cli import main
 from compare.crossval.charts import draw_curve, draw_fields, draw_held_out
-from compare.crossval.fold_results import FoldResult, SolverTask, SolverVariant, run_folds
+from compare.crossval.fold_result import FoldResult
 from compare.crossval.folds import (
     ALL,
     DRAWS,
@@ -28,9 +28,11 @@ from compare.crossval.folds import (
     hide_markers,
     load_cases_of,
 )
-from compare.crossval.l_curve import sweep_weights
 from compare.crossval.scores import Difference, Interval, difference, of_scheme, score
+from compare.crossval.solver_folds import SolverTask, run_folds
+from compare.crossval.study import SolverVariant
 from compare.crossval.true_fields import FieldSampler, TrueFields
+from compare.crossval.weight_sweep import sweep_weights
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
@@ -84,10 +86,10 @@ def task(
         ).save(paths[-1])
     half = replace(observations, displacements=0.5 * observations.displacements)
     return SolverTask(
-        entry=entry("gp"),
+        variant=variant("gp"),
         mesh=tmp_path / "mesh.npz",
         material=Material(),
-        conditions=[
+        load_cases=[
             LoadCase("full", Load(), 1.0, 35.0),
             LoadCase("half", Load(displacement=(0.0, -5.0)), 0.5, 35.0),
         ],
@@ -95,11 +97,10 @@ def task(
         observations=[[observations, half]],
         folds=[Fold(ALL, "all", ()), Fold(ONE, "marker 4", (3,)), Fold(LOAD, "half", (), 1)],
         folder=tmp_path / "kept",
-        threads=1,
     )
 
 
-def entry(name: str, **settings: object) -> SolverVariant:
+def variant(name: str, **settings: object) -> SolverVariant:
     return SolverVariant(name, name, make_solver(name, **settings).settings())
 
 
@@ -112,22 +113,22 @@ def judged(task: SolverTask) -> list[FoldResult]:
 
 
 def test_folds_hold_out_what_they_say(coarse_mesh):
-    conditions = load_cases_of(Problem(coarse_mesh), others=True)
-    folds = folds_of([ONE, TIP, RANDOM, LOAD], 9, conditions)
+    load_cases = load_cases_of(Problem(coarse_mesh), others=True)
+    folds = folds_of([ONE, TIP, RANDOM, LOAD], 9, load_cases)
     held = {scheme: [fold.held for fold in folds if fold.scheme == scheme] for scheme in (ONE, TIP, RANDOM)}
     assert held[ONE] == [(marker,) for marker in range(9)]
     assert held[TIP] == [(6, 7, 8)]
     assert len(held[RANDOM]) == DRAWS
     assert {len(set(draw)) for draw in held[RANDOM]} == {3}
     assert len(set(held[RANDOM])) > 5
-    assert [(c.load.displacement, c.load.position) for c in conditions] == [
+    assert [(c.load.displacement, c.load.position) for c in load_cases] == [
         ((0.0, -10.0), None),
         ((0.0, -5.0), None),
         ((0.0, -7.5), None),
         ((0.0, -10.0), 30.0),
         ((0.0, -10.0), 40.0),
     ]
-    assert [fold.condition for fold in folds if fold.scheme == LOAD] == [1, 2, 3, 4]
+    assert [fold.load_case for fold in folds if fold.scheme == LOAD] == [1, 2, 3, 4]
 
 
 def test_nothing_is_left_of_what_is_held_out(observations):
@@ -144,7 +145,7 @@ def test_predictions_do_not_depend_on_what_is_held_out(task, observations, name)
     fold = Fold(ONE, "marker 4", (3,))
     settings = {"degree": 1} if name != "gp" else {}
     settings |= {"weights": "precision", "choose": "left-out"} if name == "fem-asm" else {}
-    own = replace(task, entry=entry(name, **settings), folds=[fold])
+    own = replace(task, variant=variant(name, **settings), folds=[fold])
     moved = observations.displacements.copy()
     moved[3] += [5.0, -5.0]
     other = replace(observations, displacements=moved)
@@ -167,7 +168,7 @@ def test_a_fold_is_the_solver_s_own_solution_without_what_is_held_out(
     held = (1, 3)
     settings = {"degree": 1} if name != "gp" else {}
     folds = [Fold(ALL, "all", ()), Fold(RANDOM, "draw 1", held)]  # the second one finds shared work
-    _, outcome = judged(replace(task, entry=entry(name, **settings), folds=folds))
+    _, outcome = judged(replace(task, variant=variant(name, **settings), folds=folds))
     visible = ~np.isin(np.arange(9), held)
     problem = Problem(coarse_mesh, observations=replace(observations, visible=visible))
     solution = make_solver(name, **settings).solve(problem)
@@ -194,7 +195,7 @@ def test_a_fold_is_the_solver_s_own_solution_without_what_is_held_out(
 def test_what_was_learnt_is_carried_to_half_the_load(task, name):
     """All of it is linear, and so is this truth: half the load has half the errors."""
     settings = {"degree": 1} if name != "gp" else {}
-    outcomes = judged(replace(task, entry=entry(name, **settings)))
+    outcomes = judged(replace(task, variant=variant(name, **settings)))
     np.testing.assert_allclose(outcomes[2].errors, 0.5 * np.array(outcomes[0].errors), atol=1e-6)
     assert outcomes[2].held == list(range(9))
     assert len(outcomes[2].in_sample) == 0
@@ -202,7 +203,7 @@ def test_what_was_learnt_is_carried_to_half_the_load(task, name):
 
 
 def test_a_solver_that_is_given_nothing_has_nothing_in_sample(task):
-    outcomes = judged(replace(task, entry=entry("fem", degree=1, estimate=False)))
+    outcomes = judged(replace(task, variant=variant("fem", degree=1, estimate=False)))
     assert [len(outcome.in_sample) for outcome in outcomes] == [0, 0, 0]
     assert [len(outcome.held_out) for outcome in outcomes] == [0, 1, 9]
     assert outcomes[0].errors == outcomes[1].errors
@@ -214,19 +215,19 @@ def test_finished_folds_are_kept_and_those_of_other_settings_are_not(task, monke
     def again(*_: object) -> None:
         raise RuntimeError("solved again")
 
-    monkeypatch.setattr("compare.crossval.fold_results.refitter", again)
+    monkeypatch.setattr("compare.crossval.solver_folds.refitter", again)
     assert [outcome.errors for outcome in judged(task)] == [outcome.errors for outcome in first]
     with pytest.raises(RuntimeError, match="solved again"):
-        judged(replace(task, entry=entry("gp", clamp=True)))
+        judged(replace(task, variant=variant("gp", clamp=True)))
 
 
 def test_the_curve_of_weights_is_what_solving_again_with_them_gives(task, coarse_mesh, observations):
-    own = replace(task, entry=entry("fem-asm", degree=1))
+    own = replace(task, variant=variant("fem-asm", degree=1))
     curve = sweep_weights(own)
     number = 24
     assert curve["factor"][number] == pytest.approx(1e-3)
     (outcome,) = judged(
-        replace(own, entry=entry("fem-asm", degree=1, asm_weight=1.0), folds=[Fold(ALL, "all", ())])
+        replace(own, variant=variant("fem-asm", degree=1, asm_weight=1.0), folds=[Fold(ALL, "all", ())])
     )
     missed = np.sqrt((np.array(outcome.errors) ** 2).mean())
     assert curve["in_sample_mm"][number] == pytest.approx(missed, rel=1e-6)
@@ -314,7 +315,7 @@ def in_line(monkeypatch: pytest.MonkeyPatch) -> None:
         for name, each in tasks.items():
             yield name, work(each, silent)
 
-    monkeypatch.setattr("compare.runtime.staged_processes.in_processes", inline)
+    monkeypatch.setattr("compare.runtime.processes.in_processes", inline)
 
 
 def run(line: str, out: Path) -> int:
@@ -397,16 +398,21 @@ def test_bad_input_is_one_line(tmp_path, capsys, line, said):
 
 
 def test_a_solver_that_chooses_its_weights_is_there_in_three_ways():
-    from compare.commands.crossval_options import read_entries
+    from compare.commands.crossval_options import read_variants
     from compare.commands.options import SolverOptions
 
-    entries = read_entries(SolverOptions(), "fem,fem-asm", Material())
-    assert [entry.label for entry in entries] == ["fem", "fem-asm", "fem-asm left-out", "fem-asm evidence"]
-    assert [entry.settings.get("choose") for entry in entries] == [None, "given", "left-out", "evidence"]
+    variants = read_variants(SolverOptions(), "fem,fem-asm", Material())
+    assert [variant.label for variant in variants] == [
+        "fem",
+        "fem-asm",
+        "fem-asm left-out",
+        "fem-asm evidence",
+    ]
+    assert [variant.settings.get("choose") for variant in variants] == [None, "given", "left-out", "evidence"]
     fixed = SolverOptions(solver_set=("fem-asm.choose=left-out",))
-    assert [entry.label for entry in read_entries(fixed, "fem-asm", Material())] == ["fem-asm"]
+    assert [variant.label for variant in read_variants(fixed, "fem-asm", Material())] == ["fem-asm"]
     stiff = Material(law="neo-hookean")  # for which there is nothing to choose
-    assert [entry.label for entry in read_entries(SolverOptions(), "fem-asm", stiff)] == ["fem-asm"]
+    assert [variant.label for variant in read_variants(SolverOptions(), "fem-asm", stiff)] == ["fem-asm"]
 
 
 def test_pictures_show_every_solver(pages, tmp_path):

@@ -86,7 +86,6 @@ def wanted(tmp_path: Path) -> GridSearch:
         settings=TINY,
         out=tmp_path / "search",
         processes=2,
-        threads=1,
     )
 
 
@@ -127,7 +126,7 @@ def scripted(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[GridPoint]]:
             for name, task in tasks.items():
                 yield name, work(task)
 
-        monkeypatch.setattr("compare.runtime.staged_processes.in_processes", inline)
+        monkeypatch.setattr("compare.runtime.processes.in_processes", inline)
         return trained
 
     def train_with(task: TrainingTask, worth: TrainingMetrics) -> TrainingRun:
@@ -309,7 +308,7 @@ def test_another_search_in_the_same_folder_is_refused(wanted, scripted, changes,
 def test_results_of_another_program_are_refused(wanted, scripted, monkeypatch):
     scripted(distance)
     searched(wanted)
-    monkeypatch.setattr("compare.gridsearch.search.sources_digest", lambda *_: "another")
+    monkeypatch.setattr("compare.runtime.resumable_folder.sources_digest", lambda *_: "another")
     with pytest.raises(UserError, match=r"other settings \(program_sha256\)"):
         searched(wanted)
 

@@ -158,7 +158,6 @@ def test_an_interrupted_search_ends_as_if_it_had_not_been(tmp_path):
             settings={**TINY, "epochs": 60},
             out=tmp_path / name,
             processes=1,
-            threads=1,
         )
 
     with quiet() as stages:
@@ -187,7 +186,6 @@ def test_a_run_of_the_search_that_diverges_is_recorded(tmp_path):
         settings={**TINY, "epochs": 20},
         out=tmp_path / "search",
         processes=1,
-        threads=1,
     )
     with quiet() as stages:
         (diverged,) = search_grid(wanted, stages)

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from compare.crossval.fold_results import SolverTask
 from compare.crossval.scores import FIELDS
+from compare.crossval.solver_folds import SolverTask
 from compare.crossval.true_fields import FieldSampler, TrueFields
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.assimilation.marker_forces import root_mean_square
@@ -13,7 +13,7 @@ from solvers.lagrange import LagrangeField
 from solvers.problem import Problem
 from solvers.solver import Progress, silent, with_law
 
-CURVED = "fem-asm"
+SWEPT = "fem-asm"
 """The solver whose minimisers for all weights are known at once."""
 
 
@@ -24,12 +24,12 @@ def sweep_weights(task: SolverTask, progress: Progress = silent) -> dict[str, li
         Columns: `factor`; `in_sample_mm` and `left_out_mm`, root mean squares over the markers' components;
         relative L2 distances from the truth by the names of `FIELDS`.
     """
-    solver = task.entry.make(0)
+    solver = task.variant.make(0)
     if not isinstance(solver, FemAsmSolver):
         raise TypeError(f"{solver.name} has no minimisers for all weights")
     mesh, observations = TriangleMesh.load(task.mesh), task.observations[0][0]
     material = with_law(task.material, solver)
-    problem = Problem(mesh, material, task.conditions[0].load, observations)
+    problem = Problem(mesh, material, task.load_cases[0].load, observations)
     law = task.material.model_copy(update={"law": "neo-hookean", "plane": "strain"})
     finite = replace(problem, material=law)
     sampler = FieldSampler.of(mesh, observations.points, observations.marker_radius)

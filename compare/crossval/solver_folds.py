@@ -1,0 +1,189 @@
+"""Runs one solver through all folds, in a process of its own, and keeps the finished ones."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ConfigDict, TypeAdapter
+from pydantic_core import to_jsonable_python
+
+from compare.crossval.fold_result import FoldResult
+from compare.crossval.folds import Fold, LoadCase, hide_markers
+from compare.crossval.study import SolverVariant
+from compare.crossval.true_fields import FieldSampler, SampledField, TrueFields
+from geometry.atomic import atomic_path
+from geometry.errors import UserError
+from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.observations import Observations
+from solvers.assimilation.misfit import assimilates
+from solvers.assimilation.refitting import Carrying, refitter
+from solvers.problem import Material, Problem
+from solvers.solution import Solution
+from solvers.solver import Progress, Solver, UnsupportedProblemError, silent, with_law
+
+
+@dataclass(frozen=True, eq=False)
+class SolverTask:
+    """All that a process needs to run one solver.
+
+    Attributes:
+        variant: The solver.
+        mesh: File of the shared mesh.
+        material: Elastic constants.
+        load_cases: The loads, the full one first.
+        truths: File of the true fields at each load; empty with measured markers.
+        observations: For each seed, those at every load.
+        folds: What to hold out.
+        folder: Folder of finished folds.
+    """
+
+    variant: SolverVariant
+    mesh: Path
+    material: Material
+    load_cases: Sequence[LoadCase]
+    truths: Sequence[Path]
+    observations: Sequence[Sequence[Observations]]
+    folds: Sequence[Fold]
+    folder: Path
+
+
+@dataclass(frozen=True)
+class FailedSolver:
+    """A solver that ended without a result.
+
+    Attributes:
+        message: Why.
+    """
+
+    message: str
+
+
+@dataclass(frozen=True)
+class _KeptFolds:
+    """The content of a file of finished folds."""
+
+    settings: dict[str, Any]
+    results: list[FoldResult]
+    __pydantic_config__ = ConfigDict(ser_json_inf_nan="constants")
+
+
+_FILE = TypeAdapter(_KeptFolds)
+
+
+def run_folds(task: SolverTask, progress: Progress = silent) -> list[list[FoldResult]] | FailedSolver:
+    """Run a solver through all folds for every seed, skipping finished folds.
+
+    Returns:
+        For every seed the results in the order of the task's folds.
+    """
+    seeds = len(task.observations)
+    results: list[list[FoldResult]] = []
+    runner = None
+    try:
+        for seed in range(seeds):
+            solver = task.variant.make(seed)
+            if runner is None or "seed" in solver.settings():
+                runner = _FoldRunner(task, solver)
+            results.append(
+                runner.run(seed, lambda share, text: progress((len(results) + share) / seeds, text))
+            )
+    except UserError as error:
+        return FailedSolver(str(error))
+    return results
+
+
+class _FoldRunner:
+    """One solver on one mesh, with the work that folds share."""
+
+    def __init__(self, task: SolverTask, solver: Solver) -> None:
+        self._task, self._solver = task, solver
+        mesh = TriangleMesh.load(task.mesh)
+        self._problem = Problem(mesh, with_law(task.material, solver), task.load_cases[0].load)
+        finite = task.material.model_copy(update={"law": "neo-hookean", "plane": "strain"})
+        self._finite = replace(self._problem, material=finite)
+        markers = task.observations[0][0]
+        self._sampler = FieldSampler.of(mesh, markers.points, markers.marker_radius)
+        self._truths = [TrueFields.load(path) for path in task.truths]
+        self._unassimilated: dict[int, tuple[SampledField, bool]] = {}
+        self._refit: Callable[[Observations], Solution] | None = None
+        self._fit: tuple[tuple[int, ...], Solution] | None = None
+
+    def run(self, seed: int, progress: Progress) -> list[FoldResult]:
+        """The results of all folds for a seed."""
+        path = self._task.folder / f"seed-{seed}.json"
+        settings = to_jsonable_python(self._solver.settings())
+        results = _kept(path, settings)
+        self._fit = None
+        for number, fold in enumerate(self._task.folds):
+            progress(number / len(self._task.folds), f"{fold.scheme}: {fold.name}")
+            if fold not in results:
+                results[fold] = self._result(self._task.observations[seed], fold)
+                with atomic_path(path) as partial:
+                    partial.write_bytes(_FILE.dump_json(_KeptFolds(settings, list(results.values()))))
+        return [results[fold] for fold in self._task.folds]
+
+    def _result(self, observations: Sequence[Observations], fold: Fold) -> FoldResult:
+        """One fold, of which `observations` holds the markers at every load."""
+        given, deviations = assimilates(self._solver), None
+        if not given:
+            sampled, converged = self._without_markers(fold.load_case)
+        else:
+            solution = self._fitted(observations[0], fold.held)
+            sampled, converged = self._at_load_case(solution, fold.load_case), bool(solution.status.converged)
+            stated = getattr(solution.field, "standard_deviation", None)
+            if stated is not None and fold.load_case == 0:
+                noise = observations[0].standard_deviations
+                deviations = np.hypot(stated(self._sampler.centres), noise).tolist()
+        fields = {}
+        if self._truths:
+            truth = self._truths[fold.load_case]
+            fields = truth.distance(sampled, self._problem, self._finite, self._sampler.weights)
+        errors = (sampled.markers - observations[fold.load_case].displacements).tolist()
+        return FoldResult(fold, errors, deviations, fields, converged, given)
+
+    def _fitted(self, observations: Observations, held: tuple[int, ...]) -> Solution:
+        """The solution with the markers that are not held out; folds that hold out the same share it."""
+        if self._fit is None or self._fit[0] != held:
+            self._refit = self._refit or refitter(self._solver, self._problem)
+            self._fit = held, self._refit(hide_markers(observations, held))
+        return self._fit[1]
+
+    def _at_load_case(self, solution: Solution, case: int) -> SampledField:
+        """A fit at the full load, carried over to a load case.
+
+        A solver that cannot carry its fit over is solved without markers at the other load; the change that
+        the markers made at the full load, times the share of the stroke, is added. If it has no solution
+        without markers, its whole field counts as that change.
+        """
+        mesh, share = self._problem.mesh, self._task.load_cases[case].share
+        if case and isinstance(self._solver, Carrying):
+            solution = self._solver.carried(solution, self._problem, self._at(case))
+        sampled = self._sampler.of_solution(solution, mesh)
+        if case == 0 or isinstance(self._solver, Carrying):
+            return sampled
+        try:
+            there, here = (self._without_markers(each)[0] for each in (case, 0))
+        except UnsupportedProblemError:
+            return sampled * share
+        return there + (sampled + here * -1.0) * share
+
+    def _at(self, case: int) -> Problem:
+        return replace(self._problem, load=self._task.load_cases[case].load)
+
+    def _without_markers(self, case: int) -> tuple[SampledField, bool]:
+        """The solver's field without markers at a load case, and whether it converged; solved once."""
+        if case not in self._unassimilated:
+            solution = self._solver.solve(self._at(case))
+            sampled = self._sampler.of_solution(solution, self._problem.mesh)
+            self._unassimilated[case] = sampled, bool(solution.status.converged)
+        return self._unassimilated[case]
+
+
+def _kept(path: Path, settings: Mapping[str, Any]) -> dict[Fold, FoldResult]:
+    """The results of an earlier run with the same settings."""
+    if not path.exists():
+        return {}
+    content = _FILE.validate_json(path.read_bytes())
+    return {result.fold: result for result in content.results} if content.settings == settings else {}
