@@ -23,7 +23,7 @@ import numpy as np
 import torch
 
 from geometry.arrays import FloatArray
-from geometry.mesh.point_location import Location
+from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
 from solvers.elasticity import Lame
 from solvers.pinn.finite_basis.hard_constraint import BaseFactor
@@ -43,12 +43,12 @@ class NetworkField:
 
     network: Callable[[torch.Tensor], torch.Tensor]
 
-    def displacement(self, location: Location) -> FloatArray:
+    def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
         with torch.no_grad():
             return self.network(_tensor(location.points)).double().numpy()
 
-    def gradient(self, location: Location) -> FloatArray:
+    def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
         points = _tensor(location.points).requires_grad_()
         values = self.network(points)

@@ -12,7 +12,7 @@ import numpy as np
 import torch
 
 from geometry.arrays import FloatArray
-from geometry.mesh.point_location import Location
+from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
 from solvers.pinn.finite_basis.hard_constraint import BaseFactor
 from solvers.pinn.paper.losses import stiffness_matrix
@@ -147,15 +147,15 @@ class NetworkField:
     network: FingerNetwork
     parameters: torch.Tensor
 
-    def displacement(self, location: Location) -> FloatArray:
+    def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
         return self._state(location)[:, :, 0]
 
-    def gradient(self, location: Location) -> FloatArray:
+    def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
         return self._state(location)[:, :, 1:]
 
-    def _state(self, location: Location) -> FloatArray:
+    def _state(self, location: LocatedPoints) -> FloatArray:
         points = torch.tensor(np.asarray(location.points))
         with torch.no_grad():
             shift = self.network.shift(self.parameters)

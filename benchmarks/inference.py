@@ -11,7 +11,7 @@ from rich.table import Table
 
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design
-from geometry.mesh.point_location import Location
+from geometry.mesh.point_location import LocatedPoints
 from solvers.fem.linear import FemSolver
 from solvers.pinn.finite_basis.local import PinnLocalSolver
 from solvers.pinn.finite_basis.standard import PinnStdSolver
@@ -42,14 +42,14 @@ def main() -> Table:
     return table
 
 
-def _drawn(problem: Problem) -> Location:
+def _drawn(problem: Problem) -> LocatedPoints:
     mesh, rng = problem.mesh, np.random.default_rng(0)
     chosen = rng.choice(len(mesh.triangles), POINTS, p=mesh.areas / mesh.areas.sum())
     barycentric = rng.dirichlet(np.ones(3), POINTS)
     return mesh.locate(np.einsum("nc,ncx->nx", barycentric, mesh.points[mesh.triangles[chosen]]))
 
 
-def _speed(function, location: Location) -> float:
+def _speed(function, location: LocatedPoints) -> float:
     """The best of three, in million points a second."""
     seconds = []
     for _ in range(3):

@@ -1,4 +1,4 @@
-"""The networks, untouched, on twelve fingers drawn from the admissible range, against graded finite elements.
+"""The networks, untouched, on twelve fingers drawn from the allowed range, against graded finite elements.
 
 The reference has quadratic elements graded to 0.01 mm at the corners and an eighth of the contact's width
 there. "Own estimate" is the error that a network states itself. Allow ten minutes.

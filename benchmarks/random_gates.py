@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from geometry.arrays import FloatArray
-from geometry.mesh.point_location import Location
+from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
 from solvers.elasticity import Lame
 from solvers.pinn.finite_basis.hard_constraint import BaseFactor
@@ -33,12 +33,12 @@ class RandomGates:
     strips: torch.Tensor
     output: torch.Tensor
 
-    def displacement(self, location: Location) -> FloatArray:
+    def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
         parts = torch.from_numpy(np.array(location.points)).split(2000)
         return torch.cat([self.units(part)[0] @ self.output for part in parts]).numpy()
 
-    def gradient(self, location: Location) -> FloatArray:
+    def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient, shape (n, 2, 2)."""
         parts = torch.from_numpy(np.array(location.points)).split(2000)
         found = [torch.stack([along @ self.output for along in self.units(part)[1:]], -1) for part in parts]

@@ -19,19 +19,19 @@ if TYPE_CHECKING:
     from geometry.finger.presets import preset_names as preset_names
     from geometry.finger.section import Section as Section
     from geometry.finger.section import finger_section as finger_section
-    from geometry.finger.validation import admissible_range as admissible_range
-    from geometry.mesh.elements_across import elements_across as elements_across
-    from geometry.mesh.point_location import Location as Location
+    from geometry.finger.validation import allowed_range as allowed_range
+    from geometry.mesh.point_location import LocatedPoints as LocatedPoints
     from geometry.mesh.quadrature import Quadrature as Quadrature
     from geometry.mesh.quadrature import body_quadrature as body_quadrature
     from geometry.mesh.quadrature import edge_quadrature as edge_quadrature
     from geometry.mesh.settings import MeshSettings as MeshSettings
     from geometry.mesh.triangle_mesh import TriangleMesh as TriangleMesh
+    from geometry.mesh.walls import elements_through_thickness as elements_through_thickness
     from geometry.observations import Observations as Observations
 
 _HOME = {
     "Design": "finger.design",
-    "Location": "mesh.point_location",
+    "LocatedPoints": "mesh.point_location",
     "MeshSettings": "mesh.settings",
     "Observations": "observations",
     "OutsideBodyError": "errors",
@@ -40,11 +40,11 @@ _HOME = {
     "ShapeError": "errors",
     "TriangleMesh": "mesh.triangle_mesh",
     "UserError": "errors",
-    "admissible_range": "finger.validation",
+    "allowed_range": "finger.validation",
     "body_quadrature": "mesh.quadrature",
     "cad_files": "cache",
     "edge_quadrature": "mesh.quadrature",
-    "elements_across": "mesh.elements_across",
+    "elements_through_thickness": "mesh.walls",
     "finger_mesh": "cache",
     "finger_section": "finger.section",
     "load_design": "finger.presets",

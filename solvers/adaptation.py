@@ -9,7 +9,7 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.problem import Load
 
 
-class Round(NamedTuple):
+class RefinementRound(NamedTuple):
     """One solution on the way.
 
     Attributes:
@@ -36,7 +36,7 @@ class Adaptation:
     """
 
     tolerance: float
-    rounds: tuple[Round, ...]
+    rounds: tuple[RefinementRound, ...]
     mesh: TriangleMesh
 
     @property

@@ -30,7 +30,7 @@ class Lame(NamedTuple):
     λ_out: float
 
 
-class Plane(NamedTuple):
+class PlaneTensor(NamedTuple):
     """Components of a symmetric tensor of a plane state."""
 
     xx: Field
@@ -48,7 +48,7 @@ def lame_constants(young: float, poisson: float, plane: str) -> Lame:
     return Lame(λ=λ, μ=μ, λ_out=λ)
 
 
-def lame_slopes(young: float, poisson: float, plane: str) -> Lame:
+def lame_derivatives(young: float, poisson: float, plane: str) -> Lame:
     """Derivatives of the Lamé constants by Poisson's ratio, MPa; λ_out's is λ's, or 0 in plane stress."""
     μ = -young / (2 * (1 + poisson) ** 2)
     if plane == "stress":
@@ -57,14 +57,14 @@ def lame_slopes(young: float, poisson: float, plane: str) -> Lame:
     return Lame(λ=λ, μ=μ, λ_out=λ)
 
 
-def small_strain(gradient: Field, lame: Lame) -> Plane:
+def small_strain(gradient: Field, lame: Lame) -> PlaneTensor:
     """Infinitesimal strain, tensor components (the shear is half the engineering shear)."""
     xx, yy = gradient[..., 0, 0], gradient[..., 1, 1]
     xy = 0.5 * (gradient[..., 0, 1] + gradient[..., 1, 0])
     # Plane stress: sigma_zz = 0 fixes eps_zz; there the reduced λ = 2 λ3 μ/(λ3 + 2 μ) gives eps_zz = -λ/(2 μ)
     # (xx + yy).
     zz = 0 * xx if lame.λ_out else (-lame.λ / (2 * lame.μ)) * (xx + yy)
-    return Plane(xx, yy, xy, zz)
+    return PlaneTensor(xx, yy, xy, zz)
 
 
 def linear_energy_density(gradient: Field, lame: Lame) -> Field:
@@ -75,11 +75,11 @@ def linear_energy_density(gradient: Field, lame: Lame) -> Field:
     return 0.5 * lame.λ * trace * trace + lame.μ * shear
 
 
-def linear_stress(gradient: Field, lame: Lame) -> Plane:
+def linear_stress(gradient: Field, lame: Lame) -> PlaneTensor:
     """Cauchy stress of Hooke's law, MPa."""
     strain = small_strain(gradient, lame)
     trace = strain.xx + strain.yy
-    return Plane(
+    return PlaneTensor(
         xx=lame.λ * trace + 2 * lame.μ * strain.xx,
         yy=lame.λ * trace + 2 * lame.μ * strain.yy,
         xy=2 * lame.μ * strain.xy,
@@ -92,10 +92,10 @@ def deformation_jacobian(gradient: Field) -> Field:
     return (1 + gradient[..., 0, 0]) * (1 + gradient[..., 1, 1]) - gradient[..., 0, 1] * gradient[..., 1, 0]
 
 
-def green_lagrange_strain(gradient: Field) -> Plane:
+def green_lagrange_strain(gradient: Field) -> PlaneTensor:
     """E = (F^T F - I) / 2 of a plane-strain deformation."""
     a, b, c, d = gradient[..., 0, 0], gradient[..., 0, 1], gradient[..., 1, 0], gradient[..., 1, 1]
-    return Plane(
+    return PlaneTensor(
         xx=a + 0.5 * (a * a + c * c),
         yy=d + 0.5 * (b * b + d * d),
         xy=0.5 * (b + c + a * b + c * d),
@@ -110,12 +110,12 @@ def neo_hookean_energy_density(gradient: Field, lame: Lame, log: Callable[[Field
     return lame.μ * (strain.xx + strain.yy) - lame.μ * log_j + 0.5 * lame.λ * log_j * log_j
 
 
-def neo_hookean_stress(gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> Plane:
+def neo_hookean_stress(gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> PlaneTensor:
     """Cauchy stress μ/J (B - I) + λ ln(J)/J I, MPa, with B = F F^T."""
     a, b, c, d = gradient[..., 0, 0], gradient[..., 0, 1], gradient[..., 1, 0], gradient[..., 1, 1]
     jacobian = deformation_jacobian(gradient)
     pressure = lame.λ * log(jacobian) / jacobian
-    return Plane(
+    return PlaneTensor(
         xx=lame.μ / jacobian * (2 * a + a * a + b * b) + pressure,
         yy=lame.μ / jacobian * (2 * d + c * c + d * d) + pressure,
         xy=lame.μ / jacobian * (b + c + a * c + b * d),
@@ -134,13 +134,13 @@ def st_venant_kirchhoff_energy_density(gradient: Field, lame: Lame) -> Field:
     return 0.5 * lame.λ * trace * trace + lame.μ * shear
 
 
-def st_venant_kirchhoff_stress(gradient: Field, lame: Lame) -> Plane:
+def st_venant_kirchhoff_stress(gradient: Field, lame: Lame) -> PlaneTensor:
     """Cauchy stress F S F^T / J, MPa, of the second Piola-Kirchhoff stress S = λ tr(E) I + 2 μ E."""
     a, b, c, d = 1 + gradient[..., 0, 0], gradient[..., 0, 1], gradient[..., 1, 0], 1 + gradient[..., 1, 1]
     strain, jacobian = green_lagrange_strain(gradient), deformation_jacobian(gradient)
     trace = lame.λ * (strain.xx + strain.yy)
     xx, yy, xy = trace + 2 * lame.μ * strain.xx, trace + 2 * lame.μ * strain.yy, 2 * lame.μ * strain.xy
-    return Plane(
+    return PlaneTensor(
         xx=(a * a * xx + 2 * a * b * xy + b * b * yy) / jacobian,
         yy=(c * c * xx + 2 * c * d * xy + d * d * yy) / jacobian,
         xy=(a * c * xx + (a * d + b * c) * xy + b * d * yy) / jacobian,
@@ -148,7 +148,7 @@ def st_venant_kirchhoff_stress(gradient: Field, lame: Lame) -> Plane:
     )
 
 
-def strain_of(law: LawName, gradient: Field, lame: Lame) -> Plane:
+def strain_of(law: LawName, gradient: Field, lame: Lame) -> PlaneTensor:
     """The strain of a law: infinitesimal for the linear one, else Green-Lagrange."""
     return small_strain(gradient, lame) if law == "linear" else green_lagrange_strain(gradient)
 
@@ -162,7 +162,7 @@ def energy_density_of(law: LawName, gradient: Field, lame: Lame, log: Callable[[
     return neo_hookean_energy_density(gradient, lame, log)
 
 
-def stress_of(law: LawName, gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> Plane:
+def stress_of(law: LawName, gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> PlaneTensor:
     """Cauchy stress of a law, MPa; `log` is the library's own."""
     if law == "linear":
         return linear_stress(gradient, lame)
@@ -171,7 +171,7 @@ def stress_of(law: LawName, gradient: Field, lame: Lame, log: Callable[[Field], 
     return neo_hookean_stress(gradient, lame, log)
 
 
-def von_mises(stress: Plane, sqrt: Callable[[Field], Field]) -> Field:
+def von_mises(stress: PlaneTensor, sqrt: Callable[[Field], Field]) -> Field:
     """Von Mises stress, MPa, with the out-of-plane stress that plane strain needs."""
     xx, yy, xy, zz = stress
     return sqrt(0.5 * ((xx - yy) * (xx - yy) + (yy - zz) * (yy - zz) + (zz - xx) * (zz - xx)) + 3 * xy * xy)

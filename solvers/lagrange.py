@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from geometry.arrays import FloatArray, IntArray
-from geometry.mesh.point_location import Location
+from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 # Edge k joins the corners EDGES[k]; its node is number 3 + k of a quadratic element.
@@ -56,7 +56,7 @@ class LagrangeSpace:
         """Nodes in the middles of edges given as pairs of nodes, shape (..., 2), for degree 2."""
         return len(self.mesh.points) + self.mesh.edge_numbers(edges)
 
-    def at_nodes(self) -> Location:
+    def at_nodes(self) -> LocatedPoints:
         """The location of every node, in the order of the nodes."""
         corners = np.eye(3)
         barycentric = np.concatenate([corners, corners[EDGES].mean(axis=1)])[: self.cell_nodes.shape[1]]
@@ -64,9 +64,9 @@ class LagrangeSpace:
         for number, nodes in enumerate(self.cell_nodes.T):
             cells[nodes] = np.arange(len(nodes))
             local[nodes] = number
-        return Location(points=self.nodes, cells=cells, barycentric=barycentric[local])
+        return LocatedPoints(points=self.nodes, cells=cells, barycentric=barycentric[local])
 
-    def shape_functions(self, location: Location) -> csr_matrix:
+    def shape_functions(self, location: LocatedPoints) -> csr_matrix:
         """Values of the shape functions, as a matrix (n, N) that maps nodal values to values at points."""
         λ = location.barycentric
         if self.degree == 1:
@@ -75,7 +75,7 @@ class LagrangeSpace:
         middles = 4 * λ[:, EDGES[:, 0]] * λ[:, EDGES[:, 1]]
         return self._matrix(location, np.concatenate([corners, middles], axis=1))
 
-    def shape_gradients(self, location: Location) -> tuple[csr_matrix, csr_matrix]:
+    def shape_gradients(self, location: LocatedPoints) -> tuple[csr_matrix, csr_matrix]:
         """Derivatives of the shape functions along x and y, each a matrix (n, N), 1/mm."""
         dλ = self._barycentric_gradients[location.cells]
         if self.degree == 1:
@@ -96,7 +96,7 @@ class LagrangeSpace:
         rotated = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
         return np.asarray(rotated / (2 * self.mesh.areas)[:, None, None], dtype=np.float64)
 
-    def _matrix(self, location: Location, values: FloatArray) -> csr_matrix:
+    def _matrix(self, location: LocatedPoints, values: FloatArray) -> csr_matrix:
         columns = self.cell_nodes[location.cells]
         rows = np.arange(len(location) + 1) * columns.shape[1]
         return csr_matrix((values.ravel(), columns.ravel(), rows), shape=(len(location), len(self.nodes)))
@@ -114,11 +114,11 @@ class LagrangeField:
     space: LagrangeSpace
     values: FloatArray
 
-    def displacement(self, location: Location) -> FloatArray:
+    def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
         return np.asarray(self.space.shape_functions(location) @ self.values)
 
-    def gradient(self, location: Location) -> FloatArray:
+    def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
         dx, dy = self.space.shape_gradients(location)
         return np.stack([dx @ self.values, dy @ self.values], axis=-1)

@@ -8,19 +8,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.arrays import FloatArray
-from geometry.mesh.point_location import Location
-from solvers.elasticity import Plane, energy_density_of, strain_of, stress_of, von_mises
+from geometry.mesh.point_location import LocatedPoints
+from solvers.elasticity import PlaneTensor, energy_density_of, strain_of, stress_of, von_mises
 from solvers.problem import Problem
 
 
 class DisplacementField(Protocol):
     """The displacement as a function of position: what a solver has to provide."""
 
-    def displacement(self, location: Location) -> FloatArray:
+    def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement at `location.points`, shape (n, 2), mm."""
         ...
 
-    def gradient(self, location: Location) -> FloatArray:
+    def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient H[i, j] = du_i/dx_j at `location.points`, shape (n, 2, 2)."""
         ...
 
@@ -97,7 +97,7 @@ class Solution:
     error: ErrorEstimate | None = None
     left_out: FloatArray | None = None
 
-    def displacement(self, points: ArrayLike | Location) -> FloatArray:
+    def displacement(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Displacement at points of shape (n, 2), mm: shape (n, 2), mm.
 
         Raises:
@@ -105,7 +105,7 @@ class Solution:
         """
         return self.field.displacement(self._locate(points))
 
-    def gradient(self, points: ArrayLike | Location) -> FloatArray:
+    def gradient(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j at points of shape (n, 2), mm: shape (n, 2, 2).
 
         Raises:
@@ -113,12 +113,12 @@ class Solution:
         """
         return self.field.gradient(self._locate(points))
 
-    def state(self, points: ArrayLike | Location) -> "State":
+    def state(self, points: ArrayLike | LocatedPoints) -> "State":
         """Strain, stress and what follows from them at points of shape (n, 2), mm."""
         return State.from_gradient(self.gradient(points), self.problem)
 
-    def _locate(self, points: ArrayLike | Location) -> Location:
-        return points if isinstance(points, Location) else self.problem.mesh.locate(points)
+    def _locate(self, points: ArrayLike | LocatedPoints) -> LocatedPoints:
+        return points if isinstance(points, LocatedPoints) else self.problem.mesh.locate(points)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -154,6 +154,6 @@ class State:
         )
 
 
-def _in_plane(tensor: Plane) -> FloatArray:
+def _in_plane(tensor: PlaneTensor) -> FloatArray:
     rows = [np.stack([tensor.xx, tensor.xy], axis=-1), np.stack([tensor.xy, tensor.yy], axis=-1)]
     return np.stack(rows, axis=-2)

@@ -16,7 +16,7 @@ from pydantic import BaseModel
 
 from geometry.cache import CAD_FORMATS
 from geometry.finger.markers import marker_positions
-from geometry.finger.parameters import Parameters, fact
+from geometry.finger.parameters import Parameters, parameter_info
 from geometry.finger.presets import FOLDER, load_design, preset_names
 from geometry.mesh.settings import MeshSettings
 from solvers.solver import Solver
@@ -224,7 +224,9 @@ def described(model: type[BaseModel], *, symbols: bool) -> list[str]:
     """The rows that the guide must have for a model's fields."""
     rows = []
     for name, field in model.model_fields.items():
-        symbol, unit, low, high = (fact(name, key, model) for key in ("symbol", "unit", "low", "high"))
+        symbol, unit, low, high = (
+            parameter_info(name, key, model) for key in ("symbol", "unit", "low", "high")
+        )
         default = "none" if field.default is None else field.default
         cells = [
             f"`{name}`",

@@ -12,7 +12,7 @@ from scipy.special import roots_jacobi, roots_legendre
 
 from benchmarks.verification.hooke import PlaneLaw
 from geometry.arrays import BoolArray, FloatArray
-from geometry.mesh.point_location import Location
+from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import Quadrature, edge_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.fem.linear_equilibrium import LinearElasticity
@@ -67,7 +67,7 @@ class BoundaryValue:
         factors.destroy()
         return LagrangeField(space, nodal)
 
-    def state(self, field: LagrangeField, location: Location) -> State:
+    def state(self, field: LagrangeField, location: LocatedPoints) -> State:
         """Strain and stress as every solution of a solver derives them."""
         return State.from_gradient(field.gradient(location), Problem(self.mesh, self.material))
 

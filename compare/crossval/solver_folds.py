@@ -18,7 +18,7 @@ from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.assimilation.misfit import assimilates
-from solvers.assimilation.refitting import Carrying, refitter
+from solvers.assimilation.refitting import Transferable, refitter
 from solvers.problem import Material, Problem
 from solvers.solution import Solution
 from solvers.solver import Progress, Solver, UnsupportedProblemError, silent, with_law
@@ -158,10 +158,10 @@ class _FoldRunner:
         without markers, its whole field counts as that change.
         """
         mesh, share = self._problem.mesh, self._task.load_cases[case].share
-        if case and isinstance(self._solver, Carrying):
-            solution = self._solver.carried(solution, self._problem, self._at(case))
+        if case and isinstance(self._solver, Transferable):
+            solution = self._solver.transferred(solution, self._problem, self._at(case))
         sampled = self._sampler.of_solution(solution, mesh)
-        if case == 0 or isinstance(self._solver, Carrying):
+        if case == 0 or isinstance(self._solver, Transferable):
             return sampled
         try:
             there, here = (self._without_markers(each)[0] for each in (case, 0))

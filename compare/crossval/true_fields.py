@@ -14,7 +14,7 @@ from geometry.arrays import FloatArray
 from geometry.atomic import atomic_path
 from geometry.cache import cache_folder, finger_mesh
 from geometry.finger.design import Design
-from geometry.mesh.point_location import Location
+from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
@@ -64,10 +64,10 @@ class FieldSampler:
         means: From values at these points to the markers', shape (m, d).
     """
 
-    inside: Location
+    inside: LocatedPoints
     weights: FloatArray
-    centres: Location
-    discs: Location
+    centres: LocatedPoints
+    discs: LocatedPoints
     means: FloatArray
 
     @classmethod

@@ -13,9 +13,9 @@ from compare.figures.canvas import Extent
 from compare.figures.dimensions import Draughtsman
 from compare.figures.style import BODY, INK, MEASURED, WIDTH, axes_at, figure, heading
 from geometry.arrays import FloatArray
+from geometry.finger.fillets import fillet_points
 from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import Parameters
-from geometry.finger.rounded_corners import fillet_points
 from geometry.finger.section import Section, corner_angles, finger_section, rib_direction, rib_pitch
 
 CONTACT = "#d55e00"
@@ -58,7 +58,7 @@ def draw_design(path: Path, design: Parameters) -> None:
 
 def _body(axes: Axes, shape: Section) -> None:
     axes.add_patch(Polygon(shape.outer, fc=BODY, ec=INK, lw=0.9, zorder=1))
-    for cell in shape.cells:
+    for cell in shape.cavities:
         axes.add_patch(PathPatch(_rounded(cell, shape.fillet_radius), fc="white", ec=INK, lw=0.9, zorder=2))
 
 
@@ -113,7 +113,7 @@ def _ribs(pen: Draughtsman, design: Parameters, shape: Section) -> None:
     text = rf"$t_\mathrm{{flex}}$ = {d.front_thickness:g} mm"
     pen.thickness((x, 0), (x, -d.front_thickness), (x, 1.5 * em), text, side="center")
     outward = np.array([d.base_width, -d.height]) / np.hypot(d.base_width, d.height)
-    inner = shape.cells[-1][1:3].mean(axis=0)
+    inner = shape.cavities[-1][1:3].mean(axis=0)
     face = inner + outward * d.back_thickness
     pen.thickness(
         face,
@@ -144,7 +144,7 @@ def _ribs(pen: Draughtsman, design: Parameters, shape: Section) -> None:
 
 def _free_abscissa(design: Parameters, shape: Section, em: float) -> float:
     """Where the front wall has most room for a dimension: off contact, markers and the cavities' ends, mm."""
-    places = np.array([cell[[0, 3], 0] @ (1 - s, s) for cell in shape.cells for s in (0.3, 0.5, 0.7)])
+    places = np.array([cell[[0, 3], 0] @ (1 - s, s) for cell in shape.cavities for s in (0.3, 0.5, 0.7)])
     end = design.height - design.tip_length
     room = [
         np.abs(places - design.contact_abscissa) / (4.5 * em),

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.number_format import distance, number, percent
 from geometry.arrays import FloatArray
-from geometry.finger.parameters import Parameters, fact
+from geometry.finger.parameters import Parameters, parameter_info
 from geometry.observations import Observations
 from solvers.problem import Load, Material
 
@@ -23,7 +23,9 @@ def design_rows(design: Parameters) -> list[tuple[str, str, str]]:
             continue
         value = getattr(design, name)
         meaning = (described.description or name).split(" [")[0].replace("`", "")
-        rows.append((meaning, str(fact(name, "symbol")), _value(value, str(fact(name, "unit")))))
+        rows.append(
+            (meaning, str(parameter_info(name, "symbol")), _value(value, str(parameter_info(name, "unit"))))
+        )
     return [*rows, ("Abscissa of the contact's middle", "", _value(design.contact_abscissa, "mm"))]
 
 

@@ -13,9 +13,9 @@ from cadquery.occ_impl.exporters.dxf import DxfDocument
 
 from geometry.arrays import FloatArray
 from geometry.cad.svg import section_svg
+from geometry.finger.fillets import fillet_points
 from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import Parameters
-from geometry.finger.rounded_corners import fillet_points
 from geometry.finger.section import finger_section
 
 BODY_COLOUR = (0.15, 0.15, 0.17)
@@ -123,7 +123,7 @@ def write_archive(parameters: Parameters, formats: Sequence[str], path: Path) ->
 def _wires(parameters: Parameters) -> tuple[cq.Wire, list[cq.Wire]]:
     shape = finger_section(parameters)
     outer = cq.Wire.makePolygon([_vector(corner) for corner in shape.outer], close=True)
-    return outer, [_cell_wire(cell, shape.fillet_radius) for cell in shape.cells]
+    return outer, [_cell_wire(cell, shape.fillet_radius) for cell in shape.cavities]
 
 
 def _cell_wire(corners: FloatArray, radius: float) -> cq.Wire:

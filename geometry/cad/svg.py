@@ -1,9 +1,9 @@
 """The section as a drawing in true scale: one path and a circle for every marker."""
 
 from geometry.arrays import FloatArray
+from geometry.finger.fillets import fillet_points
 from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import Parameters
-from geometry.finger.rounded_corners import fillet_points
 from geometry.finger.section import finger_section
 
 MARGIN = 2.0
@@ -14,7 +14,7 @@ def section_svg(parameters: Parameters) -> str:
     """The section in SVG, with the groups `outline` and `markers`; one user unit is 1 mm, y points up."""
     p = parameters
     shape = finger_section(p)
-    paths = [_polygon(shape.outer), *(_cell(cell, shape.fillet_radius) for cell in shape.cells)]
+    paths = [_polygon(shape.outer), *(_cell(cell, shape.fillet_radius) for cell in shape.cavities)]
     circles = "\n".join(
         f'    <circle cx="{x:.6f}" cy="{y:.6f}" r="{p.marker_radius:.6g}"/>' for x, y in marker_positions(p)
     )

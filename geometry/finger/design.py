@@ -6,7 +6,7 @@ from typing import Any
 from pydantic import ValidationError, model_validator
 
 from geometry.errors import UserError
-from geometry.finger.error_messages import one_line
+from geometry.finger.error_messages import validation_message
 from geometry.finger.parameters import SYMBOLS, Parameters, title
 from geometry.finger.validation import check
 
@@ -24,16 +24,16 @@ class Design(Parameters):
         try:
             super().__init__(**values)
         except ValidationError as error:
-            raise UserError(one_line(error, Design)) from None
+            raise UserError(validation_message(error, Design)) from None
 
     def replaced(self, **changes: Any) -> "Design":
         """A checked copy with some parameters changed, by name or symbol."""
-        return Design(**{**self.model_dump(), **by_name(changes)})
+        return Design(**{**self.model_dump(), **by_parameter_name(changes)})
 
     @model_validator(mode="before")
     @classmethod
     def _accept_symbols(cls, values: Any) -> Any:
-        return by_name(values) if isinstance(values, Mapping) else values
+        return by_parameter_name(values) if isinstance(values, Mapping) else values
 
     @model_validator(mode="after")
     def _obey_rules(self) -> "Design":
@@ -41,7 +41,7 @@ class Design(Parameters):
         return self
 
 
-def by_name(values: Mapping[str, Any]) -> dict[str, Any]:
+def by_parameter_name(values: Mapping[str, Any]) -> dict[str, Any]:
     """The values with the paper's symbols turned into names.
 
     Raises:

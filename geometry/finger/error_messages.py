@@ -5,10 +5,10 @@ import difflib
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from geometry.finger.parameters import fact, title, with_unit
+from geometry.finger.parameters import parameter_info, title, with_unit
 
 
-def one_line(error: ValidationError, model: type[BaseModel]) -> str:
+def validation_message(error: ValidationError, model: type[BaseModel]) -> str:
     """A pydantic error of `model` as one line; several problems are separated by semicolons."""
     return "; ".join(_sentence(problem, model) for problem in error.errors())
 
@@ -43,4 +43,5 @@ def _sentence(problem: ErrorDetails, model: type[BaseModel]) -> str:
 
 
 def _bounds(name: str, model: type[BaseModel]) -> str:
-    return f"{fact(name, 'low', model):g} to {with_unit(fact(name, 'high', model), name, model)}"
+    low, high = parameter_info(name, "low", model), parameter_info(name, "high", model)
+    return f"{low:g} to {with_unit(high, name, model)}"

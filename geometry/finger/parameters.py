@@ -97,7 +97,7 @@ class Parameters(BaseModel):
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
 
-def fact(
+def parameter_info(
     name: str, key: Literal["unit", "symbol", "low", "high"], model: type[BaseModel] = Parameters
 ) -> Any:
     """Unit, symbol or bound of a model's parameter; an empty text where it has none."""
@@ -107,14 +107,14 @@ def fact(
 
 def with_unit(value: float, name: str, model: type[BaseModel] = Parameters) -> str:
     """A value of the parameter `name` in words, such as `2.5 mm`."""
-    return f"{value:.6g} {fact(name, 'unit', model)}".rstrip()
+    return f"{value:.6g} {parameter_info(name, 'unit', model)}".rstrip()
 
 
 def title(name: str, model: type[BaseModel] = Parameters) -> str:
     """The parameter's name with the paper's symbol, such as `rib_count (N)`."""
-    symbol = fact(name, "symbol", model)
+    symbol = parameter_info(name, "symbol", model)
     return f"{name} ({symbol})" if symbol else name
 
 
-SYMBOLS = {fact(name, "symbol"): name for name in Parameters.model_fields if fact(name, "symbol")}
+SYMBOLS = {symbol: name for name in Parameters.model_fields if (symbol := parameter_info(name, "symbol"))}
 """From the paper's symbol to the parameter's name."""

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry.errors import UserError
-from geometry.finger.design import Design, by_name
+from geometry.finger.design import Design, by_parameter_name
 from geometry.finger.error_messages import unknown_parameter
 from geometry.finger.parameters import SYMBOLS, Parameters, title
 
@@ -29,16 +29,16 @@ def load_design(name_or_path: str | Path = "default", overrides: Mapping[str, An
         overrides: Parameters by name or symbol; values may be text, as from a command line.
 
     Raises:
-        UserError: If there is no such preset or file, it cannot be read, or the design is not admissible.
+        UserError: If there is no such preset or file, it cannot be read, or the design breaks a rule.
     """
     path = _path_of(name_or_path)
     try:
         with path.open("rb") as file:
-            values = by_name(tomllib.load(file))
+            values = by_parameter_name(tomllib.load(file))
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise UserError(f"cannot read design file {path}: {reason}") from None
-    changes = by_name(overrides or {})
+    changes = by_parameter_name(overrides or {})
     try:
         return Design(**{"name": path.stem, **values, **changes})
     except UserError as error:

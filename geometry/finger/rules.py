@@ -28,7 +28,7 @@ MIN_STRAIGHT = 1e-3
 
 
 @dataclass(frozen=True)
-class Finding:
+class RuleResult:
     """What a rule found.
 
     Attributes:
@@ -46,28 +46,28 @@ class Rule:
 
     Attributes:
         check: Gives the finding.
-        mends: Parameters whose change can repair it, the likeliest first.
+        remedies: Parameters whose change can repair it, the likeliest first.
     """
 
-    check: Callable[[Parameters], Finding]
-    mends: tuple[str, ...]
+    check: Callable[[Parameters], RuleResult]
+    remedies: tuple[str, ...]
 
 
-def cavity_length(p: Parameters) -> Finding:
+def cavity_length(p: Parameters) -> RuleResult:
     """Base wall and tip leave room for a cavity."""
     length = p.height - p.tip_length - p.base_thickness
-    return Finding(
+    return RuleResult(
         length - MIN_CAVITY,
         f"no room for a cavity: height {p.height:g} mm less tip_length {p.tip_length:g} mm and "
         f"base_thickness {p.base_thickness:g} mm leaves {length:.3g} mm, at least {MIN_CAVITY} mm is needed",
     )
 
 
-def cavity_open(p: Parameters) -> Finding:
+def cavity_open(p: Parameters) -> RuleResult:
     """Front and back wall stay apart up to the tip block."""
     slope, intercept = back_offset_line(p, p.back_thickness)
     opening = -p.front_thickness - slope * (p.height - p.tip_length) - intercept
-    return Finding(
+    return RuleResult(
         opening - MIN_CAVITY,
         f"walls close the cavity: front_thickness {p.front_thickness:g} mm and back_thickness "
         f"{p.back_thickness:g} mm leave {opening:.3g} mm between them at the tip block, at least "
@@ -75,50 +75,50 @@ def cavity_open(p: Parameters) -> Finding:
     )
 
 
-def ribs_apart(p: Parameters) -> Finding:
+def ribs_apart(p: Parameters) -> RuleResult:
     """Neighbouring ribs leave a gap."""
     gap = rib_pitch(p) * np.cos(np.radians(p.rib_angle)) - p.rib_thickness
-    return Finding(
+    return RuleResult(
         float(gap) - MIN_CAVITY if p.rib_count > 1 else np.inf,
         f"ribs {'overlap' if gap < 0 else 'are too close'}: {p.rib_count} ribs of {p.rib_thickness:g} mm at "
         f"{p.rib_angle:g} deg leave gaps of {gap:.3g} mm, at least {MIN_CAVITY} mm is needed",
     )
 
 
-def ribs_clear_of_base(p: Parameters) -> Finding:
+def ribs_clear_of_base(p: Parameters) -> RuleResult:
     """The first rib stays clear of the base wall at both its ends."""
     return _cell_width(p, 0, "first rib runs into the base wall")
 
 
-def ribs_clear_of_tip(p: Parameters) -> Finding:
+def ribs_clear_of_tip(p: Parameters) -> RuleResult:
     """The last rib stays clear of the tip block at both its ends."""
     return _cell_width(p, -1, "last rib runs into the tip block")
 
 
-def contact_on_front(p: Parameters) -> Finding:
+def contact_on_front(p: Parameters) -> RuleResult:
     """The contact lies on the front face, clear of base and apex."""
     low, high = p.contact_ends
-    return Finding(
+    return RuleResult(
         min(low, p.height - high) - MIN_CONTACT_MARGIN,
         f"contact outside the front face: it reaches from x = {low:.6g} to {high:.6g} mm, the face allows "
         f"{MIN_CONTACT_MARGIN:g} to {p.height - MIN_CONTACT_MARGIN:g} mm",
     )
 
 
-def fillets_fit(p: Parameters) -> Finding:
+def fillets_fit(p: Parameters) -> RuleResult:
     """Two fillets fit on every side of every cell."""
     room = np.inf
-    for cell in finger_section(p).cells if p.fillet_radius > 0 else ():
+    for cell in finger_section(p).cavities if p.fillet_radius > 0 else ():
         tangents = p.fillet_radius / np.tan(corner_angles(cell) / 2)
         room = min(room, float((polygon_sides(cell) - tangents - np.roll(tangents, -1)).min()))
-    return Finding(
+    return RuleResult(
         room - MIN_STRAIGHT,
         f"fillets too large: two of fillet_radius {p.fillet_radius:g} mm need {-room:.3g} mm more than the "
         "shortest side of a cavity has",
     )
 
 
-def markers_fit(p: Parameters) -> Finding:
+def markers_fit(p: Parameters) -> RuleResult:
     """Every marker lies in the material.
 
     Markers sit in the middle of a wall or on the tip's bisector, so no cavity is nearer than the outline.
@@ -128,18 +128,18 @@ def markers_fit(p: Parameters) -> Finding:
     worst = int(margins.argmin())
     x, y = centres[worst]
     room = 2 * (margins[worst] - MIN_MARKER_WALL)
-    return Finding(
+    return RuleResult(
         float(margins[worst] - MIN_MARKER_WALL - p.marker_radius),
         f"marker {worst + 1} of layout {p.marker_layout!r} at ({x:.4g}, {y:.4g}) mm does not fit into the "
         f"material: marker_diameter is {p.marker_diameter:g} mm, there is room for {max(room, 0):.3g} mm",
     )
 
 
-def markers_apart(p: Parameters) -> Finding:
+def markers_apart(p: Parameters) -> RuleResult:
     """Neighbouring markers leave material between them."""
     centres = marker_positions(p)
     nearest = float(pdist(centres).min()) if len(centres) > 1 else np.inf
-    return Finding(
+    return RuleResult(
         nearest - p.marker_diameter - MIN_MARKER_WALL,
         f"markers overlap: {len(centres)} markers of layout {p.marker_layout!r} with marker_diameter "
         f"{p.marker_diameter:g} mm are {nearest:.3g} mm apart, at least "
@@ -147,9 +147,9 @@ def markers_apart(p: Parameters) -> Finding:
     )
 
 
-def markers_not_through(p: Parameters) -> Finding:
+def markers_not_through(p: Parameters) -> RuleResult:
     """The markers' pockets leave material below them."""
-    return Finding(
+    return RuleResult(
         p.depth - p.marker_height - MIN_DEPTH_LEFT,
         f"marker_height {p.marker_height:g} mm goes through the finger: depth {p.depth:g} mm less "
         f"{MIN_DEPTH_LEFT} mm is the most",
@@ -173,12 +173,12 @@ RULES: tuple[Rule, ...] = (
 """Checked in this order: the later ones mean something only where the earlier ones are obeyed."""
 
 
-def _cell_width(p: Parameters, which: int, what: str) -> Finding:
-    """Finding on the narrower end of the first or last cell."""
-    base_front, base_back, tip_back, tip_front = finger_section(p).cells[which]
+def _cell_width(p: Parameters, which: int, what: str) -> RuleResult:
+    """RuleResult on the narrower end of the first or last cell."""
+    base_front, base_back, tip_back, tip_front = finger_section(p).cavities[which]
     front, back = tip_front[0] - base_front[0], tip_back[0] - base_back[0]
     wall, width = ("front", front) if front < back else ("back", back)
-    return Finding(
+    return RuleResult(
         float(width) - MIN_CAVITY if p.rib_count else np.inf,
         f"{what}: with {p.rib_count} ribs of {p.rib_thickness:g} mm at {p.rib_angle:g} deg the cavity between"
         f" them is {width:.3g} mm wide at the {wall} wall, at least {MIN_CAVITY} mm is needed",

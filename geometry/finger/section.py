@@ -1,4 +1,4 @@
-"""The finger's section in closed form: outline, cells, ribs, area and lengths; no CAD."""
+"""The finger's section in closed form: outline, cavities, ribs, area and lengths; no CAD."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -15,16 +15,15 @@ class Section:
 
     Attributes:
         outer: Corners (0, 0), (0, -base_width), (height, 0), shape (3, 2), mm; counter-clockwise.
-        cells: The cavities from base to tip with sharp corners, each of shape (4, 2), mm, counter-clockwise:
-            front and back corner nearer the base, back and front corner nearer the tip.
-        ribs: The ribs between the walls' inner faces, corners in the order of `cells`, each of shape (4, 2),
-            mm.
+        cavities: From base to tip with sharp corners, each of shape (4, 2), mm, counter-clockwise: front and
+            back corner nearer the base, back and front corner nearer the tip.
+        ribs: Between the walls' inner faces, corners in the order of `cavities`, each of shape (4, 2), mm.
         fillet_radius: Radius that rounds every corner of every cell, mm.
         contact: Both ends of the contact on the front face, shape (2, 2), mm.
     """
 
     outer: FloatArray
-    cells: tuple[FloatArray, ...]
+    cavities: tuple[FloatArray, ...]
     ribs: tuple[FloatArray, ...]
     fillet_radius: float
     contact: FloatArray
@@ -34,13 +33,13 @@ class Section:
         """Area of the body, mm^2, fillets included."""
         return polygon_area(self.outer) - sum(
             polygon_area(cell) - sum(corner_area(angle, self.fillet_radius) for angle in corner_angles(cell))
-            for cell in self.cells
+            for cell in self.cavities
         )
 
-    def holds(self, points: FloatArray) -> BoolArray:
+    def contains(self, points: FloatArray) -> BoolArray:
         """Which points, shape (n, 2), mm, lie in the body or on its boundary; fillets do not count."""
         inside = _within(self.outer, points)
-        for cell in self.cells:
+        for cell in self.cavities:
             inside &= ~_within(cell, points, strictly=True)
         return inside
 
@@ -57,9 +56,9 @@ class Section:
 
     @property
     def perimeter(self) -> float:
-        """Length of the whole boundary, the cells' included, mm."""
+        """Length of the whole boundary, the cavities' included, mm."""
         total = float(polygon_sides(self.outer).sum())
-        for cell in self.cells:
+        for cell in self.cavities:
             turns = np.pi - corner_angles(cell)
             shortened = 2 * np.tan(turns / 2) - turns
             total += float(polygon_sides(cell).sum() - self.fillet_radius * shortened.sum())
@@ -77,7 +76,7 @@ def finger_section(parameters: Parameters) -> Section:
     quads = [np.array([*left, *right[::-1]]) for left, right in pairwise(sides)]
     return Section(
         outer=np.array([[0, 0], [0, -p.base_width], [p.height, 0]], dtype=np.float64),
-        cells=tuple(quads[::2]),
+        cavities=tuple(quads[::2]),
         ribs=tuple(quads[1::2]),
         fillet_radius=p.fillet_radius,
         contact=np.array([[x, 0] for x in p.contact_ends], dtype=np.float64),

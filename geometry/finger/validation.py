@@ -7,7 +7,7 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from geometry.finger.parameters import Parameters, fact
+from geometry.finger.parameters import Parameters, parameter_info
 from geometry.finger.rules import RULES, Rule
 
 ROUNDING = -1e-9
@@ -24,7 +24,7 @@ def check(parameters: Parameters) -> None:
     """Raise if a rule is broken.
 
     Raises:
-        UserError: One line with the reason and the admissible ranges.
+        UserError: One line with the reason and the allowed ranges.
     """
     for rule in RULES:
         finding = rule.check(parameters)
@@ -34,12 +34,14 @@ def check(parameters: Parameters) -> None:
 
 def advice(parameters: Parameters, broken: Rule) -> str:
     """The ranges of the parameters that can mend a broken rule, each with the others unchanged."""
-    ranges = _ranges(parameters, broken.mends, RULES)
+    ranges = _ranges(parameters, broken.remedies, RULES)
     if ranges:
-        return f"admissible with the rest unchanged: {', or '.join(ranges[:3])}"
-    ranges = _ranges(parameters, broken.mends, [broken])
+        return f"allowed with the rest unchanged: {', or '.join(ranges[:3])}"
+    ranges = _ranges(parameters, broken.remedies, [broken])
     alone = (
-        f"this rule alone asks for {', or '.join(ranges[:3])}" if ranges else f"try {', '.join(broken.mends)}"
+        f"this rule alone asks for {', or '.join(ranges[:3])}"
+        if ranges
+        else f"try {', '.join(broken.remedies)}"
     )
     return f"more than one parameter must change; {alone}"
 
@@ -49,13 +51,13 @@ def obeys(parameters: Parameters, rules: Iterable[Rule] = RULES) -> bool:
     return all(rule.check(parameters).margin >= ROUNDING for rule in rules)
 
 
-def admissible_range(
+def allowed_range(
     parameters: Parameters, name: str, rules: Iterable[Rule] = RULES
 ) -> tuple[float, float] | None:
     """The interval nearest to the present value in which every rule is obeyed, the rest unchanged.
 
     Args:
-        parameters: The finger, admissible or not.
+        parameters: The finger, allowed or not.
         name: The parameter to vary, over its own bounds.
         rules: The rules to obey.
 
@@ -63,7 +65,7 @@ def admissible_range(
         Both ends, rounded inward to `STEP`; None if no value was found.
     """
     rules = tuple(rules)
-    low, high = fact(name, "low"), fact(name, "high")
+    low, high = parameter_info(name, "low"), parameter_info(name, "high")
     whole = name in ("rib_count", "marker_count")
 
     def good(value: float) -> bool:
@@ -117,7 +119,7 @@ def _ranges(parameters: Parameters, names: Iterable[str], rules: Iterable[Rule])
     """`name low to high unit` for every parameter that has a range."""
     texts = []
     for name in names:
-        found = admissible_range(parameters, name, rules)
+        found = allowed_range(parameters, name, rules)
         if found is not None:
             texts.append(_in_words(name, *found))
     return texts
@@ -125,7 +127,7 @@ def _ranges(parameters: Parameters, names: Iterable[str], rules: Iterable[Rule])
 
 def _in_words(name: str, start: float, stop: float) -> str:
     """A range as text; an end at the parameter's own bound is left out unless both are."""
-    low, high, unit = fact(name, "low"), fact(name, "high"), fact(name, "unit")
+    low, high, unit = parameter_info(name, "low"), parameter_info(name, "high"), parameter_info(name, "unit")
     first, last = f"{start:.2f}".rstrip("0").rstrip("."), f"{stop:.2f}".rstrip("0").rstrip(".")
     if start == low and stop < high:
         return f"{name} up to {last} {unit}".rstrip()

@@ -33,7 +33,7 @@ class Refinement:
 def refinements(
     design: Design,
     settings: MeshSettings,
-    elements_across: float,
+    elements_through_thickness: float,
     corners: Iterable[int],
     contact: Iterable[int],
 ) -> list[Refinement]:
@@ -42,7 +42,7 @@ def refinements(
     Args:
         design: The finger.
         settings: Sizes to keep to.
-        elements_across: A wall's thickness over its largest element.
+        elements_through_thickness: A wall's thickness over its largest element.
         corners: Gmsh points at the cells' corners and at the ends of the base.
         contact: Gmsh points at the contact's ends and middle.
     """
@@ -55,7 +55,7 @@ def refinements(
     }
     by_kind = _cell_curves(design)
     found = [
-        Refinement(min(size, across / elements_across), across, curves=by_kind[kind])
+        Refinement(min(size, across / elements_through_thickness), across, curves=by_kind[kind])
         for kind, across in thickness.items()
     ]
     found.append(Refinement(size, 2 * size, curves=by_kind["tip"]))

@@ -14,15 +14,15 @@ from geometry.finger.markers import marker_positions
 from geometry.finger.section import finger_section
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.element_size import refinements, set_sizes
-from geometry.mesh.elements_across import elements_across
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.mesh.walls import elements_through_thickness
 
-MIN_ACROSS = 3
-"""Least number of elements across every wall and rib."""
+MIN_ELEMENTS = 3
+"""Least number of elements through the thickness of every wall and rib."""
 
 TRIES = (3.6, 4.8, 6.4)
-"""Thickness over element size: the first that gives `MIN_ACROSS` is taken."""
+"""Thickness over element size: the first that gives `MIN_ELEMENTS` is taken."""
 
 TOLERANCE = 1e-7
 """Nodes this near a line or a wanted position are on it, mm."""
@@ -46,19 +46,19 @@ def build_mesh(design: Design, settings: MeshSettings) -> TriangleMesh:
     """
     with tempfile.TemporaryDirectory() as folder:
         brep = section_brep(design, Path(folder) / "section.brep")
-        for across in TRIES:
-            points, triangles = _triangulate(design, settings, brep, across)
+        for elements in TRIES:
+            points, triangles = _triangulate(design, settings, brep, elements)
             mesh = _named(design, points, triangles)
-            if elements_across(mesh) >= MIN_ACROSS:
+            if (least := elements_through_thickness(mesh)) >= MIN_ELEMENTS:
                 return mesh
     raise UserError(
-        f"the mesh has only {elements_across(mesh)} elements across the thinnest place, {MIN_ACROSS} are "
+        f"the mesh has only {least} elements through the thinnest wall or rib, {MIN_ELEMENTS} are "
         f"needed; lower the mesh size below {settings.size:g} mm"
     )
 
 
 def _triangulate(
-    design: Design, settings: MeshSettings, brep: Path, across: float
+    design: Design, settings: MeshSettings, brep: Path, elements: float
 ) -> tuple[FloatArray, IntArray]:
     """Run Gmsh once: points (n, 2), mm, and counter-clockwise triangles (t, 3)."""
     gmsh.initialize(argv=[], readConfigFiles=False, interruptible=False)
@@ -77,9 +77,9 @@ def _triangulate(
         gmsh.model.occ.fragment(faces, [(0, tag) for tag in contact + markers])
         gmsh.model.occ.synchronize()
         shape = finger_section(design)
-        corners = _points_at(np.concatenate([shape.outer[:2], *shape.cells]))
+        corners = _points_at(np.concatenate([shape.outer[:2], *shape.cavities]))
         ends = _points_at(np.array([[x, 0.0] for x in _contact_abscissae(design)]))
-        set_sizes(refinements(design, settings, across, corners, ends), settings)
+        set_sizes(refinements(design, settings, elements, corners, ends), settings)
         gmsh.model.mesh.generate(2)
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
         _, connectivity = gmsh.model.mesh.getElementsByType(2)

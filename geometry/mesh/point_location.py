@@ -14,7 +14,7 @@ INSIDE_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Location:
+class LocatedPoints:
     """Points in the body with the triangle that holds each.
 
     Attributes:
@@ -43,7 +43,7 @@ class Locator:
             np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
         )
 
-    def locate(self, points: ArrayLike) -> Location:
+    def locate(self, points: ArrayLike) -> LocatedPoints:
         """Locate points of shape (n, 2), mm.
 
         Raises:
@@ -79,4 +79,4 @@ class Locator:
                 )
             todo = todo[~found]
             neighbours *= 4
-        return Location(points=where, cells=cells, barycentric=barycentric)
+        return LocatedPoints(points=where, cells=cells, barycentric=barycentric)

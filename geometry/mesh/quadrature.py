@@ -7,7 +7,7 @@ from scipy.special import roots_legendre
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from geometry.mesh.point_location import Location
+from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 
@@ -20,7 +20,7 @@ class Quadrature:
         weights: Shape (q,), mm^2.
     """
 
-    location: Location
+    location: LocatedPoints
     weights: FloatArray
 
 

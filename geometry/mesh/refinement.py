@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
-from geometry.finger.rounded_corners import fillet_centre
+from geometry.finger.fillets import fillet_centre
 from geometry.finger.section import Section
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
@@ -99,7 +99,7 @@ def _middles(mesh: TriangleMesh, cut: BoolArray, section: Section | None) -> Flo
         return middles
     radius, outside = section.fillet_radius, np.zeros(len(mesh.edges), dtype=bool)
     outside[mesh.edge_numbers(boundary_edges(mesh.triangles))] = True
-    for cell, which in product(section.cells, range(4)):
+    for cell, which in product(section.cavities, range(4)):
         centre = fillet_centre(cell, which, radius)
         off = np.abs(np.linalg.norm(ends - centre, axis=2) - radius)
         chord = outside[cut] & (off < ON_ARC).all(axis=1)

@@ -5,7 +5,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from geometry.errors import UserError
-from geometry.finger.error_messages import one_line
+from geometry.finger.error_messages import validation_message
 from geometry.finger.parameters import bounded
 
 
@@ -37,4 +37,4 @@ class MeshSettings(BaseModel):
         try:
             super().__init__(**values)
         except ValidationError as error:
-            raise UserError(one_line(error, MeshSettings)) from None
+            raise UserError(validation_message(error, MeshSettings)) from None

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from geometry.arrays import FloatArray, IntArray, frozen_array
 from geometry.errors import UserError
-from geometry.mesh.point_location import Location, Locator
+from geometry.mesh.point_location import LocatedPoints, Locator
 
 BOUNDARY_PREFIX = "boundary_"
 
@@ -116,7 +116,7 @@ class TriangleMesh:
         ends = self.points[self.boundary(name)]
         return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
 
-    def locate(self, points: ArrayLike) -> Location:
+    def locate(self, points: ArrayLike) -> LocatedPoints:
         """The triangle and the barycentric coordinates of points in the body.
 
         Args:
@@ -129,11 +129,11 @@ class TriangleMesh:
             self._cache["locator"] = Locator(self.points, self.triangles)
         return self._cache["locator"].locate(points)
 
-    def at_centroids(self) -> Location:
+    def at_centroids(self) -> LocatedPoints:
         """The location of every triangle's centroid, in the order of the triangles."""
         return self.at_barycentric(np.full((1, 3), 1 / 3))
 
-    def at_barycentric(self, barycentric: ArrayLike) -> Location:
+    def at_barycentric(self, barycentric: ArrayLike) -> LocatedPoints:
         """The same barycentric points in every triangle.
 
         Args:
@@ -144,20 +144,20 @@ class TriangleMesh:
         """
         rule = frozen_array(barycentric, dtype=np.float64, shape=(None, 3), name="barycentric")
         points = np.einsum("qc,tcx->tqx", rule, self.points[self.triangles]).reshape(-1, 2)
-        return Location(
+        return LocatedPoints(
             points=points,
             cells=np.repeat(np.arange(len(self.triangles)), len(rule)),
             barycentric=np.tile(rule, (len(self.triangles), 1)),
         )
 
-    def at_nodes(self) -> Location:
+    def at_nodes(self) -> LocatedPoints:
         """The location of every node, in the order of the nodes."""
         cells = np.zeros(len(self.points), dtype=np.int64)
         corners = np.zeros(len(self.points), dtype=np.int64)
         for corner in range(3):
             cells[self.triangles[:, corner]] = np.arange(len(self.triangles))
             corners[self.triangles[:, corner]] = corner
-        return Location(points=self.points, cells=cells, barycentric=np.eye(3)[corners])
+        return LocatedPoints(points=self.points, cells=cells, barycentric=np.eye(3)[corners])
 
     def permuted(self, seed: int) -> "TriangleMesh":
         """The same mesh with nodes and triangles numbered in another order."""

@@ -1,4 +1,4 @@
-"""Walls and ribs of a finger, found in its mesh."""
+"""Walls and ribs of a finger, found in its mesh, and the number of elements through their thickness."""
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -10,7 +10,7 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 
 
 def walls_and_ribs(mesh: TriangleMesh) -> dict[str, BoolArray]:
-    """Triangles of `front` and `back` wall, as far as there are cavities beside them, and of the `rib`s.
+    """Triangles of the `front` and `back` wall, where cavities are beside them, and of the `rib`s.
 
     A wall is as thick as the nearest cavity is far from its face. What remains falls into pieces: the one at
     the base and the one that reaches farthest are base and tip, the others are ribs.
@@ -36,6 +36,31 @@ def walls_and_ribs(mesh: TriangleMesh) -> dict[str, BoolArray]:
     base = np.isin(mesh.triangles[rest], mesh.boundary("base")).any(axis=1)
     ends = [*piece[base], piece[centroids[rest, 0].argmax()]]
     return parts | {"rib": np.isin(np.arange(len(none)), rest[~np.isin(piece, ends)])}
+
+
+def elements_through_thickness(mesh: TriangleMesh) -> int:
+    """The number of elements through the thinnest wall or rib.
+
+    Each wall lies between the outline and a cavity and each rib between two cavities: this is the least
+    number of element edges on a path from one closed boundary to another.
+    """
+    loop_of = np.full(len(mesh.points), -1)
+    for number, loop in enumerate(boundary_loops(mesh)):
+        loop_of[loop] = number
+    steps = np.where(loop_of >= 0, 0, -1)
+    ends = np.concatenate([mesh.edges, mesh.edges[:, ::-1]])
+    level = 0
+    while True:
+        start, stop = loop_of[ends[:, 0]], loop_of[ends[:, 1]]
+        met = (start >= 0) & (stop >= 0) & (start != stop)
+        if met.any():
+            return int((steps[ends[met, 0]] + steps[ends[met, 1]]).min()) + 1
+        fresh = ends[(start >= 0) & (stop < 0)]
+        if not len(fresh):
+            return level
+        level += 1
+        loop_of[fresh[:, 1]] = loop_of[fresh[:, 0]]
+        steps[fresh[:, 1]] = level
 
 
 def _distance(mesh: TriangleMesh, face: str, points: FloatArray) -> FloatArray:

@@ -23,7 +23,7 @@ import numpy as np
 from geometry.arrays import FloatArray
 
 
-class Fit(NamedTuple):
+class MarkerFit(NamedTuple):
     """The minimiser for one factor of the weights.
 
     Attributes:
@@ -41,7 +41,7 @@ class Fit(NamedTuple):
     @property
     def phrase(self) -> str:
         """How far the markers are missed, in words."""
-        return missed_phrase(self.residual, self.left_out)
+        return residual_phrase(self.residual, self.left_out)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ class MarkerForces:
         """W^1/2 (d - B u_0) in the eigenvectors, shape (2 m,)."""
         return np.asarray(self._modes[1].T @ (np.sqrt(self.weights) * self.missed).ravel())
 
-    def fit(self, factor: float = 1.0) -> Fit:
+    def fit(self, factor: float = 1.0) -> MarkerFit:
         """The minimiser for weights times a factor, which is positive."""
         values, vectors = self._modes
         root, count = np.sqrt(self.weights), len(self.weights)
@@ -77,7 +77,7 @@ class MarkerForces:
         scaled = (damped @ self._in_modes).reshape(-1, 2)
         blocks = (damped @ vectors.T).reshape(count, 2, count, 2)[np.arange(count), :, np.arange(count)]
         forces = factor * root * scaled
-        return Fit(
+        return MarkerFit(
             forces=forces,
             residual=scaled / root,
             left_out=np.linalg.solve(blocks, scaled[..., None])[..., 0] / root,
@@ -98,7 +98,7 @@ class MarkerForces:
         return -0.5 * float((self._in_modes**2 / spread).sum() / scale + np.log(spread).sum())
 
 
-def missed_phrase(residual: FloatArray, left_out: FloatArray) -> str:
+def residual_phrase(residual: FloatArray, left_out: FloatArray) -> str:
     """How far markers are missed in a fit, and where they are left out of it, mm, in words."""
     return (
         "root mean square of what the markers are missed by: "

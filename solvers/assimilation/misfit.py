@@ -30,7 +30,7 @@ from solvers.solver import Solver
 
 Weighting = Literal["paper", "precision"]
 
-SMALLEST_DEVIATION = 0.005
+MIN_STANDARD_DEVIATION = 0.005
 """Standard deviation that an observation has at least, mm.
 
 Simulated displacements have none at all; a camera that is calibrated well knows a marker to about this.
@@ -93,7 +93,7 @@ def misfit_of(
         problem: With the observations; markers that were not seen are left out.
         weights: "paper": the loss λ_ASM 1/m Σ |u - d|² beside the mean energy density, times the body's area
             A, is W = 2 A λ_ASM / m. "precision": W = scale / σ², by the observations' standard deviations,
-            of which none counts as less than `SMALLEST_DEVIATION`. The minimiser of J is then the mode of
+            of which none counts as less than `MIN_STANDARD_DEVIATION`. The minimiser of J is then the mode of
             the posterior for the prior exp(-E / scale) and independent normal errors of the observations.
         asm_weight: λ_ASM, MPa/mm², for "paper".
         scale: For "precision", the model's own error as an energy per depth, N mm / mm: a typical deviation
@@ -131,11 +131,11 @@ def disc_quadrature(centres: FloatArray, radius: float) -> tuple[FloatArray, Flo
 
 
 def standard_deviations(observations: Observations) -> FloatArray:
-    """Those of the markers seen, shape (m, 2), mm, none of them less than `SMALLEST_DEVIATION`."""
-    return np.maximum(observations.standard_deviations[observations.visible], SMALLEST_DEVIATION)
+    """Those of the markers seen, shape (m, 2), mm, none of them less than `MIN_STANDARD_DEVIATION`."""
+    return np.maximum(observations.standard_deviations[observations.visible], MIN_STANDARD_DEVIATION)
 
 
-def without_each(problem: Problem, missed: FloatArray) -> FloatArray:
+def leave_one_out_displacements(problem: Problem, missed: FloatArray) -> FloatArray:
     """What a solver that was not given marker i says of it, from what it misses it by, (m, 2), mm.
 
     Returns:

@@ -11,7 +11,7 @@ from solvers.solver import Solver
 
 
 @runtime_checkable
-class Refitting(Protocol):
+class Refittable(Protocol):
     """A solver that shares work between fits to different observations of the same markers."""
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
@@ -20,16 +20,16 @@ class Refitting(Protocol):
 
 
 @runtime_checkable
-class Carrying(Protocol):
+class Transferable(Protocol):
     """A solver that says what it learnt at one load in terms that hold at another."""
 
-    def carried(self, solution: Solution, problem: Problem, other: Problem) -> Solution:
+    def transferred(self, solution: Solution, problem: Problem, other: Problem) -> Solution:
         """The solution of another problem with what a solution of the first one found."""
         ...
 
 
 def refitter(solver: Solver, problem: Problem) -> Callable[[Observations], Solution]:
     """What solves a problem for any observations, sharing what the solver can share."""
-    if isinstance(solver, Refitting):
+    if isinstance(solver, Refittable):
         return solver.refitter(problem)
     return lambda observations: solver.solve(replace(problem, observations=observations))

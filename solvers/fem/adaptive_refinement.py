@@ -16,7 +16,7 @@ import numpy as np
 from geometry.arrays import BoolArray, FloatArray
 from geometry.finger.section import Section
 from geometry.mesh.refinement import refined
-from solvers.adaptation import Adaptation, Round, check_adaptable
+from solvers.adaptation import Adaptation, RefinementRound, check_adaptable
 from solvers.fem.error_estimate import ErrorEstimator
 from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium
 from solvers.lagrange import LagrangeSpace
@@ -55,7 +55,7 @@ def adapted(
         UserError: As `solvers.adaptation.check_adaptable`.
     """
     check_adaptable(tolerance, problem.load)
-    rounds: list[Round] = []
+    rounds: list[RefinementRound] = []
     while True:
         found, shares = _solve(problem, degree, tolerance)
         mesh = problem.mesh
@@ -81,7 +81,7 @@ def largest(shares: FloatArray, part: float) -> BoolArray:
     return chosen
 
 
-def _solve(problem: Problem, degree: int, tolerance: float) -> tuple[Round, FloatArray]:
+def _solve(problem: Problem, degree: int, tolerance: float) -> tuple[RefinementRound, FloatArray]:
     """One solution: its estimate, and what every triangle adds to the error of the unknown markers, (t,)."""
     mesh, space = problem.mesh, LagrangeSpace(problem.mesh, degree)
     equilibrium = LinearEquilibrium.of(LinearElasticity.of(problem, space))
@@ -91,11 +91,11 @@ def _solve(problem: Problem, degree: int, tolerance: float) -> tuple[Round, Floa
     functional[mesh.marker_nodes] = np.sign(error.markers) * (np.abs(error.markers) > tolerance)
     shares = estimator.shares(nodal, equilibrium.response(functional))
     equilibrium.factors.destroy()
-    found = Round(len(mesh.triangles), len(mesh.points), error.at_markers, error.energy_norm)
+    found = RefinementRound(len(mesh.triangles), len(mesh.points), error.at_markers, error.energy_norm)
     return found, shares
 
 
-def _done(rounds: list[Round], tolerance: float) -> float:
+def _done(rounds: list[RefinementRound], tolerance: float) -> float:
     """The fraction of the way from the first estimate to the tolerance, on a logarithmic scale."""
     first, now = rounds[0].at_markers, rounds[-1].at_markers
     return 1.0 if now <= tolerance else max(0.0, log(first / now) / log(first / tolerance))

@@ -17,8 +17,8 @@ from solvers.assimilation.misfit import (
     Misfit,
     Weighting,
     check_weighting,
+    leave_one_out_displacements,
     misfit_of,
-    without_each,
 )
 from solvers.fem.boundary_conditions import reaction_by_residual_work
 from solvers.fem.finite_strain.assimilation import assimilated
@@ -203,5 +203,5 @@ class FemAsmSolver:
                 "marker_force": float(np.linalg.norm(fit.forces, axis=1).max()),
             },
             history=self.choice.curve(forces),
-            left_out=without_each(problem, fit.left_out),
+            left_out=leave_one_out_displacements(problem, fit.left_out),
         )

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from geometry.arrays import FloatArray
-from geometry.mesh.point_location import Location
+from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import Quadrature, body_quadrature
 from solvers.elasticity import deformation_jacobian
 from solvers.fem.gradient_recovery import GradientRecovery
@@ -56,11 +56,11 @@ class ImprovedField:
     gradients: FloatArray
     own: LagrangeField | None = None
 
-    def displacement(self, location: Location) -> FloatArray:
+    def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
         return LagrangeField(self.space, self.values).displacement(location)
 
-    def gradient(self, location: Location) -> FloatArray:
+    def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
         flat = self.space.shape_functions(location) @ self.gradients.reshape(-1, 4)
         smooth = np.asarray(flat.reshape(-1, 2, 2))

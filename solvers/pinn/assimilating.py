@@ -24,7 +24,7 @@ class PinnAsmSolver(ChoosingWeights, PinnStdSolver):
     name: ClassVar[str] = "pinn-asm"
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
-        """See `Refitting`."""
+        """See `Refittable`."""
         return network_refitter(self, problem)
 
 
@@ -35,7 +35,7 @@ class PinnLocalAsmSolver(ChoosingWeights, PinnLocalSolver):
     name: ClassVar[str] = "pinn-local-asm"
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
-        """See `Refitting`."""
+        """See `Refittable`."""
         return network_refitter(self, problem)
 
 

@@ -15,10 +15,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.mesh.point_location import Location
+from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
 from geometry.observations import Observations
-from solvers.assimilation.misfit import Misfit, misfit_of, standard_deviations, without_each
+from solvers.assimilation.misfit import Misfit, leave_one_out_displacements, misfit_of, standard_deviations
 from solvers.elasticity import linear_energy_density
 from solvers.problem import Problem
 from solvers.section_force import section_force
@@ -79,10 +79,10 @@ class GaussianProcessSolver:
         within = float((np.abs(missed) < 2 * spread).mean())
         seconds = time.perf_counter() - started
         stats = {**solution.stats, "seconds": seconds, "left_out_within_2sd": within}
-        return replace(solution, stats=stats, left_out=without_each(problem, missed))
+        return replace(solution, stats=stats, left_out=leave_one_out_displacements(problem, missed))
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
-        """What fits other observations, without leaving any out; see `Refitting`."""
+        """What fits other observations, without leaving any out; see `Refittable`."""
         return lambda observations: self._through(replace(problem, observations=observations), FEWEST)[0]
 
     def _through(self, problem: Problem, least: int) -> tuple[Solution, Misfit, FloatArray]:
@@ -143,15 +143,15 @@ class GaussianProcessField:
     mean: KernelField
     processes: tuple[Any, Any]
 
-    def displacement(self, location: Location) -> FloatArray:
+    def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
         return self.mean.displacement(location)
 
-    def gradient(self, location: Location) -> FloatArray:
+    def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
         return self.mean.gradient(location)
 
-    def standard_deviation(self, location: Location) -> FloatArray:
+    def standard_deviation(self, location: LocatedPoints) -> FloatArray:
         """Of the displacement, shape (n, 2), mm."""
         return np.stack(
             [process.predict(location.points, return_std=True)[1] for process in self.processes], 1

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.mesh.point_location import Location
+from geometry.mesh.point_location import LocatedPoints
 
 Kernel = Literal["matern32", "matern52", "gaussian"]
 SMOOTHNESS: dict[Kernel, float] = {"matern32": 1.5, "matern52": 2.5, "gaussian": np.inf}
@@ -33,12 +33,12 @@ class KernelField:
     lengths: FloatArray
     kernel: Kernel
 
-    def displacement(self, location: Location) -> FloatArray:
+    def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
         kernels = [correlation(location.points, self.centres, length, self.kernel) for length in self.lengths]
         return np.asarray((np.stack(kernels, axis=-1) * self.coefficients).sum(axis=1))
 
-    def gradient(self, location: Location) -> FloatArray:
+    def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
         slopes = [_slope(location.points, self.centres, length, self.kernel) for length in self.lengths]
         weighted = np.stack(slopes, axis=-1) * self.coefficients

@@ -28,7 +28,7 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
 from geometry.observations import Observations
-from solvers.assimilation.misfit import standard_deviations, without_each
+from solvers.assimilation.misfit import leave_one_out_displacements, standard_deviations
 from solvers.elasticity import linear_energy_density
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
@@ -83,10 +83,10 @@ class StatFemSolver:
         within = float((np.abs(missed) < 2 * spread).mean())
         seconds = time.perf_counter() - started
         stats = {**solution.stats, "seconds": seconds, "left_out_within_2sd": within}
-        return replace(solution, stats=stats, left_out=without_each(problem, missed))
+        return replace(solution, stats=stats, left_out=leave_one_out_displacements(problem, missed))
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
-        """What solves for other observations, by the same finite elements; see `Refitting`."""
+        """What solves for other observations, by the same finite elements; see `Refittable`."""
         shapes = self._shapes(problem, silent)
 
         def refit(observations: Observations) -> Solution:

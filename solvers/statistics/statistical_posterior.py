@@ -10,7 +10,7 @@ from scipy.linalg import cho_solve
 from scipy.optimize import minimize
 
 from geometry.arrays import FloatArray, IntArray
-from geometry.mesh.point_location import Location
+from geometry.mesh.point_location import LocatedPoints
 from solvers.solution import DisplacementField
 from solvers.statistics.kernel_field import Kernel, KernelField, correlation
 
@@ -135,17 +135,17 @@ class StatFemField:
     posterior: Posterior
     shapes: tuple[DisplacementField, ...]
 
-    def displacement(self, location: Location) -> FloatArray:
+    def displacement(self, location: LocatedPoints) -> FloatArray:
         """Its mean, shape (n, 2), mm."""
         own = np.stack([shape.displacement(location) for shape in self.shapes])
         return self._by_load(own) + self.posterior.discrepancy.displacement(location)
 
-    def gradient(self, location: Location) -> FloatArray:
+    def gradient(self, location: LocatedPoints) -> FloatArray:
         """Gradient du_i/dx_j of the mean, shape (n, 2, 2)."""
         own = np.stack([shape.gradient(location) for shape in self.shapes])
         return self._by_load(own) + self.posterior.discrepancy.gradient(location)
 
-    def standard_deviation(self, location: Location) -> FloatArray:
+    def standard_deviation(self, location: LocatedPoints) -> FloatArray:
         """Of the displacement, shape (n, 2), mm."""
         own = np.stack([shape.displacement(location) for shape in self.shapes])
         return np.asarray(np.sqrt(self.posterior.at(location.points, own)[1]))

@@ -9,7 +9,7 @@ import pytest
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.uncertainty import evaluated
 from geometry.arrays import FloatArray
-from geometry.mesh.point_location import Location
+from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Problem
@@ -25,11 +25,11 @@ class BendingField:
     def __init__(self, scale: float) -> None:
         self.scale = scale
 
-    def displacement(self, location: Location) -> FloatArray:
+    def displacement(self, location: LocatedPoints) -> FloatArray:
         x, y = location.points.T
         return self.scale * np.stack([0.01 * y**2, -0.02 * x**2], axis=1)
 
-    def gradient(self, location: Location) -> FloatArray:
+    def gradient(self, location: LocatedPoints) -> FloatArray:
         x, y = location.points.T
         gradient = np.zeros((len(x), 2, 2))
         gradient[:, 0, 1] = self.scale * 0.02 * y

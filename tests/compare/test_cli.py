@@ -88,7 +88,7 @@ BAD = [
     ("compare --set rib_cuont=3", r"unknown parameter 'rib_cuont'; did you mean rib_count \(N\)\?"),
     ("compare --set rib_count=many", r"rib_count \(N\) = 'many' is not a whole number"),
     ("compare --set N=4 --set rib_count=5", "set twice"),
-    ("compare --set rib_count=40", "ribs overlap: .* admissible with the rest unchanged: rib_count up to"),
+    ("compare --set rib_count=40", "ribs overlap: .* allowed with the rest unchanged: rib_count up to"),
     ("compare --set height=9999", "outside its range, 10 to 500 mm"),
     ("compare --set contact_position=200", "contact"),  # beyond the tip
     ("compare --set name=../up", "must be a letter or digit"),  # would leave the output folder

@@ -37,7 +37,7 @@ from geometry.arrays import FloatArray
 from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.finger.design import Design
-from geometry.mesh.point_location import Location
+from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
@@ -56,10 +56,10 @@ class Shifted:
     field: DisplacementField
     by: tuple[float, float]
 
-    def displacement(self, location: Location) -> FloatArray:
+    def displacement(self, location: LocatedPoints) -> FloatArray:
         return self.field.displacement(location) + self.by
 
-    def gradient(self, location: Location) -> FloatArray:
+    def gradient(self, location: LocatedPoints) -> FloatArray:
         return self.field.gradient(location)
 
 

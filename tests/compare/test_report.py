@@ -16,7 +16,7 @@ from compare.report.text import distance, number, percent, sentence
 from geometry.finger.design import Design
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
-from solvers.adaptation import Adaptation, Round
+from solvers.adaptation import Adaptation, RefinementRound
 from solvers.problem import Load, Material, Problem
 
 VOID = {"meta", "img", "br", "link", "hr", "input"}
@@ -227,7 +227,7 @@ def test_without_an_estimate_there_is_no_plus_or_minus(content: ReportContent) -
 def test_refinement_is_told_round_by_round(
     content: ReportContent, mesh: TriangleMesh, tolerance: float, warned: bool
 ) -> None:
-    rounds = (Round(100, 70, 0.0123, 0.2), Round(250, 160, 0.00045, 0.1))
+    rounds = (RefinementRound(100, 70, 0.0123, 0.2), RefinementRound(250, 160, 0.00045, 0.1))
     page = Page(render(replace(content, adaptation=Adaptation(tolerance, rounds, mesh))))
     assert {"adapt"} <= set(page.values("id"))
     assert ("not-adapted" in page.values("id")) is warned

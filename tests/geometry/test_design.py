@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from geometry import Design, UserError
-from geometry.finger.parameters import SYMBOLS, Parameters, fact
-from geometry.finger.rules import Finding, Rule
+from geometry.finger.parameters import SYMBOLS, Parameters, parameter_info
+from geometry.finger.rules import Rule, RuleResult
 from geometry.finger.validation import RULES, STEP, advice, obeys
 
 BAD_DESIGNS = [
@@ -47,7 +47,7 @@ def message_of(values: dict[str, object]) -> str:
 def printed_ranges(message: str) -> dict[str, tuple[float | None, float | None]]:
     found = {}
     for name, up_to, at_least, low, high in RANGE.findall(
-        message.split("admissible with the rest unchanged")[-1]
+        message.split("allowed with the rest unchanged")[-1]
     ):
         start, stop = low or at_least or None, high or up_to or None
         found[name] = (float(start) if start else None, float(stop) if stop else None)
@@ -67,9 +67,9 @@ def test_bad_design_gives_one_line_with_reason_and_range(
 @pytest.mark.parametrize(("values", "name", "reason"), BAD_DESIGNS)
 def test_printed_ranges_are_true(values: dict[str, object], name: str, reason: str) -> None:
     message = message_of(values)
-    assert "admissible with the rest unchanged" in message
+    assert "allowed with the rest unchanged" in message
     for parameter, ends in printed_ranges(message).items():
-        low, high = fact(parameter, "low"), fact(parameter, "high")
+        low, high = parameter_info(parameter, "low"), parameter_info(parameter, "high")
         start, stop = (low if ends[0] is None else ends[0]), (high if ends[1] is None else ends[1])
         whole = parameter in ("rib_count", "marker_count")
         step = 1 if whole else 2 * STEP
@@ -128,11 +128,11 @@ def test_default_is_the_papers_finger() -> None:
 
 def test_symbols_are_aliases() -> None:
     by_symbol = Design(H=100, L=32, W=18, L_angle=15, L_tip=22, N=5, t_rib=1.5, t_flex=2.2, t_back=2.1)
-    by_name = Design(
+    by_parameter_name = Design(
         height=100, base_width=32, depth=18, rib_angle=15, tip_length=22, rib_count=5,
         rib_thickness=1.5, front_thickness=2.2, back_thickness=2.1,
     )  # fmt: skip
-    assert by_symbol == by_name
+    assert by_symbol == by_parameter_name
 
 
 def test_digest_follows_the_geometry_and_not_the_name() -> None:
@@ -151,7 +151,7 @@ def test_replaced_is_a_checked_copy() -> None:
 
 
 def test_when_no_range_mends_even_the_rule_itself_the_message_names_the_parameters() -> None:
-    unmendable = Rule(lambda parameters: Finding(-1.0, "never right"), ("height", "depth"))
+    unmendable = Rule(lambda parameters: RuleResult(-1.0, "never right"), ("height", "depth"))
     bad = Parameters.model_construct(tip_length=300, contact_position=500)
     assert advice(bad, unmendable) == "more than one parameter must change; try height, depth"
 
@@ -159,9 +159,11 @@ def test_when_no_range_mends_even_the_rule_itself_the_message_names_the_paramete
 def test_every_rule_can_fail() -> None:
     rng = np.random.default_rng(1)
     broken = set()
-    names = [name for name in Parameters.model_fields if fact(name, "high") != ""]
+    names = [name for name in Parameters.model_fields if parameter_info(name, "high") != ""]
     for _ in range(400):
-        values = {name: rng.uniform(fact(name, "low"), fact(name, "high")) for name in names}
+        values = {
+            name: rng.uniform(parameter_info(name, "low"), parameter_info(name, "high")) for name in names
+        }
         values |= {name: int(values[name]) for name in ("rib_count", "marker_count")}
         parameters = Parameters.model_construct(**values, marker_layout=rng.choice(["front", "joints"]))
         broken |= {rule.check.__name__ for rule in RULES if rule.check(parameters).margin < 0}

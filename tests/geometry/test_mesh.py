@@ -120,7 +120,7 @@ def test_every_node_is_found(mesh: TriangleMesh) -> None:
 def test_points_are_inside_exactly_where_the_section_is() -> None:
     mesh = build_default()
     section = finger_section(Design())
-    body = Polygon(section.outer, holes=section.cells)
+    body = Polygon(section.outer, holes=section.cavities)
     rng = np.random.default_rng(6)
     points = rng.uniform([-5, -35], [95, 5], size=(1500, 2))
     for point in points:

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from geometry import Design, MeshSettings, TriangleMesh, UserError, elements_across, finger_section
+from geometry import Design, MeshSettings, TriangleMesh, UserError, elements_through_thickness, finger_section
 from geometry import marker_positions as positions_of
 from geometry.finger.section import corner_angles, corner_area
 from geometry.mesh.boundary import boundary_edges, boundary_loops
@@ -62,7 +62,7 @@ def test_euler_characteristic_counts_the_ribs(design: Design, mesh: TriangleMesh
 def test_cells_have_their_areas(design: Design, mesh: TriangleMesh) -> None:
     """Less the corners that a fillet fills; its arcs are chords in the mesh, which costs some per mille."""
     expected = []
-    for corners in finger_section(design).cells:
+    for corners in finger_section(design).cavities:
         x, y = corners.T
         sharp = 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
         filled = sum(corner_area(angle, design.fillet_radius) for angle in corner_angles(corners))
@@ -86,7 +86,7 @@ def test_walls_and_ribs_measure_their_thickness(design: Design, mesh: TriangleMe
 
 
 def test_three_elements_lie_across_every_wall_and_rib(mesh: TriangleMesh) -> None:
-    assert elements_across(mesh) >= 3
+    assert elements_through_thickness(mesh) >= 3
 
 
 def test_markers_are_nodes_to_the_last_digit(design: Design, mesh: TriangleMesh) -> None:
@@ -124,7 +124,7 @@ def test_default_settings_keep_the_size_in_the_walls_and_grow_in_the_tip(fine_me
     assert np.median(length[walls]) == pytest.approx(0.25, rel=0.15)
     assert length[walls].max() < 0.6
     assert 0.7 < length[tip].max() < 1.3
-    assert elements_across(fine_mesh) >= 6
+    assert elements_through_thickness(fine_mesh) >= 6
 
 
 def test_meshing_twice_gives_the_same_mesh(fine_mesh: TriangleMesh) -> None:
@@ -195,5 +195,5 @@ def test_random_admissible_design_meshes(seed: int) -> None:
     section = finger_section(design)
     assert mesh.areas.sum() == pytest.approx(section.area, rel=5e-3 if design.fillet_radius else 1e-11)
     assert len(boundary_loops(mesh)) == design.rib_count + 2
-    assert elements_across(mesh) >= 3
+    assert elements_through_thickness(mesh) >= 3
     assert mesh.boundary_length("contact") == pytest.approx(design.contact_width)

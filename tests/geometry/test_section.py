@@ -14,7 +14,7 @@ def as_shapely(design: Design) -> Polygon:
     """The body, with fillets by shapely's own offsetting."""
     section = finger_section(design)
     body = Polygon(section.outer)
-    for corners in section.cells:
+    for corners in section.cavities:
         cell = Polygon(corners)
         radius = section.fillet_radius
         if radius:
@@ -31,8 +31,8 @@ def test_area_and_perimeter_agree_with_shapely(design: Design) -> None:
 
 def test_section_has_one_cell_more_than_ribs_and_none_touches_another(design: Design) -> None:
     section = finger_section(design)
-    assert len(section.cells) == len(section.ribs) + 1 == design.rib_count + 1
-    cells = [Polygon(corners) for corners in section.cells]
+    assert len(section.cavities) == len(section.ribs) + 1 == design.rib_count + 1
+    cells = [Polygon(corners) for corners in section.cavities]
     outer = Polygon(section.outer)
     assert all(cell.is_valid and polygon_area(np.array(cell.exterior.coords[:-1])) > 0 for cell in cells)
     assert all(outer.contains(cell) for cell in cells)
@@ -43,7 +43,7 @@ def test_walls_have_their_thickness_normal_to_their_faces(design: Design) -> Non
     section = finger_section(design)
     base, apex = (LineString(section.outer[[0, 1]]), LineString(section.outer[[1, 2]]))
     front = LineString(section.outer[[2, 0]])
-    cells = [Polygon(corners) for corners in section.cells]
+    cells = [Polygon(corners) for corners in section.cavities]
     assert min(cell.distance(front) for cell in cells) == pytest.approx(design.front_thickness, rel=1e-12)
     assert min(cell.distance(apex) for cell in cells) == pytest.approx(design.back_thickness, rel=1e-12)
     assert min(cell.distance(base) for cell in cells) == pytest.approx(design.base_thickness, rel=1e-12)
@@ -53,7 +53,7 @@ def test_walls_have_their_thickness_normal_to_their_faces(design: Design) -> Non
 
 def test_cavity_ends_where_the_tip_block_begins(design: Design) -> None:
     section = finger_section(design)
-    assert max(corners[:, 0].max() for corners in section.cells) == pytest.approx(
+    assert max(corners[:, 0].max() for corners in section.cavities) == pytest.approx(
         design.height - design.tip_length
     )
 

@@ -8,7 +8,7 @@ import pytest
 from geometry.errors import UserError
 from geometry.finger.presets import load_design
 from geometry.observations import Observations
-from solvers.assimilation.misfit import SMALLEST_DEVIATION, assimilates, check_weighting, misfit_of
+from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, assimilates, check_weighting, misfit_of
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
 from solvers.registry import make_solver
@@ -55,8 +55,8 @@ def test_precision_weights_are_the_log_likelihood_times_the_scale(problem):
     misfit = misfit_of(problem, weights="precision", scale=0.3)
     seen = problem.observations.visible
     deviations = problem.observations.standard_deviations[seen]
-    deviations = np.where(deviations < SMALLEST_DEVIATION, SMALLEST_DEVIATION, deviations)
-    assert deviations.min() == SMALLEST_DEVIATION
+    deviations = np.where(deviations < MIN_STANDARD_DEVIATION, MIN_STANDARD_DEVIATION, deviations)
+    assert deviations.min() == MIN_STANDARD_DEVIATION
     moved = misfit.observed + 0.02
     fall = (
         norm.logpdf(0, scale=deviations).sum() - norm.logpdf(moved - misfit.observed, scale=deviations).sum()

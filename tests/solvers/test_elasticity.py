@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from solvers.elasticity import (
-    Plane,
+    PlaneTensor,
     energy_density_of,
     lame_constants,
     linear_energy_density,
@@ -132,7 +132,9 @@ def test_von_mises_needs_the_out_of_plane_stress():
     tensor = np.array([[xx, xy, 0], [xy, yy, 0], [0, 0, zz]])
     deviator = tensor - np.trace(tensor) / 3 * np.eye(3)
     expected = np.sqrt(1.5 * (deviator**2).sum())
-    assert von_mises(Plane(*map(np.array, (xx, yy, xy, zz))), np.sqrt) == pytest.approx(expected, rel=1e-12)
+    assert von_mises(PlaneTensor(*map(np.array, (xx, yy, xy, zz))), np.sqrt) == pytest.approx(
+        expected, rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("law", FINITE)

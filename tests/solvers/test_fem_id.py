@@ -9,7 +9,7 @@ from scipy.stats import binom
 
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.assimilation.misfit import SMALLEST_DEVIATION, misfit_of
+from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, misfit_of
 from solvers.fem.identification.linear_model import LinearModel
 from solvers.fem.identification.solver import FemIdSolver
 from solvers.fem.linear import FemSolver
@@ -169,7 +169,7 @@ def test_a_marker_left_out_in_closed_form_is_nearly_that_of_a_refit(problem):
 def test_simulated_markers_count_as_known_to_the_smallest_deviation(problem):
     zero, least = (
         solver().solve(twin(problem, TRUTH, noise=1e-3, deviation=deviation)[0])
-        for deviation in (0.0, SMALLEST_DEVIATION)
+        for deviation in (0.0, MIN_STANDARD_DEVIATION)
     )
     assert dict(zero.stats) | {"seconds": 0} == dict(least.stats) | {"seconds": 0}
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from geometry.mesh.point_location import Location
+from geometry.mesh.point_location import LocatedPoints
 from solvers.statistics.kernel_field import SMOOTHNESS, KernelField, correlation
 from tests.solvers.kernels import matern
 
 
 def at(points):
     """Places that have no mesh."""
-    return Location(points, np.full(len(points), -1), np.full((len(points), 3), np.nan))
+    return LocatedPoints(points, np.full(len(points), -1), np.full((len(points), 3), np.nan))
 
 
 @pytest.fixture

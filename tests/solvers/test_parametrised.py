@@ -8,7 +8,7 @@ import pytest
 from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature, edge_quadrature
 from geometry.mesh.walls import walls_and_ribs
-from solvers.elasticity import lame_constants, lame_slopes
+from solvers.elasticity import lame_constants, lame_derivatives
 from solvers.fem.identification.linear_model import LinearModel
 from solvers.fem.identification.parameters import MEANINGS, parameters_of, parse_parameters, problem_with
 from solvers.fem.linear import FemSolver
@@ -47,7 +47,7 @@ def place(problem):
 def test_lame_slopes_are_those_of_central_differences(plane):
     step, ν = 1e-6, 0.3
     high, low = (np.array(lame_constants(2.0, ν + way * step, plane)) for way in (1, -1))
-    np.testing.assert_allclose(lame_slopes(2.0, ν, plane), (high - low) / (2 * step), rtol=1e-8)
+    np.testing.assert_allclose(lame_derivatives(2.0, ν, plane), (high - low) / (2 * step), rtol=1e-8)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
-from solvers.assimilation.refitting import Refitting, refitter
+from solvers.assimilation.refitting import Refittable, refitter
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Problem
 from solvers.registry import make_solver
@@ -45,7 +45,7 @@ def observed(coarse_mesh: TriangleMesh) -> list[Observations]:
 @pytest.mark.parametrize("name", SOLVERS)
 def test_a_refit_is_a_solution(coarse_mesh, observed, name):
     solver = make_solver(name.split(",")[0], **SOLVERS[name])
-    assert isinstance(solver, Refitting)
+    assert isinstance(solver, Refittable)
     problem = Problem(coarse_mesh)
     refit = refitter(solver, problem)
     inside = body_quadrature(coarse_mesh).location
@@ -81,9 +81,9 @@ def test_parameters_are_carried_to_another_load(coarse_mesh, observed):
     problem = Problem(coarse_mesh, observations=observed[0])
     solution = solver.solve(problem)
     other = Problem(coarse_mesh, load=Load(displacement=(0.0, -5.0), position=39.0))
-    carried = solver.carried(solution, problem, other)
-    assert carried.problem.load.displacement == pytest.approx((-0.5, -4.5), abs=0.01)
-    assert carried.problem.load.position == pytest.approx(39.0, abs=0.1)
-    again = FemSolver(degree=1, estimate=False).solve(replace(carried.problem, observations=None))
-    np.testing.assert_allclose(carried.field.values, again.field.values, atol=1e-7)
-    np.testing.assert_allclose(carried.reaction, again.reaction, rtol=1e-6)
+    transferred = solver.transferred(solution, problem, other)
+    assert transferred.problem.load.displacement == pytest.approx((-0.5, -4.5), abs=0.01)
+    assert transferred.problem.load.position == pytest.approx(39.0, abs=0.1)
+    again = FemSolver(degree=1, estimate=False).solve(replace(transferred.problem, observations=None))
+    np.testing.assert_allclose(transferred.field.values, again.field.values, atol=1e-7)
+    np.testing.assert_allclose(transferred.reaction, again.reaction, rtol=1e-6)

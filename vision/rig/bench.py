@@ -10,7 +10,7 @@ from geometry.arrays import FloatArray, IntArray
 from geometry.errors import ShapeError
 from geometry.finger.parameters import Parameters
 from geometry.mesh.boundary import boundary_edges
-from geometry.mesh.point_location import Location
+from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.triangle_mesh import TriangleMesh
 from vision.rig.shapes import Paint, Scene, Shape, circle, closed, rectangle
 from vision.tracking.workspace import Workspace
@@ -98,7 +98,7 @@ class Bench:
         return boundary_edges(self.mesh.triangles)
 
     @cached_property
-    def _marker_borders(self) -> Location:
+    def _marker_borders(self) -> LocatedPoints:
         radius = self.parameters.marker_radius
         return self.mesh.locate(np.concatenate([circle(centre, radius) for centre in self.mesh.markers]))
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from geometry.errors import UserError
-from geometry.finger.error_messages import one_line
+from geometry.finger.error_messages import validation_message
 from geometry.finger.parameters import bounded
 from vision.frames.frame import Image
 
@@ -52,7 +52,7 @@ class Exposure(BaseModel):
         try:
             super().__init__(**values)
         except ValidationError as error:
-            raise UserError(one_line(error, Exposure)) from None
+            raise UserError(validation_message(error, Exposure)) from None
 
     def develop(self, light: Light, rng: np.random.Generator) -> Image:
         """The picture that light makes, shape (height, width, 3), or (height, width) if monochrome."""

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from geometry.finger.error_messages import one_line
+from geometry.finger.error_messages import validation_message
 from geometry.finger.parameters import bounded
 
 
@@ -34,7 +34,7 @@ class Motion(BaseModel):
         try:
             super().__init__(**values)
         except ValidationError as error:
-            raise UserError(one_line(error, Motion)) from None
+            raise UserError(validation_message(error, Motion)) from None
 
     def __len__(self) -> int:
         """Number of frames."""

@@ -98,7 +98,7 @@ class Tracking:
             points[seen] = initial[seen]
         displacements[seen] = (final - initial)[seen]
         deviations[seen] = np.sqrt(np.diag(self.displacement_covariance)).reshape(-1, 2)
-        if (outside := ~finger_section(self.design).holds(points)).any():
+        if (outside := ~finger_section(self.design).contains(points)).any():
             number = int(outside.argmax())
             x, y = points[number]
             wanted_x, wanted_y = self.expected[number]

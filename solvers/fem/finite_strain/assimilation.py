@@ -13,8 +13,8 @@ import time
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
-from solvers.assimilation.marker_forces import missed_phrase
-from solvers.assimilation.misfit import Misfit, without_each
+from solvers.assimilation.marker_forces import residual_phrase
+from solvers.assimilation.misfit import Misfit, leave_one_out_displacements
 from solvers.fem.finite_strain.constraints import DisplacementConstraints
 from solvers.fem.finite_strain.load_path import LoadPath, PathPoint
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
@@ -77,7 +77,7 @@ def assimilated(
             "load_fraction": np.array([point.fraction for point in path.points]),
             "energy": energies,
         },
-        left_out=None if left_out is None else without_each(problem, left_out),
+        left_out=None if left_out is None else leave_one_out_displacements(problem, left_out),
     )
 
 
@@ -124,7 +124,7 @@ def _status(
         )
     said = (
         f"energy plus misfit is stationary: all of the load applied in {steps} steps, {iterations} Newton "
-        f"iterations; {missed_phrase(residual, left_out[np.isfinite(left_out)])}"
+        f"iterations; {residual_phrase(residual, left_out[np.isfinite(left_out)])}"
     )
     if lost := int(np.isnan(left_out[:, 0]).sum()):
         said += f"; no equilibrium was found without {lost} of the markers"

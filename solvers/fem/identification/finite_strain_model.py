@@ -12,7 +12,7 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from solvers.elasticity import Lame, lame_slopes
+from solvers.elasticity import Lame, lame_derivatives
 from solvers.fem.finite_strain.equilibrium import LoadStage
 from solvers.fem.finite_strain.load_path import LoadPath, PathPoint, Steps
 from solvers.fem.identification.linear_model import Response
@@ -112,7 +112,7 @@ def _moduli_slope(name: str, problem: Problem) -> Lame:
     """Derivatives of λ and μ by a parameter."""
     material = problem.material
     if name == "poisson":
-        return lame_slopes(material.young, material.poisson, material.plane)
+        return lame_derivatives(material.young, material.poisson, material.plane)
     if name == "young":
         return Lame(*(value / material.young for value in material.lame))
     return Lame(0.0, 0.0, 0.0)

@@ -22,7 +22,7 @@ from geometry.arrays import FloatArray
 from geometry.mesh.quadrature import body_quadrature, edge_quadrature
 from geometry.mesh.walls import walls_and_ribs
 from solvers.constrained_elimination import ConstrainedElimination
-from solvers.elasticity import lame_slopes
+from solvers.elasticity import lame_derivatives
 from solvers.fem.boundary_conditions import load_functionals
 from solvers.fem.identification.parameters import STIFFNESS, moved_functionals, problem_with, target_slope
 from solvers.lagrange import LagrangeSpace
@@ -118,7 +118,7 @@ class LinearModel:
         if name == "base_compliance":
             return self._layer(problem, named) / -named[name]
         if name == "poisson":
-            slopes = lame_slopes(material.young, material.poisson, material.plane)
+            slopes = lame_derivatives(material.young, material.poisson, material.plane)
             return self._sum(slopes.λ, slopes.μ, named)
         if name in STIFFNESS:
             volume, shape = self._parts[STIFFNESS[name]]

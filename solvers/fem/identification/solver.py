@@ -11,7 +11,7 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.assimilation.estimation import Estimate, Prediction, estimate
-from solvers.assimilation.misfit import without_each
+from solvers.assimilation.misfit import leave_one_out_displacements
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification.finite_strain_model import PARAMETERS, FiniteStrainModel
 from solvers.fem.identification.linear_model import LinearModel, Response
@@ -102,14 +102,14 @@ class FemIdSolver:
         return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
-        """What finds the parameters for other observations, by one factorisation; see `Refitting`."""
+        """What finds the parameters for other observations, by one factorisation; see `Refittable`."""
         space = LagrangeSpace(problem.mesh, self.degree)
         finger = self._finger(problem, space, parse_parameters(self.name, self.parameters))
         return lambda observations: self._found(
             replace(problem, observations=observations), observations, space, finger, silent
         )
 
-    def carried(self, solution: Solution, problem: Problem, other: Problem) -> Solution:
+    def transferred(self, solution: Solution, problem: Problem, other: Problem) -> Solution:
         """The solution of another problem with the parameters that were found for the first one.
 
         Those of finger and clamp stay. The contact is off its nominal place by as much as it was, and off its
@@ -186,7 +186,7 @@ class FemIdSolver:
                 "degree": self.degree,
                 **statistics(found),
             },
-            left_out=without_each(problem, -observer.missed_without_each(found)),
+            left_out=leave_one_out_displacements(problem, -observer.missed_without_each(found)),
         )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import torch
 
 from geometry.arrays import FloatArray
-from geometry.mesh.point_location import Location
+from geometry.mesh.point_location import LocatedPoints
 from solvers.pinn.finite_basis.hard_constraint import BaseFactor
 from solvers.pinn.finite_basis.patches import boxes_around, cut_into_patches
 from solvers.pinn.finite_basis.windows import Windows
@@ -119,11 +119,11 @@ class LocalField:
     units: LocalUnits
     output: torch.Tensor
 
-    def displacement(self, location: Location) -> FloatArray:
+    def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
         return self._sample(location.points, self.displacement_of_patch)
 
-    def gradient(self, location: Location) -> FloatArray:
+    def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
         return self._sample(location.points, self.gradient_of_patch)
 

@@ -11,8 +11,8 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
-from solvers.assimilation.marker_forces import Fit
-from solvers.assimilation.misfit import without_each
+from solvers.assimilation.marker_forces import MarkerFit
+from solvers.assimilation.misfit import leave_one_out_displacements
 from solvers.pinn.finite_basis.equilibrium import Level
 from solvers.pinn.finite_basis.hard_constraint import BaseFactor
 from solvers.pinn.finite_basis.network import LocalField, LocalUnits
@@ -156,7 +156,7 @@ class FiniteBasisSolver(Observing, ABC):
             history=dict(
                 zip(("units", "energy", "estimated_error", "seconds"), np.array(history).T, strict=True)
             ),
-            left_out=None if fit is None else without_each(problem, fit.left_out),
+            left_out=None if fit is None else leave_one_out_displacements(problem, fit.left_out),
         )
 
     def level(self, problem: Problem, scale: float) -> Level:
@@ -183,7 +183,7 @@ class FiniteBasisSolver(Observing, ABC):
         quadrature = graded_quadrature(triangles, spacing, self.cell)
         return Level.of(units, problem, *quadrature, self.given(problem))
 
-    def _status(self, path: Path, finer: float, change: float, error: float, fit: Fit | None) -> Status:
+    def _status(self, path: Path, finer: float, change: float, error: float, fit: MarkerFit | None) -> Status:
         if path.fraction < 1:
             return Status(
                 False,
