@@ -1,9 +1,9 @@
-"""Where markers may be: the paper's pipeline, up to its circles.
+"""Circles that may be markers, by the paper's pipeline.
 
 Median blur of size 3, colour detection in CIELAB, Gaussian blur, Hough circles (Wang et al., PINN-Ray, on the
 experiment). Of OpenCV's two kinds of Hough circles it is the older one: it found all discs from 4 pixels of
-radius on, of which `HOUGH_GRADIENT_ALT` missed a seventh. Corners and gaps, which it finds too, are
-not filled with the colour, or not surrounded by another, and are dropped.
+radius on, of which `HOUGH_GRADIENT_ALT` missed a seventh. It also finds corners and gaps; they are dropped
+because they are not filled with the colour, or not surrounded by another.
 """
 
 from math import ceil
@@ -20,7 +20,7 @@ PixelBox = tuple[int, int, int, int]
 """x0, y0, x1, y1, pixels; x1 and y1 are outside."""
 
 VOTES = (5.0, 8.0)
-"""Gradients that must point at a centre: twice the least radius, a third of the edge, within these limits."""
+"""Limits of the gradients that must point at a centre: twice the least radius, a third of the edge."""
 EDGE = 100.0
 """Canny's higher threshold; the blurred mask's edges have 160 or more whatever the light."""
 LEAST_FILL = 0.4
@@ -34,17 +34,17 @@ def propose_circles(
     radii: tuple[float, float],
     window: PixelBox | None = None,
 ) -> FloatArray:
-    """Circles that may be markers.
+    """Find circles that may be markers.
 
     Args:
         image: Shape (h, w) or (h, w, 3).
         colour: Of the markers.
         radii: Least and largest radius, pixels.
-        window: Where to look; everywhere if not given. What lies beyond the image is left out.
+        window: Part of the image to search, clipped to the image; all of it if not given.
 
     Returns:
-        x, y and radius of every circle, the most disc-like first, shape (n, 3), pixels. The centres lie in
-        the middle between pixels: OpenCV's accumulator has no finer ones.
+        x, y and radius of every circle, the most disc-like first, shape (n, 3), pixels. The centres lie
+        halfway between pixels, the resolution of OpenCV's accumulator.
 
     Raises:
         UserError: If the radii are not 0 < least <= largest.
@@ -81,16 +81,16 @@ def propose_circles(
 def highlight_colour(
     image: Image, colour: Colour, circles: FloatArray | None = None, *, radius: float = 25.0
 ) -> tuple[Image, float]:
-    """A picture to check a colour by eye, and the share of the image that has it.
+    """Draw a picture to check a colour by eye.
 
     Args:
         image: Shape (h, w) or (h, w, 3).
-        colour: What has it is magenta; the rest is pale.
+        colour: Drawn in magenta; the rest is pale.
         circles: x, y and radius, shape (n, 3), pixels, drawn in green.
-        radius: Largest radius that is looked for, pixels.
+        radius: Largest radius that is searched for, pixels.
 
     Returns:
-        The picture, shape (h, w, 3), and a number from 0 to 1.
+        The picture, shape (h, w, 3), and the share of its pixels that have the colour.
     """
     mask = colour.mask(np.asarray(cv2.medianBlur(image, 3), dtype=np.uint8), radius)
     coloured = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image
@@ -103,7 +103,7 @@ def highlight_colour(
 
 
 def _fill(mask: Image, circles: FloatArray) -> FloatArray:
-    """How much more colour there is within each circle than around it, shape (n,), -1 to 1."""
+    """Share of the colour within each circle minus that around it, shape (n,)."""
     shares = []
     for x, y, radius in circles:
         reach = ceil(1.5 * radius) + 1
@@ -117,7 +117,7 @@ def _fill(mask: Image, circles: FloatArray) -> FloatArray:
 
 
 def _first_of_overlapping(circles: FloatArray) -> BoolArray:
-    """Which circles do not have their centre within an earlier one that is kept."""
+    """Mask of circles whose centre is not within an earlier one that is kept."""
     kept = np.zeros(len(circles), dtype=bool)
     for number, (x, y, radius) in enumerate(circles):
         others = circles[kept]

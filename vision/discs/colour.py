@@ -1,4 +1,4 @@
-"""What colour a marker has: a box in CIELAB, or simply darker than what is around it.
+"""Colours of markers: a box in CIELAB, or darker than the surroundings.
 
 CIELAB (L* 0 to 100, a* and b* about -128 to 127) is OpenCV's, from sRGB with the white point D65, rounded
 to 8 bits: steps of 0.4 in L*, of 1 in a* and b*. A grey image has L* alone.
@@ -20,13 +20,12 @@ Lab = tuple[float, float, float]
 
 LOWEST: Lab = (0.0, -128.0, -128.0)
 HIGHEST: Lab = (100.0, 127.0, 127.0)
-
 HALF = 0.45
-"""Of the greatest darkness nearby: about where a blurred edge is, and beyond what a grey wall has."""
+"""Threshold over the greatest darkness nearby: about at a blurred edge, and darker than a grey wall."""
 
 
 class Colour(Protocol):
-    """What decides which pixels may be a marker's."""
+    """Classifier of the pixels that may belong to a marker."""
 
     def mask(self, image: Image, radius: float = ...) -> Image:
         """255 where a pixel may belong to a disc of at most `radius`, pixels; 0 elsewhere."""
@@ -62,9 +61,9 @@ class ColourRange:
 
 @dataclass(frozen=True)
 class Darker:
-    """Darker than the surroundings by `contrast` in L*, and about half as dark as what is darkest there.
+    """Darker than the surroundings by `contrast` in L*, and about half as dark as the darkest pixel nearby.
 
-    How bright the surroundings are comes from a morphological closing, so the light may be uneven: a
+    A morphological closing estimates the brightness of the surroundings, so the light may be uneven: the
     black-hat transform (F. Meyer, "Iterative image transformations for an automatic screening of cervical
     smears", J. Histochem. Cytochem. 27, 1979).
     """
@@ -128,7 +127,7 @@ def _lightness_of_grey() -> Image:
 
 
 def _in_8_bits(colour: Lab) -> FloatArray:
-    """As OpenCV codes it, rounded, shape (3,)."""
+    """OpenCV's encoding, rounded, shape (3,)."""
     return np.asarray(np.rint(np.array(colour) * (2.55, 1, 1) + (0, 128, 128)))
 
 

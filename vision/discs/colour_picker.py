@@ -1,4 +1,4 @@
-"""A colour from an example: a click into a marker, or a rectangle within it."""
+"""Range of a marker's colour from an example: a click into the marker, or a rectangle within it."""
 
 from collections.abc import Sequence
 
@@ -11,24 +11,24 @@ from vision.discs.colour import HIGHEST, LOWEST, ColourRange
 from vision.frames.frame import Image
 
 ALIKE = 12.0
-"""In L*, a* and b*: how far pixels around a click may be from it and yet be of the same marker."""
+"""Largest difference in L*, a* and b* between a click and other pixels of the same marker."""
 LEAST_WIDTH, USUAL_WIDTH = 6.0, 25.0
-"""Of the range on either side: at least for noise; where nothing is near, for shadows and other lamps."""
+"""Width of the range to either side: at least for noise; with no similar surroundings, for other light."""
 FEWEST = 9
-"""Pixels of an example."""
+"""Smallest number of pixels of an example."""
 NEAR, FAR = 3.0, 9.0
-"""Pixels around an example: what lies between is its surroundings."""
+"""Smallest and largest distance of the surroundings from an example, pixels."""
 NOTABLE = 0.1
-"""Share of the surroundings that must have another colour for the range to keep clear of it."""
+"""Share of the surroundings that must have another colour for the range to exclude it."""
 
 
 def pick_colour(image: Image, place: Sequence[float]) -> ColourRange:
-    """The range of colours of the marker at a place.
+    """Range of the colours of the marker at a place.
 
-    It reaches half way to what surrounds the marker, and 25 in L*, a* or b* where that is not met.
+    It reaches half way to the colours around the marker, and at most 25 in L*, a* or b*.
 
     Args:
-        image: Shape (h, w), of which L* alone counts, or (h, w, 3).
+        image: Shape (h, w), for L* alone, or (h, w, 3).
         place: x, y of a point in the marker, or x0, y0, x1, y1 of a rectangle that it mostly fills, pixels.
 
     Raises:
@@ -55,7 +55,7 @@ def _lab(image: Image) -> FloatArray:
 
 
 def _example(lab: FloatArray, place: Sequence[float]) -> BoolArray:
-    """Which pixels are alike and connected to the place, shape (h, w)."""
+    """Mask of similar pixels that are connected to the place, shape (h, w)."""
     height, width = lab.shape[:2]
     if len(place) not in (2, 4) or not np.isfinite(place).all():
         raise UserError(f"a place is x,y or x0,y0,x1,y1 in pixels, not {','.join(map(str, place))}")
@@ -79,11 +79,11 @@ def _example(lab: FloatArray, place: Sequence[float]) -> BoolArray:
 
 
 def _width(beyond: FloatArray, least: FloatArray) -> FloatArray:
-    """How far the range reaches to one side, shape (3,).
+    """Width of the range to one side, shape (3,).
 
     Args:
-        beyond: By how much the surroundings lie to that side, shape (n, 3).
-        least: Shape (3,); what is nearer is the marker's own noise.
+        beyond: Distance of the surroundings to that side, shape (n, 3).
+        least: Distances below these are the marker's own noise, shape (3,).
     """
     widths = np.full(3, USUAL_WIDTH)
     for channel in range(3):

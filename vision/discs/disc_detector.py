@@ -1,4 +1,4 @@
-"""Where discs are in an image: by the fit of their edge, or by the circles of the paper's pipeline alone."""
+"""Detection of discs in an image: circles of the paper's pipeline, refined by a fit of the edge or not."""
 
 from collections.abc import Callable
 from typing import Literal, NamedTuple
@@ -16,12 +16,12 @@ DetectionMethod = Literal["precise", "hough"]
 METHODS: tuple[DetectionMethod, ...] = ("precise", "hough")
 
 FLOOR = {"precise": 0.0005, "hough": 0.45}
-"""Standard deviation of what a mean over frames keeps of the error of a coordinate, pixels. Fits: as seen on
-the virtual rig at discs that stay ellipses; beside the indenter it is more, which the frames' scatter shows.
+"""Standard deviation of a coordinate's error that a mean over frames does not reduce, pixels. Fits: as on the
+virtual rig for discs that stay ellipses; beside the indenter it is more, which the frames' scatter shows.
 Hough circles sit on a lattice."""
 
 REACH = 0.8
-"""How far from its guess a circle is looked for, in radii."""
+"""Largest distance of a circle from its guess, in radii."""
 
 
 class DiscDetections(NamedTuple):
@@ -45,23 +45,16 @@ class DiscDetections(NamedTuple):
         return DiscDetections(np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0), np.empty(0))
 
     def where(self, kept: BoolArray | IntArray) -> "DiscDetections":
-        """Some of them."""
+        """Subset selected by a mask or by numbers."""
         return DiscDetections(*(part[kept] for part in self))
 
     def numbered(self, discs: IntArray) -> "DiscDetections":
-        """The disc with each of the numbers `discs`; nan for the number -1."""
-        known = np.where(discs >= 0, 1.0, np.nan)
-        if not len(self.radii):
-            return DiscDetections(
-                np.full((len(discs), 2), np.nan), np.full((len(discs), 2, 2), np.nan), known, known
-            )
-        centres, covariances, radii, contrasts = (part[discs] for part in self)
-        return DiscDetections(
-            centres * known[:, None], covariances * known[:, None, None], radii * known, contrasts * known
-        )
+        """The discs with the numbers `discs`; nan for the number -1."""
+        padded = (np.concatenate([part, np.full((1, *part.shape[1:]), np.nan)]) for part in self)
+        return DiscDetections(*(part[discs] for part in padded))  # -1 is the added nan
 
     def together(self, others: "DiscDetections") -> "DiscDetections":
-        """These, and those of the others that are not among them."""
+        """Union with other detections; the others' copies of these discs are left out."""
         away = np.linalg.norm(others.centres[:, None] - self.centres, axis=2)
         new = others.where((away > others.radii[:, None]).all(axis=1))
         return DiscDetections(*(np.concatenate(parts) for parts in zip(self, new, strict=True)))
@@ -75,10 +68,10 @@ def detect_discs(
     window: PixelBox | None = None,
     radii: Callable[[FloatArray], FloatArray] | None = None,
 ) -> DiscDetections:
-    """All discs of a colour whose radii, pixels, lie between two limits.
+    """Detect all discs of a colour whose radii, pixels, lie between two limits.
 
-    If it is known which radii, shape (n,), discs at points of the image, shape (n, 2), have, those that are
-    partly hidden are found too.
+    With `radii`, a function from points of the image, shape (n, 2), to the known radii of discs there, shape
+    (n,), partly hidden discs are detected too.
     """
     circles = propose_circles(image, colour, radii=limits, window=window)
     if method == "hough":
@@ -89,7 +82,7 @@ def detect_discs(
 def detect_discs_near(
     image: Image, colour: Colour, guesses: FloatArray, radii: FloatArray, method: DetectionMethod
 ) -> DiscDetections:
-    """The discs with known radii, shape (n,), that are near guesses, shape (n, 2), pixels; perhaps fewer."""
+    """Detect discs with known radii, shape (n,), near guesses, shape (n, 2), pixels; there may be fewer."""
     if not len(guesses):
         return DiscDetections.none()
     if method == "precise":
@@ -103,12 +96,12 @@ def detect_discs_near(
 
 
 def luma_of(image: Image) -> GreyImage:
-    """Luma: chroma has fewer pixels in most videos."""
+    """Luma, because chroma has fewer pixels in most videos."""
     return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
 
 
 def _fitted(image: Image, circles: FloatArray, radii: FloatArray | None) -> DiscDetections:
-    """What the fit finds at circles, shape (n, 3), each disc once."""
+    """Fit discs at circles, shape (n, 3), and drop duplicates."""
     discs = fit_discs(luma_of(image), circles, radii=radii)
     kept = discs.found.copy()
     apart = np.linalg.norm(discs.centres[:, None] - discs.centres, axis=2)
@@ -118,6 +111,6 @@ def _fitted(image: Image, circles: FloatArray, radii: FloatArray | None) -> Disc
 
 
 def _circles(circles: FloatArray) -> DiscDetections:
-    """Circles as they are: their error is not seen from one frame."""
+    """Detections from circles, with a fixed covariance: one frame does not show their error."""
     covariances = np.repeat(FLOOR["hough"] ** 2 * np.eye(2)[None], len(circles), axis=0)
     return DiscDetections(circles[:, :2], covariances, circles[:, 2], np.full(len(circles), np.nan))

@@ -12,25 +12,32 @@ from numpy.typing import ArrayLike
 
 from geometry.arrays import BoolArray, FloatArray, frozen_array
 from geometry.errors import UserError
-from vision.discs.disc_image_model import BLUR, CONTRAST, RADIUS, SHADE_X, SHADE_Y, SLANT, STRETCH, X, Y
-from vision.discs.fit_stages import fit_alike
+from vision.discs.disc_image_model import (
+    BLUR,
+    CONTRAST,
+    RADIUS,
+    SHADE_X,
+    SHADE_Y,
+    SLANT,
+    STRETCH,
+    WIDTH,
+    X,
+    Y,
+)
+from vision.discs.fit_stages import fit_discs_of_one_size
 from vision.discs.least_squares import DiscFit
 from vision.frames.frame import GreyImage
 
 KNOWN_RADIUS = 0.01
-"""Relative standard deviation of a radius that is called known: a marker turns and comes nearer a little."""
-
+"""Relative standard deviation of a known radius: markers turn and change their distance a little."""
 LEAST_SEEN, LEAST_SEEN_UNKNOWN = 0.25, 0.7
-"""Share of the edge below which a disc is not found, with a known radius and without."""
-
+"""Share of the edge below which a disc counts as not found, with a known radius and without."""
 LARGEST_DEVIATION = 0.5
-"""Standard deviation of the centre, pixels, above which a disc is not found."""
-
+"""Standard deviation of the centre, pixels, above which a disc counts as not found."""
 LARGEST_RESIDUAL = 0.25
-"""Root mean square residual, over the contrast, above which a disc is not found."""
-
+"""Root mean square residual, over the contrast, above which a disc counts as not found."""
 RADII = (0.6, 1.6)
-"""Radius found over radius guessed."""
+"""Accepted ratios of fitted to guessed radius."""
 
 
 @dataclass(frozen=True)
@@ -39,13 +46,12 @@ class FittedDiscs:
 
     Attributes:
         centres: x, y, shape (n, 2), pixels.
-        covariances: Of the centres, shape (n, 2, 2), pixels². Correlated noise, such as a codec's, counts, by
-            its mean over the discs of about a size.
+        covariances: Of the centres, shape (n, 2, 2), pixels², with correlated noise, such as a codec's,
+            by its median over the discs of about one size.
         radii: Square root of the product of the semi-axes, shape (n,), pixels.
         shapes: Stretch and slant as in `vision.discs.disc_image_model`, shape (n, 2); zero for circles.
         contrast: Level around the disc less level within, shape (n,), grey levels; negative for light discs.
         blur: Width of the edge, with the pixels' own width, shape (n,), pixels.
-        residual: Root mean square of the weighted residuals, shape (n,), grey levels.
         seen: Share of the edge that supports the fit, shape (n,).
         found: Shape (n,).
     """
@@ -56,7 +62,6 @@ class FittedDiscs:
     shapes: FloatArray
     contrast: FloatArray
     blur: FloatArray
-    residual: FloatArray
     seen: FloatArray
     found: BoolArray
 
@@ -71,11 +76,11 @@ def fit_discs(grey: GreyImage, guesses: ArrayLike, *, radii: ArrayLike | None = 
     Args:
         grey: Shape (height, width).
         guesses: x, y and radius of every disc, shape (n, 3), pixels.
-        radii: Known radii, one for all or shape (n,), pixels. They serve discs that are partly hidden, whose
-            size and place cannot be told apart; without them such discs are found only if most is seen.
+        radii: Known radii, one for all or shape (n,), pixels. They make partly hidden discs measurable, whose
+            size and place are otherwise coupled; without them such discs are found only if most is seen.
 
     Returns:
-        As many discs as guesses, in their order. A disc is found if the fit came to rest near the guess and
+        As many discs as guesses, in their order. A disc is found if the fit converged near the guess and
         agrees with enough of the edge.
 
     Raises:
@@ -87,38 +92,33 @@ def fit_discs(grey: GreyImage, guesses: ArrayLike, *, radii: ArrayLike | None = 
         raise UserError(
             f"discs are fitted in grey images of eight bits; this one is {grey.dtype} {grey.shape}"
         )
-    known = guesses[:, 2] if radii is None else radii
-    known = frozen_array(
-        np.broadcast_to(known, (len(guesses),)), dtype=np.float64, shape=(None,), name="radii"
-    )
+    known = np.broadcast_to(guesses[:, 2] if radii is None else radii, (len(guesses),))
+    known = frozen_array(known, dtype=np.float64, shape=(None,), name="radii")
     if not (guesses[:, 2] > 0).all() or not (known > 0).all():
         raise UserError("the radius of a disc must be above zero")
     tolerance = np.inf if radii is None else KNOWN_RADIUS
-    fit = DiscFit.empty(len(guesses))
+    fit = DiscFit.start(np.zeros((len(guesses), WIDTH)), np.zeros((len(guesses), 2), dtype=np.int64))
     sizes = np.rint(np.log(known) / np.log(1.4))
-    for size in np.unique(sizes):  # discs of a size share their window
+    for size in np.unique(sizes):  # discs of one size share the shape of their windows
         (alike,) = np.nonzero(sizes == size)
-        fit.put(alike, fit_alike(grey, guesses[alike, :2], known[alike], tolerance))
-    return _judged(fit, guesses, LEAST_SEEN_UNKNOWN if radii is None else LEAST_SEEN)
+        fit.put(alike, fit_discs_of_one_size(grey, guesses[alike, :2], known[alike], tolerance))
+    return _accepted(fit, guesses, LEAST_SEEN_UNKNOWN if radii is None else LEAST_SEEN)
 
 
-def _judged(fit: DiscFit, guesses: FloatArray, least_seen: float) -> FittedDiscs:
-    """What the fit says of the discs, those that it did not find struck out."""
+def _accepted(fit: DiscFit, guesses: FloatArray, least_seen: float) -> FittedDiscs:
+    """The fitted discs, with NaN for those that fail a check."""
     parameters = fit.parameters
     shade, blur, radii = parameters[:, [SHADE_X, SHADE_Y]], parameters[:, BLUR], parameters[:, RADIUS]
-    centres = fit.origins + parameters[:, [X, Y]]
-    centres = (
-        centres + blur[:, None] ** 2 * shade
-    )  # the light is blurred as well, which moves the picture back
+    # The gradient of the light is blurred as well, which shifts the image of the disc.
+    centres = fit.origins + parameters[:, [X, Y]] + blur[:, None] ** 2 * shade
     deviations = np.sqrt(np.linalg.eigvalsh(fit.covariances)[:, 1])
     contrast = parameters[:, CONTRAST]
-    residual = np.sqrt(fit.variance)
     ratio = radii / guesses[:, 2]
     found = (
         fit.settled
         & (fit.seen >= least_seen)
         & (deviations <= LARGEST_DEVIATION)
-        & (residual <= LARGEST_RESIDUAL * np.abs(contrast))
+        & (np.sqrt(fit.variance) <= LARGEST_RESIDUAL * np.abs(contrast))
         & (np.hypot(*(centres - guesses[:, :2]).T) <= np.maximum(guesses[:, 2], 3))
         & (ratio >= RADII[0])
         & (ratio <= RADII[1])
@@ -131,7 +131,6 @@ def _judged(fit: DiscFit, guesses: FloatArray, least_seen: float) -> FittedDiscs
         shapes=parameters[:, [STRETCH, SLANT]] * kept[:, None],
         contrast=contrast * kept,
         blur=blur * kept,
-        residual=residual * kept,
         seen=fit.seen,
         found=found,
     )

@@ -1,4 +1,4 @@
-"""The picture of a disc: what every pixel near its edge shows, and how that changes with the parameters.
+"""Model of the grey levels near the edge of a disc, with its derivatives by the parameters.
 
     I(p) = (1 + g·(p - p₀)) (L - A Φ((R(φ) - √(ρ² + s²)) / s) + Σ B Φ((n·(p - p₀) - h) / s))
 
@@ -19,24 +19,25 @@ from scipy.special import erf
 Array = NDArray[np.float32]
 
 X, Y, RADIUS, STRETCH, SLANT, BLUR, LIGHT, CONTRAST, SHADE_X, SHADE_Y = range(10)
-"""Places of the parameters. Stretch and slant make the ellipse: its R(φ) = R (√(1 + a² + b²) - a cos 2φ - b
+"""Columns of the parameters. Stretch and slant make the ellipse: its R(φ) = R (√(1 + a² + b²) - a cos 2φ - b
 sin 2φ)^-½ has semi-axes R e^(±ε), where sinh 2ε is the length of (a, b)."""
-
 COUNT = 10
-
-
+"""Parameters of a disc."""
 EDGE = 3
-"""Further parameters of every straight edge in the neighbourhood: angle of its normal, offset of the edge
-along that from p₀, and how much lighter it is beyond."""
+"""Parameters of a straight edge: angle of its normal, offset of the edge along that from p₀, and how much
+lighter it is beyond."""
+EDGES = 2
+"""Straight edges of every disc; those that are absent have zero contrast."""
+WIDTH = COUNT + EDGES * EDGE
+"""All parameters."""
 
 
-def picture(parameters: Array, x: Array, y: Array) -> tuple[Array, Array]:
+def disc_image(parameters: Array, x: Array, y: Array) -> tuple[Array, Array]:
     """Grey levels and their derivatives.
 
     Args:
-        parameters: Shape (n, m), in the order above; the centre is relative to p₀. There are 10 and 3 for
-        every
-            straight edge.
+        parameters: Those of the disc, the centre relative to p₀, then those of its straight edges; shape
+            (n, m) with m = 10 + 3 for each straight edge.
         x: Pixels relative to p₀, to the right, shape (p,).
         y: Likewise, down.
 
@@ -51,7 +52,8 @@ def picture(parameters: Array, x: Array, y: Array) -> tuple[Array, Array]:
     length = np.sqrt(1 + a * a + b * b)
     shape = 1 / np.sqrt(length - a * twice_cosine - b * twice_sine)
     distance = np.sqrt(square + s * s)
-    covered, density, z = _step((radius * shape - distance) / s)
+    z = (radius * shape - distance) / s
+    covered, density = _blurred_step(z)
     shade = 1 + gx * x + gy * y
     reflectance = light - contrast * covered
 
@@ -71,7 +73,8 @@ def picture(parameters: Array, x: Array, y: Array) -> tuple[Array, Array]:
     for first in range(COUNT, len(columns), EDGE):
         angle, offset, lighter = columns[first : first + EDGE]
         cosine, sine = np.cos(angle), np.sin(angle)
-        beyond, density, z = _step((cosine * x + sine * y - offset) / s)
+        z = (cosine * x + sine * y - offset) / s
+        beyond, density = _blurred_step(z)
         reflectance += lighter * beyond
         by_edge = density * shade * (lighter / s)
         derivatives[:, first] = by_edge * (cosine * y - sine * x)
@@ -83,7 +86,7 @@ def picture(parameters: Array, x: Array, y: Array) -> tuple[Array, Array]:
     return shade * reflectance, derivatives
 
 
-def _step(z: Array) -> tuple[Array, Array, Array]:
-    """A blurred step, its slope, and its argument."""
+def _blurred_step(z: Array) -> tuple[Array, Array]:
+    """The normal distribution and its density."""
     covered = (1 + erf(np.float32(np.sqrt(0.5)) * z)) / 2
-    return covered, np.float32(1 / np.sqrt(2 * np.pi)) * np.exp(-z * z / 2), z
+    return covered, np.float32(1 / np.sqrt(2 * np.pi)) * np.exp(-z * z / 2)

@@ -1,7 +1,8 @@
-"""Where discs of known size are, to a fraction of a pixel, from guesses that are off by several: by voting.
+"""Hough votes for the centres of discs, to a fraction of a pixel, from guesses that are off by several.
 
-Every pixel with a gradient votes for the point that lies a radius away along it. What the votes of an arc
-agree on is its centre, whatever hides the rest of it, and straight edges agree on nothing. Units: pixels.
+Every pixel with a gradient votes for the point at the distance of the radius along it. The votes of an arc
+agree on its centre, whatever hides the rest of the circle; those of straight edges agree on nothing. Units:
+pixels.
 
 Source: D. H. Ballard, "Generalizing the Hough transform to detect arbitrary shapes", Pattern Recognition 13,
 1981, for circles of one size.
@@ -13,54 +14,48 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
+from geometry.arrays import FloatArray, IntArray
 from vision.frames.frame import GreyImage
 
 SECTORS = 16
-"""Parts of the edge whose votes are counted apart."""
-
+"""Sectors of the edge whose votes are counted separately."""
 SPREAD = 1.0
 """Standard deviation of the smoothing, of the image before its derivatives and of the votes."""
-
 NEAR = 2
-"""Votes agree on a centre that they miss by at most so much along either axis."""
-
+"""Largest distance along either axis at which a vote supports a centre."""
 WEAK = 0.15
-"""Of the steepest slope: what is less does not vote."""
-
+"""Pixels below this fraction of the largest gradient cast no vote."""
 UNCERTAINTY = 0.3
 """Of a radius that is guessed, relative."""
-
-KERNEL = np.arange(-3.0, 4.0)
+MARGIN = 3
+"""Reach of the smoothing."""
 
 Floats = NDArray[np.floating[Any]]
 
 
 class HoughVotes(NamedTuple):
-    """What the votes agree on.
+    """Result of the votes.
 
     Attributes:
         centres: x, y, shape (n, 2).
         radii: Shape (n,).
-        dark: Whether the disc is darker than what surrounds it, shape (n,).
         support: Votes of the sectors of the edge over those of the better sectors, shape (n, `SECTORS`),
             counted from the x axis toward y.
     """
 
     centres: FloatArray
     radii: FloatArray
-    dark: BoolArray
     support: FloatArray
 
     def at(self, places: IntArray) -> "HoughVotes":
-        """That of some discs."""
-        return HoughVotes(self.centres[places], self.radii[places], self.dark[places], self.support[places])
+        """The votes for some discs."""
+        return HoughVotes(*(part[places] for part in self))
 
 
 def vote_for_centres(
     grey: GreyImage, guesses: FloatArray, radii: FloatArray, reach: float, *, known: bool
 ) -> HoughVotes:
-    """The best centres at most `reach` pixels from the guesses along either axis.
+    """Find the best centres at most `reach` pixels from the guesses along either axis.
 
     Args:
         grey: Shape (height, width).
@@ -71,23 +66,25 @@ def vote_for_centres(
     """
     count, origins = len(guesses), np.rint(guesses).astype(np.int64)
     half = int(np.ceil(radii.max() + reach)) + NEAR
-    line = np.arange(-half - 3, half + 4)
+    line = np.arange(-half - MARGIN, half + MARGIN + 1)
     height, width = grey.shape
     rows = np.clip(origins[:, 1, None] + line, 0, height - 1)
     columns = np.clip(origins[:, 0, None] + line, 0, width - 1)
-    tiles = grey[rows[:, None, :].transpose(0, 2, 1), columns[:, None, :]].astype(np.float32)
-    slopes_x, slopes_y = _slopes(tiles)
-    strength = np.hypot(slopes_x, slopes_y) + np.float32(1e-3)
-    line = line[3:-3]
-    away = [radii[:, None, None] * slope / strength for slope in (slopes_x, slopes_y)]
+    gradient_x, gradient_y = _gradients(grey[rows[:, :, None], columns[:, None, :]].astype(np.float32))
+    strength = np.hypot(gradient_x, gradient_y) + np.float32(1e-3)
+    line = line[MARGIN:-MARGIN]
+    away = [radii[:, None, None] * gradient / strength for gradient in (gradient_x, gradient_y)]
     most = int(np.ceil(reach))
-    polls = [_poll(line - sign * away[0], line[:, None] - sign * away[1], strength, most) for sign in (1, -1)]
-    dark = polls[0][1] >= polls[1][1]
-    sign = np.where(dark, 1, -1)[:, None, None]
-    centres = np.where(dark[:, None], polls[0][0], polls[1][0])
+    # Gradients point out of dark discs and into light ones: vote for both, and take the denser peak.
+    (dark, dark_votes), (light, light_votes) = (
+        _densest(line - sign * away[0], line[:, None] - sign * away[1], strength, most) for sign in (1, -1)
+    )
+    is_dark = dark_votes >= light_votes
+    sign = np.where(is_dark, 1, -1)[:, None, None]
+    centres = np.where(is_dark[:, None], dark, light)
     x, y = line - centres[:, 0, None, None], line[:, None] - centres[:, 1, None, None]
     distance = np.hypot(x, y) + 1e-3
-    outward = np.maximum(sign * (slopes_x * x + slopes_y * y) / distance, 0)
+    outward = np.maximum(sign * (gradient_x * x + gradient_y * y) / distance, 0)
     if not known:
         radii = _radii(distance, outward, radii)
     near = np.abs(distance - radii[:, None, None]) <= NEAR
@@ -96,7 +93,7 @@ def vote_for_centres(
     support = np.bincount(sectors[agree], weights=outward[agree], minlength=count * SECTORS)
     support = support.reshape(count, SECTORS)
     better = np.sort(support, axis=1)[:, -SECTORS // 4, None]
-    return HoughVotes(origins + centres, radii, dark, support / np.maximum(better, 1e-9))
+    return HoughVotes(origins + centres, radii, support / np.maximum(better, 1e-9))
 
 
 def sector(x: Floats, y: Floats) -> IntArray:
@@ -106,11 +103,11 @@ def sector(x: Floats, y: Floats) -> IntArray:
 
 
 def _radii(distance: Floats, outward: Floats, guesses: FloatArray) -> FloatArray:
-    """Where the mean slope along the rays is greatest, near the guess, shape (n,)."""
+    """Distance near the guess at which the mean radial gradient is greatest, shape (n,)."""
     count, bins = len(distance), int(np.ceil(2 * distance.max())) + 1
-    places = (2 * distance + 0.5).astype(np.int64) + bins * np.arange(count)[:, None, None]
-    sums = np.bincount(places.ravel(), weights=outward.ravel(), minlength=count * bins)
-    areas = np.bincount(places.ravel(), minlength=count * bins).astype(np.float64)
+    places = ((2 * distance + 0.5).astype(np.int64) + bins * np.arange(count)[:, None, None]).ravel()
+    sums = np.bincount(places, weights=outward.ravel(), minlength=count * bins)
+    areas = np.bincount(places, minlength=count * bins).astype(np.float64)
     smooth_sums, smooth_areas = (
         cv2.GaussianBlur(part.reshape(count, bins), (9, 1), 2 * SPREAD) for part in (sums, areas)
     )
@@ -120,43 +117,42 @@ def _radii(distance: Floats, outward: Floats, guesses: FloatArray) -> FloatArray
     return np.asarray(np.maximum(radii[best], 0.5))
 
 
-def _slopes(tiles: Floats) -> tuple[Floats, Floats]:
-    """Derivatives along x and y of smoothed tiles, without their margin of three pixels."""
-    bell = np.exp(-(KERNEL**2) / (2 * SPREAD**2))
+def _gradients(tiles: Floats) -> tuple[Floats, Floats]:
+    """Derivatives along x and y of smoothed tiles, without their margin."""
+    places = np.arange(-MARGIN, MARGIN + 1.0)
+    bell = np.exp(-(places**2) / (2 * SPREAD**2))
     count, side = tiles.shape[:2]
     strip = tiles.reshape(count * side, side)
 
     def derivative(along_x: FloatArray, along_y: FloatArray) -> Floats:
         filtered = cv2.sepFilter2D(strip, cv2.CV_32F, along_x, along_y).reshape(count, side, side)
-        return np.asarray(filtered[:, 3:-3, 3:-3], dtype=np.float32)
+        return np.asarray(filtered[:, MARGIN:-MARGIN, MARGIN:-MARGIN], dtype=np.float32)
 
-    return derivative(KERNEL * bell, bell), derivative(bell, KERNEL * bell)
+    return derivative(places * bell, bell), derivative(bell, places * bell)
 
 
-def _poll(x: Floats, y: Floats, strength: Floats, most: int) -> tuple[FloatArray, FloatArray]:
-    """Where the smoothed votes are densest, shape (n, 2), and how dense, shape (n,)."""
-    count, margin = len(x), 3
-    side = 2 * (most + margin) + 1
-    column, row = (np.rint(votes).astype(np.int64) + most + margin for votes in (x, y))
+def _densest(x: Floats, y: Floats, strength: Floats, most: int) -> tuple[FloatArray, FloatArray]:
+    """Places of the densest smoothed votes, shape (n, 2), and their densities, shape (n,)."""
+    count = len(x)
+    side = 2 * (most + MARGIN) + 1
+    column, row = (np.rint(votes).astype(np.int64) + most + MARGIN for votes in (x, y))
     valid = strength > WEAK * strength.max(axis=(1, 2), keepdims=True)
     valid &= (column >= 0) & (column < side) & (row >= 0) & (row < side)
     places = (np.arange(count)[:, None, None] * side + row) * side + column
-    votes = np.bincount(places[valid], weights=strength[valid], minlength=count * side * side).astype(
-        np.float64
-    )
-    strip = cv2.GaussianBlur(votes.reshape(count * side, side), (2 * margin + 1,) * 2, SPREAD)
-    density = np.asarray(strip, dtype=np.float64).reshape(count, side, side)
-    inner = density[:, margin:-margin, margin:-margin].reshape(count, -1)
-    best = inner.argmax(axis=1)
-    row, column = np.divmod(best, side - 2 * margin)
-    each, row, column = np.arange(count), row + margin, column + margin
+    votes = np.bincount(places[valid], weights=strength[valid], minlength=count * side * side)
+    strip = votes.astype(np.float64).reshape(count * side, side)
+    density = np.asarray(cv2.GaussianBlur(strip, (2 * MARGIN + 1,) * 2, SPREAD), dtype=np.float64)
+    density = density.reshape(count, side, side)
+    inner = density[:, MARGIN:-MARGIN, MARGIN:-MARGIN].reshape(count, -1)
+    best, each = inner.argmax(axis=1), np.arange(count)
+    row, column = np.array(np.divmod(best, side - 2 * MARGIN)) + MARGIN
     peak = inner[each, best]
 
     def vertex(before: FloatArray, after: FloatArray) -> FloatArray:
+        """Vertex of the parabola through the peak and its neighbours."""
         curvature = np.maximum(2 * peak - before - after, 1e-9 + 0.1 * peak)
         return np.asarray(0.5 * (after - before) / curvature)
 
     shift_x = vertex(density[each, row, column - 1], density[each, row, column + 1])
     shift_y = vertex(density[each, row - 1, column], density[each, row + 1, column])
-    centres = np.stack([column + shift_x, row + shift_y], axis=1) - (most + margin)
-    return centres, peak
+    return np.stack([column + shift_x, row + shift_y], axis=1) - (most + MARGIN), peak

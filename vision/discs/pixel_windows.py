@@ -1,4 +1,4 @@
-"""The pixels around discs of a size, gathered for all of them at once."""
+"""Pixels around discs of one size, gathered for all of them at once."""
 
 from dataclasses import dataclass, replace
 from typing import Self
@@ -11,8 +11,7 @@ from vision.discs.disc_image_model import Array
 from vision.frames.frame import GreyImage
 
 QUANTISATION = 1 / 12
-"""Variance of rounding to grey levels: the least that the noise can be."""
-
+"""Variance of rounding to grey levels, the smallest possible variance of the noise."""
 SCALE = 1.4826
 """Standard deviation over median absolute value, of normal noise."""
 
@@ -22,13 +21,13 @@ class PixelWindows:
     """The pixels around some discs.
 
     Attributes:
-        origins: Pixels that the others are relative to, shape (n, 2).
-        x, y: Of the pixels, shape (p,).
+        origins: Pixels in the middle of the windows, shape (n, 2).
+        x, y: Pixels relative to the origins, shape (p,).
         values: Grey levels, shape (n, p).
         within: Whether the image has that pixel, shape (n, p).
-        ring: Which pixels of the squares around the discs these are, shape (s, s).
-        noise: Standard deviation that the second differences along the rows show, shape (n,), grey levels;
-            edges in the window make it larger.
+        ring: Mask of these pixels in the squares around the discs, shape (s, s).
+        noise: Standard deviation from the second differences along the rows, shape (n,), grey levels; edges
+            in the window make it larger.
     """
 
     origins: IntArray
@@ -52,7 +51,7 @@ class PixelWindows:
         values = grey[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)].astype(np.float32)
         within = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
         second = np.abs(values[:, :, 2:] - 2 * values[:, :, 1:-1] + values[:, :, :-2])
-        count = len(origins)
+        noise = median_where(*(part.reshape(len(origins), -1) for part in (second, within[:, :, 1:-1])))
         return cls(
             origins=origins,
             x=x[ring].astype(np.float32),
@@ -60,13 +59,11 @@ class PixelWindows:
             values=values[:, ring],
             within=within[:, ring],
             ring=ring,
-            noise=SCALE
-            / 6**0.5
-            * median_where(second.reshape(count, -1), within[:, :, 1:-1].reshape(count, -1)),
+            noise=SCALE / 6**0.5 * noise,
         )
 
     def at(self, places: IntArray) -> "PixelWindows":
-        """Those of some discs."""
+        """The pixels of some discs."""
         return replace(
             self,
             origins=self.origins[places],
@@ -76,7 +73,7 @@ class PixelWindows:
         )
 
     def smoothed(self, values: Array, size: int) -> Array:
-        """Means over `size`² pixels, with zero where there is none, shape (n, p)."""
+        """Means over `size`² pixels, with zero outside the ring, shape (n, p)."""
         count, side = len(values), len(self.ring)
         tiles = np.zeros((count, side + size, side), dtype=np.float32)
         tiles[:, :side][:, self.ring] = values

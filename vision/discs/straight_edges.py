@@ -1,7 +1,7 @@
-"""Straight edges near a disc, such as those of the wall that it is printed on: which there are, and where.
+"""Search for straight edges near a disc, such as those of the wall that it is printed on.
 
-A greedy search (matching pursuit): of many half-planes, the one that explains most of what the picture
-without it leaves over, then a second. What the disc itself could explain by moving is taken out first.
+Greedy orthogonal matching pursuit: of many half-planes, the one that reduces the residuals most, then a
+second. What the disc itself could explain by moving is projected out first.
 
 Source: Y. C. Pati, R. Rezaiifar, P. S. Krishnaprasad, "Orthogonal matching pursuit", Asilomar Conference
 1993.
@@ -11,18 +11,13 @@ import numpy as np
 from scipy.special import ndtr
 
 from geometry.arrays import BoolArray, FloatArray
-from vision.discs.disc_image_model import BLUR, COUNT, EDGE, RADIUS, Array, picture
+from vision.discs.disc_image_model import BLUR, COUNT, EDGE, EDGES, RADIUS, Array, disc_image
 from vision.discs.pixel_windows import QUANTISATION, PixelWindows
 
-EDGES = 2
-"""At most, beside every disc."""
-
-ANGLES = 24
-OFFSETS = np.arange(0.75, 4.0, 0.5)
-"""Of the half-planes that are tried: directions of the normal, and pixels between disc and edge."""
-
+ANGLES, OFFSETS = 24, np.arange(0.75, 4.0, 0.5)
+"""Half-planes that are tried: number of directions of the normal, and pixels between disc and edge."""
 GAIN = 30.0
-"""Squares that an edge must explain, over the variance of the noise."""
+"""Sum of squares that an edge must explain, over the variance of the noise."""
 
 
 def with_edges(
@@ -32,11 +27,11 @@ def with_edges(
 
     Args:
         window: The pixels around the discs.
-        parameters: Of the discs alone, nearly right, shape (n, 10).
+        parameters: Of the discs alone, near the solution, shape (n, 10).
         trusted: Pixels that may be used, shape (n, p).
 
     Returns:
-        Parameters with two edges, shape (n, 16), and which of the edges are there, shape (n, 2).
+        Parameters with two edges, shape (n, 16), and a mask of the edges that were found, shape (n, 2).
     """
     angles, gaps = (a.ravel() for a in np.meshgrid(np.arange(ANGLES) * 2 * np.pi / ANGLES, OFFSETS))
     offsets = gaps + np.median(parameters[:, RADIUS])
@@ -44,30 +39,30 @@ def with_edges(
     x, y, used = window.x[some], window.y[some], trusted[:, some]
     across = np.outer(np.cos(angles), x) + np.outer(np.sin(angles), y)
     tried = ndtr((across - offsets[:, None]).astype(np.float32) / np.float32(np.median(parameters[:, BLUR])))
-    levels, known = picture(parameters.astype(np.float32), x, y)
+    levels, known = disc_image(parameters.astype(np.float32), x, y)
     known *= used[:, None]
-    rest = (window.values[:, some] - np.clip(levels, 0, 255)) * used
+    residuals = (window.values[:, some] - np.clip(levels, 0, 255)) * used
     inverse = np.linalg.inv(known @ known.transpose(0, 2, 1) + 1e-3 * np.eye(COUNT)).astype(np.float32)
 
-    def beside(values: Array) -> Array:
-        """What the disc cannot explain of values at the pixels, shape (n, p)."""
+    def orthogonal(values: Array) -> Array:
+        """Part of values at the pixels that is orthogonal to the disc's derivatives, shape (n, p)."""
         share = inverse @ (known @ values[:, :, None])
         return np.asarray(values - (share.transpose(0, 2, 1) @ known)[:, 0])
 
     shared = known @ tried.T
     squares = used @ (tried * tried).T - (shared * (inverse @ shared)).sum(axis=1)
-    rest = beside(rest)
-    each = np.arange(len(rest))
-    edges, present = np.zeros((len(rest), EDGES, EDGE)), np.zeros((len(rest), EDGES), dtype=bool)
+    residuals = orthogonal(residuals)
+    each = np.arange(len(residuals))
+    edges, present = np.zeros((len(residuals), EDGES, EDGE)), np.zeros((len(residuals), EDGES), dtype=bool)
     for number in range(EDGES):
-        alike, length = rest @ tried.T, np.maximum(squares, 1.0)
-        best = (alike**2 / length).argmax(axis=1)
-        lighter = alike[each, best] / length[each, best]
-        gain = lighter * alike[each, best]
+        overlap, length = residuals @ tried.T, np.maximum(squares, 1.0)
+        best = (overlap**2 / length).argmax(axis=1)
+        lighter = overlap[each, best] / length[each, best]
+        gain = lighter * overlap[each, best]
         present[:, number] = gain > GAIN * np.maximum(window.noise**2, QUANTISATION)
         edges[:, number] = np.stack([angles[best], offsets[best], lighter], axis=1)
-        chosen = beside(tried[best] * used)
-        rest = rest - lighter[:, None] * chosen
+        chosen = orthogonal(tried[best] * used)
+        residuals = residuals - lighter[:, None] * chosen
         squares = squares - (chosen @ tried.T) ** 2 / np.maximum((chosen**2).sum(axis=1, keepdims=True), 1.0)
     edges *= present[:, :, None]
-    return np.concatenate([parameters, edges.reshape(len(rest), -1)], axis=1), present
+    return np.concatenate([parameters, edges.reshape(len(residuals), -1)], axis=1), present
