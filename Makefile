@@ -2,11 +2,11 @@
 # Arguments go through ARGS, as in: make compare ARGS="--design slender"
 BIN := .venv/bin
 
-.PHONY: help setup compare test verification lint bench clean
+.PHONY: help setup compare test test-all verification lint bench clean
 .DEFAULT_GOAL := help
 
 help: ## list these targets
-	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile | expand -t 22
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 22
 
 setup: ## set up this machine: Debian's packages, .venv, this project
 	@tools/setup.sh
@@ -14,8 +14,14 @@ setup: ## set up this machine: Debian's packages, .venv, this project
 compare: setup ## the main job: compare all solvers on the default finger
 	$(BIN)/compare $(or $(ARGS),--design default)
 
-test: setup ## run the tests
-	$(BIN)/pytest $(ARGS)
+# Each worker computes on one thread: two that share two cores would wait for each other.
+PYTEST = OMP_NUM_THREADS=1 $(BIN)/pytest -n $(or $(WORKERS),$(shell nproc)) --dist loadfile
+
+test: setup ## run the tests that take less than ten seconds
+	$(PYTEST) -m "not slow" $(ARGS)
+
+test-all: setup ## run all tests, as CI does
+	$(PYTEST) $(ARGS)
 
 verification: setup ## measure fem against known answers, write docs/verification.md
 	$(BIN)/python -m benchmarks.verification

@@ -31,6 +31,7 @@ def off(mesh, exact):
     return np.abs(solution.displacement(mesh.markers) - exact).max(), solution.stats["unknowns"]
 
 
+@pytest.mark.slow
 def test_the_tolerance_is_reached_and_true(adaptation, exact):
     """The estimate, and the true error within the factor of two that estimates have; seen: 0.0008 mm."""
     assert adaptation.reached

@@ -159,6 +159,7 @@ def test_what_it_says_of_a_marker_that_is_left_out_is_what_it_says_without(probl
     assert np.abs(solution.left_out - again.displacement(problem.mesh.markers))[:6].max() > 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("choose", ["left-out", "evidence"])
 def test_the_chosen_weights_are_the_best_on_the_curve(problem, choose):
     solver = PinnAsmSolver(**{**QUICK, "tolerance": 1.0}, weights="precision", choose=choose)

@@ -123,6 +123,7 @@ def errors(network: Solution, reference: Solution) -> tuple[float, float]:
     )
 
 
+@pytest.mark.slow
 def test_displacement_and_stress_are_those_of_finite_elements():
     """The default finger and settings, against elements graded to 0.02 mm; 0.05 % and 2.6 % are usual."""
     mesh = finger_mesh(Design())
@@ -136,6 +137,7 @@ def test_displacement_and_stress_are_those_of_finite_elements():
     assert network.status.converged, network.status.message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [PinnStdSolver, PinnLocalSolver])
 def test_a_broken_law_is_seen(coarse_mesh, monkeypatch, kind):
     """The first Lamé constant of plane stress in place of plane strain's: 20 % in stress; else 6 %.
