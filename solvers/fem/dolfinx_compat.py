@@ -19,6 +19,7 @@ from petsc4py import PETSc
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
 from geometry.errors import UserError
+from solvers.elasticity import Lame
 from solvers.fem.ranks import communicator
 from solvers.lagrange import LagrangeSpace
 
@@ -108,25 +109,29 @@ class DistributedSpace:
         self._node_of_dof = _nodes_of_dofs(space, self.domain, self.dolfinx_space)
         self._owned = self.dolfinx_space.dofmap.index_map.size_local
 
-    def constant(self, value: float) -> Any:
-        """A number that can change without compiling the form again."""
-        return dolfinx.fem.Constant(self.domain, PETSc.ScalarType(value))
+    def moduli(self, lame: Lame) -> Lame:
+        """Lamé's constants λ and μ as numbers that can change without compiling a form again."""
+        λ, μ = (dolfinx.fem.Constant(self.domain, PETSc.ScalarType(value)) for value in lame[:2])
+        return Lame(λ, μ, lame.λ_out)
 
     def form(self, expression: Any) -> Any:
         """Compile a UFL form."""
         with _quiet_compiler():
             return dolfinx.fem.form(expression)
 
-    def clamp(self, nodes: IntArray, axes: Sequence[int] = (0, 1)) -> list[Any]:
-        """Homogeneous Dirichlet conditions on components of nodes."""
-        dofs = np.flatnonzero(np.isin(self._node_of_dof, nodes)).astype(np.int32)
-        conditions = []
-        for axis in axes:
-            part = self.dolfinx_space.sub(axis)
+    def derivatives(self, energy: Any) -> tuple[Any, Any]:
+        """Compile the first and the second derivative of an energy, a UFL form, by `function`."""
+        space = self.function.function_space
+        force = ufl.derivative(energy, self.function, ufl.TestFunction(space))
+        return self.form(force), self.form(ufl.derivative(force, self.function, ufl.TrialFunction(space)))
+
+    def clamp(self, clamped: BoolArray) -> list[Any]:
+        """Homogeneous Dirichlet conditions on the components of a mask of shape (N, 2)."""
+        zero, conditions = PETSc.ScalarType(0.0), []
+        for axis, held in enumerate(clamped[self._node_of_dof].T):
             # A sub-space numbers its degrees of freedom within the blocked parent.
-            conditions.append(
-                dolfinx.fem.dirichletbc(PETSc.ScalarType(0.0), (2 * dofs + axis).astype(np.int32), part)
-            )
+            dofs = (2 * np.flatnonzero(held) + axis).astype(np.int32)
+            conditions.append(dolfinx.fem.dirichletbc(zero, dofs, self.dolfinx_space.sub(axis)))
         return conditions
 
     def assemble_matrix(
@@ -139,12 +144,10 @@ class DistributedSpace:
             conditions: What is clamped.
             into: An earlier matrix of the same form, which is overwritten; a new one if None.
         """
-        assemble: Any = dolfinx.fem.petsc.assemble_matrix
-        if into is None:
-            matrix = assemble(form, bcs=list(conditions))
-        else:
+        if into is not None:
             into.zeroEntries()
-            matrix = assemble(into, form, bcs=list(conditions))
+        assemble: Any = dolfinx.fem.petsc.assemble_matrix
+        matrix = assemble(*(() if into is None else (into,)), form, bcs=list(conditions))
         matrix.assemble()
         return matrix
 

@@ -1,6 +1,6 @@
-"""Linear elasticity as least energy: the stiffness, its factorisation, and minimisers for given values."""
+"""Linear elasticity: the stiffness, and equilibria for given values at base and contact."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -9,7 +9,7 @@ from petsc4py import PETSc
 
 from geometry.arrays import BoolArray, FloatArray
 from solvers.constrained_elimination import ConstrainedElimination
-from solvers.elasticity import Lame, linear_energy_density
+from solvers.elasticity import linear_energy_density
 from solvers.fem.boundary_conditions import (
     held_components,
     held_displacement,
@@ -33,12 +33,21 @@ the iterations (1.4 GB).
 
 @dataclass(frozen=True, eq=False)
 class LinearElasticity:
-    """The assembled stiffness with its boundary conditions."""
+    """The forms of the linear problem.
+
+    Attributes:
+        problem: The problem.
+        distributed: The elements in DOLFINx.
+        force: The compiled internal force.
+        stiffness: The compiled stiffness.
+        iterative: Whether systems are solved by multigrid, not by factorisation.
+    """
 
     problem: Problem
     distributed: DistributedSpace
-    forms: dict[str, Any] = field(default_factory=dict)
-    iterative: bool = False
+    force: Any
+    stiffness: Any
+    iterative: bool
 
     @classmethod
     def of(
@@ -46,28 +55,16 @@ class LinearElasticity:
     ) -> "LinearElasticity":
         """Compile the forms of a problem."""
         distributed = DistributedSpace(space)
-        lame = problem.material.lame
-        constants = Lame(distributed.constant(lame.λ), distributed.constant(lame.μ), lame.λ_out)
-        u = distributed.function
-        energy = linear_energy_density(ufl.grad(u), constants) * ufl.dx
-        residual = ufl.derivative(energy, u, ufl.TestFunction(u.function_space))
-        stiffness = ufl.derivative(residual, u, ufl.TrialFunction(u.function_space))
-        forms = {"residual": distributed.form(residual), "stiffness": distributed.form(stiffness)}
-        iterative = {
-            "auto": 2 * len(space.nodes) > ITERATIVE_BEYOND,
-            "direct": False,
-            "iterative": True,
-        }[linear_solver]
-        return cls(problem, distributed, forms, iterative)
+        moduli = distributed.moduli(problem.material.lame)
+        energy = linear_energy_density(ufl.grad(distributed.function), moduli) * ufl.dx
+        iterative = linear_solver == "iterative"
+        if linear_solver == "auto":
+            iterative = 2 * len(space.nodes) > ITERATIVE_BEYOND
+        return cls(problem, distributed, *distributed.derivatives(energy), iterative)
 
     def assemble(self, clamped: BoolArray) -> PETSc.Mat:
         """The stiffness with the components of the mask `clamped`, shape (N, 2), held."""
-        conditions = [
-            condition
-            for axis in (0, 1)
-            for condition in self.distributed.clamp(np.flatnonzero(clamped[:, axis]), (axis,))
-        ]
-        return self.distributed.assemble_matrix(self.forms["stiffness"], conditions)
+        return self.distributed.assemble_matrix(self.stiffness, self.distributed.clamp(clamped))
 
     def factorise(self, clamped: BoolArray) -> Factorisation | Multigrid:
         """Assemble and factorise with the components of the mask `clamped`, shape (N, 2), held."""
@@ -79,7 +76,7 @@ class LinearElasticity:
     def internal_force(self, nodal: FloatArray) -> FloatArray:
         """Internal force K u of nodal displacements, shape (N, 2), N/mm."""
         self.distributed.set_function(nodal)
-        return self.distributed.assemble_nodal(self.forms["residual"])
+        return self.distributed.assemble_nodal(self.force)
 
 
 @dataclass(frozen=True, eq=False)

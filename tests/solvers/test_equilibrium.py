@@ -1,9 +1,12 @@
 """The discrete finite-strain problem: derivatives by Taylor's theorem, objectivity, SNES and its failures."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium, LoadStage
+from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
+from solvers.fem.finite_strain.load_state import LoadState
 from solvers.fem.finite_strain.newton import ConstrainedNewton, NewtonResult
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
@@ -11,7 +14,6 @@ from tests.solvers.conftest import bar_mesh
 
 LAWS = ("neo-hookean", "st-venant-kirchhoff")
 STEPS = 0.1 * 0.5 ** np.arange(4)
-REST = LoadStage(0.0, np.zeros(0))
 
 
 def equilibrium(law, load=Load(kind="patch")) -> FiniteStrainEquilibrium:
@@ -47,7 +49,7 @@ def test_energy_has_the_internal_force_and_the_tangent_as_derivatives(law):
     problem = equilibrium(law)
     start, direction = fields(problem, 0, 1)
     energy, force = problem.energy(start), problem.internal_force(start)
-    problem.factorise(start, REST)
+    problem.factorise(replace(problem.rest, nodal=start))
     first, second = (force * direction).sum(), (direction * times_tangent(problem, direction)).sum()
     changes = np.array([problem.energy(start + t * direction) - energy for t in STEPS])
     np.testing.assert_allclose(slopes(changes - STEPS * first), 2, atol=0.1)
@@ -58,19 +60,16 @@ def test_balance_with_a_cylinder_has_its_tangent_as_derivative():
     """With some nodes in contact and the cylinder shifted, so that its normals turn."""
     load = Load(kind="cylinder", radius=3.0, displacement=(0.1, -0.2))
     problem = equilibrium("neo-hookean", load)
-    stage = LoadStage(1.0, np.full(len(problem.contact.nodes), 0.05))
-    start, direction = fields(problem, 0, 1, size=0.01)
-    pressed = problem.contact.forces(start, stage.fraction, stage.multipliers) > 0
+    nodal, direction = fields(problem, 0, 1, size=0.01)
+    start = LoadState(1.0, nodal, np.zeros(0), np.full(len(problem.contact.nodes), 0.05))
+    pressed = problem.contact.forces(start) > 0
     assert 0 < pressed.sum() < len(pressed)
-    none = np.zeros(0)
-    balance, _ = problem.unbalanced(start, none, stage)
-    problem.factorise(start, stage)
+    balance, _ = problem.unbalanced(start)
+    problem.factorise(start)
     change = times_tangent(problem, direction)
     steps = 0.1 * STEPS  # so small that no node comes into contact or leaves it
-    left = [
-        np.linalg.norm(problem.unbalanced(start + t * direction, none, stage)[0] - balance - t * change)
-        for t in steps
-    ]
+    there = [problem.unbalanced(replace(start, nodal=nodal + t * direction))[0] for t in steps]
+    left = [np.linalg.norm(force - balance - t * change) for force, t in zip(there, steps, strict=True)]
     np.testing.assert_allclose(slopes(left), 2, atol=0.1)
 
 
@@ -93,8 +92,7 @@ def newton(problem: FiniteStrainEquilibrium, iterations: int = 12) -> Constraine
 
 def started(solver: ConstrainedNewton, problem: FiniteStrainEquilibrium) -> NewtonResult:
     """From the linear guess to the full load."""
-    nodal, forces, pressed = problem.linear_guess(1.0)
-    return solver.solve(nodal, forces, LoadStage(1.0, pressed))
+    return solver.solve(problem.linear_guess(1.0))
 
 
 def test_newton_meets_constraints_and_balance_and_converges_quadratically():
@@ -102,9 +100,10 @@ def test_newton_meets_constraints_and_balance_and_converges_quadratically():
     balance = started(newton(problem), problem)
     assert (balance.converged, balance.reason) == (True, "converged_fnorm_relative")
     assert balance.iterations <= 5
-    left, size = problem.unbalanced(balance.nodal, balance.forces, LoadStage(1.0, np.zeros(0)))
+    left, size = problem.unbalanced(balance.state)
     assert np.abs(left).max() < 1e-8 * size
-    np.testing.assert_allclose(problem.constraints.missing(balance.nodal, balance.forces, 1.0), 0, atol=1e-10)
+    missing = problem.constraints.missing(balance.state.nodal, balance.state.forces, 1.0)
+    np.testing.assert_allclose(missing, 0, atol=1e-10)
 
 
 def test_newton_says_that_it_takes_too_long():
@@ -116,14 +115,14 @@ def test_newton_says_that_it_takes_too_long():
 def test_newton_does_not_start_from_an_element_turned_inside_out():
     problem = equilibrium("neo-hookean", Load(kind="mean", displacement=(0.1, -0.4)))
     (torn,) = fields(problem, 0, size=2.0)
-    balance = newton(problem).solve(torn, np.zeros(2), LoadStage(1.0, np.zeros(0)))
+    balance = newton(problem).solve(replace(problem.rest, fraction=1.0, nodal=torn))
     assert (balance.converged, balance.reason) == (False, "diverged_function_domain")
 
 
 def test_newton_meets_constraints_that_its_start_misses():
     problem = equilibrium("neo-hookean", Load(kind="mean", displacement=(0.02, -0.05)))
     expected = started(newton(problem), problem)
-    found = newton(problem).solve(0 * expected.nodal, np.zeros(2), LoadStage(1.0, np.zeros(0)))
+    found = newton(problem).solve(replace(problem.rest, fraction=1.0))
     assert found.converged
-    np.testing.assert_allclose(found.nodal, expected.nodal, atol=1e-8)
-    np.testing.assert_allclose(found.forces, expected.forces, rtol=1e-6)
+    np.testing.assert_allclose(found.state.nodal, expected.state.nodal, atol=1e-8)
+    np.testing.assert_allclose(found.state.forces, expected.state.forces, rtol=1e-6)

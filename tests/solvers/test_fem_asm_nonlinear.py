@@ -11,8 +11,9 @@ from geometry.observations import Observations
 from solvers.assimilation.misfit import misfit_of
 from solvers.fem.assimilating import FemAsmSolver
 from solvers.fem.finite_strain.constraints import DisplacementConstraints
-from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium, LoadStage
+from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
 from solvers.fem.finite_strain.load_path import LoadPath
+from solvers.fem.finite_strain.load_state import LoadState
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem, contact_functional
@@ -119,11 +120,11 @@ def test_energy_plus_misfit_has_balance_and_tangent_as_derivatives(law):
 
     def gradient(nodal):
         forces = constraints.missing(nodal, np.zeros(len(constraints.targets)), 1.0) / constraints.slacks
-        return equilibrium.unbalanced(nodal, forces, LoadStage(1.0, np.zeros(0)))[0]
+        return equilibrium.unbalanced(LoadState(1.0, nodal, forces, np.zeros(0)))[0]
 
     steps = 0.02 * 0.5 ** np.arange(4)
     first = (gradient(start) * direction).sum()
-    equilibrium.factorise(start, LoadStage(1.0, np.zeros(0)))
+    equilibrium.factorise(replace(equilibrium.rest, nodal=start))
     vector, product = equilibrium.matrix.createVecs()
     equilibrium.distributed.distribute(direction, vector)
     equilibrium.matrix.mult(vector, product)

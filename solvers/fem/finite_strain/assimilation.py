@@ -16,7 +16,8 @@ from geometry.arrays import BoolArray, FloatArray
 from solvers.assimilation.marker_forces import residual_phrase
 from solvers.assimilation.misfit import Misfit, leave_one_out_displacements
 from solvers.fem.finite_strain.constraints import DisplacementConstraints
-from solvers.fem.finite_strain.load_path import LoadPath, PathPoint
+from solvers.fem.finite_strain.load_path import LoadPath
+from solvers.fem.finite_strain.load_state import LoadState
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
@@ -103,7 +104,7 @@ def _left_out(
     return missed
 
 
-def _from_rest(path: LoadPath, problem: Problem, kept: BoolArray) -> PathPoint | None:
+def _from_rest(path: LoadPath, problem: Problem, kept: BoolArray) -> LoadState | None:
     """Equilibrium at the full load under some of a path's constraints; None if there is none."""
     equilibrium = path.equilibrium
     again = _path(problem, equilibrium.distributed.space, equilibrium.constraints.only(kept))

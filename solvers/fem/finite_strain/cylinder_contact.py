@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
+from solvers.fem.finite_strain.load_state import LoadState
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem, contact_ends
 
@@ -62,34 +63,23 @@ class CylinderContact:
         """The fraction of the load in which the cylinder moves by half its radius."""
         return float(0.5 * self.radius / np.linalg.norm(self.travel))
 
-    def gaps(self, nodal: FloatArray, fraction: float) -> tuple[FloatArray, FloatArray]:
-        """Distances from the cylinder, shape (m,), mm, and its outer normals there, shape (m, 2).
-
-        Args:
-            nodal: Displacements of all nodes, shape (N, 2), mm.
-            fraction: Of the load.
-        """
-        away = self.positions + nodal[self.nodes] - self.centre - fraction * self.travel
+    def gaps(self, state: LoadState) -> tuple[FloatArray, FloatArray]:
+        """Distances g from the cylinder, shape (m,), mm, and its outer normals n there, shape (m, 2)."""
+        away = self.positions + state.nodal[self.nodes] - self.centre - state.fraction * self.travel
         distance = np.linalg.norm(away, axis=1)
         return distance - self.radius, away / distance[:, None]
 
-    def forces(self, nodal: FloatArray, fraction: float, multipliers: FloatArray) -> FloatArray:
-        """Forces q of the cylinder on the nodes along its outer normal, shape (m,), N/mm; never tension."""
-        gap, _ = self.gaps(nodal, fraction)
-        return np.maximum(0.0, multipliers - self.stiffness * gap)
+    def forces(self, state: LoadState) -> FloatArray:
+        """Forces q along the outer normals, shape (m,), N/mm, never tension; λ is `state.contact`."""
+        return np.maximum(0.0, state.contact - self.stiffness * self.gaps(state)[0])
 
-    def gradient(self, nodal: FloatArray, fraction: float, multipliers: FloatArray) -> FloatArray:
-        """What contact adds to the balance of the m nodes: - q n, shape (m, 2), N/mm.
+    def gradient(self, state: LoadState) -> FloatArray:
+        """Residual force - q n of the contact, the derivative of Σ (q^2 - λ^2) / 2 k, shape (m, 2), N/mm."""
+        return -self.forces(state)[:, None] * self.gaps(state)[1]
 
-        It is the derivative of the sum of (q^2 - λ^2) / 2 k.
-        """
-        _, normal = self.gaps(nodal, fraction)
-        return -self.forces(nodal, fraction, multipliers)[:, None] * normal
-
-    def tangent(self, nodal: FloatArray, fraction: float, multipliers: FloatArray) -> FloatArray:
-        """Derivative of the gradient, a block k n n^T - q (I - n n^T) / |away| a node, shape (m, 2, 2)."""
-        gap, normal = self.gaps(nodal, fraction)
-        force = np.maximum(0.0, multipliers - self.stiffness * gap)
+    def tangent(self, state: LoadState) -> FloatArray:
+        """Derivative of the gradient, a block k n n^T - q (I - n n^T) / (g + radius) a node, (m, 2, 2)."""
+        (gap, normal), force = self.gaps(state), self.forces(state)
         across = np.einsum("mi,mj->mij", normal, normal)
         turning = (force / (gap + self.radius))[:, None, None] * (np.eye(2) - across)
         return np.asarray((force > 0)[:, None, None] * self.stiffness * across - turning)
@@ -143,20 +133,13 @@ class ContactRegion:
         }
 
     @classmethod
-    def of(
-        cls, contact: CylinderContact, nodal: FloatArray, fraction: float, force: FloatArray
-    ) -> "ContactRegion | None":
+    def of(cls, contact: CylinderContact, state: LoadState) -> "ContactRegion | None":
         """The region in a state of equilibrium; none where the cylinder does not touch the finger.
 
         Its ends are taken half way between a point that touches and the next one that does not.
-
-        Args:
-            contact: The cylinder.
-            nodal: Displacements of all nodes, shape (N, 2), mm.
-            fraction: Of the load.
-            force: On the nodes of the front, shape (m,), N/mm.
         """
-        gap, normal = contact.gaps(nodal, fraction)
+        gap, normal = contact.gaps(state)
+        nodal, force = state.nodal, state.contact
         touching = np.flatnonzero(force > 0)
         if not len(touching):
             return None

@@ -6,7 +6,7 @@ potential Π of the elastic energy and, for a cylinder, of contact, equilibrium 
     dΠ/dc - f_k b_k = 0        b_k . c + s_k f_k = d_k
 """
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from solvers.fem.boundary_conditions import held_components, held_displacement
 from solvers.fem.dolfinx_compat import DistributedSpace, Factorisation
 from solvers.fem.finite_strain.constraints import DisplacementConstraints
 from solvers.fem.finite_strain.cylinder_contact import CylinderContact
+from solvers.fem.finite_strain.load_state import LoadState
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 
@@ -27,19 +28,6 @@ QUADRATURE_DEGREE = 4
 """Of the energy's integral: exact for quadratic elements with the quadratic part of the law."""
 PROBE = 1e-4
 """Fraction of the load in the difference that stands for a derivative of the internal forces at rest."""
-
-
-@dataclass(frozen=True, eq=False)
-class LoadStage:
-    """What is given at one stage of the load.
-
-    Attributes:
-        fraction: Of the load.
-        multipliers: Of the contact, shape (m,), N/mm; empty without one.
-    """
-
-    fraction: float
-    multipliers: FloatArray
 
 
 class FiniteStrainEquilibrium:
@@ -64,23 +52,16 @@ class FiniteStrainEquilibrium:
         self.constraints = constraints or DisplacementConstraints.of(problem, space)
         self.contact = CylinderContact.of(problem, space) if problem.load.kind == "cylinder" else None
         self._derivatives = space.shape_gradients(body_quadrature(problem.mesh, QUADRATURE_DEGREE).location)
-        lame = problem.material.lame
-        constants = Lame(self.distributed.constant(lame.λ), self.distributed.constant(lame.μ), lame.λ_out)
+        constants = self.distributed.moduli(problem.material.lame)
         self._moduli: tuple[Any, Any] = constants[:2]
-        u = self.distributed.function
+        gradient = ufl.grad(self.distributed.function)
         measure = ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
-        energy = energy_density_of(problem.material.law, ufl.grad(u), constants, ufl.ln) * measure
-        residual = ufl.derivative(energy, u, ufl.TestFunction(u.function_space))
-        tangent = ufl.derivative(residual, u, ufl.TrialFunction(u.function_space))
-        self._energy, self._residual, self._tangent = map(self.distributed.form, (energy, residual, tangent))
-        self._conditions = [
-            condition
-            for axis in (0, 1)
-            for condition in self.distributed.clamp(np.flatnonzero(self.clamped[:, axis]), (axis,))
-        ]
-        matrix = self.distributed.assemble_matrix(self._tangent, self._conditions)
-        self.matrix = matrix
-        self.factors = Factorisation(self.distributed, matrix, self.clamped, positive_definite=False)
+        energy = energy_density_of(problem.material.law, gradient, constants, ufl.ln) * measure
+        self._energy = self.distributed.form(energy)
+        self._force, self._tangent = self.distributed.derivatives(energy)
+        self._conditions = self.distributed.clamp(self.clamped)
+        self.matrix = self.distributed.assemble_matrix(self._tangent, self._conditions)
+        self.factors = Factorisation(self.distributed, self.matrix, self.clamped, positive_definite=False)
         self.elimination = self._elimination()
 
     def become(self, problem: Problem) -> None:
@@ -113,31 +94,24 @@ class FiniteStrainEquilibrium:
     def internal_force(self, nodal: FloatArray) -> FloatArray:
         """Derivative of the elastic energy, shape (N, 2), N/mm."""
         self.distributed.set_function(nodal)
-        return self.distributed.assemble_nodal(self._residual)
+        return self.distributed.assemble_nodal(self._force)
 
-    def unbalanced(self, nodal: FloatArray, forces: FloatArray, stage: LoadStage) -> tuple[FloatArray, float]:
-        """What is left of equilibrium, shape (N, 2), N/mm, zero where clamped; the largest internal force.
-
-        Args:
-            nodal: Displacements, shape (N, 2), mm.
-            forces: Multipliers of the constraints, shape (k,), N/mm.
-            stage: Of the load.
-        """
-        internal = self.internal_force(nodal)
-        balance = internal - self.constraints.at_nodes(forces)
+    def unbalanced(self, state: LoadState) -> tuple[FloatArray, float]:
+        """Residual force, shape (N, 2), N/mm, zero where clamped, and the largest internal force."""
+        internal = self.internal_force(state.nodal)
+        balance = internal - self.constraints.at_nodes(state.forces)
         if self.contact is not None:
-            balance[self.contact.nodes] += self.contact.gradient(nodal, stage.fraction, stage.multipliers)
+            balance[self.contact.nodes] += self.contact.gradient(state)
         return np.where(self.clamped, 0.0, balance), float(np.abs(internal).max())
 
-    def factorise(self, nodal: FloatArray, stage: LoadStage) -> None:
-        """Factorise the tangent at displacements of shape (N, 2), mm."""
-        self.distributed.set_function(nodal)
+    def factorise(self, state: LoadState) -> None:
+        """Factorise the tangent at a state."""
+        self.distributed.set_function(state.nodal)
         self.distributed.assemble_matrix(self._tangent, self._conditions, into=self.matrix)
         if self.contact is not None:
-            nodes = self.contact.nodes
-            blocks = self.contact.tangent(nodal, stage.fraction, stage.multipliers)
-            free = ~self.clamped[nodes]
-            self.distributed.add_blocks(self.matrix, nodes, blocks * (free[:, :, None] & free[:, None, :]))
+            free = ~self.clamped[self.contact.nodes]
+            blocks = self.contact.tangent(state) * (free[:, :, None] & free[:, None, :])
+            self.distributed.add_blocks(self.matrix, self.contact.nodes, blocks)
         self.factors.update()
         self.elimination = self._elimination()
 
@@ -148,11 +122,7 @@ class FiniteStrainEquilibrium:
         )
 
     def response(self, force: FloatArray) -> FloatArray:
-        """Change of the displacements under more nodal forces, by the tangent that is factorised, (N, 2), mm.
-
-        Args:
-            force: Shape (N, 2), N/mm.
-        """
+        """Displacements, mm, under nodal forces, N/mm, by the factorised tangent: both (N, 2)."""
         return self.elimination.solution(self.factors.solve(force))[0]
 
     def possible(self, nodal: FloatArray) -> bool:
@@ -160,34 +130,35 @@ class FiniteStrainEquilibrium:
         gradient = np.stack([derivative @ nodal for derivative in self._derivatives], axis=-1)
         return bool(np.isfinite(nodal).all() and (deformation_jacobian(gradient) > 0).all())
 
-    def linear_guess(self, fraction: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Where the undeformed tangent, which must be factorised, leads at a fraction of the load.
+    @property
+    def rest(self) -> LoadState:
+        """The state without load."""
+        contact = 0 if self.contact is None else len(self.contact.nodes)
+        forces = np.zeros(len(self.constraints.targets))
+        return LoadState(0.0, np.zeros(self.clamped.shape), forces, np.zeros(contact))
 
-        For a cylinder that is as if it touched only the node that it has come nearest to.
+    def linear_guess(self, fraction: float) -> LoadState:
+        """The linear solution at a fraction of the load, by the undeformed tangent, which must be factorised.
 
-        Returns:
-            Displacements, shape (N, 2), mm, that meet the constraints; multipliers of the constraints, shape
-            (k,), and of the contact, shape (m,), N/mm.
+        A cylinder touches only the node nearest to it.
         """
+        if self.contact is not None:
+            return self._pressed_at_one_node(self.contact, fraction)
         nodal = fraction * self.held
         if nodal.any():
             step = PROBE * self.held
             stiffness = (self.internal_force(step) - self.internal_force(-step)) / (2 * PROBE)
             nodal = nodal + self.factors.solve(-fraction * stiffness)
-        if self.contact is not None:
-            return self._pressed_at_one_node(self.contact, fraction)
-        return *self.elimination.solution(nodal, fraction * self.constraints.targets), np.zeros(0)
+        nodal, forces = self.elimination.solution(nodal, fraction * self.constraints.targets)
+        return LoadState(fraction, nodal, forces, np.zeros(0))
 
-    def _pressed_at_one_node(
-        self, contact: CylinderContact, fraction: float
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        rest = np.zeros(self.clamped.shape)
-        gap, normal = contact.gaps(rest, fraction)
+    def _pressed_at_one_node(self, contact: CylinderContact, fraction: float) -> LoadState:
+        rest = replace(self.rest, fraction=fraction)
+        gap, normal = contact.gaps(rest)
         nearest = gap.argmin()
-        functional = rest.copy()
-        functional[contact.nodes[nearest]] = normal[nearest]
-        pressing = ConstrainedElimination.of(self.factors.solve, functional[None])
-        nodal, force = pressing.solution(rest, np.maximum(-gap[[nearest]], 0.0))
-        pressed = np.zeros(len(gap))
-        pressed[nearest] = force[0]
-        return nodal, np.zeros(0), pressed
+        functional = np.zeros((1, *self.clamped.shape))
+        functional[0, contact.nodes[nearest]] = normal[nearest]
+        pressing = ConstrainedElimination.of(self.factors.solve, functional)
+        nodal, force = pressing.solution(rest.nodal, np.maximum(-gap[[nearest]], 0.0))
+        rest.contact[nearest] = force[0]
+        return replace(rest, nodal=nodal)

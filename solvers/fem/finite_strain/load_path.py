@@ -1,7 +1,7 @@
 """From rest to the full load in steps that adapt to how hard they are."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -10,7 +10,8 @@ from geometry.arrays import BoolArray, FloatArray
 from solvers.fem.boundary_conditions import reaction_by_residual_work
 from solvers.fem.finite_strain.constraints import DisplacementConstraints
 from solvers.fem.finite_strain.cylinder_contact import ContactRegion
-from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium, LoadStage
+from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
+from solvers.fem.finite_strain.load_state import LoadState
 from solvers.fem.finite_strain.newton import ConstrainedNewton
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
@@ -31,23 +32,6 @@ class Steps:
     first: float
     longest: float
     shortest: float
-
-
-@dataclass(frozen=True, eq=False)
-class PathPoint:
-    """Equilibrium at a fraction of the load.
-
-    Attributes:
-        fraction: Of the load.
-        nodal: Displacements, shape (N, 2), mm.
-        forces: Multipliers of the constraints, shape (k,), N/mm.
-        contact: Forces of the cylinder on the nodes of the front, shape (m,), N/mm.
-    """
-
-    fraction: float
-    nodal: FloatArray
-    forces: FloatArray
-    contact: FloatArray
 
 
 class LoadPath:
@@ -96,9 +80,7 @@ class LoadPath:
         self._newton = self._begin()
         contact = self.equilibrium.contact
         self._longest = steps.longest if contact is None else min(steps.longest, contact.longest_step)
-        pressed = np.zeros(0 if contact is None else len(contact.nodes))
-        rest = np.zeros((len(space.nodes), 2))
-        self.points = [PathPoint(0.0, rest, np.zeros(len(self.equilibrium.constraints.targets)), pressed)]
+        self.points = [self.equilibrium.rest]
         self.halved = self.iterations = 0
         self.reason = ""
 
@@ -124,8 +106,8 @@ class LoadPath:
             progress(fraction, f"{fraction:.0%} of the load, {self.iterations - before} Newton iterations")
             step = min(self._longest, step * (2 if hardest <= QUICK else 1))
 
-    def continued(self, problem: Problem, nodal: FloatArray, forces: FloatArray) -> PathPoint | None:
-        """Equilibrium at the full load of another problem; None if none is found.
+    def continued(self, problem: Problem, nodal: FloatArray, forces: FloatArray) -> LoadState | None:
+        """Equilibrium under the full load of another problem; None if none is found.
 
         Args:
             problem: With another load and moduli.
@@ -133,65 +115,56 @@ class LoadPath:
             forces: Multipliers that are near, shape (k,), N/mm.
         """
         self.equilibrium.become(problem)
-        balance = self._newton.solve(nodal, forces, LoadStage(1.0, np.zeros(0)))
-        self.iterations += balance.iterations
-        if not balance.converged:
-            return None
-        return PathPoint(1.0, balance.nodal, balance.forces, np.zeros(0))
+        return self._settled(self._newton, LoadState(1.0, nodal, forces, np.zeros(0)))
 
-    def relaxed(self, kept: BoolArray) -> PathPoint | None:
-        """Equilibrium at the full load near the last one, under the constraints of a mask alone, if any."""
+    def relaxed(self, kept: BoolArray) -> LoadState | None:
+        """Equilibrium near the last one under the constraints of a mask alone; None if none is found."""
         last, constraints = self.points[-1], self.equilibrium.constraints
         self.equilibrium.constraints = constraints.only(kept)
         newton = self._begin()
-        balance = newton.solve(last.nodal, last.forces[kept], LoadStage(1.0, last.contact))
+        state = self._settled(newton, replace(last, forces=last.forces[kept]))
         newton.close()
         self.equilibrium.constraints = constraints
-        self.iterations += balance.iterations
-        return PathPoint(1.0, balance.nodal, balance.forces, last.contact) if balance.converged else None
+        return state
 
-    def _step(self, fraction: float) -> tuple[PathPoint | None, int]:
+    def _settled(self, newton: ConstrainedNewton, guess: LoadState) -> LoadState | None:
+        result = newton.solve(guess)
+        self.iterations += result.iterations
+        return result.state if result.converged else None
+
+    def _step(self, fraction: float) -> tuple[LoadState | None, int]:
         """Equilibrium at a fraction of the load, None if there is none; iterations of the hardest solve."""
-        nodal, forces, pressed = self._guess(fraction)
-        hardest = 0
+        guess, contact, hardest = self._guess(fraction), self.equilibrium.contact, 0
         for _ in range(UPDATES):
-            balance = self._newton.solve(nodal, forces, LoadStage(fraction, pressed))
-            self.iterations += balance.iterations
-            hardest = max(hardest, balance.iterations)
-            if not balance.converged:
-                self.reason = f"SNES: {balance.reason}"
+            result = self._newton.solve(guess)
+            self.iterations += result.iterations
+            hardest = max(hardest, result.iterations)
+            if not result.converged:
+                self.reason = f"SNES: {result.reason}"
                 return None, hardest
-            nodal, forces = balance.nodal, balance.forces
-            contact = self.equilibrium.contact
             if contact is None:
-                return PathPoint(fraction, nodal, forces, pressed), hardest
-            pressed = contact.forces(nodal, fraction, pressed)
-            gap, _ = contact.gaps(nodal, fraction)
-            if max(np.abs(gap[pressed > 0]).max(initial=0.0), -gap.min()) <= PENETRATION:
-                return PathPoint(fraction, nodal, forces, pressed), hardest
+                return result.state, hardest
+            guess = replace(result.state, contact=contact.forces(result.state))
+            gap, _ = contact.gaps(guess)
+            if max(np.abs(gap[guess.contact > 0]).max(initial=0.0), -gap.min()) <= PENETRATION:
+                return guess, hardest
         self.reason = "the contact does not settle"
         return None, hardest
 
-    def _guess(self, fraction: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Displacements and multipliers at a fraction of the load: the last two states continued."""
-        last = self.points[-1]
+    def _guess(self, fraction: float) -> LoadState:
+        """The state at a fraction of the load by extrapolation of the last two."""
         if len(self.points) == 1:
             return self.equilibrium.linear_guess(fraction)
-        before = self.points[-2]
-        slope = (fraction - last.fraction) / (last.fraction - before.fraction)
-        return (
-            last.nodal + slope * (last.nodal - before.nodal),
-            last.forces + slope * (last.forces - before.forces),
-            last.contact,
-        )
+        before, last = self.points[-2:]
+        times = (fraction - last.fraction) / (last.fraction - before.fraction)
+        nodal = last.nodal + times * (last.nodal - before.nodal)
+        return LoadState(fraction, nodal, last.forces + times * (last.forces - before.forces), last.contact)
 
-    def reaction(self, point: PathPoint) -> FloatArray:
+    def reaction(self, point: LoadState) -> FloatArray:
         """Force of the indenter on the finger, shape (2,), N/mm."""
         return reaction_by_residual_work(self._space, self.equilibrium.internal_force(point.nodal))
 
-    def region(self, point: PathPoint) -> ContactRegion | None:
+    def region(self, point: LoadState) -> ContactRegion | None:
         """Where a cylinder touches the finger; None where it does not, or there is none."""
         contact = self.equilibrium.contact
-        if contact is None:
-            return None
-        return ContactRegion.of(contact, point.nodal, point.fraction, point.contact)
+        return None if contact is None else ContactRegion.of(contact, point)

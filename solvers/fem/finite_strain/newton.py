@@ -1,13 +1,14 @@
 """Newton's method with line search by PETSc's SNES, for displacements and multipliers together."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
 
 from geometry.arrays import FloatArray
-from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium, LoadStage
+from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
+from solvers.fem.finite_strain.load_state import LoadState
 
 SMALL = 1e-4
 """Least size of the internal forces over Young's modulus, mm: rounding of positions makes forces too."""
@@ -20,15 +21,13 @@ class NewtonResult:
     """How a Newton iteration ended.
 
     Attributes:
-        nodal: Displacements, shape (N, 2), mm.
-        forces: Multipliers of the constraints, shape (k,), N/mm.
+        state: Displacements and forces.
         converged: Whether they are in equilibrium.
         reason: PETSc's word for the end, in lower case.
         iterations: Newton steps taken.
     """
 
-    nodal: FloatArray
-    forces: FloatArray
+    state: LoadState
     converged: bool
     reason: str
     iterations: int
@@ -55,7 +54,7 @@ class ConstrainedNewton:
             max_iterations: Newton steps.
         """
         self._equilibrium, self._scale, self._tolerance = equilibrium, scale, tolerance
-        self._stage = LoadStage(0.0, np.zeros(0))
+        self._state = equilibrium.rest
         self._size = 0.0
         self._torn = False
         self._part, _ = equilibrium.matrix.createVecs()
@@ -87,18 +86,18 @@ class ConstrainedNewton:
         for item in (self._snes, self._jacobian, self._residual, self._unknown, self._part):
             item.destroy()
 
-    def solve(self, nodal: FloatArray, forces: FloatArray, stage: LoadStage) -> NewtonResult:
-        """Find equilibrium at a stage from displacements that meet its constraints."""
-        self._stage, self._torn = stage, not self._equilibrium.possible(nodal)
+    def solve(self, guess: LoadState) -> NewtonResult:
+        """Find equilibrium at the guess's fraction of the load and multipliers of the contact."""
+        self._state, self._torn = guess, not self._equilibrium.possible(guess.nodal)
         if self._torn:
-            return NewtonResult(nodal, forces, False, "diverged_function_domain", 0)
-        self._join(nodal, forces, self._unknown)
+            return NewtonResult(guess, False, "diverged_function_domain", 0)
+        self._join(guess.nodal, guess.forces, self._unknown)
         self._snes.solve(None, self._unknown)
-        nodal, forces = self._split(self._unknown)
         reason = self._snes.getConvergedReason()
         words = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if name[0] != "_"}
         word = "diverged_function_domain" if self._torn else words[reason].lower()
-        return NewtonResult(nodal, forces, reason > 0, word, self._snes.getIterationNumber())
+        iterations = self._snes.getIterationNumber()
+        return NewtonResult(self._at(self._unknown), reason > 0, word, iterations)
 
     def apply(self, preconditioner: PETSc.PC, right: PETSc.Vec, step: PETSc.Vec) -> None:
         """J^-1, as PETSc calls it."""
@@ -119,14 +118,13 @@ class ConstrainedNewton:
         self._join(np.where(self._equilibrium.clamped, 0.0, balance), missed, product)
 
     def _evaluate(self, snes: PETSc.SNES, unknown: PETSc.Vec, residual: PETSc.Vec) -> None:
-        nodal, forces = self._split(unknown)
-        balance, self._size = self._equilibrium.unbalanced(nodal, forces, self._stage)
-        missed = self._equilibrium.constraints.missing(nodal, forces, self._stage.fraction)
+        state = self._at(unknown)
+        balance, self._size = self._equilibrium.unbalanced(state)
+        missed = self._equilibrium.constraints.missing(state.nodal, state.forces, state.fraction)
         self._join(balance, self._scale * missed, residual)
 
     def _factorise(self, snes: PETSc.SNES, unknown: PETSc.Vec, jacobian: PETSc.Mat, other: PETSc.Mat) -> None:
-        nodal, _ = self._split(unknown)
-        self._equilibrium.factorise(nodal, self._stage)
+        self._equilibrium.factorise(self._at(unknown))
 
     def _shorten(self, unknown: PETSc.Vec, step: PETSc.Vec) -> bool:
         """Halve the step, which will be subtracted, until no element is turned inside out."""
@@ -149,6 +147,10 @@ class ConstrainedNewton:
         if residual <= self._tolerance * max(self._size, SMALL * self._scale):
             return int(reasons.CONVERGED_FNORM_RELATIVE)
         return int(reasons.CONVERGED_ITERATING)
+
+    def _at(self, unknown: PETSc.Vec) -> LoadState:
+        nodal, forces = self._split(unknown)
+        return replace(self._state, nodal=nodal, forces=forces)
 
     def _split(self, unknown: PETSc.Vec) -> tuple[FloatArray, FloatArray]:
         """Displacements, shape (N, 2), and multipliers, shape (k,), the same on every rank."""

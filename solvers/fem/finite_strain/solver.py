@@ -12,7 +12,6 @@ from geometry.errors import UserError
 from solvers.fem.error_estimate import ErrorEstimator
 from solvers.fem.finite_strain.constraints import DisplacementConstraints
 from solvers.fem.finite_strain.cylinder_contact import ContactRegion
-from solvers.fem.finite_strain.equilibrium import LoadStage
 from solvers.fem.finite_strain.load_path import LoadPath, Steps
 from solvers.fem.locking import locking_advice
 from solvers.fem.ranks import on_all_ranks
@@ -127,7 +126,7 @@ def _error(path: LoadPath, problem: Problem, space: LagrangeSpace) -> ErrorEstim
     untouched = path.equilibrium.contact is not None and not last.contact.any()
     if last.fraction < 1 or problem.load.kind == "point" or untouched:
         return None
-    path.equilibrium.factorise(last.nodal, LoadStage(last.fraction, last.contact))
+    path.equilibrium.factorise(last)
     return ErrorEstimator(problem, space).estimate(last.nodal, path.equilibrium.response)
 
 

@@ -1,10 +1,4 @@
-"""The finger at finite strain as a function of its parameters, with exact derivatives at the equilibrium.
-
-With the internal force F, the equilibrium F(c, θ) = f_k b_k(θ), b_k(θ) . c = d_k(θ) and the tangent K there,
-the derivative by a parameter, written ', costs one back-substitution:
-
-    K c' - f_k' b_k = f_k b_k' - dF/dθ,   b_k . c' = d_k' - b_k' . c
-"""
+"""The finger at finite strain as a function of its parameters."""
 
 from collections.abc import Sequence
 
@@ -13,10 +7,10 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from solvers.elasticity import Lame, lame_derivatives
-from solvers.fem.finite_strain.equilibrium import LoadStage
-from solvers.fem.finite_strain.load_path import LoadPath, PathPoint, Steps
-from solvers.fem.identification.linear_model import Response
-from solvers.fem.identification.parameters import moved_functionals, problem_with, target_slope
+from solvers.fem.finite_strain.load_path import LoadPath, Steps
+from solvers.fem.finite_strain.load_state import LoadState
+from solvers.fem.identification.parameters import problem_with
+from solvers.fem.identification.response import Response
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 from solvers.solver import silent
@@ -40,7 +34,7 @@ class FiniteStrainModel:
     """
 
     def __init__(self, problem: Problem, space: LagrangeSpace, names: Sequence[str]) -> None:
-        self._problem, self._space, self._names = problem, space, tuple(names)
+        self._problem, self.space, self._names = problem, space, tuple(names)
         self._path: LoadPath | None = None
         self._last: tuple[FloatArray, Response] | None = None
 
@@ -64,7 +58,7 @@ class FiniteStrainModel:
         self._last = values.copy(), response
         return response
 
-    def _continued(self, problem: Problem, values: FloatArray) -> PathPoint | None:
+    def _continued(self, problem: Problem, values: FloatArray) -> LoadState | None:
         """From the last response, along its derivatives."""
         if self._path is None or self._last is None:
             return None
@@ -73,8 +67,8 @@ class FiniteStrainModel:
         nodal = last.nodal + np.einsum("p,pnx->nx", step, last.nodal_slopes)
         return self._path.continued(problem, nodal, last.forces + step @ last.force_slopes)
 
-    def _from_rest(self, problem: Problem) -> PathPoint:
-        self._path = LoadPath(problem, self._space, STEPS, tolerance=TOLERANCE, max_iterations=ITERATIONS)
+    def _from_rest(self, problem: Problem) -> LoadState:
+        self._path = LoadPath(problem, self.space, STEPS, tolerance=TOLERANCE, max_iterations=ITERATIONS)
         self._path.follow(silent)
         last = self._path.points[-1]
         if last.fraction < 1:
@@ -85,26 +79,20 @@ class FiniteStrainModel:
             )
         return last
 
-    def _with_slopes(self, problem: Problem, point: PathPoint) -> Response:
+    def _with_slopes(self, problem: Problem, point: LoadState) -> Response:
         path = self._path
         if path is None:
             raise RuntimeError("there is no path to an equilibrium yet")
-        equilibrium, nodal = path.equilibrium, point.nodal
-        equilibrium.factorise(nodal, LoadStage(1.0, np.zeros(0)))
-        nodal_slopes = np.empty((len(self._names), *nodal.shape))
-        force_slopes = np.empty((len(self._names), len(point.forces)))
-        for row, name in enumerate(self._names):
-            moved = moved_functionals(name, problem, self._space)
-            force = equilibrium.force_slope(nodal, problem.material.lame, _moduli_slope(name, problem))
-            free = equilibrium.factors.solve(np.tensordot(point.forces, moved, axes=1) - force)
-            targets = target_slope(name, problem) - np.einsum("knx,nx->k", moved, nodal)
-            nodal_slopes[row], force_slopes[row] = equilibrium.elimination.solution(free, targets)
-        return Response(
-            nodal=nodal,
-            forces=point.forces,
-            nodal_slopes=nodal_slopes,
-            force_slopes=force_slopes,
-            energy=equilibrium.energy(nodal),
+        equilibrium, nodal, moduli = path.equilibrium, point.nodal, problem.material.lame
+        equilibrium.factorise(point)
+        return Response.of(
+            problem,
+            self.space,
+            self._names,
+            (nodal, point.forces, equilibrium.energy(nodal)),
+            equilibrium.factors.solve,
+            equilibrium.elimination,
+            lambda name: equilibrium.force_slope(nodal, moduli, _moduli_slope(name, problem)),
         )
 
 

@@ -10,7 +10,7 @@ from geometry.observations import Observations
 from solvers.assimilation.estimation import Estimate, Prediction
 from solvers.assimilation.misfit import misfit_of, standard_deviations
 from solvers.fem.boundary_conditions import marker_functionals
-from solvers.fem.identification.linear_model import Response
+from solvers.fem.identification.response import Response
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 

@@ -4,14 +4,11 @@ from collections.abc import Mapping, Sequence
 from math import log
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
-from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.mesh.walls import walls_and_ribs
 from solvers.assimilation.estimation import Parameter
-from solvers.lagrange import LagrangeSpace
-from solvers.problem import Load, Problem, contact_ends, contact_functional
+from solvers.problem import Load, Problem, contact_ends
 from solvers.solver import UnsupportedProblemError
 
 MEANINGS = {
@@ -107,23 +104,3 @@ def problem_with(problem: Problem, values: Mapping[str, float]) -> Problem:
         Load(kind=load.kind, displacement=(u, v), position=position, radius=load.radius),
         problem.observations,
     )
-
-
-def moved_functionals(name: str, problem: Problem, space: LagrangeSpace) -> FloatArray:
-    """Derivatives of `load_functionals` by a parameter, shape (k, N, 2).
-
-    The weight moves with the contact: by its position, the mean of the displacement over it changes by the
-    mean of du/dx.
-    """
-    slopes = np.zeros((len(problem.load.prescribed), len(space.nodes), 2))
-    if name == "position":
-        points, weights = contact_functional(problem)
-        along: csr_matrix = space.shape_gradients(problem.mesh.locate(points))[0]
-        for row, axis in enumerate(problem.load.prescribed):
-            slopes[row, :, axis] = along.T @ weights
-    return slopes
-
-
-def target_slope(name: str, problem: Problem) -> FloatArray:
-    """Derivative of the prescribed displacements by a parameter, shape (k,)."""
-    return np.array([float(name == f"stroke_{'uv'[axis]}") for axis in problem.load.prescribed])

@@ -1,4 +1,4 @@
-"""`fem-id`: the parameters of a finger for which finite elements move its markers as they were observed."""
+"""`fem-id`: parameters of load, clamp and material fitted to the markers by finite elements."""
 
 import time
 from collections.abc import Callable
@@ -14,9 +14,10 @@ from solvers.assimilation.estimation import Estimate, Prediction, estimate
 from solvers.assimilation.misfit import leave_one_out_displacements
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification.finite_strain_model import PARAMETERS, FiniteStrainModel
-from solvers.fem.identification.linear_model import LinearModel, Response
+from solvers.fem.identification.linear_model import LinearModel
 from solvers.fem.identification.observation_model import ObservationModel
 from solvers.fem.identification.parameters import parameters_of, parse_parameters, problem_with
+from solvers.fem.identification.response import Response
 from solvers.fem.identification.summary import sentence
 from solvers.fem.linear import FemSolver
 from solvers.lagrange import LagrangeField, LagrangeSpace
@@ -29,13 +30,13 @@ Model = Literal["fem", "fem-nonlinear"]
 
 @dataclass(frozen=True)
 class FemIdSolver:
-    """`fem` with the parameters of load, clamp and material that its markers tell.
+    """`fem` with parameters of load, clamp and material fitted to the markers.
 
     Attributes:
         model: "fem", or "fem-nonlinear" for finite strain, where the base is rigid and walls are as drawn.
         parameters: Names of the parameters to find, with commas between them, of
             `solvers.fem.identification.parameters.MEANINGS`.
-        prior: Factor of the standard deviations that the parameters have before anything is observed.
+        prior: Factor of the parameters' prior standard deviations.
         reaction: Measured force of the indenter on the finger along y per depth, N/mm; None if there is none.
         reaction_error: Standard deviation of the reaction over its size.
         degree: Degree of the elements, 1 or 2.
@@ -55,7 +56,7 @@ class FemIdSolver:
     assimilates: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        names = parse_parameters(self.name, self.parameters)
+        names = self._names
         if self.model not in get_args(Model):
             raise UserError(f"fem-id: model must be {' or '.join(get_args(Model))}, got {self.model!r}")
         if self.model == "fem-nonlinear" and (linear := sorted(set(names) - set(PARAMETERS))):
@@ -82,6 +83,10 @@ class FemIdSolver:
         """Those of the model."""
         return self._plain().laws
 
+    @property
+    def _names(self) -> tuple[str, ...]:
+        return parse_parameters(self.name, self.parameters)
+
     def _plain(self) -> FemSolver | FemNonlinearSolver:
         """The model without any parameters to find."""
         if self.model == "fem":
@@ -89,96 +94,87 @@ class FemIdSolver:
         return FemNonlinearSolver(degree=self.degree)
 
     def settings(self) -> dict[str, object]:
-        """What is to be found, by what, and the elements."""
+        """Parameters, model, prior and elements."""
         return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Find the parameters and solve with them; see `Solver`. Without observations it is its model."""
         check_problem(self, problem)
         if problem.observations is not None:
-            return self._solve(problem, problem.observations, progress)
+            fem = self._model(problem)
+            solution = self._fitted(fem, problem, problem.observations, progress)
+            fem.close()
+            return solution
         plain = self._plain().solve(problem, progress)
         said = f"without markers, this is {self.model}: {plain.status.message}"
         return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
-        """What finds the parameters for other observations, by one factorisation; see `Refittable`."""
-        space = LagrangeSpace(problem.mesh, self.degree)
-        finger = self._finger(problem, space, parse_parameters(self.name, self.parameters))
-        return lambda observations: self._found(
-            replace(problem, observations=observations), observations, space, finger, silent
+        """A function that finds the parameters for other observations; see `Refittable`."""
+        fem = self._model(problem)
+        return lambda observations: self._fitted(
+            fem, replace(problem, observations=observations), observations, silent
         )
 
     def transferred(self, solution: Solution, problem: Problem, other: Problem) -> Solution:
-        """The solution of another problem with the parameters that were found for the first one.
+        """The solution of another problem with the parameters found for the first one.
 
-        Those of finger and clamp stay. The contact is off its nominal place by as much as it was, and off its
-        nominal travel by as much of the travel.
+        Those of finger and clamp stay. The contact keeps its distance from the nominal place, and from the
+        nominal travel the same fraction of the travel.
         """
-        names = parse_parameters(self.name, self.parameters)
+        names = self._names
         share = float(np.linalg.norm(other.load.values) / np.linalg.norm(problem.load.values))
         values = []
         for before, now in zip(parameters_of(problem, names), parameters_of(other, names), strict=True):
             found = float(solution.stats[before.name])
             off = {"position": 1.0, "stroke_u": share, "stroke_v": share}.get(before.name)
             values.append(found if off is None else now.start + off * (found - before.start))
-        space = LagrangeSpace(other.mesh, self.degree)
-        finger = self._finger(other, space, names)
-        response = finger.response(np.array(values))
-        finger.close()
+        fem = self._model(other)
+        response = fem.response(np.array(values))
+        fem.close()
         return replace(
             solution,
             problem=problem_with(other, dict(zip(names, values, strict=True))),
-            field=LagrangeField(space, response.nodal),
+            field=LagrangeField(fem.space, response.nodal),
             energy=response.energy,
             reaction=_reaction(other, response),
             left_out=None,
         )
 
-    def _finger(
-        self, problem: Problem, space: LagrangeSpace, names: tuple[str, ...]
-    ) -> LinearModel | FiniteStrainModel:
-        return (LinearModel if self.model == "fem" else FiniteStrainModel)(problem, space, names)
-
-    def _solve(self, problem: Problem, observations: Observations, progress: Progress) -> Solution:
+    def _model(self, problem: Problem) -> LinearModel | FiniteStrainModel:
         space = LagrangeSpace(problem.mesh, self.degree)
-        finger = self._finger(problem, space, parse_parameters(self.name, self.parameters))
-        solution = self._found(problem, observations, space, finger, progress)
-        finger.close()
-        return solution
+        return (LinearModel if self.model == "fem" else FiniteStrainModel)(problem, space, self._names)
 
-    def _found(
+    def _fitted(
         self,
+        fem: LinearModel | FiniteStrainModel,
         problem: Problem,
         observations: Observations,
-        space: LagrangeSpace,
-        finger: LinearModel | FiniteStrainModel,
         progress: Progress,
     ) -> Solution:
         started = time.perf_counter()
-        names = parse_parameters(self.name, self.parameters)
-        parameters = parameters_of(problem, names, self.prior)
-        observer = ObservationModel.of(problem, space, observations, self.marker_radius)
+        names = self._names
+        observed = ObservationModel.of(problem, fem.space, observations, self.marker_radius)
         if self.reaction is not None:
-            observer = observer.with_reaction(
-                problem, self.reaction, self.reaction_error * abs(self.reaction)
-            )
+            deviation = self.reaction_error * abs(self.reaction)
+            observed = observed.with_reaction(problem, self.reaction, deviation)
 
         def model(values: FloatArray) -> Prediction:
             progress(0.5, " ".join(f"{name} {value:.4g}" for name, value in zip(names, values, strict=True)))
-            return observer.predicted(finger.response(values))
+            return observed.predicted(fem.response(values))
 
-        found = estimate(model, observer.observed, observer.deviations, parameters)
-        response = finger.response(found.values)
+        found = estimate(
+            model, observed.observed, observed.deviations, parameters_of(problem, names, self.prior)
+        )
+        response = fem.response(found.values)
         own = problem_with(problem, dict(zip(names, found.values.tolist(), strict=True)))
-        missed = observer.missed(found)
         return Solution(
             solver=self.name,
             problem=own,
-            field=LagrangeField(space, response.nodal),
+            field=LagrangeField(fem.space, response.nodal),
             energy=response.energy,
             reaction=_reaction(problem, response),
-            status=Status(found.converged, sentence(found, missed)),
+            status=Status(found.converged, sentence(found, observed.missed(found))),
             stats={
                 "seconds": time.perf_counter() - started,
                 "unknowns": response.nodal.size,
@@ -186,7 +182,7 @@ class FemIdSolver:
                 "degree": self.degree,
                 **statistics(found),
             },
-            left_out=leave_one_out_displacements(problem, -observer.missed_without_each(found)),
+            left_out=leave_one_out_displacements(problem, -observed.missed_without_each(found)),
         )
 
 
