@@ -1,8 +1,7 @@
-"""Refine the shared mesh until `fem` knows the displacements of the markers to a tolerance.
+"""Refinement of the shared mesh until the displacements of the markers by `fem` are within a tolerance.
 
-Solve, estimate, mark, refine. What is to be known is the sum of the errors of all marker components that are
-not within the tolerance, one functional; the triangles that hold a given share of its error by the
-dual-weighted estimate are marked, the largest first.
+Solve, estimate, mark, refine. The functional is the sum of the errors of all marker components that are not
+within the tolerance; the fewest triangles that hold a given share of its dual-weighted error are marked.
 
 Source: W. Dörfler, A convergent adaptive algorithm for Poisson's equation, SIAM J. Numer. Anal. 33 (1996)
 1106-1124, section 4.2 (the share); R. Becker, R. Rannacher, Acta Numerica 10 (2001) 1-102, section 4.
@@ -40,16 +39,16 @@ def adapted(
     most_rounds: int = MOST_ROUNDS,
     progress: Progress = silent,
 ) -> Adaptation:
-    """Refine the mesh of a linear problem until its markers are known.
+    """Refine the mesh of a linear problem until the estimated error at its markers is within a tolerance.
 
     Args:
         problem: With the mesh to start from.
         tolerance: Largest estimated error of u or v at a marker, mm.
         degree: Of the elements of `fem`.
-        section: The body, so that refined fillets get nearer to their arcs.
-        most_triangles: No mesh gets more.
-        most_rounds: No more solutions than this.
-        progress: Told of every round.
+        section: The body, for the arcs of refined fillets.
+        most_triangles: Of a mesh.
+        most_rounds: Of solutions.
+        progress: Called after every round.
 
     Raises:
         UserError: As `solvers.adaptation.check_adaptable`.
@@ -82,7 +81,7 @@ def largest(shares: FloatArray, part: float) -> BoolArray:
 
 
 def _solve(problem: Problem, degree: int, tolerance: float) -> tuple[RefinementRound, FloatArray]:
-    """One solution: its estimate, and what every triangle adds to the error of the unknown markers, (t,)."""
+    """One solution: its estimate, and every triangle's contribution to the functional's error, shape (t,)."""
     mesh, space = problem.mesh, LagrangeSpace(problem.mesh, degree)
     equilibrium = LinearEquilibrium.of(LinearElasticity.of(problem, space))
     nodal, estimator = equilibrium.solution(), ErrorEstimator(problem, space)

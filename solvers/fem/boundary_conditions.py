@@ -9,7 +9,7 @@ from solvers.problem import Problem, contact_functional
 
 
 def held_components(problem: Problem, space: LagrangeSpace) -> BoolArray:
-    """Nodal components that a Dirichlet condition prescribes, (N, 2): base and, for a `patch`, contact."""
+    """Mask (N, 2) of components with a Dirichlet condition: the base and, for a `patch`, the contact."""
     held = np.zeros((len(space.nodes), 2), dtype=bool)
     held[space.boundary_nodes("base")] = True
     if problem.load.kind == "patch":
@@ -44,7 +44,7 @@ def load_functionals(problem: Problem, space: LagrangeSpace) -> FloatArray:
 
 
 def marker_functionals(misfit: Misfit, space: LagrangeSpace) -> FloatArray:
-    """The functionals that give u v u v ... of the m markers, shape (2 m, N, 2)."""
+    """Functionals for the displacements u v u v ... of the m markers, shape (2 m, N, 2)."""
     points, weights = misfit.sampling()
     sampling = weights @ space.shape_functions(space.mesh.locate(points)).toarray()
     return np.kron(sampling, np.eye(2)).reshape(-1, len(space.nodes), 2)

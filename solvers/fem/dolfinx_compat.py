@@ -1,8 +1,4 @@
-"""The one module that knows how DOLFINx changed between 0.5 (Debian 12) and 0.11.
-
-It offers a vector space on the shared mesh, with a map between its degrees of freedom and the nodes of a
-`LagrangeSpace`, and sparse solves by MUMPS.
-"""
+"""Vector spaces and direct solves with DOLFINx from 0.5 (Debian 12) to 0.11, behind one interface."""
 
 import inspect
 import logging
@@ -47,7 +43,7 @@ def _vector_space(mesh: Any, degree: int) -> Any:
 
 
 def _nodes_of_dofs(space: LagrangeSpace, domain: Any, dolfinx_space: Any) -> IntArray:
-    """The node of the `LagrangeSpace` that every blocked degree of freedom of this rank is.
+    """The node of the `LagrangeSpace` at every blocked degree of freedom of this rank.
 
     A cell of DOLFINx has its degrees of freedom at its corners and, for degree 2, at the middles of the edges
     opposite to them, in the order of the corners.
@@ -66,7 +62,7 @@ def _nodes_of_dofs(space: LagrangeSpace, domain: Any, dolfinx_space: Any) -> Int
 
 
 def _rows(table: Any, width: int) -> IntArray:
-    """A table of DOLFINx with one row a cell: an array from 0.7 on, before it an adjacency list."""
+    """A table of DOLFINx with one row a cell: an array from 0.7 on, an adjacency list before."""
     return np.asarray(getattr(table, "array", table)).reshape(-1, width)
 
 
@@ -141,7 +137,7 @@ class DistributedSpace:
 
         Args:
             form: The compiled bilinear form.
-            conditions: What is clamped.
+            conditions: Dirichlet conditions.
             into: An earlier matrix of the same form, which is overwritten; a new one if None.
         """
         if into is not None:
@@ -191,13 +187,13 @@ class Factorisation:
     """A symmetric matrix factorised by MUMPS, for any number of right-hand sides.
 
     Args:
-        space: Whose nodal arrays the right-hand sides and solutions are.
+        space: The space of right-hand sides and solutions.
         matrix: The assembled matrix.
         clamped: Mask of shape (N, 2): components whose right-hand side is set to zero.
         positive_definite: False where a tangent may be indefinite.
 
     Attributes:
-        message: How the systems are solved, for people.
+        message: The method in words.
         stats: The same for a table.
     """
 

@@ -1,4 +1,4 @@
-"""How far a finite-element solution is from the exact one, from its own smoothed gradient.
+"""Estimated discretisation error of a finite-element solution, from its smoothed gradient.
 
 The error's gradient is estimated by the difference of the smoothed gradient from the field's own, here R u
 for nodal displacements u (Zienkiewicz and Zhu, Int. J. Numer. Meth. Engng 24 (1987) 337-357). Its energy is
@@ -35,9 +35,8 @@ from solvers.solution import ErrorEstimate, State
 QUADRATURE_DEGREE = 4
 """Exact for the energy of the estimated error: smoothed gradients are polynomials of degree 2."""
 
-
 STEP = 1e-6
-"""Part of the gradient's error in the difference that stands for a derivative of the stress."""
+"""Fraction of the gradient's error in the finite difference of the stress."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +47,8 @@ class ImprovedField:
         space: The elements.
         values: Nodal displacements, shape (N, 2), mm.
         gradients: Nodal values of the smoothed gradient, shape (N, 2, 2).
-        own: What takes its place where it would turn the material inside out; None at small strain.
+        own: The field whose gradient replaces it where it would turn the material inside out; None at small
+            strain.
     """
 
     space: LagrangeSpace
@@ -72,12 +72,7 @@ class ImprovedField:
 
 @dataclass(frozen=True, eq=False)
 class ErrorEstimator:
-    """Estimates for fields of one finite-element space.
-
-    Attributes:
-        problem: Whose material counts.
-        space: The elements.
-    """
+    """Error estimates for fields of one finite-element space and the problem's material."""
 
     problem: Problem
     space: LagrangeSpace
@@ -110,8 +105,8 @@ class ErrorEstimator:
 
         Args:
             nodal: Its nodal displacements, shape (N, 2), mm.
-            solve: From nodal forces (N, 2), N/mm, to the change of the nodal displacements (N, 2), mm, that
-                they cause there while nothing that is prescribed at base and contact changes.
+            solve: Change of the nodal displacements, mm, under nodal forces, N/mm, both (N, 2), at constant
+                prescribed values at base and contact.
         """
         own = LagrangeField(self.space, nodal)
         gradient, difference = own.gradient(self.rule.location), self.gradient_error(nodal)
@@ -119,7 +114,6 @@ class ErrorEstimator:
         stress, von_mises = self._changes(gradient, difference)
         displacement = solve(self.force(stress))
         energy = 0.5 * self._integral(np.einsum("qij,qij->q", stress, difference))
-        better = nodal + displacement
         return ErrorEstimate(
             energy_norm=float(np.sqrt(energy / self._integral(state.energy_density))),
             displacement=self._relative(self._shapes @ displacement, self._shapes @ nodal),
@@ -127,16 +121,16 @@ class ErrorEstimator:
             markers=displacement[self.space.mesh.marker_nodes],
             field=ImprovedField(
                 self.space,
-                better,
+                nodal + displacement,
                 self.recovery.gradient(nodal),
                 None if self.problem.material.law == "linear" else own,
             ),
         )
 
     def _changes(self, gradient: FloatArray, difference: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """By how much the first Piola-Kirchhoff stress and the von Mises stress change with the gradient.
+        """Changes of the first Piola-Kirchhoff stress and of the von Mises stress with the gradient.
 
-        At finite strain to first order: the whole difference, large in corners, might turn material inside
+        To first order at finite strain: the whole difference, large in corners, might turn material inside
         out.
 
         Args:
@@ -155,14 +149,12 @@ class ErrorEstimator:
         state = State.from_gradient(gradient, self.problem)
         if self.problem.material.law == "linear":
             return state.stress, state.von_mises
-        deformation = np.eye(2) + gradient
-        cofactors = np.empty_like(deformation)
-        cofactors[:, 0, 0], cofactors[:, 1, 1] = deformation[:, 1, 1], deformation[:, 0, 0]
-        cofactors[:, 0, 1], cofactors[:, 1, 0] = -deformation[:, 1, 0], -deformation[:, 0, 1]
+        trace = np.trace(gradient, axis1=1, axis2=2)[:, None, None] + 1
+        cofactors = trace * np.eye(2) - gradient.swapaxes(1, 2)  # J F^-T of two by two
         return state.stress @ cofactors, state.von_mises
 
     def shares(self, nodal: FloatArray, dual: FloatArray) -> FloatArray:
-        """What every triangle adds to the error of a functional, shape (t,).
+        """Contribution of every triangle to the error of a functional, shape (t,).
 
         Args:
             nodal: The solution, shape (N, 2), mm.

@@ -23,7 +23,7 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.lagrange import LagrangeSpace
 
 FEWEST = 4
-"""Triangles that a patch has at least."""
+"""Least number of triangles in a patch."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -78,13 +78,13 @@ class FemSolver:
 
 
 class Prepared:
-    """A finger whose stiffness is factorised: solutions for many loads.
+    """Solutions for many loads with shared factors of the stiffness.
 
     `mean` and `point` loads share the factorisation, wherever they act; so do patches at one place that hold
     the same components. Loads that differ in their displacement only share the responses to unit forces too.
 
     Args:
-        solver: Whose solutions they are.
+        solver: The solver.
         equilibrium: The factorisation, and the responses for one load.
     """
 
@@ -146,7 +146,7 @@ class Prepared:
 
 
 def _uncertainty(problem: Problem, error: ErrorEstimate | None) -> str:
-    """What is known of the discretisation error, in words."""
+    """The discretisation error in words."""
     if problem.load.kind == "point":
         return "a point load has no limit under refinement, so there is no error to estimate"
     if error is None:

@@ -21,7 +21,7 @@ class Multigrid:
     Computing 56, 179-196).
 
     Args:
-        space: Whose nodal arrays the right-hand sides and solutions are.
+        space: The space of right-hand sides and solutions.
         matrix: The assembled matrix.
         clamped: Mask of shape (N, 2): components whose right-hand side is set to zero.
     """
@@ -48,7 +48,7 @@ class Multigrid:
 
     @property
     def message(self) -> str:
-        """How the systems are solved, for people."""
+        """The method in words."""
         return (
             f"solved by {max(self._iterations, default=0)} conjugate-gradient iterations to a residual of "
             f"{TOLERANCE:g} of the load"
@@ -56,7 +56,7 @@ class Multigrid:
 
     @property
     def stats(self) -> dict[str, float | int | str]:
-        """The same for a table; `iterations` is the sum over all right-hand sides so far."""
+        """The method for a table; `iterations` is the sum over all right-hand sides so far."""
         return {"linear_solver": "iterative", "iterations": sum(self._iterations)}
 
     def solve(self, nodal: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""MPI ranks that serve a command: rank 0 runs it, the others take part in its solves and nothing else.
+"""MPI ranks that serve a command: rank 0 runs it, the others only take part in its solves.
 
 Without a `RankPool` every rank runs the whole program, and its finite-element spaces are distributed over all
 ranks. With one (`mpirun -n 2 compare ...`) a space is rank 0's own, but for those made `on_all_ranks`.
@@ -26,13 +26,13 @@ TASK, DISMISSAL = 1, 2
 """Tags of messages from rank 0: a task with its problem, the exit code of the command."""
 
 FAULT = 1
-"""Exit code of a program that has a fault."""
+"""Exit code after an unexpected exception."""
 
 PATIENCE_S = 5.0
-"""How long a rank on which a task failed waits for its end on the others, before it ends them."""
+"""Time that a rank on which a task failed waits for the others before it ends them."""
 
 POLL_S = 0.005
-"""Idle ranks sleep so long between looks at their messages; MPI would look all the time, and heat a core."""
+"""Time between two looks of an idle rank at its messages; MPI itself would keep a core busy."""
 
 Answer = TypeVar("Answer")
 
@@ -62,7 +62,7 @@ def lead(command: Callable[[], Any], guarded: Callable[[Callable[[], Any]], int]
 
     Args:
         command: What rank 0 does.
-        guarded: Runs it and says what went wrong, in one line where a user can mend it.
+        guarded: Runs it and reports errors; returns the exit code.
     """
     petsc4py.init()  # on all ranks together: one alone would wait for the others when it first solves
     pool = RankPool(MPI.COMM_WORLD.Dup())
@@ -115,7 +115,7 @@ class RankPool:
         return self._do(task, problem, progress)
 
     def serve(self) -> int:
-        """Do what rank 0 sends until it dismisses this rank; the exit code that it gives.
+        """Do what rank 0 sends until it dismisses this rank; returns the exit code that it sends.
 
         Raises:
             Exception: What a task raised here and not on rank 0.
@@ -135,7 +135,7 @@ class RankPool:
                     raise
 
     def dismiss(self, code: int) -> None:
-        """Let the other ranks end with an exit code."""
+        """End the other ranks with an exit code."""
         for rank in range(1, self.comm.size):
             self.comm.send(code, dest=rank, tag=DISMISSAL)
 

@@ -1,4 +1,4 @@
-"""Functionals of the displacements whose values are given, rigidly or through springs, and their forces."""
+"""Prescribed values of functionals of the displacements, rigid or through springs."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from solvers.problem import Problem
 
 @dataclass(frozen=True, eq=False)
 class DisplacementConstraints:
-    """b_k . c + s_k f_k = d_k, with displacements c and forces f_k by which the functionals are held.
+    """Constraints b_k . c + s_k f_k = d_k on the displacements c, with forces f_k.
 
     Attributes:
         functionals: b_k, shape (k, N, 2).
@@ -28,17 +28,17 @@ class DisplacementConstraints:
 
     @classmethod
     def of(cls, problem: Problem, space: LagrangeSpace, slack: float = 0.0) -> "DisplacementConstraints":
-        """The load's, all of one slack; none but for a `mean` or `point` load."""
+        """The constraints of a `mean` or `point` load, all of one slack; else none."""
         targets = load_targets(problem)
         return cls(load_functionals(problem, space), targets, np.full(len(targets), slack))
 
     @classmethod
     def springs(cls, misfit: Misfit, space: LagrangeSpace) -> "DisplacementConstraints":
-        """Springs between markers and where they were observed, whose energy is the misfit; u v u v ..."""
+        """Springs between markers and observed positions, whose energy is the misfit; u v u v ..."""
         return cls(marker_functionals(misfit, space), misfit.observed.ravel(), 1 / misfit.weights.ravel())
 
     def joined(self, other: "DisplacementConstraints") -> "DisplacementConstraints":
-        """These and others after them."""
+        """Both, in this order."""
         return DisplacementConstraints(
             np.concatenate([self.functionals, other.functionals]),
             np.concatenate([self.targets, other.targets]),
@@ -46,7 +46,7 @@ class DisplacementConstraints:
         )
 
     def only(self, kept: BoolArray) -> "DisplacementConstraints":
-        """Those of a mask of shape (k,)."""
+        """Subset selected by a mask of shape (k,)."""
         return DisplacementConstraints(self.functionals[kept], self.targets[kept], self.slacks[kept])
 
     def values(self, nodal: FloatArray) -> FloatArray:
@@ -58,5 +58,5 @@ class DisplacementConstraints:
         return np.asarray(np.einsum("k,knx->nx", forces, self.functionals))
 
     def missing(self, nodal: FloatArray, forces: FloatArray, fraction: float) -> FloatArray:
-        """By how much they are missed at a fraction of the load, shape (k,), mm."""
+        """Residual of the constraints at a fraction of the load, shape (k,), mm."""
         return np.asarray(fraction * self.targets - self.values(nodal) - self.slacks * forces)

@@ -1,10 +1,10 @@
-"""A rigid cylinder pressed on the front face without friction: gaps, forces and what they do to equilibrium.
+"""A rigid cylinder pressed on the front face without friction: gaps, forces and their tangent.
 
 The gap is collocated at the nodes of the boundary `front`, which are the points of Simpson's rule on the
 edges of quadratic elements (of the trapezium rule on linear ones). With g the gap of a node, positive outside
 the cylinder, and λ its multiplier, the nodal force is q = max(0, λ - k g): the augmented Lagrangian of
 J. C. Simo, T. A. Laursen, An augmented Lagrangian treatment of contact problems involving friction, Computers
-& Structures 42 (1992) 97-116, without friction. Which nodes touch is found, not given.
+& Structures 42 (1992) 97-116, without friction. The contact is found, not given.
 """
 
 from dataclasses import dataclass
@@ -22,11 +22,11 @@ STIFFNESS = 10.0
 
 @dataclass(frozen=True, eq=False)
 class CylinderContact:
-    """The cylinder and the m nodes that it may touch, in the order of x.
+    """The cylinder and the m nodes of the front, in the order of x.
 
     Attributes:
         nodes: Numbers of the nodes, shape (m,).
-        positions: Where they are before the load, shape (m, 2), mm.
+        positions: Of the nodes before the load, shape (m, 2), mm.
         centre: Of the cylinder before the load, shape (2,), mm: it touches y = 0 from outside.
         travel: Of the cylinder under the full load, shape (2,), mm.
         radius: mm.
@@ -85,7 +85,7 @@ class CylinderContact:
         return np.asarray((force > 0)[:, None, None] * self.stiffness * across - turning)
 
     def lengths(self, nodal: FloatArray) -> FloatArray:
-        """Deformed length of front face that each node stands for by the edges' rule, shape (m,), mm."""
+        """Weights of the nodes in an integral along the deformed front, shape (m,), mm."""
         pieces = np.linalg.norm(np.diff(self.positions + nodal[self.nodes], axis=0), axis=1)
         edges = pieces.reshape(-1, self.degree).sum(axis=1)
         lengths = np.zeros(len(self.nodes))
@@ -96,18 +96,18 @@ class CylinderContact:
 
 @dataclass(frozen=True)
 class ContactRegion:
-    """Where the cylinder touches the finger, and how hard.
+    """The contact region and its pressure.
 
     Attributes:
-        start: Abscissa before the load of the end nearer to the base, mm.
+        start: Abscissa of the end nearer to the base before the load, mm.
         end: Of the other end, mm.
         parts: Number of separate intervals between them.
         width: Deformed length of front face in contact, mm.
-        spacing: Deformed length between neighbouring points there, mm: how well the width is known.
+        spacing: Deformed length between neighbouring nodes there, mm: the resolution of the width.
         pressure: Largest Cauchy pressure, MPa.
-        penetration: How far a point of the front lies within the cylinder at most, mm.
+        penetration: Largest depth of a node within the cylinder, mm.
         force: Integral of the pressure, N/mm: sum of q n.
-        at_end: Whether the region reaches an end of the front face, beyond which no contact is looked for.
+        at_end: Whether the region reaches an end of the front face.
     """
 
     start: float
@@ -121,7 +121,7 @@ class ContactRegion:
     at_end: bool
 
     def stats(self) -> dict[str, float | int]:
-        """The numbers for a solution's record."""
+        """Columns of a solution's `stats`."""
         return {
             "contact_start_mm": self.start,
             "contact_end_mm": self.end,

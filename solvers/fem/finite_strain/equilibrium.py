@@ -1,4 +1,4 @@
-"""The finite-strain problem at one stage of its load: potential, forces, tangent and constraints.
+"""The discrete finite-strain problem: potential, forces, tangent and constraints.
 
 With displacements c, multipliers f of the constraints, which may be springs of the compliance s_k, and the
 potential Π of the elastic energy and, for a cylinder, of contact, equilibrium is
@@ -27,7 +27,7 @@ from solvers.problem import Problem
 QUADRATURE_DEGREE = 4
 """Of the energy's integral: exact for quadratic elements with the quadratic part of the law."""
 PROBE = 1e-4
-"""Fraction of the load in the difference that stands for a derivative of the internal forces at rest."""
+"""Fraction of the load in the finite difference of the internal forces at rest."""
 
 
 class FiniteStrainEquilibrium:
@@ -37,7 +37,7 @@ class FiniteStrainEquilibrium:
         distributed: The elements in DOLFINx.
         clamped: Components that a Dirichlet condition holds, mask of shape (N, 2).
         held: Their displacement under the full load, shape (N, 2), mm.
-        constraints: What holds functionals of the displacements.
+        constraints: On functionals of the displacements.
         elimination: Of the constraints, by the tangent that was factorised last.
         contact: The cylinder, if there is one.
     """
@@ -74,8 +74,8 @@ class FiniteStrainEquilibrium:
 
         Args:
             nodal: Displacements, shape (N, 2), mm.
-            moduli: What λ and μ are, MPa.
-            slopes: How they change.
+            moduli: λ and μ, MPa.
+            slopes: Their change, MPa.
         """
         self._set_moduli(slopes)
         force = self.internal_force(nodal)
@@ -116,7 +116,7 @@ class FiniteStrainEquilibrium:
         self.elimination = self._elimination()
 
     def _elimination(self) -> ConstrainedElimination:
-        """Of the constraints, by the tangent that is factorised."""
+        """Of the constraints, by the factorised tangent."""
         return ConstrainedElimination.of(
             self.factors.solve, self.constraints.functionals, self.constraints.slacks
         )

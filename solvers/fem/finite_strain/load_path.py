@@ -1,4 +1,4 @@
-"""From rest to the full load in steps that adapt to how hard they are."""
+"""The load path from rest to the full load, in adaptive steps."""
 
 import math
 from dataclasses import dataclass, replace
@@ -20,9 +20,9 @@ from solvers.solver import Progress
 QUICK = 5
 """Newton iterations of a step after which the next one may be twice as long."""
 UPDATES = 30
-"""Solves in a step, each with better multipliers of the contact, before the step counts as failed."""
+"""Updates of the contact's multipliers in a step before it counts as failed."""
 PENETRATION = 1e-5
-"""How far a node may lie within the cylinder, and one that is pressed outside of it, mm."""
+"""Largest gap of a node in contact and penetration of any node, mm."""
 
 
 @dataclass(frozen=True)
@@ -35,17 +35,17 @@ class Steps:
 
 
 class LoadPath:
-    """Equilibria that a problem runs through as its load grows.
+    """Equilibria of a problem as its load grows.
 
     Every step starts from the last two states extrapolated, the first from the linear solution. A step whose
     Newton iteration fails is halved.
 
     Attributes:
         equilibrium: The discrete problem.
-        points: What was found, from rest.
-        halved: How many steps failed.
+        points: The equilibria, from rest.
+        halved: Number of failed steps.
         iterations: Newton iterations of all steps.
-        reason: How the last step that failed did, where it was Newton's method in PETSc's word.
+        reason: Why the last failed step failed, for Newton's method in PETSc's word.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class LoadPath:
             steps: Fractions of the load.
             tolerance: Of `ConstrainedNewton`.
             max_iterations: Of `ConstrainedNewton`.
-            constraints: The load's, and others whose targets grow with it; the load's if None.
+            constraints: Their targets grow with the load; the load's own if None.
         """
         self._steps, self._space = steps, space
         self.equilibrium = FiniteStrainEquilibrium(problem, space, constraints)
@@ -90,7 +90,7 @@ class LoadPath:
         self.equilibrium.factors.destroy()
 
     def follow(self, progress: Progress) -> None:
-        """Go to the full load, or as far as there is equilibrium."""
+        """Go to the full load, or as far as equilibria are found."""
         step = min(self._steps.first, self._longest)
         while (rest := 1 - self.points[-1].fraction) > 0:
             fraction = 1 - rest * (1 - 1 / math.ceil(rest / step - 1e-9))  # equal steps to the end

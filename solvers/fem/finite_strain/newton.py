@@ -11,9 +11,9 @@ from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
 from solvers.fem.finite_strain.load_state import LoadState
 
 SMALL = 1e-4
-"""Least size of the internal forces over Young's modulus, mm: rounding of positions makes forces too."""
+"""Least internal force over Young's modulus, mm, in the criterion: rounding of positions makes forces too."""
 SHORTEST = 2.0**-10
-"""Fraction of a Newton step below which shortening it any further is no use."""
+"""Fraction of a Newton step below which it is not shortened further."""
 
 
 @dataclass(frozen=True, eq=False)

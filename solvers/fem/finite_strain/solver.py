@@ -27,7 +27,7 @@ class FemNonlinearSolver:
 
     Every step starts from the last two states extrapolated; the first from the linear solution. A step whose
     Newton iteration fails, or turns an element inside out, is halved. A `patch` whose tangential component is
-    free slides. A `cylinder` presses without friction on the part of the front face that is found.
+    free slides. A `cylinder` presses without friction.
 
     Attributes:
         degree: Degree of the elements, 1 or 2.
@@ -66,7 +66,7 @@ class FemNonlinearSolver:
     def path(
         self, problem: Problem, space: LagrangeSpace, constraints: DisplacementConstraints | None = None
     ) -> LoadPath:
-        """The load path that is to be followed, with constraints as `LoadPath` has them."""
+        """The load path, not yet followed; for the arguments see `LoadPath`."""
         return LoadPath(
             problem,
             space,
@@ -131,7 +131,7 @@ def _error(path: LoadPath, problem: Problem, space: LagrangeSpace) -> ErrorEstim
 
 
 def _status(path: LoadPath, regions: Sequence[ContactRegion | None], remarks: str) -> Status:
-    """Whether the path led to the full load, and what to try where it did not; else remarks."""
+    """Success at the full load with remarks, or advice."""
     contact = path.equilibrium.contact
     fraction = path.points[-1].fraction
     if fraction < 1:

@@ -16,11 +16,11 @@ from solvers.problem import Problem
 from solvers.solver import silent
 
 PARAMETERS = ("position", "stroke_u", "stroke_v", "poisson", "young")
-"""What can be found at finite strain."""
+"""Parameters that can be found at finite strain."""
 
 STEPS = Steps(first=0.05, longest=0.2, shortest=1e-3)
 TOLERANCE = 1e-10
-"""Of Newton's method: derivatives are of no use where the equilibrium is not exact."""
+"""Of Newton's method: derivatives need an exact equilibrium."""
 ITERATIONS = 12
 
 
@@ -28,7 +28,7 @@ class FiniteStrainModel:
     """Responses of a finger at finite strain to a `mean` or `point` load; each starts from the last one.
 
     Args:
-        problem: With the values of all that is no parameter.
+        problem: With the values of everything else.
         space: The elements.
         names: The parameters, of `PARAMETERS`.
     """

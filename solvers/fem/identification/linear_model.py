@@ -31,7 +31,7 @@ class LinearModel:
     """Responses of a finger to a `mean` or `point` load; one factorisation while its stiffness stays.
 
     Args:
-        problem: With the values of all that is no parameter.
+        problem: With the values of everything else.
         space: The elements.
         names: The parameters, keys of `solvers.fem.identification.parameters.MEANINGS`.
     """

@@ -1,4 +1,4 @@
-"""What is observed of a finger: displacements of its markers and, if it was measured, the reaction."""
+"""Observations of a finger: displacements of its markers and, if measured, the reaction."""
 
 from dataclasses import dataclass, replace
 
@@ -23,7 +23,7 @@ class ObservationModel:
         functionals: From nodal displacements to the markers', shape (2 m, N, 2).
         observed: Shape (2 m,) or (2 m + 1,), mm and N/mm.
         deviations: Their standard deviations, of the same shape.
-        axis: Which of the load's prescribed components the reaction belongs to; None if it was not measured.
+        axis: Index of the reaction among the load's prescribed components; None if it was not measured.
     """
 
     functionals: FloatArray
@@ -58,7 +58,7 @@ class ObservationModel:
         )
 
     def predicted(self, response: Response) -> Prediction:
-        """What a model says of them, with its derivatives."""
+        """Predictions of a model, with their derivatives."""
         values = np.tensordot(self.functionals, response.nodal)
         slopes = np.tensordot(self.functionals, response.nodal_slopes, axes=((1, 2), (1, 2)))
         if self.axis is None:

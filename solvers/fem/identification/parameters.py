@@ -1,4 +1,4 @@
-"""Parameters of a finger that markers may tell: what they are and what is assumed of them."""
+"""Parameters that `fem-id` can find, and their priors."""
 
 from collections.abc import Mapping, Sequence
 from math import log
@@ -22,10 +22,10 @@ MEANINGS = {
     "rib_stiffness": "factor of Young's modulus in the ribs",
     "young": "Young's modulus",
 }
-"""Every parameter that can be asked for."""
+"""Every parameter, with its description."""
 
 STIFFNESS = {"front_stiffness": "front", "back_stiffness": "back", "rib_stiffness": "rib"}
-"""From a parameter to the part whose stiffness it is."""
+"""Part of the finger of each stiffness parameter."""
 
 
 def parse_parameters(solver: str, text: str) -> tuple[str, ...]:
@@ -46,10 +46,10 @@ def parse_parameters(solver: str, text: str) -> tuple[str, ...]:
 
 
 def parameters_of(problem: Problem, names: Sequence[str], width: float = 1.0) -> list[Parameter]:
-    """The parameters with what is assumed of them.
+    """The parameters with their priors.
 
     Args:
-        problem: Whose values are the means of the priors.
+        problem: Its values are the means of the priors.
         names: Keys of `MEANINGS`.
         width: Factor of the standard deviations of the priors.
 
@@ -90,7 +90,7 @@ def parameters_of(problem: Problem, names: Sequence[str], width: float = 1.0) ->
 
 
 def problem_with(problem: Problem, values: Mapping[str, float]) -> Problem:
-    """The problem with load and material as found; what it has no place for is left out."""
+    """The problem with the values for its load and material; others are ignored."""
     load, material = problem.load, problem.material
     u, v = (
         values.get(name, known)

@@ -1,4 +1,4 @@
-"""What was found of a finger's parameters, in words."""
+"""Identified parameters in words."""
 
 import numpy as np
 
@@ -6,11 +6,11 @@ from geometry.arrays import FloatArray
 from solvers.assimilation.estimation import LEVEL, Estimate
 
 MENTIONED = 0.2
-"""Least share of a parameter in a combination for it to be named."""
+"""Least coefficient of a parameter named in a combination."""
 
 
 def sentence(found: Estimate, missed: FloatArray) -> str:
-    """Values and intervals, whether the model explains the markers, and what they do not determine.
+    """Values and intervals, goodness of fit, and parameters that the markers do not determine.
 
     Args:
         found: The parameters.
@@ -44,7 +44,7 @@ def sentence(found: Estimate, missed: FloatArray) -> str:
 
 
 def combination(found: Estimate) -> str:
-    """The combination of parameters that the observations say least of, in their priors' deviations."""
+    """The least determined combination of parameters, in standard deviations of their priors."""
     direction = found.least_known * np.sign(found.least_known[np.abs(found.least_known).argmax()])
     order = np.argsort(-np.abs(direction))
     text = " ".join(
