@@ -59,7 +59,11 @@ def test_plane_strain_for_plane_stress(case, monkeypatch):
 
 
 def test_too_few_integration_points(monkeypatch):
-    """One point a triangle leaves quadratic elements with motions that cost no energy."""
+    """One point a triangle leaves P2 motions without energy, at which MUMPS fails or not, by rounding."""
     monkeypatch.setattr(linear_equilibrium.ufl, "dx", ufl.dx(metadata={"quadrature_degree": 1}))
-    with pytest.raises(UserError, match="cannot factorise"):
-        MANUFACTURED.measure()
+    rows, refused = (), ""
+    try:
+        rows = MANUFACTURED.measure()
+    except UserError as error:
+        refused = str(error)
+    assert "cannot factorise" in refused or not passes(rows, degree=2)
