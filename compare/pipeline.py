@@ -1,11 +1,9 @@
 """The main job: mesh, measure, solve, evaluate, draw, report."""
 
-import json
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import partial
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +33,7 @@ from compare.runtime.output_folder import (
 from compare.runtime.provenance import file_digest, machine, package_versions, sources_digest
 from compare.runtime.stages import Stages
 from geometry.atomic import write_json
+from geometry.content_hash import content_hash
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
@@ -314,6 +313,7 @@ def _key(solver: Solver, problem: Problem, observations: Observations) -> str:
         solver.settings(),
         package_versions(),
         sources_digest(["compare.evaluation.evaluation", "geometry", "solvers", package]),
+        problem.digest,
+        observations.points,
     ]
-    text = json.dumps(parts, sort_keys=True, default=str)
-    return sha256((text + problem.digest).encode() + observations.points.tobytes()).hexdigest()
+    return content_hash(parts)

@@ -1,8 +1,6 @@
 """Meshes and CAD files, made once for each design and kept by the hash of all that they depend on."""
 
-import hashlib
 import importlib.metadata
-import json
 import os
 import tempfile
 import warnings
@@ -11,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
+from geometry.content_hash import content_hash
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
@@ -107,9 +106,9 @@ def cache_key(design: Design, task: dict[str, object]) -> str:
         "design": design.digest,
         "task": {key: value for key, value in task.items() if key != "what"},
         "versions": {package: _version(package) for package in MAKERS},
-        "sources": [hashlib.sha256(source.read_bytes()).hexdigest() for source in sources],
+        "sources": [source.read_text(encoding="utf-8") for source in sources],
     }
-    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+    return content_hash(parts)
 
 
 def _cached(

@@ -1,7 +1,5 @@
 """The boundary-value problem: the argument of every solver, and nothing else."""
 
-import hashlib
-import json
 from dataclasses import dataclass
 from typing import Literal, Self
 
@@ -11,6 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from geometry.arrays import FloatArray, IntArray
+from geometry.content_hash import content_hash
 from geometry.errors import UserError
 from geometry.mesh.quadrature import segment_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
@@ -143,13 +142,11 @@ class Problem:
     @property
     def digest(self) -> str:
         """SHA-256 over everything that defines the problem."""
-        sha = hashlib.sha256(self.mesh.digest.encode())
-        sha.update(json.dumps([self.material.model_dump(), self.load.model_dump()], sort_keys=True).encode())
-        if self.observations is not None:
-            for name in ("points", "displacements", "standard_deviations", "visible"):
-                sha.update(getattr(self.observations, name).tobytes())
-            sha.update(repr(self.observations.marker_radius).encode())
-        return sha.hexdigest()
+        content: list[object] = [self.mesh.digest, self.material.model_dump(), self.load.model_dump()]
+        if (seen := self.observations) is not None:
+            content += [seen.points, seen.displacements, seen.standard_deviations, seen.visible]
+            content.append(seen.marker_radius)
+        return content_hash(content)
 
 
 POINTS_ON_EDGE = 12

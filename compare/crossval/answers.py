@@ -1,64 +1,57 @@
-"""What a cross-validation answers, in words."""
+"""The two questions of a cross-validation, answered in sentences."""
 
 from collections.abc import Mapping
 
 from compare.crossval.folds import ALL
 from compare.crossval.result import CrossvalResult
-from compare.crossval.tables import has_fields
 from compare.evaluation.number_format import percent
 from solvers.assimilation.misfit import assimilates
 
 NAMES = {"displacement": "displacement", "strain": "strain", "von_mises": "von Mises stress"}
-"""Of the fields, for people."""
+"""Names of the fields in sentences."""
 
 
 def answers(result: CrossvalResult) -> Mapping[str, list[str]]:
-    """Sentences on solvers that were given markers, by question; questions that have an answer."""
+    """Sentences on the solvers that assimilate, by question; questions without an answer are left out."""
+    given = [
+        variant.label
+        for variant in result.study.variants
+        if variant.label in result.scores and assimilates(variant.make(0))
+    ]
     found = {
-        "Are held-out markers better predicted with the others than without?": _predictions(result),
-        "Is the stress better after assimilation?": _stresses(result),
+        "Are held-out markers better predicted with the others than without?": _predictions(result, given),
+        "Is the stress better after assimilation?": _stresses(result, given),
     }
     return {question: sentences for question, sentences in found.items() if sentences}
 
 
-def _given(result: CrossvalResult) -> list[str]:
-    given = {entry.label for entry in result.study.variants if assimilates(entry.make(0))}
-    return [label for label in result.scores if label in given]
-
-
-def _predictions(result: CrossvalResult) -> list[str]:
-    """Where each solver's held-out error is below that of every baseline, and where it is not."""
+def _predictions(result: CrossvalResult, given: list[str]) -> list[str]:
+    """Verdicts on each solver's held-out error against every baseline, grouped by verdict."""
     sentences = []
-    for label in _given(result):
+    for label in given:
         for baseline, schemes in result.differences[label].items():
-            verdicts = {
-                scheme: found["mae_sum"].verdict for scheme, found in schemes.items() if "mae_sum" in found
-            }
+            verdicts: dict[str, list[str]] = {}
+            for scheme, found in schemes.items():
+                if "mae_sum" in found:
+                    verdicts.setdefault(found["mae_sum"].verdict, []).append(scheme)
             if verdicts:
-                sentences.append(f"{label} against {baseline}: {_grouped(verdicts)}.")
+                said = "; ".join(f"{verdict} in {', '.join(names)}" for verdict, names in verdicts.items())
+                sentences.append(f"{label} against {baseline}: {said}.")
     return sentences
 
 
-def _grouped(verdicts: Mapping[str, str]) -> str:
-    """`better in one-out and random; worse in tip-out`."""
-    having: dict[str, list[str]] = {}
-    for scheme, verdict in verdicts.items():
-        having.setdefault(verdict, []).append(scheme)
-    return "; ".join(f"{verdict} in {', '.join(schemes)}" for verdict, schemes in having.items())
-
-
-def _stresses(result: CrossvalResult) -> list[str]:
+def _stresses(result: CrossvalResult, given: list[str]) -> list[str]:
     """Distances of the fields from the truth, all markers given, beside those of `fem`."""
-    if not has_fields(result) or "fem" not in result.scores:
+    if not result.has_fields or "fem" not in result.scores:
         return []
     plain = result.scores["fem"][ALL].fields
     sentences = []
-    for label in _given(result):
+    for label in given:
         own = result.scores[label][ALL].fields
         parts = []
         for name, words in NAMES.items():
-            verdict = result.differences[label]["fem"][ALL].get(name)
-            said = verdict.verdict if verdict else "not told apart"
+            difference = result.difference(label, "fem", ALL, name)
+            said = difference.verdict if difference else "not told apart"
             parts.append(f"{words} {percent(plain[name].mean, 2)} to {percent(own[name].mean, 2)} ({said})")
         sentences.append(f"{label}, given every marker, against fem: {', '.join(parts)} away from the truth.")
     return sentences

@@ -1,4 +1,4 @@
-"""A cross-validation as pictures: errors of held-out markers, and distances from the truth."""
+"""Charts of a cross-validation: errors at markers, distances from the truth, marker weights."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,19 +22,19 @@ HEAD, HEIGHT, FOOT, LEFT, GAP = 0.5, 2.2, 0.5, 0.72, 0.5
 """Heights, the left margin and the gap between charts, inches."""
 
 SHAPES = "os^Dv"
-"""Of the marks: another one when the colours begin again."""
+"""Shapes of the marks: another one when the colours begin again."""
 
 SHIFT = 0.03
-"""Of a solver's marks from those of the one before, so that none hides another."""
+"""Horizontal shift of a solver's marks from the previous solver's, so that none hides another."""
 
 SMALLEST = 1e-4
-"""Misfit below which nothing is drawn, mm: no camera knows it."""
+"""Misfit below which nothing is drawn, mm: no camera resolves it."""
 
 PANELS = {"displacement": "displacement", "strain": "strain", "von_mises": "von Mises stress"}
 
 
 def draw_held_out(path: Path, *, errors: Mapping[str, Sequence[float]], simulated: bool) -> None:
-    """Draw the mean of |du| + |dv| at every marker where it is held out, a line a solver."""
+    """Draw the mean of |du| + |dv| at every marker where it is held out, a line for each solver."""
     height = legend_height(list(errors))
     with figure(path, HEAD + height + HEIGHT + FOOT) as drawn:
         heading(
@@ -51,14 +51,8 @@ def draw_held_out(path: Path, *, errors: Mapping[str, Sequence[float]], simulate
         _finish(axes)
 
 
-def draw_fields(path: Path, *, scores: Mapping[str, Mapping[str, Score]], schemes: Sequence[str]) -> bool:
-    """Draw relative L2 distances from the truth by scheme, a chart a field.
-
-    Returns:
-        Whether there was a truth to be away from.
-    """
-    if not any(score.fields for each in scores.values() for score in each.values()):
-        return False
+def draw_fields(path: Path, *, scores: Mapping[str, Mapping[str, Score]], schemes: Sequence[str]) -> None:
+    """Draw relative L2 distances from the truth by scheme, a chart for each field."""
     height = legend_height(list(scores))
     width = (WIDTH - LEFT - 0.1 - (len(PANELS) - 1) * GAP) / len(PANELS)
     with figure(path, HEAD + height + HEIGHT + FOOT + 0.25) as drawn:
@@ -78,15 +72,14 @@ def draw_fields(path: Path, *, scores: Mapping[str, Mapping[str, Score]], scheme
             _finish(axes, legend=column == 0)
             axes.set_xlabel(title)
         drawn.axes[0].set_ylabel("%")
-    return True
 
 
-def draw_curve(path: Path, *, curve: Mapping[str, Sequence[float]]) -> None:
-    """Draw what more weight of the markers does to `fem-asm`: to the markers, and to the fields.
+def draw_weight_sweep(path: Path, *, sweep: Mapping[str, Sequence[float]]) -> None:
+    """Draw the errors of `fem-asm` at the markers and over the body against the weight of the markers.
 
     Args:
         path: The picture.
-        curve: Columns of `compare.crossval.weight_sweep.sweep_weights`.
+        sweep: Columns of `compare.crossval.weight_sweep.sweep_weights`.
     """
     panels: dict[str, dict[str, str]] = {
         "root mean square, mm": {"in_sample_mm": "markers given", "left_out_mm": "each left out"},
@@ -97,14 +90,14 @@ def draw_curve(path: Path, *, curve: Mapping[str, Sequence[float]]) -> None:
     with figure(path, HEAD + legend + HEIGHT + FOOT) as drawn:
         heading(
             drawn,
-            "What more weight of the markers does to fem-asm",
+            "fem-asm for other weights of the markers",
             "All markers given, first seed. Factors of the weight that it has.",
         )
         for column, (label, lines) in enumerate(panels.items()):
             axes = axes_at(drawn, (LEFT + column * (width + between), HEAD + legend, width, HEIGHT))
             for number, (name, title) in enumerate(lines.items()):
-                values = [100 * value if column else value for value in curve[name]]
-                axes.plot(curve["factor"], values, color=solver_colour(number), linewidth=1.2, label=title)
+                values = [100 * value if column else value for value in sweep[name]]
+                axes.plot(sweep["factor"], values, color=solver_colour(number), linewidth=1.2, label=title)
             axes.set_xscale("log")
             axes.set_xlabel("factor of the weight")
             axes.set_ylabel(label)

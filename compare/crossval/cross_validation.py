@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from compare.crossval.fold_result import FoldResult
+from compare.crossval.fold_result import FoldResult, SeedResults
 from compare.crossval.folds import LOAD, LoadCase, folds_of, load_cases_of
 from compare.crossval.output_files import write_results
 from compare.crossval.result import CrossvalResult
@@ -159,7 +159,7 @@ def _results(
 
 
 def _sweep(
-    tasks: Mapping[str, SolverTask], results: Mapping[str, list[list[FoldResult]]], stages: Stages
+    tasks: Mapping[str, SolverTask], results: Mapping[str, SeedResults], stages: Stages
 ) -> dict[str, list[float]]:
     """The sweep of `sweep_weights`, if its solver is there."""
     swept = {"weights": tasks[SWEPT]} if SWEPT in results else {}

@@ -1,10 +1,10 @@
-"""What a cross-validation found."""
+"""The scores of a finished cross-validation."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Self
 
-from compare.crossval.fold_result import FoldResult
+from compare.crossval.fold_result import SeedResults
 from compare.crossval.folds import SCHEMES, Fold
 from compare.crossval.scores import COMPARED, LEVEL, Difference, Score, difference, of_scheme, score
 from compare.crossval.study import Study
@@ -13,7 +13,7 @@ from geometry.observations import Observations
 from solvers.assimilation.misfit import assimilates
 
 BASELINES = ("fem", "gp")
-"""Solvers from which differences are told."""
+"""Solvers that the others are compared with."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,13 +21,13 @@ class CrossvalResult:
     """A finished study.
 
     Attributes:
-        study: What was asked for.
-        source: One sentence on where the markers' displacements come from.
-        markers: How many there are.
-        folds: What was held out.
+        study: The study.
+        source: One sentence on the source of the markers' displacements.
+        markers: Number of markers.
+        folds: The folds of every solver.
         scores: By solver and scheme.
         differences: By solver, baseline, scheme and entry of `COMPARED`.
-        failed: What solvers that have no score ended with.
+        failed: Error messages of the solvers that have no score.
     """
 
     study: Study
@@ -40,9 +40,18 @@ class CrossvalResult:
 
     @property
     def schemes(self) -> list[str]:
-        """Those that there are folds of, in the usual order."""
+        """The schemes of the folds, in the order of `SCHEMES`."""
         present = {fold.scheme for fold in self.folds}
         return [scheme for scheme in SCHEMES if scheme in present]
+
+    @property
+    def has_fields(self) -> bool:
+        """Whether fields were compared with a truth."""
+        return any(score.fields for each in self.scores.values() for score in each.values())
+
+    def difference(self, label: str, baseline: str, scheme: str, what: str) -> Difference | None:
+        """One of the `differences`; None if there is no such one."""
+        return self.differences[label].get(baseline, {}).get(scheme, {}).get(what)
 
     @classmethod
     def of(
@@ -50,13 +59,13 @@ class CrossvalResult:
         study: Study,
         observations: Observations,
         folds: Sequence[Fold],
-        outcomes: Mapping[str, list[list[FoldResult]]],
+        results: Mapping[str, SeedResults],
         failed: Mapping[str, str],
     ) -> Self:
-        """Score what came of every fold."""
+        """Score the results of all folds of each solver."""
         schemes = list(dict.fromkeys(fold.scheme for fold in folds))
         by_scheme = {
-            label: {scheme: of_scheme(each, scheme) for scheme in schemes} for label, each in outcomes.items()
+            label: {scheme: of_scheme(each, scheme) for scheme in schemes} for label, each in results.items()
         }
         differences = {
             label: {
@@ -79,7 +88,7 @@ class CrossvalResult:
             markers=len(observations.points),
             folds=folds,
             scores={
-                label: {scheme: score(entries) for scheme, entries in each.items()}
+                label: {scheme: score(found) for scheme, found in each.items()}
                 for label, each in by_scheme.items()
             },
             differences=differences,
@@ -87,7 +96,7 @@ class CrossvalResult:
         )
 
     def content(self) -> dict[str, Any]:
-        """What `crossval.json` says of it."""
+        """The part of `crossval.json` that holds the result."""
         return {
             "measurements": {"description": self.source, "markers": self.markers},
             "seeds": self.study.seeds,
@@ -103,11 +112,9 @@ class CrossvalResult:
                     "solver": variant.solver,
                     "settings": dict(variant.settings),
                     "assimilates": assimilates(variant.make(0)),
-                    "schemes": {
-                        scheme: asdict(found) for scheme, found in self.scores[variant.label].items()
-                    },
+                    "schemes": {scheme: asdict(one) for scheme, one in self.scores[variant.label].items()},
                     "against": {
-                        baseline: {scheme: _verdicts(each) for scheme, each in by_scheme.items()}
+                        baseline: {scheme: _with_verdicts(each) for scheme, each in by_scheme.items()}
                         for baseline, by_scheme in self.differences[variant.label].items()
                     },
                 }
@@ -118,5 +125,5 @@ class CrossvalResult:
         }
 
 
-def _verdicts(differences: Mapping[str, Difference]) -> dict[str, dict[str, Any]]:
+def _with_verdicts(differences: Mapping[str, Difference]) -> dict[str, dict[str, Any]]:
     return {what: {**asdict(one), "verdict": one.verdict} for what, one in differences.items()}

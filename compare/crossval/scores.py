@@ -1,4 +1,4 @@
-"""What the outcomes of a cross-validation say: means, intervals, differences, and words for them."""
+"""Scores of a solver from its folds: means, confidence intervals and differences from a baseline."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,27 +7,27 @@ from math import nan, sqrt
 import numpy as np
 from scipy.stats import norm, t
 
-from compare.crossval.fold_result import FoldResult
+from compare.crossval.fold_result import FoldResult, SeedResults
 from geometry.arrays import FloatArray
 
 LEVEL = 0.95
-"""Of every interval, and of the intervals of which coverage is the share that holds."""
+"""Confidence level of every interval; coverage is the share of errors inside the interval of this level."""
 
 RESAMPLES = 2000
-"""Of the bootstrap."""
+"""Resamples of the bootstrap."""
 
 MARKERS = ("mae_u", "mae_v", "mae_sum", "mae_rss")
 FIELDS = ("displacement", "strain", "von_mises", "von_mises_finite")
 COMPARED = ("mae_sum", "displacement", "strain", "von_mises")
-"""What a difference is told of."""
+"""Scores of which differences from the baselines are computed."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A mean over seeds with Student's interval; its ends are NaN for one seed.
+    """A mean with a confidence interval, whose ends are NaN for one seed.
 
     Attributes:
-        mean: Over the seeds.
+        mean: The mean.
         low: Lower end.
         high: Upper end.
     """
@@ -38,7 +38,7 @@ class Interval:
 
     @classmethod
     def of(cls, values: Sequence[float]) -> "Interval":
-        """From a value for each seed."""
+        """Student's interval from a value for each seed."""
         mean = float(np.mean(values))
         if len(values) < 2:
             return cls(mean, nan, nan)
@@ -47,25 +47,15 @@ class Interval:
 
 
 @dataclass(frozen=True)
-class Difference:
-    """A solver's score minus a baseline's, in the same folds and seeds.
-
-    Attributes:
-        mean: Negative where the solver is better.
-        low: Lower end of the interval by bootstrap over folds and seeds.
-        high: Upper end.
-    """
-
-    mean: float
-    low: float
-    high: float
+class Difference(Interval):
+    """A solver's score minus a baseline's, in the same folds and seeds; negative if it is better."""
 
     @classmethod
-    def of(cls, differences: FloatArray) -> "Difference":
-        """From one difference for each seed and fold, shape (s, f).
+    def bootstrap(cls, differences: FloatArray) -> "Difference":
+        """Bootstrap interval from one difference for each seed and fold, shape (s, f).
 
-        Seeds and folds are drawn anew with replacement, each by itself, since a fold is as hard for every
-        seed.
+        Seeds and folds are resampled with replacement, independently of each other, since a fold is equally
+        hard for every seed.
         """
         seeds, folds = differences.shape
         draws = np.random.default_rng(0)
@@ -77,7 +67,7 @@ class Difference:
 
     @property
     def verdict(self) -> str:
-        """In words."""
+        """`better`, `worse` or `not told apart`."""
         if self.high < 0:
             return "better"
         return "worse" if self.low > 0 else "not told apart"
@@ -105,88 +95,71 @@ class Score:
     converged: float
 
 
-FoldResults = Sequence[Sequence[FoldResult]]
-"""Of one solver in one scheme: for each seed its folds."""
+def of_scheme(results: SeedResults, scheme: str) -> list[list[FoldResult]]:
+    """The results of a scheme's folds."""
+    return [[found for found in seed if found.fold.scheme == scheme] for seed in results]
 
 
-def of_scheme(outcomes: FoldResults, scheme: str) -> list[list[FoldResult]]:
-    """Those of a scheme."""
-    return [[outcome for outcome in seed if outcome.fold.scheme == scheme] for seed in outcomes]
-
-
-def score(outcomes: FoldResults) -> Score:
-    """The score of a solver in a scheme."""
-    ratios = np.concatenate([outcome.ratios for seed in outcomes for outcome in seed])
+def score(results: SeedResults) -> Score:
+    """The score of a solver from its results in one scheme."""
+    ratios = np.concatenate([found.ratios for seed in results for found in seed])
     inside = np.abs(ratios) <= norm.ppf((1 + LEVEL) / 2)
-    fields = [name for name in FIELDS if name in outcomes[0][0].fields]
     return Score(
-        in_sample=_errors(outcomes, lambda outcome: outcome.in_sample),
-        held_out=_errors(outcomes, lambda outcome: outcome.held_out),
+        in_sample=_errors(results, lambda found: found.in_sample),
+        held_out=_errors(results, lambda found: found.held_out),
         fields={
-            name: Interval.of(
-                [float(np.mean([outcome.fields[name] for outcome in seed])) for seed in outcomes]
-            )
-            for name in fields
+            name: Interval.of([float(np.mean([found.fields[name] for found in seed])) for seed in results])
+            for name in FIELDS
+            if name in results[0][0].fields
         },
         coverage=float(inside.mean()) if inside.size else None,
-        per_marker=_per_marker(outcomes),
-        converged=float(np.mean([outcome.converged for seed in outcomes for outcome in seed])),
+        per_marker=_per_marker(results),
+        converged=float(np.mean([found.converged for seed in results for found in seed])),
     )
 
 
 def marker_errors(errors: FloatArray) -> dict[str, float]:
-    """Mean absolute errors of errors of shape (n, 2), mm, as the paper's two definitions have them."""
+    """Mean absolute errors of errors of shape (n, 2), mm, by the paper's two definitions."""
     u, v = (float(value) for value in np.abs(errors).mean(axis=0))
     return {"mae_u": u, "mae_v": v, "mae_sum": u + v, "mae_rss": float(np.hypot(u, v))}
 
 
-def difference(outcomes: FoldResults, baseline: FoldResults, what: str) -> Difference | None:
-    """How a solver's score differs from a baseline's; None where there is no such score.
+def difference(results: SeedResults, baseline: SeedResults, what: str) -> Difference | None:
+    """Difference of a solver's score from a baseline's; None where one of them has no such score.
 
     Args:
-        outcomes: Of the solver in a scheme.
-        baseline: Of the other one in the same.
+        results: Of the solver in a scheme.
+        baseline: Of the baseline in the same scheme.
         what: One of `COMPARED`.
     """
-    pair = [_values(each, what) for each in (outcomes, baseline)]
-    if pair[0] is None or pair[1] is None:
-        return None
-    return Difference.of(pair[0] - pair[1])
+    own, other = (_values(each, what) for each in (results, baseline))
+    return None if own is None or other is None else Difference.bootstrap(own - other)
 
 
-def _values(outcomes: FoldResults, what: str) -> FloatArray | None:
-    """A score for each seed and fold, shape (s, f)."""
-    if what in FIELDS:
-        found = [[outcome.fields.get(what, nan) for outcome in seed] for seed in outcomes]
-    else:
-        found = [
-            [marker_errors(outcome.held_out)[what] if len(outcome.held_out) else nan for outcome in seed]
-            for seed in outcomes
-        ]
-    values = np.array(found)
+def _values(results: SeedResults, what: str) -> FloatArray | None:
+    """A score for each seed and fold, shape (s, f); None if some fold has none."""
+
+    def value(found: FoldResult) -> float:
+        if what in FIELDS:
+            return found.fields.get(what, nan)
+        return marker_errors(found.held_out)[what] if len(found.held_out) else nan
+
+    values = np.array([[value(found) for found in seed] for seed in results])
     return values if np.isfinite(values).all() else None
 
 
-def _mean_fields(outcomes: FoldResults, name: str) -> list[float]:
-    """Mean distance over the folds of each seed."""
-    return [float(np.mean([outcome.fields[name] for outcome in seed])) for seed in outcomes]
-
-
-def _errors(outcomes: FoldResults, chosen: Callable[[FoldResult], FloatArray]) -> dict[str, Interval]:
+def _errors(results: SeedResults, chosen: Callable[[FoldResult], FloatArray]) -> dict[str, Interval]:
     """Intervals of the mean absolute errors over all folds of a seed."""
-    by_seed = [np.concatenate([chosen(outcome) for outcome in seed]) for seed in outcomes]
+    by_seed = [np.concatenate([chosen(found) for found in seed]) for seed in results]
     if not all(map(len, by_seed)):
         return {}
     errors = [marker_errors(values) for values in by_seed]
     return {name: Interval.of([entry[name] for entry in errors]) for name in MARKERS}
 
 
-def _per_marker(outcomes: FoldResults) -> list[float]:
-    count = len(outcomes[0][0].errors)
-    sums, times = np.zeros((2, count))
-    for seed in outcomes:
-        for outcome in seed:
-            held = outcome.held
-            sums[held] += np.abs(outcome.held_out).sum(axis=1)
-            times[held] += 1
+def _per_marker(results: SeedResults) -> list[float]:
+    sums, times = np.zeros((2, len(results[0][0].errors)))
+    for found in (found for seed in results for found in seed):
+        sums[found.held] += np.abs(found.held_out).sum(axis=1)
+        times[found.held] += 1
     return [float(total / number) if number else nan for total, number in zip(sums, times, strict=True)]

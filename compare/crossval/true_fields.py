@@ -1,7 +1,5 @@
 """The truth that solvers are judged by: the virtual experiment on a mesh of half the size, everywhere."""
 
-import hashlib
-import json
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -13,6 +11,7 @@ from compare.runtime.provenance import package_versions, sources_digest
 from geometry.arrays import FloatArray
 from geometry.atomic import atomic_path
 from geometry.cache import cache_folder, finger_mesh
+from geometry.content_hash import content_hash
 from geometry.finger.design import Design
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
@@ -173,7 +172,7 @@ class TruthTask:
                 [*SOURCES, "compare.crossval.true_fields", "compare.evaluation.virtual_experiment"]
             ),
         ]
-        digest = hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+        digest = content_hash(parts)
         return cache_folder() / f"truth-{digest}.npz"
 
 

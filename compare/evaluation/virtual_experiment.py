@@ -5,8 +5,6 @@ judged by it, and whose distance from them is known to be of the size and patter
 simulation and experiment.
 """
 
-import hashlib
-import json
 from contextlib import suppress
 from zipfile import BadZipFile
 
@@ -15,6 +13,7 @@ import numpy as np
 from compare.evaluation.evaluation import Evaluation
 from compare.runtime.provenance import package_versions, sources_digest
 from geometry.cache import cache_folder
+from geometry.content_hash import content_hash
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.problem import Load, Problem
@@ -133,4 +132,4 @@ def _richer(problem: Problem) -> tuple[Solver, Problem]:
 def _key(solver: Solver, problem: Problem) -> str:
     """SHA-256 over solver, problem, sources and versions."""
     parts = [problem.digest, solver.settings(), package_versions(), sources_digest(SOURCES), SOURCE]
-    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+    return content_hash(parts)

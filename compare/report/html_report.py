@@ -4,8 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
 from compare.evaluation.certificate import Certificate
 from compare.evaluation.differences import ReferenceDifferences
 from compare.evaluation.evaluation import Evaluation
@@ -20,6 +18,7 @@ from compare.report.certificate_text import certificate_sentences
 from compare.report.table_one import PRINTED, millimetres, table_one
 from compare.report.tables import seconds
 from compare.report.truth_text import truth_sentences
+from compare.runtime.html import template_environment
 from geometry.atomic import atomic_path
 from geometry.finger.parameters import Parameters
 from geometry.mesh.triangle_mesh import TriangleMesh
@@ -86,19 +85,12 @@ def write_report(path: Path, content: ReportContent) -> None:
 
 def render(content: ReportContent) -> str:
     """The report as HTML text."""
-    environment = Environment(
-        loader=PackageLoader("compare"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = template_environment()
     environment.filters |= {
         "millimetres": millimetres,
         "number": number,
         "distance": distance,
         "percent": percent,
-        "png": text.embedded,
         "sentence": text.sentence,
         "stat": text.stat,
         "symbol": text.symbol,

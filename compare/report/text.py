@@ -1,8 +1,6 @@
 """Words and numbers of the report."""
 
-import base64
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 from markupsafe import Markup
@@ -99,11 +97,6 @@ def in_words(value: object) -> str:
     if isinstance(value, Mapping):
         return ", ".join(f"{key} {in_words(inner)}" for key, inner in value.items()) or "defaults"
     return "–" if value is None else str(value)
-
-
-def embedded(path: Path) -> str:
-    """A PNG file as a data URL."""
-    return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
 
 
 def symbol(name: str) -> Markup:

@@ -1,10 +1,10 @@
 """The parameters of a finger: names, the paper's symbols, units and bounds; mm and degrees throughout."""
 
-import hashlib
-import json
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
+
+from geometry.content_hash import content_hash
 
 
 def bounded(default: Any, low: float, high: float, unit: str, symbol: str, meaning: str) -> Any:
@@ -94,7 +94,7 @@ class Parameters(BaseModel):
     def digest(self) -> str:
         """SHA-256 over everything but the name, in hexadecimal; equal for equal fingers."""
         values = self.model_dump(exclude={"name"}) | {"contact_position": self.contact_abscissa}
-        return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
+        return content_hash(values)
 
 
 def parameter_info(

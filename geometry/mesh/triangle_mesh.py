@@ -1,6 +1,5 @@
 """The triangle mesh that every solver shares."""
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.arrays import FloatArray, IntArray, frozen_array
+from geometry.content_hash import content_hash
 from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints, Locator
 
@@ -95,11 +95,7 @@ class TriangleMesh:
     @cached_property
     def digest(self) -> str:
         """SHA-256 over every array, in hexadecimal; equal for equal meshes."""
-        sha = hashlib.sha256()
-        for name, array in self._arrays().items():
-            sha.update(name.encode())
-            sha.update(np.ascontiguousarray(array).tobytes())
-        return sha.hexdigest()
+        return content_hash(self._arrays())
 
     def boundary(self, name: str) -> IntArray:
         """Edges of the boundary called `name`, shape (k, 2).

@@ -13,7 +13,7 @@ import pytest
 from scipy.stats import t
 
 from compare.cli import main
-from compare.crossval.charts import draw_curve, draw_fields, draw_held_out
+from compare.crossval.charts import draw_fields, draw_held_out, draw_weight_sweep
 from compare.crossval.fold_result import FoldResult
 from compare.crossval.folds import (
     ALL,
@@ -282,16 +282,16 @@ def test_scores_by_hand():
 def test_a_difference_is_paired_by_fold():
     """Folds differ by more than solvers do, and yet the solvers are told apart."""
     hard = np.array([[1.0, 5.0, 9.0, 20.0]])
-    better = Difference.of((hard - 0.1) - hard)
+    better = Difference.bootstrap((hard - 0.1) - hard)
     assert (better.mean, better.verdict) == (pytest.approx(-0.1), "better")
-    assert Difference.of(np.array([[0.1, 0.2], [0.3, 0.1]])).verdict == "worse"
-    assert Difference.of(np.array([[1.0, -1.2, 0.9, -0.8]])).verdict == "not told apart"
+    assert Difference.bootstrap(np.array([[0.1, 0.2], [0.3, 0.1]])).verdict == "worse"
+    assert Difference.bootstrap(np.array([[1.0, -1.2, 0.9, -0.8]])).verdict == "not told apart"
 
 
 def test_the_bootstrap_is_about_as_wide_as_the_mean_is_uncertain():
     """Against the normal theory of a mean of 40 independent values."""
     values = np.random.default_rng(3).normal(size=(1, 40))
-    found = Difference.of(values)
+    found = Difference.bootstrap(values)
     expected = 2 * 1.96 * values.std(ddof=1) / np.sqrt(40)
     assert found.high - found.low == pytest.approx(expected, rel=0.1)
 
@@ -377,6 +377,7 @@ def test_measured_markers_have_no_truth(tmp_path, capsys, in_line, observations)
     assert len(content["solvers"]["gp"]["schemes"]["one-out"]["per_marker"]) == 8
     assert content["solvers"]["gp"]["schemes"]["one-out"]["fields"] == {}
     assert not (tmp_path / "out" / "fields.csv").exists()
+    assert not (tmp_path / "out" / "fields.png").exists()
 
 
 @pytest.mark.parametrize(
@@ -421,14 +422,12 @@ def test_pictures_show_every_solver(pages, tmp_path):
     fields = {"displacement": 0.2, "strain": 0.3, "von_mises": 2.0}
     one = score([[outcome_of(ONE, (0,), [[1.0, 1.0]], fields=fields)]])
     scores = {label: {ALL: one, ONE: one} for label in values}
-    assert draw_fields(tmp_path / "fields.png", scores=scores, schemes=[ALL, ONE])
+    draw_fields(tmp_path / "fields.png", scores=scores, schemes=[ALL, ONE])
     columns = ("factor", "in_sample_mm", "left_out_mm", *fields)
-    draw_curve(tmp_path / "curve.png", curve={name: [1e-6, 1e-3, 1.0] for name in columns})
+    draw_weight_sweep(tmp_path / "curve.png", sweep={name: [1e-6, 1e-3, 1.0] for name in columns})
     page = pages[tmp_path / "curve.png"]
     assert (page.cut_off(), page.overlaps()) == ([], [])
     for name in ("held.png", "fields.png"):
         page = pages[tmp_path / name]
         assert page.cut_off() == []
         assert all(label in page.text for label in values)
-    bare = {"gp": {ALL: score([[outcome_of(ALL, (0,), [[1.0, 1.0]])]])}}
-    assert not draw_fields(tmp_path / "none.png", scores=bare, schemes=[ALL])

@@ -1,7 +1,5 @@
 """`pinn-std --preset paper`: the paper's two networks, its loss, its optimiser, its 60,000 epochs."""
 
-import hashlib
-import json
 import time
 from dataclasses import dataclass, field, fields, replace
 from typing import ClassVar, Literal
@@ -10,6 +8,7 @@ import numpy as np
 import torch
 
 from geometry.arrays import FloatArray
+from geometry.content_hash import content_hash
 from geometry.errors import UserError
 from solvers.pinn.marker_terms import Observing
 from solvers.pinn.paper.collocation import Collocation, base_points, body_sample
@@ -166,7 +165,7 @@ class PaperPinnSolver(Observing):
         if self._context.folder is None:
             return None
         binding = {name: value for name, value in self.settings().items() if name not in FREE}
-        digest = hashlib.sha256((problem.digest + json.dumps(binding, sort_keys=True)).encode()).hexdigest()
+        digest = content_hash([problem.digest, binding])
         return Store(self._context.folder, digest, self._context.resume, writes=processes.rank == 0)
 
     def loss(self, problem: Problem, processes: Processes = ONE_PROCESS) -> Loss:

@@ -1,0 +1,41 @@
+"""Tables for the terminal, all of one style."""
+
+from collections.abc import Collection, Iterable, Sequence
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+
+def terminal_table(
+    title: str,
+    headings: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    *,
+    caption: str = "",
+    left: Collection[str] = (),
+    narrow: bool = False,
+) -> Table:
+    """A table with a title above and a caption below.
+
+    Args:
+        title: Above the table.
+        headings: Of the columns.
+        rows: As many texts as headings.
+        caption: Below the table.
+        left: Headings of the columns that are aligned to the left; the others are aligned to the right.
+        narrow: Whether columns stand as close as they can.
+    """
+    table = Table(
+        title=title or None,
+        caption=caption or None,
+        box=SIMPLE_HEAD,
+        title_justify="left",
+        caption_justify="left",
+        padding=0 if narrow else (0, 1),
+        pad_edge=not narrow,
+    )
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading in left else "right", no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
+    return table
