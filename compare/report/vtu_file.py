@@ -1,5 +1,6 @@
 """One writer of fields for every solver: VTK unstructured grids (.vtu) that ParaView opens."""
 
+import unicodedata
 from pathlib import Path
 
 import numpy as np
@@ -47,11 +48,17 @@ def write_vtu(path: Path, mesh: TriangleMesh, evaluation: Evaluation) -> None:
     grid.cell_data["energy_density_MPa"] = evaluation.per_triangle(evaluation.energy_density)
     grid.field_data["solver"] = [evaluation.solver]
     grid.field_data["converged"] = [int(evaluation.converged)]
-    grid.field_data["status"] = [evaluation.message]
+    grid.field_data["status"] = [_ascii(evaluation.message)]
     grid.field_data["energy_N_mm_per_mm"] = [evaluation.energy]
     grid.field_data["reaction_N_per_mm"] = evaluation.reaction[None]
     with atomic_path(path) as partial:
         grid.save(partial)
+
+
+def _ascii(text: str) -> str:
+    """The text in the only letters that VTK takes: no-break spaces and minus signs become plain ones."""
+    plain = unicodedata.normalize("NFKC", text).replace("−", "-")
+    return plain.encode("ascii", "replace").decode("ascii")
 
 
 def write_mesh(path: Path, mesh: TriangleMesh) -> None:

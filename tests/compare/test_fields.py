@@ -63,6 +63,15 @@ def test_it_says_whose_result_it_is(grid: pyvista.UnstructuredGrid, sheared: Eva
     np.testing.assert_array_equal(np.ravel(grid.field_data["reaction_N_per_mm"]), sheared.reaction)
 
 
+def test_a_message_keeps_its_meaning_in_the_letters_of_vtk(
+    sheared: Evaluation, mesh: TriangleMesh, tmp_path: Path
+) -> None:
+    message = "its energy is −12 % above"
+    write_vtu(tmp_path / "fem.vtu", mesh, replace(sheared, message=message))
+    grid = pyvista.read(tmp_path / "fem.vtu")
+    assert list(grid.field_data["status"]) == ["its energy is -12 % above"]
+
+
 def test_a_mesh_file_says_where_boundaries_and_markers_are(mesh: TriangleMesh, tmp_path: Path) -> None:
     write_mesh(tmp_path / "mesh.vtu", mesh)
     data = pyvista.read(tmp_path / "mesh.vtu").point_data
