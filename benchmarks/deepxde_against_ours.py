@@ -99,7 +99,7 @@ def deepxde_curve(load: Load, seconds: float) -> list[Judged]:
 
 
 def _steps(problem: Problem, threads: int) -> int:
-    """How many iterations a few seconds allow, the first, which sets things up, not counted."""
+    """Number of iterations in a few seconds, without the first, which includes the set-up."""
     torch.set_num_threads(threads)
     starts: list[float] = []
 

@@ -26,7 +26,7 @@ from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
 from solvers.elasticity import Lame
-from solvers.pinn.finite_basis.hard_constraint import BaseFactor
+from solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from solvers.problem import Problem, contact_functional
 
 os.environ.setdefault("DDE_BACKEND", "pytorch")  # read when DeepXDE is imported
@@ -102,7 +102,7 @@ def conditioned(network: Any, problem: Problem) -> Callable[[torch.Tensor], torc
     box = problem.mesh.points.min(axis=0), problem.mesh.points.max(axis=0)
     middle, half = _tensor((box[0] + box[1]) / 2), float((box[1] - box[0]).max() / 2)
     stroke = float(np.abs(problem.load.values).max())
-    factor = BaseFactor.of(problem.mesh, BASE_LENGTH)
+    factor = HardConstraint.of(problem.mesh, BASE_LENGTH)
     contact, weights = map(_tensor, contact_functional(problem))
     prescribed = _tensor(np.array([value or 0.0 for value in problem.load.displacement]))
     shape = factor.at(contact)[0] * weights[:, None]

@@ -1,4 +1,4 @@
-"""The paper's kind of network with hard conditions, written plainly: what the recipes train.
+"""Modified MLPs with hard constraints, written plainly, for the training recipes.
 
 Two modified MLPs N of the scaled position give u = f (N - m(f N) / m(f) + t / m(f)), with the factor f of the
 clamp and the load's functional m, which is t, whatever the weights. The elastic energy is |r|² / 2 with three
@@ -14,10 +14,10 @@ import torch
 from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
-from solvers.pinn.finite_basis.hard_constraint import BaseFactor
-from solvers.pinn.paper.losses import stiffness_matrix
+from solvers.pinn.finite_basis.hard_constraint import HardConstraint
+from solvers.pinn.paper.loss_terms import stiffness_matrix
 from solvers.pinn.paper.modified_mlp import ModifiedMlp
-from solvers.pinn.threading import cut, in_threads
+from solvers.pinn.threading import map_in_threads, slices
 from solvers.problem import Problem, contact_functional
 
 BASE_LENGTH = 5.0
@@ -50,15 +50,15 @@ class FingerNetwork:
 
     @cached_property
     def roots(self) -> torch.Tensor:
-        """What gives the residuals from (du/dx, du/dy, dv/dx, dv/dy), shape (3, 4), MPa^1/2."""
+        """Matrix from (du/dx, du/dy, dv/dx, dv/dy) to the residuals, shape (3, 4), MPa^1/2."""
         values, vectors = np.linalg.eigh(stiffness_matrix(self.problem.material.lame))
         return torch.tensor(np.sqrt(values[1:, None]) * vectors.T[1:])
 
     @cached_property
     def _contact(self) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Points (k, 2), the functional over f, which acts on N, (k,), and what N's mean has to be, (2,)."""
+        """Points (k, 2), the functional over f, which acts on N, (k,), and the required mean of N, (2,)."""
         points, weights = contact_functional(self.problem)
-        factored = BaseFactor.of(self.problem.mesh, BASE_LENGTH).at(points)[0][:, 0] * weights
+        factored = HardConstraint.of(self.problem.mesh, BASE_LENGTH).at(points)[0][:, 0] * weights
         targets = np.array([value or 0.0 for value in self.problem.load.displacement]) / factored.sum()
         return torch.tensor(points), torch.tensor(factored / factored.sum()), torch.tensor(targets)
 
@@ -78,7 +78,7 @@ class FingerNetwork:
         return parameters.view(self.shape.networks, -1)[:, -self.shape.width - 1 :]
 
     def shift(self, parameters: torch.Tensor) -> torch.Tensor:
-        """What is added to both networks for the load's sake, shape (2,)."""
+        """Constants added to both networks to meet the load, shape (2,)."""
         points, functional, targets = (array.to(parameters.dtype) for array in self._contact)
         return targets - self._streams(parameters, points)[:, 0] @ functional
 
@@ -88,7 +88,7 @@ class FingerNetwork:
 
     def state(self, parameters: torch.Tensor, shift: torch.Tensor, points: torch.Tensor) -> torch.Tensor:
         """Displacement and its derivatives along x and y at points (n, 2): shape (2, 3, n)."""
-        factor, slope = (part[:, 0] for part in BaseFactor.of(self.problem.mesh, BASE_LENGTH).at(points))
+        factor, slope = (part[:, 0] for part in HardConstraint.of(self.problem.mesh, BASE_LENGTH).at(points))
         streams = self._streams(parameters, points)
         value = streams[:, 0] + shift[:, None]
         return torch.stack(
@@ -114,7 +114,7 @@ class FingerNetwork:
             energy = 0.5 * (residuals * residuals).sum()
             return energy.item(), *torch.autograd.grad(energy, (trained, leaf))
 
-        parts = in_threads(piece, cut(len(points), PIECE))
+        parts = map_in_threads(piece, slices(len(points), PIECE))
         energies, gradients, of_shift = zip(*parts, strict=True)
         through_shift = torch.autograd.grad(shift, trained, torch.stack(of_shift).sum(0))[0]
         return sum(energies), torch.stack(gradients).sum(0) + through_shift
@@ -164,7 +164,7 @@ class NetworkField:
         def piece(rows: slice) -> torch.Tensor:
             return self.network.state(self.parameters, shift, points[rows])
 
-        return torch.cat(in_threads(piece, cut(len(points), PIECE)), dim=2).permute(2, 0, 1).numpy()
+        return torch.cat(map_in_threads(piece, slices(len(points), PIECE)), dim=2).permute(2, 0, 1).numpy()
 
 
 def _activated(value: torch.Tensor, slopes: torch.Tensor) -> torch.Tensor:

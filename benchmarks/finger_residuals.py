@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import torch
 
 from benchmarks.finger_network import PIECE, FingerNetwork
-from solvers.pinn.threading import cut, in_threads
+from solvers.pinn.threading import map_in_threads, slices
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class FingerResiduals:
         def piece(rows: slice) -> torch.Tensor:
             return self.network.residuals(parameters, shift, self.points[rows], self.weights[rows])
 
-        return torch.cat(in_threads(piece, cut(len(self.points), PIECE)), dim=1).T.flatten()
+        return torch.cat(map_in_threads(piece, slices(len(self.points), PIECE)), dim=1).T.flatten()
 
     def linearised(self, parameters: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Residuals and their Jacobian, shape (3 n, p)."""

@@ -1,4 +1,4 @@
-"""How many points a second the trained networks evaluate, beside finite elements on the shared mesh.
+"""Points a second that the trained networks evaluate, beside finite elements on the shared mesh.
 
 The points are drawn evenly in the default finger and located in the mesh beforehand. The preset `paper` is
 timed untrained: its speed does not depend on its weights. Half a minute.

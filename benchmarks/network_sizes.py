@@ -54,7 +54,7 @@ STUDIES: dict[str, tuple[str, Callable, tuple[float, ...]]] = {
         (1, 2, 4, 6, 8),
     ),
 }
-"""What is varied: where its figure is found, the solver and the design for a value, and the values."""
+"""Varied quantities: the place of its figure, the solver and the design for a value, and the values."""
 
 
 def main() -> Table:

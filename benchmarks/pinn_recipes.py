@@ -217,7 +217,7 @@ REMARKS = {
     "pinn-std, preset fast": "gates that sum to one, sparse exact output layer",
     "pinn-local": "the same with bumps instead of gates",
 }
-"""What was learnt from a recipe, in a sentence."""
+"""The lesson of each recipe, in a sentence."""
 
 
 def main(seconds: float = SECONDS) -> Table:

@@ -1,4 +1,4 @@
-"""What `pinn-std` was before its gates became a tree: random gates whose windows do not sum to one.
+"""Random gates whose windows do not sum to one: `pinn-std` before its gates became a tree.
 
 Unit j is (1 - Z_j) A_j + Z_j B_j with a neuron A_j, its negative B_j, and a gate that opens where two crossed
 strips around a random point of the body meet. The output layer is solved for exactly, as a dense system.
@@ -14,7 +14,7 @@ from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
 from solvers.elasticity import Lame
-from solvers.pinn.finite_basis.hard_constraint import BaseFactor
+from solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from solvers.problem import Problem, contact_functional
 
 WIDTH, SLOPE, STEEPNESS = 3.0, 0.3, 2.0
@@ -28,7 +28,7 @@ ROUND = 500
 class RandomGates:
     """U units: neurons (3, U), strips (4, 3, U) and output layer (U, 2)."""
 
-    factor: BaseFactor
+    factor: HardConstraint
     neurons: torch.Tensor
     strips: torch.Tensor
     output: torch.Tensor
@@ -64,7 +64,7 @@ class RandomGates:
 def random_gates(problem: Problem, seed: int = 0) -> Iterator[RandomGates]:
     """The field of least energy after each round of new units."""
     rng = np.random.default_rng(seed)
-    mesh, factor = problem.mesh, BaseFactor.of(problem.mesh, 5.0)
+    mesh, factor = problem.mesh, HardConstraint.of(problem.mesh, 5.0)
     rule = body_quadrature(mesh)
     points, weights = (torch.from_numpy(np.array(a)) for a in (rule.location.points, rule.weights))
     contact, shares = (torch.from_numpy(np.array(a)) for a in contact_functional(problem))

@@ -9,22 +9,22 @@ from dataclasses import replace
 
 import torch
 
-from solvers.pinn.finite_basis.equilibrium import Level
+from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
 from solvers.pinn.finite_basis.load_conditions import load_conditions
-from solvers.pinn.finite_basis.network import LocalField
+from solvers.pinn.finite_basis.network import FiniteBasisField
 from solvers.pinn.finite_basis.patches import boxes_around
 from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.problem import Problem
 from solvers.tangent import energy_density
 
 SCALE = 2.0
-"""Spacing, in that of the solver's settings: few units, so that there is something to gain."""
+"""Spacing relative to the solver's settings: few neurons, so that training can gain something."""
 
 
-def trained_neurons(problem: Problem, seed: int = 0) -> Iterator[LocalField]:
+def trained_neurons(problem: Problem, seed: int = 0) -> Iterator[FiniteBasisField]:
     """The field after each evaluation of the energy; the first has the neurons as drawn."""
     level = PinnStdSolver(seed=seed).level(problem, SCALE)
-    drawn = level.energy.units.neurons
+    drawn = level.energy.basis.neurons
     scale = drawn[:2].norm(dim=0)  # so that all variables are of the same size
     variable = (drawn / scale).requires_grad_()
     stepper = torch.optim.LBFGS([variable], max_iter=1, history_size=50, line_search_fn="strong_wolfe")
@@ -32,7 +32,7 @@ def trained_neurons(problem: Problem, seed: int = 0) -> Iterator[LocalField]:
 
     def closure() -> float:
         now = with_neurons(level, problem, (variable * scale).detach())
-        solved = now.step(now.rest)
+        solved = now.step(now.zero_output)
         if solved is None:
             return float("inf")
         field = now.field(solved.output)
@@ -47,23 +47,27 @@ def trained_neurons(problem: Problem, seed: int = 0) -> Iterator[LocalField]:
         yield fields[-1]
 
 
-def with_neurons(level: Level, problem: Problem, neurons: torch.Tensor) -> Level:
+def with_neurons(level: ConstrainedNetwork, problem: Problem, neurons: torch.Tensor) -> ConstrainedNetwork:
     """The level with other neurons, shape (3, m, c)."""
-    units = replace(level.energy.units, neurons=neurons)
+    basis = replace(level.energy.basis, neurons=neurons)
     conditions = load_conditions(problem)
-    shape = (*level.load, units.windows.count, 2, units.per_window)
+    shape = (*level.load_shape, basis.windows.count, 2, basis.per_window)
     functionals = level.functionals.reshape(shape).copy()
     for row, axis in enumerate(problem.load.prescribed):
-        functionals[row, :, :, axis] = units.functionals(conditions.points, conditions.weights)
+        functionals[row, :, :, axis] = basis.functionals(conditions.points, conditions.weights)
     return replace(
         level,
-        energy=replace(level.energy, units=units),
+        energy=replace(level.energy, basis=basis),
         functionals=functionals.reshape(level.functionals.shape),
     )
 
 
 def lagrangian_gradient(
-    level: Level, neurons: torch.Tensor, field: LocalField, forces: torch.Tensor, problem: Problem
+    level: ConstrainedNetwork,
+    neurons: torch.Tensor,
+    field: FiniteBasisField,
+    forces: torch.Tensor,
+    problem: Problem,
 ) -> None:
     """Add the gradient of E - forces · load to the variables behind the neurons, patch by patch."""
     leaf = neurons.detach().requires_grad_()
@@ -73,7 +77,7 @@ def lagrangian_gradient(
         (patch.weights @ energy_density(gradient, material.lame, material.law)).backward()
     conditions = load_conditions(problem)
     points = torch.from_numpy(conditions.points.copy())
-    (near,) = field.units.windows.near(boxes_around([points]))
+    (near,) = field.basis.windows.near(boxes_around([points]))
     displacement, _ = _field_and_gradient(field, leaf, points, near)
     work = torch.from_numpy(conditions.weights[0].copy()) @ displacement[:, problem.load.prescribed] @ forces
     (-work).backward()
@@ -81,11 +85,11 @@ def lagrangian_gradient(
 
 
 def _field_and_gradient(
-    field: LocalField, neurons: torch.Tensor, points: torch.Tensor, near: torch.Tensor
+    field: FiniteBasisField, neurons: torch.Tensor, points: torch.Tensor, near: torch.Tensor
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Displacement (n, 2) and its gradient (n, 2, 2), written plainly for automatic differentiation."""
-    share, slopes = field.units.windows.shares_with_slopes(points, near)
-    factor, factor_slope = field.units.factor.at(points)
+    share, slopes = field.basis.windows.values_and_gradients(points, near)
+    factor, factor_x = field.basis.constraint.at(points)
     weights = neurons[:, :, near]
     neuron = torch.tanh(torch.einsum("nx,xmw->nmw", points, weights[:2]) + weights[2])
     output = field.output[near]
@@ -95,5 +99,5 @@ def _field_and_gradient(
     for axis in range(2):
         inner = torch.einsum("nmw,mw,wim->nwi", 1 - neuron**2, weights[axis], output[:, :, 1:])
         along = torch.einsum("nw,nwi->ni", slopes[axis], encoder) + torch.einsum("nw,nwi->ni", share, inner)
-        columns.append(factor * along + (factor_slope * value if axis == 0 else 0))
+        columns.append(factor * along + (factor_x * value if axis == 0 else 0))
     return factor * value, torch.stack(columns, dim=-1)

@@ -1,4 +1,4 @@
-"""What the optimisers for sums of squares are given and what they return."""
+"""Arguments and results of the optimisers for sums of squares."""
 
 from typing import NamedTuple, Protocol
 
@@ -18,7 +18,7 @@ class Residuals(Protocol):
 
 
 class Iterate(NamedTuple):
-    """Where an optimiser is.
+    """State of an optimiser.
 
     Attributes:
         parameters: Shape (n,).

@@ -7,7 +7,7 @@ from compare.crossval.solver_folds import SolverTask
 from compare.crossval.true_fields import FieldSampler, TrueFields
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.assimilation.marker_forces import root_mean_square
-from solvers.assimilation.marker_weight import FACTORS
+from solvers.assimilation.marker_weighting import FACTORS
 from solvers.fem.assimilating import FemAsmSolver
 from solvers.lagrange import LagrangeField
 from solvers.problem import Problem

@@ -15,7 +15,7 @@ for the posterior's mode.
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from scipy.special import roots_legendre
@@ -155,17 +155,6 @@ def radius_within(mesh: TriangleMesh, points: FloatArray, radius: float) -> floa
     along, offset = end - start, points[:, None] - start
     share = ((offset * along).sum(axis=2) / (along**2).sum(axis=1)).clip(0, 1)
     return min(radius, float(np.linalg.norm(offset - share[..., None] * along, axis=2).min()))
-
-
-def check_weighting(
-    solver: str, weights: str, asm_weight: float, scale: float, marker_radius: float | None = None
-) -> None:
-    """Raise a `UserError` if a solver's settings make no misfit."""
-    if weights not in get_args(Weighting):
-        raise UserError(f"{solver}: weights must be {' or '.join(get_args(Weighting))}, got {weights!r}")
-    for name, value in (("asm_weight", asm_weight), ("scale", scale), ("marker_radius", marker_radius)):
-        if value is not None and not 0 <= value < np.inf:
-            raise UserError(f"{solver}: {name} must be zero or more, got {value}")
 
 
 def assimilates(solver: Solver) -> bool:

@@ -1,27 +1,35 @@
-"""`pinn-asm` and `pinn-local-asm`: the networks of `pinn-std` and `pinn-local`, given the markers."""
+"""`pinn-asm` and `pinn-local-asm`: the networks of `pinn-std` and `pinn-local` with the markers' misfit."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
-from geometry.arrays import FloatArray
-from geometry.errors import UserError
 from geometry.observations import Observations
+from solvers.assimilation.marker_weighting import Choice
+from solvers.assimilation.misfit import Weighting
 from solvers.pinn.finite_basis.local import PinnLocalSolver
 from solvers.pinn.finite_basis.refit import network_refitter
 from solvers.pinn.finite_basis.standard import PinnStdSolver
-from solvers.pinn.marker_terms import Assimilating, ChoosingWeights
 from solvers.pinn.paper.solver import PaperPinnSolver
-from solvers.pinn.threading import pool
 from solvers.problem import Problem
 from solvers.solution import Solution
 
 
 @dataclass(frozen=True, kw_only=True)
-class PinnAsmSolver(ChoosingWeights, PinnStdSolver):
-    """The network of `PinnStdSolver`, given the markers."""
+class PinnAsmSolver(PinnStdSolver):
+    """The network of `PinnStdSolver`, random hidden weights and exact output layer, with the markers' misfit.
 
+    Energy plus misfit is minimised. The settings that are not the network's are those of `MarkerWeighting`.
+    """
+
+    weights: Weighting = "paper"
+    asm_weight: float = 1000.0
+    scale: float = 1.0
+    marker_radius: float | None = None
+    contact_deviation: float = 0.0
+    choose: Choice = "given"
     name: ClassVar[str] = "pinn-asm"
+    assimilates: ClassVar[bool] = True
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
         """See `Refittable`."""
@@ -29,10 +37,17 @@ class PinnAsmSolver(ChoosingWeights, PinnStdSolver):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PinnLocalAsmSolver(ChoosingWeights, PinnLocalSolver):
-    """The network of `PinnLocalSolver`, given the markers."""
+class PinnLocalAsmSolver(PinnLocalSolver):
+    """The network of `PinnLocalSolver` with the markers' misfit, as in `PinnAsmSolver`."""
 
+    weights: Weighting = "paper"
+    asm_weight: float = 1000.0
+    scale: float = 1.0
+    marker_radius: float | None = None
+    contact_deviation: float = 0.0
+    choose: Choice = "given"
     name: ClassVar[str] = "pinn-local-asm"
+    assimilates: ClassVar[bool] = True
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
         """See `Refittable`."""
@@ -40,26 +55,16 @@ class PinnLocalAsmSolver(ChoosingWeights, PinnLocalSolver):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PaperPinnAsmSolver(Assimilating, PaperPinnSolver):
+class PaperPinnAsmSolver(PaperPinnSolver):
     """The networks and the training of `PaperPinnSolver`, with the paper's L_ASM in the loss.
 
     Attributes:
-        marker_radius: As in `Assimilating`; the paper takes the displacement of the centre.
+        marker_radius: As in `MarkerWeighting`; the paper takes the displacement of the centre.
     """
 
+    weights: Weighting = "paper"
+    asm_weight: float = 1000.0
+    scale: float = 1.0
     marker_radius: float | None = 0.0
     name: ClassVar[str] = "pinn-asm"
-
-
-def l_curve(solver: PinnAsmSolver | PinnLocalAsmSolver, problem: Problem) -> dict[str, FloatArray]:
-    """Energy and misfit for all weights, see `WeightChoice.curve`, in the time of one level.
-
-    Raises:
-        UserError: If there are no markers that weigh anything, or the law is not linear.
-    """
-    with pool():
-        level = solver.level(problem, 1.0)
-        state = level.step(level.rest)
-    if state is None or state.markers is None:
-        raise UserError(f"{solver.name} has an L-curve for the linear law and markers that it is given")
-    return solver.choice.curve(state.markers)
+    assimilates: ClassVar[bool] = True

@@ -1,8 +1,8 @@
-"""Evaluate many points in pieces that stay in a core's cache, one piece a thread.
+"""Evaluates many points in chunks that stay in a core's cache, one chunk a thread.
 
 Elementwise operations on large arrays are bound by memory, and torch's own threads meet at a barrier after
-each of them; with pieces there is one barrier in all. On two busy cores this was measured to be three to
-eight times as fast.
+each of them; chunks need one barrier in all. On two busy cores this was measured to be three to eight times
+as fast.
 """
 
 import ctypes
@@ -16,8 +16,8 @@ from typing import TypeVar
 import torch
 from threadpoolctl import threadpool_limits
 
-PIECE = 2**14
-"""Numbers in one array of a piece: an eighth of a megabyte."""
+CHUNK = 2**14
+"""Numbers in one array of a chunk: an eighth of a megabyte."""
 
 _POOL: ContextVar[ThreadPoolExecutor | None] = ContextVar("_POOL", default=None)
 
@@ -25,36 +25,30 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-def in_pieces(task: Callable[[slice], None], points: int, units: int) -> None:
-    """Call `task` with slices that cut `points` rows of `units` numbers into pieces, on every thread."""
-    in_threads(task, cut(points, max(PIECE // units, 8)))
+def slices(points: int, size: int) -> list[slice]:
+    """Slices of at most `size` rows that partition `points` rows; one empty slice for none."""
+    return [slice(start, min(start + size, points)) for start in range(0, max(points, 1), size)]
 
 
-def cut(points: int, size: int) -> list[slice]:
-    """Slices that cut `points` rows into pieces of at most `size`."""
-    return [slice(start, min(start + size, points)) for start in range(0, points, size)]
-
-
-def in_threads(task: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+def map_in_threads(task: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
     """`task` of every item, in the items' order, on every thread."""
-    with pool() as threads:
-        return list(threads.map(task, items))
+    return list(imap_in_threads(task, items))
 
 
-def one_by_one(task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-    """The same, each result given up as soon as the next one is asked for."""
+def imap_in_threads(task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+    """The same, each result released as soon as the next one is asked for."""
     with pool() as threads:
         yield from threads.map(task, items)
 
 
 @contextmanager
 def pool() -> Iterator[ThreadPoolExecutor]:
-    """A thread for each that torch may use; the threads of torch and of its BLAS rest meanwhile.
+    """A pool of as many threads as torch may use; torch and its BLAS have one thread each meanwhile.
 
-    Within it the functions of this module use it, and what lies between them has one thread: on busy cores
-    torch's own threads wait for one another after every small operation, which was measured to cost more
-    than half of the time. With DOLFINx in the process torch's matrix products may be OpenBLAS's, which has
-    threads of its own and lets callers wait for one another: three times as slow, when measured.
+    The functions of this module use the pool that they are called in. On busy cores torch's own threads wait
+    for one another after every small operation, which was measured to cost more than half of the time. With
+    DOLFINx in the process torch's matrix products may be OpenBLAS's, whose threads let callers wait for one
+    another: measured three times as slow.
     """
     outer = _POOL.get()
     if outer is not None:
@@ -76,9 +70,9 @@ def pool() -> Iterator[ThreadPoolExecutor]:
 
 @cache
 def _keep_freed_memory() -> None:
-    """Have glibc keep what a piece frees for the next one.
+    """Make glibc keep freed memory for the next chunk.
 
-    By default it returns blocks above 128 kB to the kernel at once; getting them again by page faults was
+    By default it returns blocks above 128 kB to the kernel at once; the page faults of getting them back were
     measured to take a quarter of the time.
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
@@ -90,7 +84,7 @@ def _keep_freed_memory() -> None:
 
 @contextmanager
 def torch_threads(count: int) -> Iterator[int]:
-    """Let torch use `count` threads, or as many as it is set to if that is 0; yields how many those are."""
+    """Set torch's number of threads to `count`, unchanged if that is 0, and yield the number."""
     before = torch.get_num_threads()
     torch.set_num_threads(count or before)
     try:

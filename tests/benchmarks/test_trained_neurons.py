@@ -11,13 +11,13 @@ from solvers.problem import Problem
 def test_gradient_is_that_of_the_least_energy(coarse_mesh):
     problem = Problem(coarse_mesh)
     level = PinnStdSolver(corner_spacing=0.2, neurons=2).level(problem, 2.0)
-    drawn = level.energy.units.neurons
+    drawn = level.energy.basis.neurons
 
     def least_energy(neurons: torch.Tensor) -> float:
         now = with_neurons(level, problem, neurons)
-        return now.energy.total(now.step(now.rest).output)
+        return now.energy.total(now.step(now.zero_output).output)
 
-    solved = level.step(level.rest)
+    solved = level.step(level.zero_output)
     variable = drawn.clone().requires_grad_()
     forces = torch.from_numpy(level.reaction(solved.forces))
     lagrangian_gradient(level, variable, level.field(solved.output), forces, problem)

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.errors import UserError
 from geometry.finger.presets import load_design
 from geometry.observations import Observations
-from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, assimilates, check_weighting, misfit_of
+from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, assimilates, misfit_of
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
 from solvers.registry import make_solver
@@ -127,22 +126,8 @@ def test_a_disc_does_not_reach_beyond_the_body(problem):
 def test_the_disc_is_that_of_the_designs_markers(problem, preset, name):
     radius = load_design(preset).marker_diameter / 2
     observed = replace(problem, observations=replace(problem.observations, marker_radius=radius))
-    assert make_solver(name).misfit(observed).radius == radius
-    assert make_solver(name, marker_radius=0.3).misfit(observed).radius == 0.3
-
-
-@pytest.mark.parametrize(
-    ("settings", "said"),
-    [
-        (("papers", 1.0, 1.0), "weights must be paper or precision, got 'papers'"),
-        (("paper", -1.0, 1.0), "asm_weight must be zero or more, got -1"),
-        (("precision", 1.0, float("nan")), "scale must be zero or more, got nan"),
-        (("paper", 1.0, 1.0, -0.8), "marker_radius must be zero or more, got -0.8"),
-    ],
-)
-def test_settings_that_make_no_misfit_are_refused(settings, said):
-    with pytest.raises(UserError, match=f"fem-asm: {said}"):
-        check_weighting("fem-asm", *settings)
+    assert make_solver(name).weighting.misfit(observed).radius == radius
+    assert make_solver(name, marker_radius=0.3).weighting.misfit(observed).radius == 0.3
 
 
 def test_only_a_solver_that_says_so_assimilates():

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from solvers.pinn.paper.collocation import base_points, body_sample
+from solvers.pinn.paper.collocation import base_points, collocation_points
 
 
 @pytest.mark.parametrize("kind", ["nodes", "elements", "random"])
 def test_shares_make_a_mean(coarse_mesh, kind):
-    points, shares = body_sample(coarse_mesh, kind, 0)
+    points, shares = collocation_points(coarse_mesh, kind, 0)
     assert shares.sum() == pytest.approx(1.0, rel=1e-12)
     assert len(coarse_mesh.locate(points)) == len(points), "all in the body"
 
@@ -19,12 +19,12 @@ def test_elements_integrate_and_random_points_estimate(coarse_mesh):
     exact = (corners**2).sum(axis=1) + (corners[:, [1, 2, 0]] * corners).sum(axis=1)
     mean = (coarse_mesh.areas * exact / 6).sum() / coarse_mesh.areas.sum()
     for kind, tolerance in (("elements", 1e-12), ("random", 0.08)):
-        points, shares = body_sample(coarse_mesh, kind, 0)
+        points, shares = collocation_points(coarse_mesh, kind, 0)
         assert (shares * points[:, 0] ** 2).sum() == pytest.approx(mean, rel=tolerance), kind
 
 
 def test_nodes_are_those_of_the_mesh_and_alike(coarse_mesh):
-    points, shares = body_sample(coarse_mesh, "nodes", 0)
+    points, shares = collocation_points(coarse_mesh, "nodes", 0)
     np.testing.assert_array_equal(points, coarse_mesh.points)
     assert len(set(shares)) == 1
 

@@ -7,7 +7,7 @@ import pytest
 
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.assimilation.marker_weight import FACTORS
+from solvers.assimilation.marker_weighting import FACTORS
 from solvers.assimilation.misfit import misfit_of
 from solvers.fem.assimilating import FemAsmSolver
 from solvers.fem.linear import FemSolver
@@ -241,9 +241,12 @@ def test_a_patch_is_certain(problem):
     [
         ({"degree": 3}, "degree 1 and 2, not 3"),
         ({"weights": "equal"}, "weights must be paper or precision"),
-        ({"choose": "best"}, "choose must be given, left-out, evidence"),
+        ({"choose": "best"}, "choose must be given or left-out or evidence"),
         ({"choose": "evidence"}, "needs weights=precision"),
-        ({"contact_deviation": -1.0}, "contact_deviation must be zero or more"),
+        ({"asm_weight": -1.0}, "fem-asm: asm_weight must be zero or more, got -1"),
+        ({"scale": float("nan")}, "fem-asm: scale must be zero or more, got nan"),
+        ({"marker_radius": -0.8}, "fem-asm: marker_radius must be zero or more, got -0.8"),
+        ({"contact_deviation": -1.0}, "fem-asm: contact_deviation must be zero or more, got -1"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(settings, said):

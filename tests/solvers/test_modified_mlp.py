@@ -77,7 +77,7 @@ def test_initial_weights_are_glorot_normal():
 def test_values_and_slopes(network, parameters, points, at_points):
     torch.testing.assert_close(at_points.values(), plain(network, parameters, points), rtol=1e-12, atol=1e-13)
     expected = plain_slopes(network, parameters, points).detach()
-    torch.testing.assert_close(at_points.slopes(), expected, rtol=1e-12, atol=1e-13)
+    torch.testing.assert_close(at_points.input_gradients(), expected, rtol=1e-12, atol=1e-13)
 
 
 @pytest.mark.parametrize("of", ["values", "slopes"])
@@ -87,12 +87,12 @@ def test_gradient_over_every_parameter(network, parameters, points, at_points, o
     variable = parameters.clone().requires_grad_()
     if of == "values":
         factors = noise(2, 11, seed=3)
-        at_points.add_value_gradient(factors, network.weights(gradient))
+        at_points.backward_values(factors, network.weights(gradient))
         loss = (factors * plain(network, variable, points)).sum()
     else:
         factors = noise(2, 11, 2, seed=3)
-        at_points.slopes()
-        at_points.add_slope_gradient(factors, network.weights(gradient))
+        at_points.input_gradients()
+        at_points.backward_input_gradients(factors, network.weights(gradient))
         loss = (factors * plain_slopes(network, variable, points)).sum()
     expected = torch.autograd.grad(loss, variable)[0]
     ours = network.in_logistic_form(gradient - 1)

@@ -16,13 +16,13 @@ from geometry.mesh.settings import MeshSettings
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.pinn.finite_basis import newton as local_newton
-from solvers.pinn.finite_basis.energy import LocalEnergy
-from solvers.pinn.finite_basis.hard_constraint import BaseFactor
+from solvers.pinn.finite_basis.energy import NetworkEnergy
+from solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from solvers.pinn.finite_basis.local import PinnLocalSolver
-from solvers.pinn.finite_basis.network import LocalField, LocalUnits
+from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
 from solvers.pinn.finite_basis.patches import PATCH, boxes_around, cut_into_patches
 from solvers.pinn.finite_basis.point_spacing import (
-    Spacing,
+    PointSpacing,
     graded_quadrature,
     graded_triangles,
     spread_points,
@@ -35,20 +35,20 @@ from tests.solvers.conftest import bar_mesh
 
 
 @pytest.fixture(scope="module")
-def spacing(coarse_mesh) -> Spacing:
-    return Spacing.of(Problem(coarse_mesh), wall=0.5, corner=0.05, growth=0.3)
+def spacing(coarse_mesh) -> PointSpacing:
+    return PointSpacing.of(Problem(coarse_mesh), wall=0.5, corner=0.05, growth=0.3)
 
 
 @pytest.fixture(scope="module")
-def units(coarse_mesh, spacing) -> LocalUnits:
+def basis(coarse_mesh, spacing) -> FiniteBasis:
     centres = spread_points(graded_triangles(coarse_mesh, spacing, 0.6), coarse_mesh, spacing, 0.75)
     distances = spacing.at(centres)
-    return LocalUnits.around(
+    return FiniteBasis.around(
         ShepardWindows(torch.from_numpy(centres), torch.from_numpy(1.8 * distances)),
         centres,
         0.4 / distances,
         neurons=3,
-        factor=BaseFactor.of(coarse_mesh, 5.0),
+        constraint=HardConstraint.of(coarse_mesh, 5.0),
         rng=np.random.default_rng(0),
     )
 
@@ -113,7 +113,7 @@ def test_cut_triangles_keep_the_area_and_meet_the_spacing(coarse_mesh, spacing):
 
 def test_triangles_far_smaller_than_the_spacing_take_one_point(coarse_mesh, spacing):
     triangles = graded_triangles(coarse_mesh, spacing, 0.6)
-    coarse = Spacing.of(Problem(coarse_mesh), wall=5.0, corner=0.05, growth=3.0)
+    coarse = PointSpacing.of(Problem(coarse_mesh), wall=5.0, corner=0.05, growth=3.0)
     longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
     small = longest <= 0.15 * coarse.at(triangles.mean(axis=1))
     points, weights = graded_quadrature(triangles, coarse, 0.6)
@@ -130,29 +130,29 @@ def test_spread_points_keep_their_distance_and_leave_no_hole(coarse_mesh, spacin
     assert (nearest <= 0.75 * spacing.at(coarse_mesh.points) * 1.3).all()
 
 
-def test_windows_sum_to_one(units, coarse_mesh):
+def test_windows_sum_to_one(basis, coarse_mesh):
     """With output weights on the constants alone the network is the base factor times a constant."""
-    output = torch.zeros(units.windows.count, 2, units.per_window, dtype=torch.float64)
+    output = torch.zeros(basis.windows.count, 2, basis.per_window, dtype=torch.float64)
     output[:, :, 0] = torch.tensor([2.0, -3.0])
     location = coarse_mesh.at_centroids()
-    factor, _ = units.factor.at(location.points)
+    factor, _ = basis.constraint.at(location.points)
     np.testing.assert_allclose(
-        LocalField(units, output).displacement(location), factor * [2.0, -3.0], rtol=1e-12
+        FiniteBasisField(basis, output).displacement(location), factor * [2.0, -3.0], rtol=1e-12
     )
 
 
-def test_derivatives_are_those_of_differences(units, coarse_mesh):
+def test_derivatives_are_those_of_differences(basis, coarse_mesh):
     points = torch.from_numpy(coarse_mesh.at_centroids().points[::10].copy())
-    (near,), step = units.windows.near(boxes_around([points])), 1e-6
-    for axis, derivative in enumerate(units.derivatives(points, near)):
+    (near,), step = basis.windows.near(boxes_around([points])), 1e-6
+    for axis, derivative in enumerate(basis.gradients(points, near)):
         shift = step * torch.eye(2, dtype=torch.float64)[axis]
-        difference = (units.values(points + shift, near) - units.values(points - shift, near)) / (2 * step)
+        difference = (basis.values(points + shift, near) - basis.values(points - shift, near)) / (2 * step)
         assert (difference.mT - derivative).abs().max() < 1e-5
 
 
-def test_a_point_in_no_window_is_refused(units):
+def test_a_point_in_no_window_is_refused(basis):
     with pytest.raises(UserError, match="lie in no window"):
-        units.functionals(np.array([[1.0, 500.0]]), np.ones((1, 1)))
+        basis.functionals(np.array([[1.0, 500.0]]), np.ones((1, 1)))
 
 
 def test_patches_hold_every_point_once(coarse_mesh):
@@ -162,19 +162,19 @@ def test_patches_hold_every_point_once(coarse_mesh):
 
 
 @pytest.mark.parametrize("law", ["linear", "neo-hookean"])
-def test_hessian_is_the_derivative_of_the_slope_and_that_of_the_energy(units, coarse_mesh, law):
+def test_hessian_is_the_derivative_of_the_slope_and_that_of_the_energy(basis, coarse_mesh, law):
     """Differences in one direction, of the energy that the law's density gives at the quadrature points."""
     rule = body_quadrature(coarse_mesh, 2)
     problem = Problem(coarse_mesh, Material(law=law))
-    energy = LocalEnergy.of(units, problem.material, rule.location.points, rule.weights)
+    energy = NetworkEnergy.of(basis, problem.material, rule.location.points, rule.weights)
     rng = np.random.default_rng(0)
     output, direction = (
-        torch.from_numpy(rng.normal(scale=size, size=(units.windows.count, 2, units.per_window)))
+        torch.from_numpy(rng.normal(scale=size, size=(basis.windows.count, 2, basis.per_window)))
         for size in (0.01, 1.0)
     )
 
     def total(layer: torch.Tensor) -> float:
-        gradient = LocalField(units, layer).gradient(rule.location)
+        gradient = FiniteBasisField(basis, layer).gradient(rule.location)
         return float((rule.weights * State.from_gradient(gradient, problem).energy_density).sum())
 
     slope, hessian = energy.derivatives(output)
@@ -219,12 +219,12 @@ def test_factors_are_freed():
 
 def test_a_window_without_quadrature_points_does_no_harm(coarse_mesh):
     solver = PinnLocalSolver(wall_spacing=3.0, corner_spacing=0.5, growth=3.0)
-    units = solver.level(Problem(coarse_mesh), 1.0).energy.units
+    basis = solver.level(Problem(coarse_mesh), 1.0).energy.basis
     corner = coarse_mesh.points[:1] + 0.05
-    energy = LocalEnergy.of(units, Material(), corner, np.ones(1))
-    hessian = energy.derivatives(torch.ones(units.windows.count, 2, units.per_window).double())[1]
-    found = hessian.solve(np.ones((1, 2 * units.windows.count * units.per_window)), 1e-12)
-    assert hessian.size == units.windows.count > len(energy.patches[0].near)
+    energy = NetworkEnergy.of(basis, Material(), corner, np.ones(1))
+    hessian = energy.derivatives(torch.ones(basis.windows.count, 2, basis.per_window).double())[1]
+    found = hessian.solve(np.ones((1, 2 * basis.windows.count * basis.per_window)), 1e-12)
+    assert hessian.size == basis.windows.count > len(energy.patches[0].near)
     assert np.isfinite(found).all()
 
 

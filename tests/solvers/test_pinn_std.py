@@ -64,12 +64,12 @@ def test_shares_are_those_of_the_gates_applied_from_the_bottom_up(tree, points):
         return (1 - gate) * mixed(closed) + gate * mixed(opened)
 
     everyone = torch.arange(tree.count)
-    torch.testing.assert_close(tree.shares(points, everyone) @ given, mixed(0), rtol=0, atol=1e-12)
+    torch.testing.assert_close(tree.values(points, everyone) @ given, mixed(0), rtol=0, atol=1e-12)
 
 
 def test_shares_sum_to_one_and_their_slopes_to_zero(tree, points):
     (near,) = tree.near(boxes_around([points[:1]]))
-    shares, slopes = tree.shares_with_slopes(points[:1], near)
+    shares, slopes = tree.values_and_gradients(points[:1], near)
     assert len(near) < tree.count
     assert shares.sum().item() == pytest.approx(1, abs=gate_tree.NEGLIGIBLE * tree.count)
     assert slopes.sum(dim=2).abs().max() < 1e-4
@@ -77,7 +77,7 @@ def test_shares_sum_to_one_and_their_slopes_to_zero(tree, points):
 
 def test_encoders_that_are_left_out_have_a_negligible_share(tree, points):
     patch = 4 + 0.05 * points
-    shares = tree.shares(patch, torch.arange(tree.count))
+    shares = tree.values(patch, torch.arange(tree.count))
     left_out = np.setdiff1d(np.arange(tree.count), tree.near(boxes_around([patch]))[0].numpy())
     assert len(left_out) > tree.count / 3
     assert shares[:, left_out].max() <= gate_tree.NEGLIGIBLE
@@ -86,15 +86,15 @@ def test_encoders_that_are_left_out_have_a_negligible_share(tree, points):
 def test_slopes_are_those_of_automatic_differentiation(tree, points):
     everyone = torch.arange(tree.count)
     variable = points.clone().requires_grad_()
-    shares = tree.shares(variable, everyone)
-    _, slopes = tree.shares_with_slopes(points, everyone)
+    shares = tree.values(variable, everyone)
+    _, slopes = tree.values_and_gradients(points, everyone)
     for encoder in (0, 7, tree.count - 1):
         (gradient,) = torch.autograd.grad(shares[:, encoder].sum(), variable, retain_graph=True)
         torch.testing.assert_close(gradient.T, slopes[:, :, encoder], rtol=1e-9, atol=1e-11)
 
 
 def test_an_encoder_has_its_largest_share_near_its_centre(tree, centres):
-    shares = tree.shares(torch.from_numpy(centres), torch.arange(tree.count)).numpy()
+    shares = tree.values(torch.from_numpy(centres), torch.arange(tree.count)).numpy()
     spacing = 0.2 + 0.1 * np.linalg.norm(centres, axis=1)
     distance = np.linalg.norm(centres - centres[shares.argmax(axis=0)], axis=1)
     assert np.median(distance / spacing) < 1
@@ -105,7 +105,7 @@ def test_one_encoder_needs_no_gate(points):
     tree = GateTree.over(np.zeros((1, 2)), np.ones(1), width=1.0, rng=np.random.default_rng(0))
     (near,) = tree.near(boxes_around([points]))
     assert near.tolist() == [0]
-    torch.testing.assert_close(tree.shares(points, near), torch.ones(len(points), 1, dtype=torch.float64))
+    torch.testing.assert_close(tree.values(points, near), torch.ones(len(points), 1, dtype=torch.float64))
 
 
 def errors(network: Solution, reference: Solution) -> tuple[float, float]:

@@ -1,11 +1,11 @@
-"""Energy plus misfit to the markers at finite strain: springs pull at the markers along the load path.
+"""Energy plus misfit to the markers at finite strain: springs at the markers along the load path.
 
-At a stationary point of E(u) + 1/2 (B u - d)^T W (B u - d) component j of the markers is pulled by the force
-f_j, where b_j . u + f_j / W_jj = d_j: the misfit is one more spring that gives way, as a contact that is not
-certain is. On the path the observed displacements grow with the load.
+At a stationary point of E(u) + 1/2 (B u - d)^T W (B u - d) the force f_j acts on component j of the markers,
+where b_j . u + f_j / W_jj = d_j: the misfit is a compliant spring, as is a contact with a standard deviation.
+On the path the observed displacements grow with the load.
 
-There is no closed form for a marker that is left out: Newton's method goes on from the solution without its
-two springs and, where that does not converge, all the way from rest.
+There is no closed form for a marker that is left out: Newton's method continues from the solution without
+its two springs and, where that does not converge, from rest.
 """
 
 import time
@@ -13,8 +13,10 @@ import time
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
+from geometry.errors import UserError
 from solvers.assimilation.marker_forces import residual_phrase
-from solvers.assimilation.misfit import Misfit, leave_one_out_displacements
+from solvers.assimilation.marker_weighting import MarkerWeighting
+from solvers.assimilation.misfit import leave_one_out_displacements
 from solvers.fem.finite_strain.constraints import DisplacementConstraints
 from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.finite_strain.load_state import LoadState
@@ -22,31 +24,34 @@ from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
-from solvers.solver import Progress
+from solvers.solver import Progress, silent
 
 MIN_STEP = 0.01
-"""Fraction of the load below which the path is given up: what pulls so hard tears elements."""
+"""Smallest load step, as a fraction of the load; large forces at the markers invert elements."""
 PATH_SHARE = 0.5
-"""Of the progress that the load path is; the markers that are left out are the rest."""
+"""Share of the load path in the progress; the rest is for the markers left out."""
 
 
-def assimilated(
-    name: str, problem: Problem, *, degree: int, misfit: Misfit, slack: float, progress: Progress
-) -> Solution:
-    """The displacement to which the load path leads, with each marker left out.
+def assimilated(problem: Problem, weighting: MarkerWeighting, *, degree: int, progress: Progress) -> Solution:
+    """The stationary point that the load path leads to, and the same without each marker.
 
     Args:
-        name: Of the solver.
         problem: With a law of finite strain, and observations.
+        weighting: Of the markers; its contact springs are for the loads `mean` and `point`.
         degree: Of the elements.
-        misfit: To the observations.
-        slack: Compliance of springs between contact and indenter, mm per N/mm, for `mean` and `point`.
         progress: Of the work.
+
+    Raises:
+        UserError: If the problem has no markers that weigh anything.
     """
     started = time.perf_counter()
+    misfit = weighting.misfit(problem)
+    if misfit is None:
+        raise UserError(f"{weighting.solver_name} was given no markers to assimilate")
     space = LagrangeSpace(problem.mesh, degree)
     springs = DisplacementConstraints.springs(misfit, space)
-    path = _path(problem, space, DisplacementConstraints.of(problem, space, slack).joined(springs))
+    constraints = DisplacementConstraints.of(problem, space, weighting.slack).joined(springs)
+    path = _path(problem, space, constraints)
     path.follow(lambda done, text: progress(PATH_SHARE * done, text))
     steps, iterations, last = len(path.points) - 1, path.iterations, path.points[-1]
     forces = last.forces[-len(springs.targets) :]
@@ -56,7 +61,7 @@ def assimilated(
     left_out = _left_out(path, problem, springs, progress) if last.fraction == 1 else None
     path.close()
     return Solution(
-        solver=name,
+        solver=weighting.solver_name,
         problem=problem,
         field=LagrangeField(space, last.nodal),
         energy=float(energies[-1]),
@@ -89,7 +94,7 @@ def _path(problem: Problem, space: LagrangeSpace, constraints: DisplacementConst
 def _left_out(
     path: LoadPath, problem: Problem, springs: DisplacementConstraints, progress: Progress
 ) -> FloatArray:
-    """What each marker is missed by without it, shape (m, 2), mm; NaN where there is no equilibrium."""
+    """Residual of each marker without it, shape (m, 2), mm; NaN where no equilibrium is found."""
     count = len(springs.targets) // 2
     first = len(path.points[-1].forces) - 2 * count
     missed = np.full((count, 2), np.nan)
@@ -108,7 +113,7 @@ def _from_rest(path: LoadPath, problem: Problem, kept: BoolArray) -> LoadState |
     """Equilibrium at the full load under some of a path's constraints; None if there is none."""
     equilibrium = path.equilibrium
     again = _path(problem, equilibrium.distributed.space, equilibrium.constraints.only(kept))
-    again.follow(lambda done, text: None)
+    again.follow(silent)
     again.close()
     return again.points[-1] if again.points[-1].fraction == 1 else None
 

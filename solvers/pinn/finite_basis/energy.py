@@ -1,4 +1,4 @@
-"""Energy of a finite-basis network with its first and second derivatives by the output layer."""
+"""Elastic energy of a finite-basis network, with its gradient and Hessian in the output layer."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -7,22 +7,22 @@ import numpy as np
 import torch
 
 from geometry.arrays import FloatArray, IntArray
-from solvers.pinn.finite_basis.network import LocalField, LocalUnits
+from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
 from solvers.pinn.finite_basis.patches import boxes_around, cut_into_patches
 from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
-from solvers.pinn.threading import one_by_one
+from solvers.pinn.threading import imap_in_threads
 from solvers.problem import Material
 from solvers.tangent import energy_density, piola_stress_and_tangent
 
 
-class Patch(NamedTuple):
-    """A few quadrature points.
+class QuadraturePatch(NamedTuple):
+    """A few neighbouring quadrature points.
 
     Attributes:
         points: Shape (p, 2), mm.
         weights: Shape (p,), mm^2.
-        near: The windows that reach them, (w,).
-        pairs: Where the blocks of these windows' pairs i <= j are in the matrix, (w (w + 1) / 2,).
+        near: Numbers of the windows that reach them, (w,).
+        pairs: Block numbers in the matrix of these windows' pairs i <= j, (w (w + 1) / 2,).
     """
 
     points: torch.Tensor
@@ -32,49 +32,49 @@ class Patch(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class LocalEnergy:
-    """The energy's integral over the body, cut into patches.
+class NetworkEnergy:
+    """Integral of the energy density over the body, by patches of quadrature points.
 
-    Every patch gives a small dense Hessian of the output weights that reach it. With the units' derivatives
-    Z_x and Z_y and the tangent A, the block of the components i and k is the sum over j and l of
-    Z_j^T w A_ijkl Z_l; one product of matrices has them all.
+    Every patch adds a small dense Hessian of the output weights that reach it. With the derivatives Z_x and
+    Z_y of the basis functions and the tangent A, the block of the components i and k is the sum over j and l
+    of Z_j^T w A_ijkl Z_l; one matrix product gives all blocks.
 
     Attributes:
-        units: The hidden units.
+        basis: The basis functions.
         material: The elastic law.
         patches: The quadrature.
         rows: First window of every pair that a patch has, shape (b,).
         columns: Second window, not before the first, shape (b,).
-        origin: A displacement that has no energy; None for zero.
+        origin: Displacement of zero energy; None for zero.
     """
 
-    units: LocalUnits
+    basis: FiniteBasis
     material: Material
-    patches: list[Patch]
+    patches: list[QuadraturePatch]
     rows: IntArray
     columns: IntArray
-    origin: LocalField | None = None
+    origin: FiniteBasisField | None = None
 
     @classmethod
     def of(
-        cls, units: LocalUnits, material: Material, points: FloatArray, weights: FloatArray
-    ) -> "LocalEnergy":
+        cls, basis: FiniteBasis, material: Material, points: FloatArray, weights: FloatArray
+    ) -> "NetworkEnergy":
         """The energy by a quadrature rule: points (q, 2), mm, and weights (q,), mm^2."""
         cuts = cut_into_patches(points)
         places = [torch.from_numpy(points[cut]) for cut in cuts]
-        near = units.windows.near(boxes_around(places))
+        near = basis.windows.near(boxes_around(places))
         keys = []
         for windows in near:
             first, second = torch.triu_indices(len(windows), len(windows))
-            keys.append(windows[first] * units.windows.count + windows[second])
-        count = units.windows.count
+            keys.append(windows[first] * basis.windows.count + windows[second])
+        count = basis.windows.count
         diagonal = torch.arange(count) * (count + 1)
         known, number = torch.unique(torch.cat([*keys, diagonal]), return_inverse=True)
         pairs = number[:-count].split([len(key) for key in keys])
-        shares = [torch.from_numpy(weights[cut]) for cut in cuts]
-        patches = [Patch(*parts) for parts in zip(places, shares, near, pairs, strict=True)]
+        rules = [torch.from_numpy(weights[cut]) for cut in cuts]
+        patches = [QuadraturePatch(*parts) for parts in zip(places, rules, near, pairs, strict=True)]
         rows, columns = np.divmod(known.numpy(), count)
-        return cls(units, material, patches, rows, columns)
+        return cls(basis, material, patches, rows, columns)
 
     @property
     def points(self) -> int:
@@ -83,60 +83,60 @@ class LocalEnergy:
 
     def total(self, output: torch.Tensor) -> float:
         """The energy per depth of an output layer (c, 2, m + 1), N mm / mm."""
-        field = LocalField(self.units, output)
+        field = FiniteBasisField(self.basis, output)
 
-        def task(patch: Patch) -> float:
+        def task(patch: QuadraturePatch) -> float:
             density = energy_density(
                 field.gradient_of_patch(patch.points, patch.near), self.material.lame, self.material.law
             )
             return float(patch.weights @ density)
 
-        return sum(one_by_one(task, self.patches))
+        return sum(imap_in_threads(task, self.patches))
 
     def derivatives(self, output: torch.Tensor) -> tuple[torch.Tensor, BlockMatrix]:
-        """First and second derivative of the energy at an output layer (c, 2, m + 1).
+        """Gradient and Hessian of the energy at an output layer (c, 2, m + 1).
 
         Returns:
-            The first, of the shape of `output`, N/mm, and the second, N/mm^2.
+            The gradient, of the shape of `output`, N/mm, and the Hessian, N/mm^2.
         """
-        size = 2 * self.units.per_window
+        size = 2 * self.basis.per_window
         blocks = output.new_zeros(len(self.rows), size, size)
         first = torch.zeros_like(output)
 
-        def task(patch: Patch) -> tuple[Patch, torch.Tensor, torch.Tensor]:
+        def task(patch: QuadraturePatch) -> tuple[QuadraturePatch, torch.Tensor, torch.Tensor]:
             return patch, *self._of_patch(patch, output[patch.near])
 
-        for patch, slope, curvature in one_by_one(task, self.patches):
-            first.index_add_(0, patch.near, slope)
+        for patch, gradient, curvature in imap_in_threads(task, self.patches):
+            first.index_add_(0, patch.near, gradient)
             blocks.index_add_(0, patch.pairs, curvature)
         # Windows that reach one patch need not overlap; one that reaches none keeps its empty diagonal.
         filled = (blocks.abs().amax(dim=(1, 2)).numpy() > 0) | (self.rows == self.columns)
         parts = (self.rows[filled], self.columns[filled], blocks.numpy()[filled])
-        return first, BlockMatrix(self.units.windows.count, *parts)
+        return first, BlockMatrix(self.basis.windows.count, *parts)
 
-    def _of_patch(self, patch: Patch, output: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """What a patch adds to the first derivative (w, 2, m + 1) and to the blocks of its pairs."""
-        along = self.units.derivatives(patch.points, patch.near)
-        windows, units = along.shape[2:]
+    def _of_patch(self, patch: QuadraturePatch, output: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Contribution of a patch to the gradient, (w, 2, m + 1), and to the blocks of its pairs."""
+        along = self.basis.gradients(patch.points, patch.near)
+        windows, functions = along.shape[2:]
         gradient = torch.einsum("xnwu,wiu->nix", along, output)
         if self.origin is not None:
-            (near,) = self.origin.units.windows.near(boxes_around([patch.points]))
+            (near,) = self.origin.basis.windows.near(boxes_around([patch.points]))
             gradient -= self.origin.gradient_of_patch(patch.points, near)
         stress, tangent = piola_stress_and_tangent(gradient, self.material.lame, self.material.law)
         first = torch.einsum("xnwu,nix->wiu", along, patch.weights[:, None, None] * stress)
         weighted = patch.weights[:, None, None, None, None] * tangent
         flat = along.flatten(2)
-        right = flat.new_empty(2, len(patch.points), 3, windows * units)
+        right = flat.new_empty(2, len(patch.points), 3, windows * functions)
         for part, (i, k) in enumerate(((0, 0), (0, 1), (1, 1))):
             for j in range(2):
                 torch.mul(weighted[:, i, j, k, 0, None], flat[0], out=right[j, :, part])
                 right[j, :, part].addcmul_(weighted[:, i, j, k, 1, None], flat[1])
         product = flat.flatten(0, 1).T @ right.flatten(0, 1).flatten(1)
-        uu, uv, vv = product.view(windows, units, 3, windows, units).unbind(2)
+        uu, uv, vv = product.view(windows, functions, 3, windows, functions).unbind(2)
         above, below = torch.triu_indices(windows, windows)
-        blocks = product.new_empty(len(above), 2, units, 2, units)
+        blocks = product.new_empty(len(above), 2, functions, 2, functions)
         blocks[:, 0, :, 0] = uu[above, :, below]
         blocks[:, 0, :, 1] = uv[above, :, below]
         blocks[:, 1, :, 0] = uv[below, :, above].mT
         blocks[:, 1, :, 1] = vv[above, :, below]
-        return first, blocks.view(len(above), 2 * units, 2 * units)
+        return first, blocks.view(len(above), 2 * functions, 2 * functions)

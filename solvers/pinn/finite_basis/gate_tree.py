@@ -1,8 +1,8 @@
-"""The gate of the modified MLP, applied to its own results: smooth windows that sum to one, made of gates.
+"""A tree of gates: the gated layer of the modified MLP applied recursively, which gives windows.
 
 A gated layer of Wang, Teng and Perdikaris (SIAM J. Sci. Comput. 43 (2021) A3055-A3081) mixes two encoders by
-a gate Z that sees the input X itself: (1 - Z) A + Z B. Here A and B are in turn what two gates below let
-through, down to encoders that serve a small part of the body each:
+a gate Z of the input X: (1 - Z) A + Z B. Here A and B are in turn the results of two gates below, down to
+encoders that serve a small part of the body each:
 
     H_g = (1 - Z_g) H_closed(g) + Z_g H_open(g)        Z_g = σ(X w_g + b_g)
 
@@ -38,9 +38,9 @@ class GateTree:
     """Gates over c encoders.
 
     Attributes:
-        gates: Slopes along x and y, 1/mm, and the bias of every gate, shape (c - 1, 3).
-        children: What a closed and an open gate let through, shape (c - 1, 2): the number of a gate, or
-            less than zero, the complement ~e of the number of an encoder.
+        gates: Weights of x and y, 1/mm, and the bias of every gate, shape (c - 1, 3).
+        children: Number of the gate below that a closed and an open gate pass on, shape (c - 1, 2); below
+            zero it is the complement ~e of the number of an encoder.
         paths: For every encoder the gates above it, padded with -1, shape (c, d).
         opened: Whether the encoder is on their open sides, shape (c, d).
     """
@@ -113,9 +113,9 @@ class GateTree:
             done = node < 0
             found.append(torch.stack([box[done], ~node[done]]))
             box, node, bound = box[~done], node[~done], bound[~done]
-            slopes, bias = self.gates[node].split([2, 1], dim=1)
-            logit = (slopes * middle[box]).sum(dim=1) + bias[:, 0]
-            spread = (slopes.abs() * half[box]).sum(dim=1)
+            weights, bias = self.gates[node].split([2, 1], dim=1)
+            logit = (weights * middle[box]).sum(dim=1) + bias[:, 0]
+            spread = (weights.abs() * half[box]).sum(dim=1)
             closed, opened = bound * (spread - logit).sigmoid(), bound * (spread + logit).sigmoid()
             bound = torch.cat([closed, opened])
             reached = bound > NEGLIGIBLE
@@ -128,36 +128,31 @@ class GateTree:
         pairs = pairs[:, (pairs[0] * self.count + pairs[1]).argsort()]
         return list(pairs[1].split(pairs[0].bincount(minlength=len(boxes)).tolist()))
 
-    def shares(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
+    def values(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
         """Shares of the encoders `near` (w,) at points (n, 2), mm: (n, w)."""
-        gates, above, opened = self._above(near)
-        return self._shares(points, self._logits(points, gates), gates, above, opened)
+        return self._shares(points, *self._above(near))[0]
 
-    def shares_with_slopes(
+    def values_and_gradients(
         self, points: torch.Tensor, near: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Shares (n, w) and their derivatives along x and y, (2, n, w), 1/mm."""
+        """Shares (n, w) and their derivatives with respect to x and y, (2, n, w), 1/mm."""
         gates, above, opened = self._above(near)
-        logits = self._logits(points, gates)
-        share = self._shares(points, logits, gates, above, opened)
-        slopes = self.gates[gates, :2].T
-        along = (slopes @ opened)[:, None] - (logits.sigmoid_() * slopes[:, None]) @ above
+        share, logits = self._shares(points, gates, above, opened)
+        weights = gates[:, :2].T
+        along = (weights @ opened)[:, None] - (logits.sigmoid_() * weights[:, None]) @ above
         return share, along.mul_(share)
 
     def _shares(
-        self,
-        points: torch.Tensor,
-        logits: torch.Tensor,
-        gates: torch.Tensor,
-        above: torch.Tensor,
-        opened: torch.Tensor,
-    ) -> torch.Tensor:
-        weights = self.gates[gates].T @ opened  # the sum of the logits of open gates is linear in X too
+        self, points: torch.Tensor, gates: torch.Tensor, above: torch.Tensor, opened: torch.Tensor
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Shares (n, w) and the gates' logits (n, k)."""
+        logits = torch.addmm(gates[:, 2], points, gates[:, :2].T)
+        weights = gates.T @ opened  # the sum of the logits of open gates is linear in X too
         linear = torch.addmm(weights[2], points, weights[:2])
-        return torch.addmm(linear, softplus(logits), above, alpha=-1).exp_()
+        return torch.addmm(linear, softplus(logits), above, alpha=-1).exp_(), logits
 
     def _above(self, near: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """The gates above encoders (w,), and the matrices |P| and P of the module's formula, (k, w)."""
+        """Gates above encoders (w,), (k, 3), and the matrices |P| and P of the module's formula, (k, w)."""
         paths, opened = self.paths[near], self.opened[near]
         on_path = paths >= 0
         gates, row = paths[on_path].unique(return_inverse=True)
@@ -165,11 +160,7 @@ class GateTree:
         above = self.gates.new_zeros(2, len(gates), len(near))
         above[0, row, column] = 1.0
         above[1, row, column] = opened[on_path].to(above.dtype)
-        return gates, above[0], above[1]
-
-    def _logits(self, points: torch.Tensor, gates: torch.Tensor) -> torch.Tensor:
-        weights = self.gates[gates]
-        return torch.addmm(weights[:, 2], points, weights[:, :2].T)
+        return self.gates[gates], above[0], above[1]
 
 
 def _roomiest_cut(

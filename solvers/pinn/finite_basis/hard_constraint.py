@@ -1,4 +1,4 @@
-"""The clamped base as a factor of the network."""
+"""The clamped base as a factor of the network: a hard Dirichlet condition."""
 
 from dataclasses import dataclass
 from typing import TypeVar
@@ -14,19 +14,19 @@ Points = TypeVar("Points", torch.Tensor, FloatArray)
 
 
 @dataclass(frozen=True)
-class BaseFactor:
-    """The factor d / (d + length) of the distance d to the base, where u = 0 then holds whatever the weights.
+class HardConstraint:
+    """The factor d / (d + length) of the distance d to the base, where u = 0 then holds for all weights.
 
     Attributes:
-        abscissa: Where the base is, mm.
+        base_x: The base is on the line x = base_x, mm.
         length: Distance at which the factor is one half, mm.
     """
 
-    abscissa: float
+    base_x: float
     length: float
 
     @classmethod
-    def of(cls, mesh: TriangleMesh, length: float) -> "BaseFactor":
+    def of(cls, mesh: TriangleMesh, length: float) -> "HardConstraint":
         """The factor for a mesh.
 
         Raises:
@@ -40,6 +40,6 @@ class BaseFactor:
         return cls(float(x.mean()), length)
 
     def at(self, points: Points) -> tuple[Points, Points]:
-        """The factor and its slope along x, 1/mm, at points (n, 2), mm, each (n, 1): tensors or arrays."""
-        distance = points[:, :1] - self.abscissa
+        """The factor and its derivative with respect to x, 1/mm, at points (n, 2), mm, each (n, 1)."""
+        distance = points[:, :1] - self.base_x
         return distance / (distance + self.length), self.length / (distance + self.length) ** 2

@@ -1,4 +1,4 @@
-"""The load's conditions on a network, as linear functionals of its displacement."""
+"""The load as linear functionals of a network's displacement."""
 
 from typing import NamedTuple
 
@@ -11,12 +11,12 @@ MOMENTS = 12
 """Moments of the displacement that a rigid patch prescribes for each component."""
 
 
-class Conditions(NamedTuple):
-    """For every prescribed component: the sum of weights times displacement at points is a value.
+class LoadConditions(NamedTuple):
+    """Prescribed values of weighted sums of the displacement at points, for every prescribed component.
 
     Attributes:
         points: Shape (q, 2), mm.
-        weights: Shape (k, q); those of the first functional sum to one, so that its multiplier is the force.
+        weights: Shape (k, q); the first functional's sum to one, so that its multiplier is the force.
         values: Shape (a, k), mm, for each prescribed component.
     """
 
@@ -25,7 +25,7 @@ class Conditions(NamedTuple):
     values: FloatArray
 
 
-def load_conditions(problem: Problem) -> Conditions:
+def load_conditions(problem: Problem) -> LoadConditions:
     """The functionals of a load.
 
     For `patch` they are moments against the tractions T_k(s) / sqrt(1 - s^2) with Chebyshev polynomials T_k,
@@ -36,12 +36,12 @@ def load_conditions(problem: Problem) -> Conditions:
     values = problem.load.values[:, None]
     if problem.load.kind != "patch":
         points, weights = contact_functional(problem)
-        return Conditions(points, weights[None], values)
+        return LoadConditions(points, weights[None], values)
     angles = np.pi * (np.arange(2 * MOMENTS) + 0.5) / (2 * MOMENTS)
     left, right = contact_end_points(problem)
     points = left + 0.5 * (1 + np.cos(angles))[:, None] * (right - left)
     weights = np.cos(np.outer(np.arange(MOMENTS), angles)) / len(angles)
-    return Conditions(points, weights, np.pad(values, ((0, 0), (0, MOMENTS - 1))))
+    return LoadConditions(points, weights, np.pad(values, ((0, 0), (0, MOMENTS - 1))))
 
 
 def contact_end_points(problem: Problem) -> FloatArray:

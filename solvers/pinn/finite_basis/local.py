@@ -1,4 +1,4 @@
-"""`pinn-local`: a finite-basis network with Shepard's windows, its output layer solved exactly."""
+"""`pinn-local`: random tanh neurons in Shepard's windows, the output layer solved exactly."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -14,7 +14,9 @@ from solvers.pinn.finite_basis.windows import ShepardWindows
 
 @dataclass(frozen=True, kw_only=True)
 class PinnLocalSolver(FiniteBasisSolver):
-    """Round windows, normalised to sum to one; the rest is as in `FiniteBasisSolver`.
+    """A finite-basis network with random hidden weights, whose output layer alone is solved for, exactly.
+
+    Its windows are round and normalised to sum to one. The rest is as in `FiniteBasisSolver`.
 
     Attributes:
         radius: Radius of a window in spacings.

@@ -1,11 +1,11 @@
-"""Newton's method for a finite-basis network, the load applied in adaptive steps."""
+"""Newton's method for a finite-basis network, with the load applied in adaptive steps."""
 
 from typing import NamedTuple
 
 import numpy as np
 import torch
 
-from solvers.pinn.finite_basis.equilibrium import Equilibrium, Level
+from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
 from solvers.solver import Progress
 
 FIRST_STEP, MAX_STEP, MIN_STEP = 0.1, 0.25, 1e-3
@@ -15,8 +15,8 @@ TOLERANCE = 1e-10
 MAX_ITERATIONS = 12
 
 
-class Path(NamedTuple):
-    """How far the load could be applied.
+class LoadStep(NamedTuple):
+    """Equilibrium under a fraction of the load.
 
     Attributes:
         fraction: Of the load.
@@ -25,25 +25,16 @@ class Path(NamedTuple):
     """
 
     fraction: float
-    state: Equilibrium
+    state: NewtonIterate
     iterations: int
 
-    @classmethod
-    def start(cls, level: Level) -> "Path":
-        """No load yet."""
-        return cls(0.0, Equilibrium(level.rest, np.zeros(len(level.values)), 0.0), 0)
 
-    def to(self, fraction: float, state: Equilibrium | None, iterations: int) -> "Path":
-        """With more iterations, which led to a state at a fraction of the load or, if None, nowhere."""
-        if state is None:
-            return self._replace(iterations=self.iterations + iterations)
-        return Path(fraction, state, self.iterations + iterations)
-
-
-def equilibrium(level: Level, guess: torch.Tensor, fraction: float) -> tuple[Equilibrium | None, int]:
+def find_equilibrium(
+    network: ConstrainedNetwork, guess: torch.Tensor, fraction: float
+) -> tuple[NewtonIterate | None, int]:
     """Equilibrium under a fraction of the load, None if the iteration fails, and the iterations taken."""
     for iteration in range(1, MAX_ITERATIONS + 1):
-        state = level.step(guess, fraction)
+        state = network.step(guess, fraction)
         if state is None:
             return None, iteration
         if state.change < TOLERANCE:
@@ -52,24 +43,30 @@ def equilibrium(level: Level, guess: torch.Tensor, fraction: float) -> tuple[Equ
     return None, MAX_ITERATIONS
 
 
-def follow_load(level: Level, progress: Progress) -> Path:
-    """Apply the load in steps that start from the last two states, continued on a straight line.
+def follow_load(network: ConstrainedNetwork, progress: Progress) -> LoadStep:
+    """Apply the load in steps that start from the last two states, extrapolated linearly.
 
     A step whose iteration fails is halved; one that takes few iterations is doubled.
+
+    Returns:
+        The last equilibrium, below the full load where Newton's method fails beyond it.
     """
-    path = before = Path.start(level)
+    unloaded = NewtonIterate(network.zero_output, np.zeros(len(network.targets)), 0.0)
+    last = before = LoadStep(0.0, unloaded, 0)
     step = FIRST_STEP
-    while path.fraction < 1 and step >= MIN_STEP:
-        fraction = min(path.fraction + step, 1.0)
-        guess = path.state.output
-        if path.fraction > 0:
-            ahead = (fraction - path.fraction) / (path.fraction - before.fraction)
+    while last.fraction < 1 and step >= MIN_STEP:
+        fraction = min(last.fraction + step, 1.0)
+        guess = last.state.output
+        if last.fraction > 0:
+            ahead = (fraction - last.fraction) / (last.fraction - before.fraction)
             guess = guess + ahead * (guess - before.state.output)
-        state, iterations = equilibrium(level, guess, fraction)
-        before, path = path if state else before, path.to(fraction, state, iterations)
+        state, iterations = find_equilibrium(network, guess, fraction)
+        iterations_in_all = last.iterations + iterations
         if state is None:
+            last = last._replace(iterations=iterations_in_all)
             step /= 2
             continue
+        before, last = last, LoadStep(fraction, state, iterations_in_all)
         progress(fraction, f"{fraction:.0%} of the load, {iterations} Newton iterations")
         step = min(MAX_STEP, step * (2 if iterations <= 5 else 1))
-    return path
+    return last

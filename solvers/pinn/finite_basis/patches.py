@@ -1,7 +1,7 @@
-"""Points in patches: neighbours, so few that what is evaluated at them stays in a core's cache.
+"""Patches of neighbouring points, small enough for arrays over a patch to stay in a core's cache.
 
-The units of a finite-basis network that reach one patch are a small dense block, which the fast kernels for
-dense matrices like better than a sparse matrix of all points and units.
+The basis functions that reach one patch are a small dense block, for which dense matrix kernels are faster
+than a sparse matrix of all points and basis functions.
 """
 
 from collections.abc import Sequence
@@ -14,16 +14,16 @@ from scipy.spatial import cKDTree
 from geometry.arrays import FloatArray, IntArray
 
 PATCH = 96
-"""Points in a patch: with fewer, windows are in more patches; with more, far from some of the points."""
+"""Points in a patch: with fewer, a window is in more patches; with more, it is far from some points."""
 
 MANY, MOST = 1000, 1024
-"""Patches from which on they may hold more points, and the most points that one then holds."""
+"""Number of patches above which they grow, and the most points in one."""
 
 
 def cut_into_patches(points: FloatArray) -> list[IntArray]:
-    """Numbers of the points (n, 2) of each patch; every point is in one of them.
+    """Numbers of the points (n, 2) in each patch; every point is in one patch.
 
-    Very many points lie so densely that larger patches, which cost less each, are still small.
+    Very many points are so dense that larger patches, which cost less a point, are still small.
     """
     if not len(points):
         return []

@@ -19,7 +19,7 @@ class Singularities(NamedTuple):
 
     Attributes:
         points: Shape (s, 2), mm.
-        spacing: Wanted distance between neighbours there, mm.
+        spacing: Distance between neighbouring points there, mm.
     """
 
     points: FloatArray
@@ -27,15 +27,15 @@ class Singularities(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Spacing:
-    """Wanted distance between neighbours: that of the nearest boundary, less near singularities.
+class PointSpacing:
+    """Distance between neighbouring points: that at the nearest boundary, less near singularities.
 
     At distance d from a singularity with spacing s it is at most s + growth * d.
 
     Attributes:
         boundary: Points of the boundary, shape (b, 2), mm.
         walls: The spacing there, shape (b,), mm.
-        singularities: Of one kind each.
+        singularities: Points of equal spacing, one entry a kind.
         growth: Growth of the spacing per distance from a singularity.
     """
 
@@ -45,7 +45,7 @@ class Spacing:
     growth: float
 
     @classmethod
-    def of(cls, problem: Problem, *, wall: float, corner: float, growth: float) -> "Spacing":
+    def of(cls, problem: Problem, *, wall: float, corner: float, growth: float) -> "PointSpacing":
         """The spacing for a body, in units of its own thicknesses.
 
         Args:
@@ -85,7 +85,7 @@ class Spacing:
         return np.asarray(distance)
 
 
-def graded_triangles(mesh: TriangleMesh, spacing: Spacing, share: float) -> FloatArray:
+def graded_triangles(mesh: TriangleMesh, spacing: PointSpacing, share: float) -> FloatArray:
     """The mesh's triangles, cut in four until no edge exceeds `share` of the spacing, shape (t, 3, 2)."""
     todo = mesh.points[mesh.triangles]
     done = []
@@ -99,11 +99,13 @@ def graded_triangles(mesh: TriangleMesh, spacing: Spacing, share: float) -> Floa
     return np.concatenate(done)
 
 
-def graded_quadrature(triangles: FloatArray, spacing: Spacing, share: float) -> tuple[FloatArray, FloatArray]:
+def graded_quadrature(
+    triangles: FloatArray, spacing: PointSpacing, share: float
+) -> tuple[FloatArray, FloatArray]:
     """Points (q, 2), mm, and weights (q,), mm^2, in triangles (t, 3, 2).
 
-    Three points of degree 2, but one in a triangle whose edges are below a quarter of `share` of the spacing:
-    of such there are sixteen where one would do.
+    Three points of degree 2; one point in a triangle whose edges are below a quarter of `share` of the
+    spacing, since sixteen of them stand for one.
     """
     small = _longest_edge(triangles) <= 0.25 * share * spacing.at(triangles.mean(axis=1))
     parts = [_element_rule(triangles[small], 1), _element_rule(triangles[~small], 2)]
@@ -123,7 +125,9 @@ def _longest_edge(triangles: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1))
 
 
-def spread_points(triangles: FloatArray, mesh: TriangleMesh, spacing: Spacing, share: float) -> FloatArray:
+def spread_points(
+    triangles: FloatArray, mesh: TriangleMesh, spacing: PointSpacing, share: float
+) -> FloatArray:
     """Corners of triangles (t, 3, 2), thinned to at least `share` of the spacing apart, shape (c, 2), mm.
 
     The mesh's boundary nodes are taken before all others, and near singular points before those far away.

@@ -1,4 +1,4 @@
-"""Other observations of the same markers, for a finite-basis network whose levels were factorised once."""
+"""Solutions for other observations of the same markers, with one factorisation of each refinement level."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.observations import Observations
-from solvers.pinn.finite_basis.equilibrium import Level, Responses
-from solvers.pinn.finite_basis.network import LocalField
-from solvers.pinn.finite_basis.newton import Path
+from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, LinearResponse
+from solvers.pinn.finite_basis.network import FiniteBasisField
+from solvers.pinn.finite_basis.newton import LoadStep
 from solvers.pinn.finite_basis.solver import FiniteBasisSolver
 from solvers.pinn.threading import pool
 from solvers.problem import Problem
@@ -17,8 +17,8 @@ from solvers.solver import Progress, silent
 
 
 def network_refitter(solver: FiniteBasisSolver, problem: Problem) -> Callable[[Observations], Solution]:
-    """What solves for other observations; by one factorisation of each level if the law is linear."""
-    kept: dict[float, tuple[Level, Responses]] = {}
+    """See `Refittable`; one factorisation of each level for all observations if the law is linear."""
+    kept: dict[float, tuple[ConstrainedNetwork, LinearResponse]] = {}
     first: list[Observations] = []
 
     def refit(observations: Observations) -> Solution:
@@ -26,30 +26,32 @@ def network_refitter(solver: FiniteBasisSolver, problem: Problem) -> Callable[[O
             replace(problem, observations=replace(observations, visible=seen))
             for seen in (observations.visible, np.ones_like(observations.visible))
         )
-        given, whole = solver.given(own), solver.given(every)
+        misfit, whole = solver.misfit(own), solver.misfit(every)
         first[:] = first or [observations]
         if (
-            given is None
+            misfit is None
             or whole is None
             or problem.material.law != "linear"
-            or given.misfit.radius != whole.misfit.radius
+            or misfit.radius != whole.radius
             or not np.array_equal(first[0].points, observations.points)
         ):
             return solver.solve(own)
 
-        def train(scale: float, coarse: LocalField | None, progress: Progress) -> tuple[Level, Path]:
+        def train(
+            scale: float, coarse: FiniteBasisField | None, progress: Progress
+        ) -> tuple[ConstrainedNetwork, LoadStep]:
             if scale not in kept:
-                level = solver.level(every, scale)
-                found = level.respond(level.rest)
-                if found is None:
+                network = solver.level(every, scale)
+                response = network.linear_response(network.zero_output)
+                if response is None:
                     raise ValueError("a linear energy has derivatives everywhere")
-                kept[scale] = level, found
-            level, found = kept[scale]
-            seen = np.concatenate([np.ones(level.held, dtype=bool), np.repeat(observations.visible, 2)])
+                kept[scale] = network, response
+            network, response = kept[scale]
+            seen = np.concatenate([np.ones(network.load_count, bool), np.repeat(observations.visible, 2)])
             (rows,) = np.nonzero(seen)
-            told = level.told(given, rows)
-            state = told.balance(told.rest, found._replace(unit=found.unit[rows]))
-            return told, Path.start(told).to(1.0, state, 1)
+            network = network.with_misfit(misfit, rows)
+            response = response._replace(unit=response.unit[rows])
+            return network, LoadStep(1.0, network.constrained_step(network.zero_output, response), 1)
 
         with pool():
             return solver.trained(own, train, silent)

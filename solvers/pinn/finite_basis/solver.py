@@ -1,9 +1,9 @@
-"""What `pinn-std` and `pinn-local` share: a finite-basis network whose output layer is solved exactly."""
+"""Base of `pinn-std` and `pinn-local`: a network with random hidden weights and an exact output layer."""
 
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import ClassVar
 
 import numpy as np
@@ -12,43 +12,43 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
 from solvers.assimilation.marker_forces import MarkerFit
-from solvers.assimilation.misfit import leave_one_out_displacements
-from solvers.pinn.finite_basis.equilibrium import Level
-from solvers.pinn.finite_basis.hard_constraint import BaseFactor
-from solvers.pinn.finite_basis.network import LocalField, LocalUnits
-from solvers.pinn.finite_basis.newton import Path, equilibrium, follow_load
+from solvers.assimilation.marker_weighting import MarkerWeighting
+from solvers.assimilation.misfit import Misfit, assimilates, leave_one_out_displacements
+from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
+from solvers.pinn.finite_basis.hard_constraint import HardConstraint
+from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
+from solvers.pinn.finite_basis.newton import LoadStep, find_equilibrium, follow_load
 from solvers.pinn.finite_basis.point_spacing import (
-    Spacing,
+    PointSpacing,
     graded_quadrature,
     graded_triangles,
     spread_points,
 )
 from solvers.pinn.finite_basis.windows import Windows
-from solvers.pinn.marker_terms import ASSIMILATION, Observing
 from solvers.pinn.threading import pool
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, check_problem, silent
 
-Train = Callable[[float, LocalField | None, Progress], tuple[Level, Path]]
-"""What gives a level of a scale of spacings, trained, from the field of the one before."""
+Train = Callable[[float, FiniteBasisField | None, Progress], tuple[ConstrainedNetwork, LoadStep]]
+"""Trains one refinement level, of a scale of the spacings, starting from the coarser level's field."""
 
 ORDER = 2
-"""In the spacing, of the displacement's error: what the levels' change is taken to mean. It falls faster."""
+"""Assumed (conservative) convergence order that turns the change between levels into an error estimate."""
 
 FINEST = 0.75
-"""Spacing of a third level, in that of the second, where the second is not enough."""
+"""Spacing of the third level relative to the second's."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class FiniteBasisSolver(Observing, ABC):
-    """Windows spread over the body, denser at its re-entrant corners, each with a few random tanh neurons.
+class FiniteBasisSolver(ABC):
+    """A network with random hidden weights, whose output layer alone is solved for, exactly.
 
-    The energy of the linear law is quadratic in the output layer, which is found by one sparse factorisation;
-    the neo-Hookean one is minimised by Newton's method. The hidden weights stay as they were drawn. It is
-    solved on two levels of spacing, and the change between them tells how large the error is; if it is too
-    large, there is a third. Spacings are in units of the body's thickness, so that one setting serves every
-    design.
+    Its windows are spread over the body, denser at re-entrant corners, and have a few random tanh neurons
+    each. The energy of the linear law is quadratic in the output layer, which takes one sparse factorisation;
+    the neo-Hookean energy is minimised by Newton's method. The network is solved on two levels of spacing,
+    whose change estimates the error; if that is too large, on a third. Spacings are in units of the body's
+    thickness, so that one setting serves every design.
 
     Attributes:
         wall_spacing: Spacing of the windows in the width of a wall or cavity, at most the mean thickness.
@@ -56,11 +56,11 @@ class FiniteBasisSolver(Observing, ABC):
         growth: Growth of the spacing per distance from them.
         neurons: Neurons in a window.
         steepness: Steepness of the neurons per spacing.
-        coarser: How many times larger the spacings of the first level are.
+        coarser: Ratio of the first level's spacings to the second's.
         tolerance: Estimated relative L2 error of the displacement below which it has converged.
         thinning: Smallest distance of two windows in spacings.
         cell: Longest edge of a quadrature cell in spacings.
-        base_length: Distance from the base, mm, at which the hard condition's factor is one half.
+        base_length: Distance from the base, mm, at which the factor of the hard constraint is one half.
         seed: Of the random numbers.
     """
 
@@ -75,15 +75,18 @@ class FiniteBasisSolver(Observing, ABC):
     cell: float
     base_length: float = 5.0
     seed: int = 0
+    name: ClassVar[str]
     laws: ClassVar[tuple[str, ...]] = ("linear", "neo-hookean")
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
 
     def __post_init__(self) -> None:
+        of_markers = {entry.name for entry in fields(MarkerWeighting)}
         for setting, value in asdict(self).items():
-            if setting not in ("seed", "growth", *ASSIMILATION) and not value > 0:
+            if setting not in ("seed", "growth", *of_markers) and not value > 0:
                 raise UserError(f"{self.name}: {setting} must be positive, got {value}")
         if self.seed < 0 or self.neurons < 2 or self.coarser <= 1 or self.growth < 0:
             raise UserError(f"{self.name} needs seed >= 0, neurons >= 2, coarser > 1 and growth >= 0")
+        _ = self.weighting
 
     @abstractmethod
     def windows(self, centres: FloatArray, spacing: FloatArray, rng: np.random.Generator) -> Windows:
@@ -96,44 +99,55 @@ class FiniteBasisSolver(Observing, ABC):
         """
 
     def settings(self) -> dict[str, object]:
-        """Spacing, windows, neurons, criterion and seed."""
+        """All of them, see `Solver`."""
         return asdict(self)
+
+    @property
+    def weighting(self) -> MarkerWeighting | None:
+        """The weights of the markers; None for a solver that does not assimilate them."""
+        return MarkerWeighting.of(self) if assimilates(self) else None
+
+    def misfit(self, problem: Problem) -> Misfit | None:
+        """The misfit that is minimised together with the energy, if any; see `MarkerWeighting.misfit`."""
+        return None if self.weighting is None else self.weighting.misfit(problem)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Train the network; see `Solver`."""
         check_problem(self, problem)
 
-        def train(scale: float, coarse: LocalField | None, progress: Progress) -> tuple[Level, Path]:
-            level = self.level(problem, scale)
-            return level, _train(level, coarse, progress)
+        def train(
+            scale: float, coarse: FiniteBasisField | None, progress: Progress
+        ) -> tuple[ConstrainedNetwork, LoadStep]:
+            network = self.level(problem, scale)
+            return network, _train(network, coarse, progress)
 
         with pool():
             return self.trained(problem, train, progress)
 
     def trained(self, problem: Problem, train: Train, progress: Progress) -> Solution:
-        """The solution by levels that are trained one after the other until two agree."""
+        """The solution by refinement levels, trained one after the other until two agree."""
         started = time.perf_counter()
         rule = body_quadrature(problem.mesh, 1)
         before = np.zeros_like(rule.location.points)
         history = []
-        coarse: LocalField | None = None
+        coarse: FiniteBasisField | None = None
         scales = (self.coarser, 1.0, FINEST)
         for number, scale in enumerate(scales):
-            level, path = train(scale, coarse, _part(progress, number / len(scales), 1 / len(scales)))
-            field = coarse = level.field(path.state.output)
+            network, reached = train(scale, coarse, _part(progress, number / len(scales), 1 / len(scales)))
+            state = reached.state
+            field = coarse = network.field(state.output)
             displacement = field.displacement(rule.location)
             change = _relative(displacement - before, displacement, rule.weights)
             finer = scales[max(number - 1, 0)] / scale
             error = change / (finer**ORDER - 1) if number else float("inf")
             before = displacement
-            energy = level.energy.total(path.state.output)
-            units = field.units.windows.count * field.units.per_window
-            history.append((units, energy, error, time.perf_counter() - started))
-            progress((number + 1) / len(scales), f"{units} units, energy {energy:.4f} N mm/mm")
-            if path.fraction < 1 or error <= self.tolerance:
+            energy = network.energy.total(state.output)
+            history.append((field.basis.size, energy, error, time.perf_counter() - started))
+            progress((number + 1) / len(scales), f"{field.basis.size} units, energy {energy:.4f} N mm/mm")
+            if reached.fraction < 1 or error <= self.tolerance:
                 break
-        state, reaction = path.state, np.zeros(2)
-        reaction[problem.load.prescribed] = level.reaction(state.forces)
+        reaction = np.zeros(2)
+        reaction[problem.load.prescribed] = network.reaction(state.forces)
         fit = None if state.markers is None else state.markers.fit(state.factor)
         return Solution(
             solver=self.name,
@@ -141,15 +155,15 @@ class FiniteBasisSolver(Observing, ABC):
             field=field,
             energy=energy,
             reaction=reaction,
-            status=self._status(path, finer, change, error, fit),
+            status=self._status(reached.fraction, finer, change, error, fit),
             stats={
                 "seconds": time.perf_counter() - started,
                 "unknowns": field.output.numel(),
-                "units": units,
-                "windows": field.units.windows.count,
-                "quadrature_points": level.energy.points,
-                "newton_iterations": path.iterations,
-                **level.marker_stats(state),
+                "units": field.basis.size,
+                "windows": field.basis.windows.count,
+                "quadrature_points": network.energy.points,
+                "newton_iterations": reached.iterations,
+                **network.marker_stats(state),
                 "seed": self.seed,
                 "device": "cpu",
             },
@@ -159,10 +173,10 @@ class FiniteBasisSolver(Observing, ABC):
             left_out=None if fit is None else leave_one_out_displacements(problem, fit.left_out),
         )
 
-    def level(self, problem: Problem, scale: float) -> Level:
-        """The network with spacings of `scale` times the settings', its quadrature and its load."""
+    def level(self, problem: Problem, scale: float) -> ConstrainedNetwork:
+        """The network of a refinement level, with spacings of `scale` times the settings'."""
         mesh = problem.mesh
-        spacing = Spacing.of(
+        spacing = PointSpacing.of(
             problem,
             wall=self.wall_spacing * scale,
             corner=self.corner_spacing * scale,
@@ -172,22 +186,24 @@ class FiniteBasisSolver(Observing, ABC):
         centres = spread_points(triangles, mesh, spacing, self.thinning)
         distances = spacing.at(centres)
         rng = np.random.default_rng(self.seed)
-        units = LocalUnits.around(
+        basis = FiniteBasis.around(
             self.windows(centres, distances, rng),
             centres,
             self.steepness / distances,
             neurons=self.neurons,
-            factor=BaseFactor.of(mesh, self.base_length),
+            constraint=HardConstraint.of(mesh, self.base_length),
             rng=rng,
         )
         quadrature = graded_quadrature(triangles, spacing, self.cell)
-        return Level.of(units, problem, *quadrature, self.given(problem))
+        return ConstrainedNetwork.of(basis, problem, *quadrature, self.weighting)
 
-    def _status(self, path: Path, finer: float, change: float, error: float, fit: MarkerFit | None) -> Status:
-        if path.fraction < 1:
+    def _status(
+        self, fraction: float, finer: float, change: float, error: float, fit: MarkerFit | None
+    ) -> Status:
+        if fraction < 1:
             return Status(
                 False,
-                f"stopped at {path.fraction:.1%} of the load: Newton's method fails beyond; "
+                f"stopped at {fraction:.1%} of the load: Newton's method fails beyond; "
                 "take a smaller spacing, the load patch or a smaller stroke",
             )
         message = (
@@ -199,19 +215,19 @@ class FiniteBasisSolver(Observing, ABC):
         return Status(converged, message + advice + (f"; {fit.phrase}" if fit else ""))
 
 
-def _train(level: Level, coarse: LocalField | None, progress: Progress) -> Path:
-    """Equilibrium on a level: at once for a linear law, else from a coarser level's or along the load."""
-    if level.energy.material.law == "linear":
-        return Path.start(level).to(1.0, level.step(level.rest), 1)
-    if coarse is not None:
-        state, iterations = equilibrium(level, level.nearest(coarse), 1.0)
-        if state is not None:
-            return Path.start(level).to(1.0, state, iterations)
-    return follow_load(level, progress)
+def _train(network: ConstrainedNetwork, coarse: FiniteBasisField | None, progress: Progress) -> LoadStep:
+    """Equilibrium of a level: at once for a linear law, else from a coarser level's or along the load."""
+    if network.energy.material.law == "linear":
+        state, iterations = network.step(network.zero_output), 1
+    elif coarse is not None:
+        state, iterations = find_equilibrium(network, network.project(coarse), 1.0)
+    else:
+        state = None
+    return follow_load(network, progress) if state is None else LoadStep(1.0, state, iterations)
 
 
 def _part(progress: Progress, start: float, share: float) -> Progress:
-    """The progress of a part of the work."""
+    """Reports the progress of a share of the work."""
     return lambda fraction, text: progress(start + share * fraction, text)
 
 

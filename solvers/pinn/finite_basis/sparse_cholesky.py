@@ -35,7 +35,7 @@ class BlockMatrix:
 
         Args:
             right: Right-hand sides, shape (r, n b).
-            regularisation: What to add to the unit diagonal.
+            regularisation: Added to the unit diagonal.
             definite: Whether the matrix is known to be positive definite.
 
         Raises:
@@ -70,7 +70,7 @@ class BlockMatrix:
                 ksp.solve(vector, result)
                 found[:] = result.array
         except PETSc.Error as error:
-            raise UserError("MUMPS cannot factorise the network's output layer; take fewer units") from error
+            raise UserError("MUMPS cannot factorise the output layer; take fewer neurons") from error
         finally:
             # petsc4py would keep the preconditioner, and the factors, for ever.
             for item in (vector, result, preconditioner, ksp, stored):

@@ -1,4 +1,4 @@
-"""`pinn-std`: the paper's gated architecture, its gates a tree, its output layer solved exactly."""
+"""`pinn-std`: a tree of gates over random tanh neurons, its output layer solved exactly."""
 
 from dataclasses import asdict, dataclass
 from typing import ClassVar
@@ -12,11 +12,12 @@ from solvers.pinn.finite_basis.solver import FiniteBasisSolver
 
 @dataclass(frozen=True, kw_only=True)
 class PinnStdSolver(FiniteBasisSolver):
-    """A gated network: sigmoid gates of the input that mix, layer by layer, what encoders of the input give.
+    """A gated network with random hidden weights, whose output layer alone is solved for, exactly.
 
-    The gated layer of the paper's network mixes two encoders. Here its result is mixed again by the gate
-    above it, and so on (`GateTree`), so that every encoder serves a part of the body of its own; an encoder
-    is a hidden layer of tanh neurons with its own output weights. The rest is as in `FiniteBasisSolver`.
+    This is the preset `fast`; the preset `paper`, `PaperPinnSolver`, trains all weights as the paper does. A
+    gated layer of the paper's network mixes two encoders; here the gate above mixes its result again, and so
+    on (`GateTree`), so that every encoder serves a part of the body. An encoder is a hidden layer of tanh
+    neurons with its own output weights. The rest is as in `FiniteBasisSolver`.
 
     Attributes:
         gate_width: Width of the gates in spacings.
@@ -31,7 +32,7 @@ class PinnStdSolver(FiniteBasisSolver):
     name: ClassVar[str] = "pinn-std"
 
     def settings(self) -> dict[str, object]:
-        """The preset that this is, and the settings of `FiniteBasisSolver`."""
+        """The preset and the settings of `FiniteBasisSolver`."""
         return {"preset": "fast", **asdict(self)}
 
     def windows(self, centres: FloatArray, spacing: FloatArray, rng: np.random.Generator) -> GateTree:

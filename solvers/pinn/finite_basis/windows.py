@@ -1,4 +1,4 @@
-"""Windows: smooth functions, each living in a part of the body, that sum to one everywhere in it."""
+"""Windows: smooth functions of local support that sum to one everywhere in the body."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -24,14 +24,14 @@ class Windows(Protocol):
         """
         ...
 
-    def shares(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
+    def values(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
         """The windows `near` (w,) at points (n, 2), mm: (n, w)."""
         ...
 
-    def shares_with_slopes(
+    def values_and_gradients(
         self, points: torch.Tensor, near: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        """The same (n, w) and their derivatives along x and y, (2, n, w), 1/mm."""
+        """The same (n, w) and their derivatives with respect to x and y, (2, n, w), 1/mm."""
         ...
 
 
@@ -63,35 +63,32 @@ class ShepardWindows:
             found.append((distance.square_().sum(dim=1) < self.radii.square()).nonzero()[:, 0])
         return found
 
-    def shares(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
+    def values(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
         """The windows `near` (w,) at points (n, 2), mm: (n, w).
 
         Raises:
             UserError: If a point lies in no window.
         """
-        bumps = self._rise(self._local(points, near)) ** 3
+        _, base = self._local(points, near)
+        bumps = base**3
         return bumps / _total(bumps)
 
-    def shares_with_slopes(
+    def values_and_gradients(
         self, points: torch.Tensor, near: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        """The same (n, w) and their derivatives along x and y, (2, n, w), 1/mm."""
-        local = self._local(points, near)
-        rise = self._rise(local)
-        bumps = rise**3
+        """The same (n, w) and their derivatives with respect to x and y, (2, n, w), 1/mm."""
+        local, base = self._local(points, near)
+        bumps = base**3
         total = _total(bumps)
-        share = bumps / total
-        slopes = (-6 * rise.square() / self.radii[near])[:, :, None] * local
-        along = slopes.permute(2, 0, 1)
-        return share, (along - share * along.sum(dim=2, keepdim=True)) / total
+        value = bumps / total
+        gradient = (-6 * base.square() / self.radii[near])[:, :, None] * local
+        along = gradient.permute(2, 0, 1)
+        return value, (along - value * along.sum(dim=2, keepdim=True)) / total
 
-    def _local(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
-        """Positions in the windows, in radii, (n, w, 2)."""
-        return (points[:, None] - self.centres[near]) / self.radii[near, None]
-
-    @staticmethod
-    def _rise(local: torch.Tensor) -> torch.Tensor:
-        return (1 - local.square().sum(dim=-1)).clamp_(min=0)
+    def _local(self, points: torch.Tensor, near: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Positions in the windows, in radii, (n, w, 2), and 1 - |x - c|^2 / R^2 or zero outside, (n, w)."""
+        local = (points[:, None] - self.centres[near]) / self.radii[near, None]
+        return local, (1 - local.square().sum(dim=-1)).clamp_(min=0)
 
 
 def _total(bumps: torch.Tensor) -> torch.Tensor:

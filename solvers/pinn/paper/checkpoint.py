@@ -1,6 +1,5 @@
-"""Checkpoints of a training: safetensors that replace each other whole, and know what they belong to."""
+"""Checkpoints of a training: safetensors files, replaced atomically, with the digest of their problem."""
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -8,24 +7,20 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 
+from geometry.atomic import atomic_path
 from geometry.errors import UserError
 
 FILE = "checkpoint.safetensors"
 
 
 def save_checkpoint(folder: Path, state: Mapping[str, torch.Tensor], digest: str) -> None:
-    """Write a state; a killed process leaves the last one."""
-    folder.mkdir(parents=True, exist_ok=True)
-    partial = folder / f".{os.getpid()}.{FILE}"
-    try:
+    """Write a state atomically."""
+    with atomic_path(folder / FILE) as partial:
         save_file({name: tensor.contiguous() for name, tensor in state.items()}, partial, {"digest": digest})
-        os.replace(partial, folder / FILE)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def load_checkpoint(folder: Path, digest: str) -> dict[str, torch.Tensor] | None:
-    """The state that was saved last, or None if there is none.
+    """The last saved state, or None if there is none.
 
     Raises:
         UserError: If it cannot be read, or belongs to another problem or other settings.

@@ -1,4 +1,4 @@
-"""Where gradient-trained networks see the problem: collocation points of the energy, points of the base."""
+"""Collocation points of the energy, and points of the base, for the paper's training."""
 
 from typing import Literal, NamedTuple
 
@@ -13,32 +13,32 @@ Collocation = Literal["nodes", "elements", "random"]
 `random`: as many points as nodes, drawn uniformly in the body."""
 
 
-class Sample(NamedTuple):
-    """Points and the share that each has in a mean over the body.
+class CollocationPoints(NamedTuple):
+    """Points and their weights in a mean over the body.
 
     Attributes:
         points: Shape (n, 2), mm.
-        shares: Shape (n,); they sum to one.
+        weights: Shape (n,); they sum to one.
     """
 
     points: FloatArray
-    shares: FloatArray
+    weights: FloatArray
 
 
-def body_sample(mesh: TriangleMesh, collocation: Collocation, seed: int) -> Sample:
+def collocation_points(mesh: TriangleMesh, collocation: Collocation, seed: int) -> CollocationPoints:
     """Collocation points of the body.
 
-    The mean over nodes is the paper's. It is biased to where the mesh is dense.
+    The mean over nodes is the paper's. It has a bias towards dense parts of the mesh.
     """
     if collocation == "elements":
         rule = body_quadrature(mesh)
-        return Sample(rule.location.points, rule.weights / rule.weights.sum())
+        return CollocationPoints(rule.location.points, rule.weights / rule.weights.sum())
     points = mesh.points if collocation == "nodes" else _uniform_points(mesh, len(mesh.points), seed)
-    return Sample(points, np.full(len(points), 1 / len(points)))
+    return CollocationPoints(points, np.full(len(points), 1 / len(points)))
 
 
 def base_points(mesh: TriangleMesh, count: int) -> FloatArray:
-    """Evenly spaced points of the straight base with both its ends, shape (count, 2), mm."""
+    """Evenly spaced points of the straight base, both ends included, shape (count, 2), mm."""
     nodes, times = np.unique(mesh.boundary("base"), return_counts=True)
     start, end = mesh.points[nodes[times == 1]]
     return np.asarray(np.linspace(start, end, count))

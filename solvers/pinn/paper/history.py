@@ -1,4 +1,4 @@
-"""The record of a training, as a table that people and TensorBoard can read."""
+"""Writes the history of a training as CSV and, for TensorBoard, as event files."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from geometry.arrays import FloatArray
+from geometry.atomic import atomic_path
 
 UNITS = {"PDE": "MPa", "BC": "mm2", "ASM": "mm2", "total": "MPa", "energy": "N mm/mm", "seconds": "s"}
 
@@ -15,9 +16,9 @@ class HistoryFiles:
     """Writes `history.csv` and, if TensorBoard is installed, its event files.
 
     Args:
-        folder: Where.
+        folder: Where they are written.
         columns: Names of the columns, the epoch first.
-        done: Epochs that are recorded there already.
+        done: Number of epochs already recorded there.
     """
 
     def __init__(self, folder: Path, columns: Sequence[str], done: int) -> None:
@@ -28,9 +29,8 @@ class HistoryFiles:
     def write(self, history: FloatArray) -> None:
         """Write a history of shape (epochs, columns)."""
         titles = [f"{name} [{UNITS[name]}]" if name in UNITS else name for name in self._columns]
-        partial = self._path.with_suffix(".partial")
-        np.savetxt(partial, history, delimiter=",", header=",".join(titles), comments="", fmt="%.9g")
-        partial.replace(self._path)
+        with atomic_path(self._path) as partial:
+            np.savetxt(partial, history, delimiter=",", header=",".join(titles), comments="", fmt="%.9g")
         if self._board is not None:
             for row in history[self._done :]:
                 for name, value in zip(self._columns[1:], row[1:], strict=True):

@@ -1,4 +1,4 @@
-"""The loss and its derivatives over the parameters, in pieces of points, on several threads and processes."""
+"""The loss and its gradient in the parameters, by chunks of points on several threads and processes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,28 +7,28 @@ from typing import NamedTuple
 
 import torch
 
-from solvers.pinn.paper.losses import LossTerm
+from solvers.pinn.paper.distributed import ONE_PROCESS, ProcessGroup
+from solvers.pinn.paper.loss_terms import LossTerm
 from solvers.pinn.paper.mlp_passes import MlpPass
 from solvers.pinn.paper.modified_mlp import ModifiedMlp
-from solvers.pinn.paper.processes import ONE_PROCESS, Processes
-from solvers.pinn.threading import cut, in_threads
+from solvers.pinn.threading import map_in_threads, slices
 
 LANES = 16
-"""Pieces are summed in so many fixed groups, so that rounding does not depend on the threads."""
+"""Fixed groups in which chunks are summed, so that rounding is independent of the number of threads."""
 
-PIECE = 384
-"""Points in a piece."""
+CHUNK = 384
+"""Points in a chunk."""
 
-Piece = tuple[LossTerm, slice]
+Chunk = tuple[LossTerm, slice]
 
 
-class Evaluation(NamedTuple):
+class LossEvaluation(NamedTuple):
     """The loss at some parameters.
 
     Attributes:
         terms: Value of every term, without its factor.
         total: Sum of factor times term.
-        gradient: Derivatives of the total, shape (networks, parameters).
+        gradient: Of the total, shape (networks, parameters).
     """
 
     terms: dict[str, float]
@@ -42,46 +42,46 @@ class Loss:
 
     Attributes:
         network: The networks.
-        terms: What is summed.
+        terms: The terms.
         factors: Weight of the terms by their names.
-        processes: Who share the pieces.
+        processes: Processes that share the chunks.
     """
 
     network: ModifiedMlp
     terms: Sequence[LossTerm]
     factors: Mapping[str, float]
-    processes: Processes = ONE_PROCESS
+    processes: ProcessGroup = ONE_PROCESS
 
-    def __call__(self, parameters: torch.Tensor) -> Evaluation:
+    def __call__(self, parameters: torch.Tensor) -> LossEvaluation:
         """The loss and its gradient at parameters of shape (networks, parameters)."""
         weights = self.network.weights(self.network.in_logistic_form(parameters))
 
-        def lane(pieces: list[Piece]) -> tuple[dict[str, float], torch.Tensor]:
+        def lane(chunks: list[Chunk]) -> tuple[dict[str, float], torch.Tensor]:
             values = dict.fromkeys(self.factors, 0.0)
             gradient = torch.zeros_like(parameters)
             sums = self.network.weights(gradient)
-            for term, rows in pieces:
+            for term, rows in chunks:
                 networks = MlpPass(self.network, weights, term.points[rows])
                 values[term.name] += term.add(networks, rows, self.factors[term.name], sums)
             return values, gradient
 
         values = torch.zeros(len(self.factors), dtype=torch.float64)
         gradient = torch.zeros_like(parameters)
-        for of_lane, gradient_of_lane in in_threads(lane, self._lanes):
+        for of_lane, gradient_of_lane in map_in_threads(lane, self._lanes):
             values += torch.tensor(list(of_lane.values()), dtype=torch.float64)
             gradient += gradient_of_lane
         self.processes.sum(values, gradient)
         terms = dict(zip(self.factors, values.tolist(), strict=True))
         total = sum(self.factors[name] * value for name, value in terms.items())
-        return Evaluation(terms, total, self.network.in_logistic_form(gradient))
+        return LossEvaluation(terms, total, self.network.in_logistic_form(gradient))
 
     @cached_property
-    def _lanes(self) -> list[list[Piece]]:
-        """The pieces of this process, in groups; one piece a term on a GPU."""
-        pieces: list[Piece] = []
+    def _lanes(self) -> list[list[Chunk]]:
+        """The chunks of this process, in groups; one chunk a term on a GPU."""
+        chunks: list[Chunk] = []
         for term in self.terms:
             count = len(term.points)
-            size = PIECE if term.divisible and not term.points.is_cuda else count
-            pieces += [(term, rows) for rows in cut(count, size)]
-        lanes = [pieces[start::LANES] for start in range(min(LANES, len(pieces)))]
+            size = CHUNK if term.divisible and not term.points.is_cuda else count
+            chunks += [(term, rows) for rows in slices(count, size)]
+        lanes = [chunks[start::LANES] for start in range(min(LANES, len(chunks)))]
         return lanes[self.processes.rank :: self.processes.count]

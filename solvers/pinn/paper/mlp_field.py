@@ -1,5 +1,6 @@
-"""Trained modified MLPs as a displacement field."""
+"""Displacement field of two modified MLPs."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from solvers.pinn.paper.mlp_passes import MlpPass
 from solvers.pinn.paper.modified_mlp import ModifiedMlp
-from solvers.pinn.threading import in_pieces
+from solvers.pinn.threading import CHUNK, map_in_threads, slices
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,22 +27,18 @@ class MlpField:
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
-        result = torch.empty(len(location), 2, dtype=torch.float64)
-        self._evaluate(location, result, slopes=False)
-        return np.asarray(result.numpy())
+        return self._evaluate(location, MlpPass.values)
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
-        result = torch.empty(len(location), 2, 2, dtype=torch.float64)
-        self._evaluate(location, result, slopes=True)
-        return np.asarray(result.numpy())
+        return self._evaluate(location, MlpPass.input_gradients)
 
-    def _evaluate(self, location: LocatedPoints, result: torch.Tensor, *, slopes: bool) -> None:
+    def _evaluate(self, location: LocatedPoints, quantity: Callable[[MlpPass], torch.Tensor]) -> FloatArray:
         points = torch.from_numpy(np.array(location.points))
         weights = self.network.weights(self.network.in_logistic_form(self.parameters))
 
-        def task(rows: slice) -> None:
-            networks = MlpPass(self.network, weights, points[rows])
-            result[rows] = (networks.slopes() if slopes else networks.values()).transpose(0, 1)
+        def evaluate(rows: slice) -> torch.Tensor:
+            return quantity(MlpPass(self.network, weights, points[rows])).transpose(0, 1)
 
-        in_pieces(task, len(points), self.network.width)
+        rows = slices(len(points), max(CHUNK // self.network.width, 8))
+        return np.asarray(torch.cat(map_in_threads(evaluate, rows)).numpy())

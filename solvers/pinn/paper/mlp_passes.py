@@ -1,20 +1,19 @@
-"""Values of modified MLPs, their derivatives along x and y, and the derivatives of both over the parameters.
+"""Values of modified MLPs, their gradients in x and y, and the gradients of both in the parameters.
 
 With σ the logistic function, whose argument s is twice tanh's, and a, b, σ_k in the place of A, B, Z_k, the
 formulas of `modified_mlp` read
 
     step = 4 (b - a)        base = 4 a - 2 b - 1        H_k+1 = base + σ_k * step
 
-The derivatives along x and y take one pass down through the layers, as in reverse differentiation. What a
-loss needs of them over the parameters is the sum over points of f_x du/dx + f_y du/dy, the derivative of u
-along a direction f at each point. Over a matrix between a layer h and an argument s the derivative of u is
-h^T δ with δ = du/ds; that of the sum is, by the product rule,
+The gradient in x and y takes one backward pass. A loss needs the gradient in the parameters of the sum over
+points of f_x du/dx + f_y du/dy, the derivative of u along a direction f at each point. The derivative of u by
+a matrix between a layer h and an argument s is h^T δ with δ = du/ds; that of the sum is
 
     h'^T δ + h^T δ'
 
-with h' and δ' the derivatives of h and δ along f: one more pass up and one down. These are two thirds of the
-matrix products that it takes to carry both derivatives forward. Arrays have the shape (networks, n, width),
-those of the layers that see X (networks, 3, n, width); the three are a, b and σ_1 (or that of H_1).
+with the tangents h' and δ', the derivatives of h and δ along f: one more forward and one more backward pass.
+These take two thirds of the matrix products of carrying both derivatives forward. Arrays have the shape
+(networks, n, width), those of the input layers (networks, 3, n, width), which are a, b and σ_1 (or H_1's).
 """
 
 from typing import NamedTuple
@@ -24,15 +23,15 @@ import torch
 from solvers.pinn.paper.modified_mlp import ModifiedMlp, Weights
 
 
-class Ascent(NamedTuple):
-    """A pass from the points to the output, or its derivatives along directions.
+class ForwardPass(NamedTuple):
+    """Layers from the points to the output, or their tangents along directions.
 
     Attributes:
         points: Points with a column of ones, shape (n, 3); or directions with zeros, (networks, 1, n, 3).
-        first: The layers that see the points.
+        first: The input layers.
         step: 4 (b - a).
-        gates: σ_k of the gates that see a hidden layer.
-        hidden: What they see and, last, what the output layer sees.
+        gates: σ_k of the gates on hidden layers.
+        hidden: Inputs of these gates and, last, of the output layer.
     """
 
     points: torch.Tensor
@@ -42,16 +41,16 @@ class Ascent(NamedTuple):
     hidden: list[torch.Tensor]
 
 
-class Descent(NamedTuple):
-    """A pass from the output to the points: derivatives of the output along the layers.
+class BackwardPass(NamedTuple):
+    """Derivatives of the output with respect to the layers, or their tangents.
 
     Attributes:
-        above: Along `Ascent.hidden`.
-        rates: Derivative of σ_k along the gate's argument, in the order of `Ascent.gates`.
-        arguments: Along the gates' arguments.
-        outer: Along `Ascent.first`.
-        first_rates: Derivative of `Ascent.first` along its arguments.
-        first: Along those arguments.
+        above: With respect to `ForwardPass.hidden`.
+        rates: Of σ_k with respect to its argument, in the order of `ForwardPass.gates`.
+        arguments: With respect to the gates' arguments.
+        outer: With respect to `ForwardPass.first`.
+        first_rates: Of `ForwardPass.first` with respect to its arguments.
+        first: With respect to those arguments.
     """
 
     above: list[torch.Tensor]
@@ -83,104 +82,105 @@ class MlpPass:
         for matrix, bias in zip(weights.gates, weights.biases, strict=True):
             gates.append(torch.baddbmm(bias, hidden[-1], matrix).sigmoid_())
             hidden.append(torch.addcmul(base, gates[-1], step))
-        self._up = Ascent(ones, first, step, gates, hidden)
+        self._forward_pass = ForwardPass(ones, first, step, gates, hidden)
 
     def values(self) -> torch.Tensor:
         """Outputs of the networks, shape (networks, n)."""
-        return (self._up.hidden[-1] @ self._weights.output)[..., 0] + self._weights.output_bias
+        return (self._forward_pass.hidden[-1] @ self._weights.output)[..., 0] + self._weights.output_bias
 
-    def slopes(self) -> torch.Tensor:
-        """Derivatives of the outputs along x and y, shape (networks, n, 2)."""
-        self._down = self._descend(self._up.first.new_ones(1))
-        return torch.matmul(self._down.first, self._weights.first[:, :, :2].mT).sum(1)
+    def input_gradients(self) -> torch.Tensor:
+        """Derivatives of the outputs with respect to x and y, shape (networks, n, 2)."""
+        self._backward_pass = self._backward(self._forward_pass.first.new_ones(1))
+        return torch.matmul(self._backward_pass.first, self._weights.first[:, :, :2].mT).sum(1)
 
-    def add_value_gradient(self, factors: torch.Tensor, sums: Weights) -> None:
-        """Add to `sums` the derivatives over the parameters of Σ factors * values.
+    def backward_values(self, factors: torch.Tensor, sums: Weights) -> None:
+        """Add to `sums` the gradient of Σ factors * values in the parameters.
 
         Args:
             factors: Shape (networks, n).
             sums: Views of a tensor in the shape of the parameters in logistic form.
         """
-        down = self._descend(factors[..., None])
-        _add_products(self._up, down.first, down.arguments, sums)
-        _add_biases(down.arguments, sums)
-        sums.output.add_(self._up.hidden[-1].mT @ factors[..., None])
+        backward = self._backward(factors[..., None])
+        _add_products(self._forward_pass, backward.first, backward.arguments, sums)
+        _add_biases(backward.arguments, sums)
+        sums.output.add_(self._forward_pass.hidden[-1].mT @ factors[..., None])
         sums.output_bias.add_(factors.sum(1, keepdim=True))
 
-    def add_slope_gradient(self, factors: torch.Tensor, sums: Weights) -> None:
-        """Add those of Σ factors * slopes, with factors of shape (networks, n, 2); after `slopes`."""
-        up, down = self._up, self._down
-        up_along = self._ascend_along(factors)
-        first, arguments = self._descend_along(up_along)
-        _add_products(up, first, arguments, sums)
+    def backward_input_gradients(self, factors: torch.Tensor, sums: Weights) -> None:
+        """The same for Σ factors * input gradients, factors (networks, n, 2); after `input_gradients`."""
+        forward, backward = self._forward_pass, self._backward_pass
+        forward_tangent = self._forward_tangent(factors)
+        first, arguments = self._backward_tangent(forward_tangent)
+        _add_products(forward, first, arguments, sums)
         _add_biases(arguments, sums)
-        _add_products(up_along, down.first, down.arguments, sums)
-        sums.output.add_(up_along.hidden[-1].sum(1)[..., None])
+        _add_products(forward_tangent, backward.first, backward.arguments, sums)
+        sums.output.add_(forward_tangent.hidden[-1].sum(1)[..., None])
 
-    def _descend(self, factors: torch.Tensor) -> Descent:
+    def _backward(self, factors: torch.Tensor) -> BackwardPass:
         """Derivatives of the sum of factors times values."""
-        up, weights = self._up, self._weights
-        above = [(factors * weights.output.mT).expand_as(up.step)]
+        forward, weights = self._forward_pass, self._weights
+        above = [(factors * weights.output.mT).expand_as(forward.step)]
         rates: list[torch.Tensor] = []
         arguments: list[torch.Tensor] = []
-        to_base, to_step = torch.zeros_like(up.step), torch.zeros_like(up.step)
-        for gate, matrix in zip(reversed(up.gates), reversed(weights.gates), strict=True):
+        to_base, to_step = torch.zeros_like(forward.step), torch.zeros_like(forward.step)
+        for gate, matrix in zip(reversed(forward.gates), reversed(weights.gates), strict=True):
             rates.insert(0, torch.addcmul(gate, gate, gate, value=-1))
             to_base += above[0]
             to_step.addcmul_(above[0], gate)
-            arguments.insert(0, (above[0] * up.step).mul_(rates[0]))
+            arguments.insert(0, (above[0] * forward.step).mul_(rates[0]))
             above.insert(0, arguments[0] @ matrix.mT)
-        outer = torch.empty_like(up.first)
+        outer = torch.empty_like(forward.first)
         if self._literal:
             torch.mul(above[0], 2, out=outer[:, 2])
         else:
             to_base += above[0]
-            to_step.addcmul_(above[0], up.first[:, 2])
-            torch.mul(above[0], up.step, out=outer[:, 2])
+            to_step.addcmul_(above[0], forward.first[:, 2])
+            torch.mul(above[0], forward.step, out=outer[:, 2])
         _to_encoders(to_base, to_step, outer)
-        first_rates = torch.addcmul(up.first, up.first, up.first, value=-1)
-        return Descent(above, rates, arguments, outer, first_rates, outer * first_rates)
+        first_rates = torch.addcmul(forward.first, forward.first, forward.first, value=-1)
+        return BackwardPass(above, rates, arguments, outer, first_rates, outer * first_rates)
 
-    def _ascend_along(self, directions: torch.Tensor) -> Ascent:
-        """Derivatives of the way up along directions of shape (networks, n, 2)."""
-        up, down, weights = self._up, self._down, self._weights
+    def _forward_tangent(self, directions: torch.Tensor) -> ForwardPass:
+        """Tangents of the forward pass along directions of shape (networks, n, 2)."""
+        forward, backward, weights = self._forward_pass, self._backward_pass, self._weights
         points = torch.nn.functional.pad(directions, (0, 1))[:, None]
-        first = torch.matmul(points, weights.first).mul_(down.first_rates)
+        first = torch.matmul(points, weights.first).mul_(backward.first_rates)
         step, base = _step_and_base(first)
         third = first[:, 2]
         gates: list[torch.Tensor] = []
-        hidden = [2 * third if self._literal else _product_along(base, up.first[:, 2], third, up.step, step)]
-        for gate, rate, matrix in zip(up.gates, down.rates, weights.gates, strict=True):
+        product = _product_tangent(base, forward.first[:, 2], third, forward.step, step)
+        hidden = [2 * third if self._literal else product]
+        for gate, rate, matrix in zip(forward.gates, backward.rates, weights.gates, strict=True):
             gates.append((hidden[-1] @ matrix).mul_(rate))
-            hidden.append(_product_along(base, gate, gates[-1], up.step, step))
-        return Ascent(points, first, step, gates, hidden)
+            hidden.append(_product_tangent(base, gate, gates[-1], forward.step, step))
+        return ForwardPass(points, first, step, gates, hidden)
 
-    def _descend_along(self, along: Ascent) -> tuple[torch.Tensor, list[torch.Tensor]]:
-        """Derivatives of `Descent.first` and `Descent.arguments` along the same directions."""
-        up, down, weights = self._up, self._down, self._weights
-        above = torch.zeros_like(up.step)
+    def _backward_tangent(self, tangent: ForwardPass) -> tuple[torch.Tensor, list[torch.Tensor]]:
+        """Tangents of `BackwardPass.first` and `BackwardPass.arguments` along the same directions."""
+        forward, backward, weights = self._forward_pass, self._backward_pass, self._weights
+        above = torch.zeros_like(forward.step)
         arguments: list[torch.Tensor] = []
-        to_base, to_step = torch.zeros_like(up.step), torch.zeros_like(up.step)
-        for k in reversed(range(len(up.gates))):
-            gate, gate_along, higher = up.gates[k], along.gates[k], down.above[k + 1]
+        to_base, to_step = torch.zeros_like(forward.step), torch.zeros_like(forward.step)
+        for k in reversed(range(len(forward.gates))):
+            gate, gate_tangent, higher = forward.gates[k], tangent.gates[k], backward.above[k + 1]
             to_base += above
-            to_step.addcmul_(above, gate).addcmul_(higher, gate_along)
-            rate = torch.addcmul(gate_along, gate, gate_along, value=-2)
-            level = (along.step * down.rates[k]).addcmul_(up.step, rate)
-            argument = (higher * level).addcmul_(above * up.step, down.rates[k])
+            to_step.addcmul_(above, gate).addcmul_(higher, gate_tangent)
+            rate = torch.addcmul(gate_tangent, gate, gate_tangent, value=-2)
+            level = (tangent.step * backward.rates[k]).addcmul_(forward.step, rate)
+            argument = (higher * level).addcmul_(above * forward.step, backward.rates[k])
             arguments.insert(0, argument)
             above = argument @ weights.gates[k].mT
-        outer = torch.empty_like(up.first)
-        third, third_along = up.first[:, 2], along.first[:, 2]
+        outer = torch.empty_like(forward.first)
+        third, third_tangent = forward.first[:, 2], tangent.first[:, 2]
         if self._literal:
             torch.mul(above, 2, out=outer[:, 2])
         else:
             to_base += above
-            to_step.addcmul_(above, third).addcmul_(down.above[0], third_along)
-            torch.mul(above, up.step, out=outer[:, 2]).addcmul_(down.above[0], along.step)
+            to_step.addcmul_(above, third).addcmul_(backward.above[0], third_tangent)
+            torch.mul(above, forward.step, out=outer[:, 2]).addcmul_(backward.above[0], tangent.step)
         _to_encoders(to_base, to_step, outer)
-        rates = torch.addcmul(along.first, up.first, along.first, value=-2)
-        return outer.mul_(down.first_rates).addcmul_(down.outer, rates), arguments
+        rates = torch.addcmul(tangent.first, forward.first, tangent.first, value=-2)
+        return outer.mul_(backward.first_rates).addcmul_(backward.outer, rates), arguments
 
 
 def _step_and_base(first: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
@@ -190,26 +190,28 @@ def _step_and_base(first: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
 
 
 def _to_encoders(to_base: torch.Tensor, to_step: torch.Tensor, outer: torch.Tensor) -> None:
-    """Derivatives along a and b, the first two of `outer`, from those along base and step."""
+    """Derivatives by a and b, the first two of `outer`, from those by base and step."""
     torch.sub(to_base, to_step, out=outer[:, 0]).mul_(4)
     torch.sub(4 * to_step, to_base, alpha=2, out=outer[:, 1])
 
 
-def _product_along(
+def _product_tangent(
     base: torch.Tensor,
     gate: torch.Tensor,
-    gate_along: torch.Tensor,
+    gate_tangent: torch.Tensor,
     step: torch.Tensor,
-    step_along: torch.Tensor,
+    step_tangent: torch.Tensor,
 ) -> torch.Tensor:
-    """Derivative of base + gate * step."""
-    return torch.addcmul(base, gate_along, step).addcmul_(gate, step_along)
+    """Tangent of base + gate * step."""
+    return torch.addcmul(base, gate_tangent, step).addcmul_(gate, step_tangent)
 
 
-def _add_products(up: Ascent, first: torch.Tensor, arguments: list[torch.Tensor], sums: Weights) -> None:
-    """Add inputs times derivatives along arguments, h^T δ, of every layer but the last."""
-    sums.first.add_(torch.matmul(up.points.mT, first))
-    for matrix, hidden, argument in zip(sums.gates, up.hidden[:-1], arguments, strict=True):
+def _add_products(
+    forward: ForwardPass, first: torch.Tensor, arguments: list[torch.Tensor], sums: Weights
+) -> None:
+    """Add h^T δ, inputs times derivatives by arguments, of every layer but the last."""
+    sums.first.add_(torch.matmul(forward.points.mT, first))
+    for matrix, hidden, argument in zip(sums.gates, forward.hidden[:-1], arguments, strict=True):
         matrix.baddbmm_(hidden.mT, argument)
 
 

@@ -1,4 +1,4 @@
-"""The modified MLP that the paper uses: its shape, its initial weights, and views of its parameters.
+"""The paper's modified MLP: shape, initial weights, and views of its parameters.
 
 With X = (x, y) and `*` by element (S. Wang, Y. Teng, P. Perdikaris: Understanding and mitigating gradient
 flow pathologies in physics-informed neural networks, SIAM J. Sci. Comput. 43 (2021) A3055-A3081):
@@ -22,9 +22,9 @@ class Weights(NamedTuple):
     """Parameters of the networks, as views of one tensor.
 
     Attributes:
-        first: The layers that see X, those of A, B and Z_1 (or H_1): slopes along x and y and the bias, shape
+        first: The input layers, those of A, B and Z_1 (or H_1): weights of x and y and the bias, shape
             (networks, 3, 3, width).
-        gates: Matrices of the gates that see a hidden layer, each (networks, width, width).
+        gates: Matrices of the gates on hidden layers, each (networks, width, width).
         biases: Their biases, each (networks, 1, width).
         output: Shape (networks, width, 1).
         output_bias: Shape (networks, 1).
@@ -39,10 +39,10 @@ class Weights(NamedTuple):
 
 @dataclass(frozen=True)
 class ModifiedMlp:
-    """Shape of modified MLPs of one output each, which are evaluated together.
+    """Shape of modified MLPs of one output each, evaluated together.
 
     Attributes:
-        networks: How many.
+        networks: Number of networks.
         width: Neurons in a layer.
         layers: Number of gates L.
         literal_gate: Whether the first gate has a layer of its own, as printed in the paper.
@@ -55,7 +55,7 @@ class ModifiedMlp:
 
     @property
     def gates(self) -> int:
-        """Number of gates that see a hidden layer."""
+        """Number of gates on hidden layers."""
         return self.layers if self.literal_gate else self.layers - 1
 
     @property
@@ -91,10 +91,10 @@ class ModifiedMlp:
         return parameters.to(dtype)
 
     def in_logistic_form(self, parameters: torch.Tensor) -> torch.Tensor:
-        """Twice all parameters but the output's: what the passes of `mlp_passes` work with.
+        """Twice all parameters but the output's, as `mlp_passes` takes them.
 
         tanh(s) = 2 σ(2 s) - 1 with the logistic function σ, which torch evaluates several times as fast.
-        Applied to derivatives over the doubled parameters it gives those over the parameters.
+        Applied to a gradient in the doubled parameters it gives that in the parameters.
         """
         doubled = 2 * parameters
         doubled[:, -self.width - 1 :] = parameters[:, -self.width - 1 :]

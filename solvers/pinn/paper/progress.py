@@ -1,9 +1,9 @@
-"""What a person is told while a network trains."""
+"""Progress text of a training."""
 
 import time
 from dataclasses import dataclass, field
 
-from solvers.pinn.paper.loss_gradient import Evaluation
+from solvers.pinn.paper.loss_gradient import LossEvaluation
 from solvers.solver import Progress
 
 
@@ -12,12 +12,12 @@ class TrainingProgress:
     """Reports epochs, loss terms, energy and the time left.
 
     Attributes:
-        progress: Who is told.
-        epochs: How many there are to be.
-        done: How many were done before this run.
-        area: What the mean energy density is multiplied by to give the energy, mm².
+        progress: Receives the text.
+        epochs: Number of epochs in all.
+        done: Number of epochs before this run.
+        area: Of the body, mm², which times the mean energy density is the energy.
         reference: Energy of a reference solution, N mm/mm.
-        started: When this run started, s.
+        started: Start of this run, s.
     """
 
     progress: Progress
@@ -27,7 +27,7 @@ class TrainingProgress:
     reference: float | None
     started: float = field(default_factory=time.perf_counter)
 
-    def __call__(self, epoch: int, evaluation: Evaluation) -> None:
+    def __call__(self, epoch: int, evaluation: LossEvaluation) -> None:
         """Report the state after an epoch."""
         energy = self.area * evaluation.terms["PDE"]
         terms = ", ".join(f"{name} {value:.3g}" for name, value in evaluation.terms.items())

@@ -1,4 +1,4 @@
-"""`pinn-std --preset paper`: the paper's two networks, its loss, its optimiser, its 60,000 epochs."""
+"""`pinn-std --preset paper`: the paper's two networks, loss and optimiser, trained for 60,000 epochs."""
 
 import time
 from dataclasses import dataclass, field, fields, replace
@@ -10,16 +10,17 @@ import torch
 from geometry.arrays import FloatArray
 from geometry.content_hash import content_hash
 from geometry.errors import UserError
-from solvers.pinn.marker_terms import Observing
-from solvers.pinn.paper.collocation import Collocation, base_points, body_sample
-from solvers.pinn.paper.convergence import judge
+from solvers.assimilation.marker_weighting import MarkerWeighting
+from solvers.assimilation.misfit import assimilates
+from solvers.pinn.paper.assessment import assess_training
+from solvers.pinn.paper.collocation import Collocation, base_points, collocation_points
+from solvers.pinn.paper.distributed import ONE_PROCESS, ProcessGroup
 from solvers.pinn.paper.loss_gradient import Loss
-from solvers.pinn.paper.losses import DisplacementTerm, EnergyTerm, LossTerm, stiffness_matrix
+from solvers.pinn.paper.loss_terms import DisplacementTerm, EnergyTerm, LossTerm, stiffness_matrix
 from solvers.pinn.paper.mlp_field import MlpField
 from solvers.pinn.paper.modified_mlp import ModifiedMlp
-from solvers.pinn.paper.processes import ONE_PROCESS, Processes
 from solvers.pinn.paper.progress import TrainingProgress
-from solvers.pinn.paper.training import OPTIMISERS, Recipe, Store, Training
+from solvers.pinn.paper.training import OPTIMISERS, CheckpointStore, Training, TrainingSettings
 from solvers.pinn.threading import pool, torch_threads
 from solvers.problem import Problem, contact_functional
 from solvers.solution import Solution
@@ -33,8 +34,8 @@ FREE = ("epochs", "patience", "min_change", "checkpoint_every", "threads", "devi
 
 
 @dataclass(frozen=True)
-class PaperPinnSolver(Observing):
-    """Two modified MLPs, one for u and one for v, trained by gradients on energy plus soft conditions.
+class PaperPinnSolver:
+    """Two modified MLPs, for u and v, all weights trained by Adam on energy plus penalty terms.
 
     Attributes:
         epochs: Steps of the optimiser, each over all points.
@@ -93,6 +94,7 @@ class PaperPinnSolver(Observing):
             )
         if self.device == "cuda" and not torch.cuda.is_available():
             raise UserError(f"{self.name}: device cuda needs a GPU and torch's CUDA build; take device=cpu")
+        _ = self.weighting
 
     def settings(self) -> dict[str, object]:
         """Network, loss, optimiser and seed."""
@@ -107,6 +109,11 @@ class PaperPinnSolver(Observing):
         return solver
 
     @property
+    def weighting(self) -> MarkerWeighting | None:
+        """The weights of the markers; None for a solver that does not assimilate them."""
+        return MarkerWeighting.of(self) if assimilates(self) else None
+
+    @property
     def network(self) -> ModifiedMlp:
         """The two networks' shape."""
         return ModifiedMlp(width=self.width, layers=self.layers, literal_gate=self.literal_gate)
@@ -119,22 +126,23 @@ class PaperPinnSolver(Observing):
         """
         check_problem(self, problem)
         started = time.perf_counter()
-        processes = Processes.of_environment()
+        processes = ProcessGroup.from_environment()
         area = float(problem.mesh.areas.sum())
         with torch_threads(self.threads) as threads, pool():
             loss = self.loss(problem, processes)
             initial = self.network.initial(self.seed, PRECISIONS[self.precision]).to(self.device)
-            training = Training(loss, initial, self._recipe(), area, self._store(problem, processes))
-            told = TrainingProgress(
+            settings = TrainingSettings(**{e.name: getattr(self, e.name) for e in fields(TrainingSettings)})
+            training = Training(loss, initial, settings, area, self._store(problem, processes))
+            report = TrainingProgress(
                 progress if processes.rank == 0 else silent,
                 self.epochs,
                 training.epoch,
                 area,
                 self._context.reference_energy,
             )
-            training.run(told)
+            training.run(report)
             field = MlpField(self.network, training.parameters.double().cpu())
-            result = judge(problem, field, training)
+            result = assess_training(problem, field, training)
         seconds = time.perf_counter() - started
         return Solution(
             solver=self.name,
@@ -157,18 +165,15 @@ class PaperPinnSolver(Observing):
             history=dict(zip(training.columns, training.history.T, strict=True)),
         )
 
-    def _recipe(self) -> Recipe:
-        return Recipe(**{entry.name: getattr(self, entry.name) for entry in fields(Recipe)})
-
-    def _store(self, problem: Problem, processes: Processes) -> Store | None:
+    def _store(self, problem: Problem, processes: ProcessGroup) -> CheckpointStore | None:
         """Where to save; a checkpoint belongs to the problem and to all settings but those of `FREE`."""
         if self._context.folder is None:
             return None
         binding = {name: value for name, value in self.settings().items() if name not in FREE}
         digest = content_hash([problem.digest, binding])
-        return Store(self._context.folder, digest, self._context.resume, writes=processes.rank == 0)
+        return CheckpointStore(self._context.folder, digest, self._context.resume, writes=processes.rank == 0)
 
-    def loss(self, problem: Problem, processes: Processes = ONE_PROCESS) -> Loss:
+    def loss(self, problem: Problem, processes: ProcessGroup = ONE_PROCESS) -> Loss:
         """The paper's loss: L_PDE + bc_weight L_BC and, of a solver that assimilates, its factor times L_ASM.
 
         L_ASM is the mean square of the misfits' lengths, mm²; with unequal weights, the weighted mean.
@@ -177,14 +182,14 @@ class PaperPinnSolver(Observing):
         def tensor(array: FloatArray) -> torch.Tensor:
             return torch.tensor(np.asarray(array), dtype=PRECISIONS[self.precision], device=self.device)
 
-        body = body_sample(problem.mesh, self.collocation, self.seed)
+        body = collocation_points(problem.mesh, self.collocation, self.seed)
         base = base_points(problem.mesh, self.base_points)
         contact, functional = contact_functional(problem)
         targets = np.array([[value or 0.0] for value in problem.load.displacement])
         wanted = np.array([[float(value is not None)] for value in problem.load.displacement])
         terms: list[LossTerm] = [
             EnergyTerm(
-                tensor(body.points), tensor(body.shares), tensor(stiffness_matrix(problem.material.lame))
+                tensor(body.points), tensor(body.weights), tensor(stiffness_matrix(problem.material.lame))
             ),
             DisplacementTerm(
                 "BC",
@@ -197,9 +202,9 @@ class PaperPinnSolver(Observing):
             ),
         ]
         factors = {"PDE": 1.0, "BC": self.bc_weight}
-        misfit = self.misfit(problem)
-        if misfit is not None and misfit.weights.any():
-            points, shares = misfit.sampling()
+        misfit = None if self.weighting is None else self.weighting.misfit(problem)
+        if misfit is not None:
+            points, means = misfit.sampling()
             total = float(misfit.weights.sum())
             factors["ASM"] = total / (4 * float(problem.mesh.areas.sum()))
             terms.append(
@@ -208,7 +213,7 @@ class PaperPinnSolver(Observing):
                     tensor(points),
                     targets=tensor(misfit.observed.T),
                     weights=tensor(2 * misfit.weights.T / total),
-                    functional=tensor(shares),
+                    functional=tensor(means),
                 )
             )
         return Loss(self.network, terms, factors, processes)

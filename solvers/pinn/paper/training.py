@@ -1,4 +1,4 @@
-"""The training loop: epochs of an optimiser, recorded, saved, resumed, and ended when they lead astray."""
+"""The training loop: epochs of an optimiser with history, checkpoints, early stop and divergence check."""
 
 import math
 import time
@@ -12,19 +12,19 @@ import torch
 from geometry.arrays import FloatArray
 from solvers.pinn.paper.checkpoint import load_checkpoint, save_checkpoint
 from solvers.pinn.paper.history import HistoryFiles
-from solvers.pinn.paper.loss_gradient import Evaluation, Loss
+from solvers.pinn.paper.loss_gradient import Loss, LossEvaluation
 from solvers.training import TrainingDiverged
 
 OPTIMISERS: dict[str, Callable[..., torch.optim.Optimizer]] = {"adam": torch.optim.Adam}
 """By the names of the settings; called with the parameters and `lr`."""
 
-ASTRAY = 1e3
-"""How many times its first value the loss may reach."""
+DIVERGED = 1e3
+"""Ratio of the loss to its first value above which the training has diverged."""
 
 
 @dataclass(frozen=True)
-class Recipe:
-    """How to train; see `PaperPinnSolver` for the meaning of its settings."""
+class TrainingSettings:
+    """Settings of the training; see `PaperPinnSolver` for their meaning."""
 
     optimiser: str
     learning_rate: float
@@ -35,13 +35,13 @@ class Recipe:
 
 
 @dataclass(frozen=True)
-class Store:
-    """Where a training is saved.
+class CheckpointStore:
+    """Destination of a training's checkpoint and history.
 
     Attributes:
         folder: The folder of the checkpoint and the history.
-        digest: Identifies the problem and the settings that decide the result.
-        resume: Whether to go on from a checkpoint in the folder.
+        digest: Of the problem and the settings that determine the result.
+        resume: Whether to continue from a checkpoint in the folder.
         writes: Whether this process writes.
     """
 
@@ -55,20 +55,25 @@ class Training:
     """A training that can be run, saved and resumed.
 
     Args:
-        loss: What is minimised.
-        initial: Parameters to start from, shape (networks, parameters); they are changed in place.
-        recipe: How.
-        area: What the mean energy density is multiplied by to give the energy, mm².
-        store: Where to save, if anywhere.
+        loss: The loss.
+        initial: Initial parameters, shape (networks, parameters); they are changed in place.
+        settings: Of the training.
+        area: Of the body, mm², which times the mean energy density is the energy.
+        store: Destination of checkpoint and history; None for none.
     """
 
     def __init__(
-        self, loss: Loss, initial: torch.Tensor, recipe: Recipe, area: float, store: Store | None
+        self,
+        loss: Loss,
+        initial: torch.Tensor,
+        settings: TrainingSettings,
+        area: float,
+        store: CheckpointStore | None,
     ) -> None:
         self.parameters = initial
         self.columns = ("epoch", *loss.factors, "total", "energy", "seconds")
-        self._loss, self._recipe, self._area, self._store = loss, recipe, area, store
-        self._stepper = OPTIMISERS[recipe.optimiser]([initial], lr=recipe.learning_rate)
+        self._loss, self._settings, self._area, self._store = loss, settings, area, store
+        self._stepper = OPTIMISERS[settings.optimiser]([initial], lr=settings.learning_rate)
         self._rows: list[tuple[float, ...]] = []
         saved = load_checkpoint(store.folder, store.digest) if store and store.resume else None
         if saved:
@@ -78,7 +83,7 @@ class Training:
 
     @property
     def epoch(self) -> int:
-        """How many epochs are done."""
+        """Number of epochs done."""
         return len(self._rows)
 
     @property
@@ -86,18 +91,18 @@ class Training:
         """The columns of every epoch, shape (epochs, columns); losses are those before the epoch's step."""
         return np.array(self._rows).reshape(-1, len(self.columns))
 
-    def run(self, report: Callable[[int, Evaluation], None]) -> None:
-        """Train up to the recipe's number of epochs; `report` is called after each.
+    def run(self, report: Callable[[int, LossEvaluation], None]) -> None:
+        """Train up to the settings' number of epochs; `report` is called after each.
 
         Raises:
             TrainingDiverged: If the loss is not a number or has grown beyond all bounds.
         """
         last = self._state()
         try:
-            while self.epoch < self._recipe.epochs and not self.settled():
+            while self.epoch < self._settings.epochs and not self.settled():
                 evaluation = self._step()
                 last = self._state()
-                if self._recipe.checkpoint_every and self.epoch % self._recipe.checkpoint_every == 0:
+                if self._settings.checkpoint_every and self.epoch % self._settings.checkpoint_every == 0:
                     self._save(last)
                 report(self.epoch, evaluation)
         except KeyboardInterrupt:
@@ -107,15 +112,15 @@ class Training:
 
     def settled(self) -> bool:
         """Whether the mean loss of the last `patience` epochs is no better than that of as many before."""
-        count = self._recipe.patience
+        count = self._settings.patience
         if count == 0 or self.epoch < 2 * count or self.epoch % count:
             return False
         total = self.history[-2 * count :, self.columns.index("total")].reshape(2, count).mean(axis=1)
-        return bool(total[1] > (1 - self._recipe.min_change) * total[0])
+        return bool(total[1] > (1 - self._settings.min_change) * total[0])
 
-    def _step(self) -> Evaluation:
+    def _step(self) -> LossEvaluation:
         """One step of the optimiser."""
-        evaluations: list[Evaluation] = []
+        evaluations: list[LossEvaluation] = []
 
         def closure() -> float:
             evaluation = self._loss(self.parameters)
@@ -132,7 +137,7 @@ class Training:
 
     def _check(self, total: float) -> None:
         first = self._rows[0][self.columns.index("total")] if self._rows else total
-        if math.isfinite(total) and total <= ASTRAY * first:
+        if math.isfinite(total) and total <= DIVERGED * first:
             return
         what = (
             f"grew to {total / first:.3g} times its first value"
@@ -141,11 +146,11 @@ class Training:
         )
         raise TrainingDiverged(
             f"the loss {what} in epoch {self.epoch + 1}; take a learning_rate below "
-            f"{self._recipe.learning_rate:g} or smaller weights of the loss"
+            f"{self._settings.learning_rate:g} or smaller weights of the loss"
         )
 
     def _state(self) -> tuple[int, dict[str, torch.Tensor]]:
-        """The epoch, and a copy of all that the following epochs depend on: an interrupt may halve a step."""
+        """The epoch and a copy of parameters and optimiser state, safe from an interrupt within a step."""
         state = {"parameters": self.parameters.clone()}
         for name, value in self._stepper.state[self.parameters].items():
             state[f"optimiser.{name}"] = value.clone()

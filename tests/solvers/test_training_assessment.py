@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from solvers.pinn.paper.convergence import judge
+from solvers.pinn.paper.assessment import assess_training
 from solvers.problem import Load, Problem
 
 
@@ -31,16 +31,16 @@ def training(*energies: float) -> SimpleNamespace:
 
 def test_energy_and_reaction_are_those_of_finite_elements(medium_fem):
     """The mean section force; both integrate the same field, whose sections balance up to the mesh."""
-    verdict = judge(medium_fem.problem, medium_fem.field, training(1.0))
-    assert verdict.energy == pytest.approx(medium_fem.energy, rel=0.01)
-    np.testing.assert_allclose(verdict.reaction, medium_fem.reaction, rtol=0.02)
+    assessed = assess_training(medium_fem.problem, medium_fem.field, training(1.0))
+    assert assessed.energy == pytest.approx(medium_fem.energy, rel=0.01)
+    np.testing.assert_allclose(assessed.reaction, medium_fem.reaction, rtol=0.02)
 
 
 def test_a_free_component_has_no_reaction(medium_fem):
     problem = Problem(medium_fem.problem.mesh, load=Load(displacement=(None, -10.0)))
-    verdict = judge(problem, medium_fem.field, training(1.0))
-    assert verdict.reaction[0] == 0
-    assert verdict.reaction[1] < 0
+    assessed = assess_training(problem, medium_fem.field, training(1.0))
+    assert assessed.reaction[0] == 0
+    assert assessed.reaction[1] < 0
 
 
 @pytest.mark.parametrize(
@@ -53,8 +53,8 @@ def test_a_free_component_has_no_reaction(medium_fem):
     ],
 )
 def test_converged_means_settled_with_the_conditions_met(medium_fem, factor, energies, converged):
-    verdict = judge(medium_fem.problem, Scaled(medium_fem.field, factor), training(*energies))
-    assert verdict.status.converged == converged
-    assert ("take more epochs" in verdict.status.message) != converged
+    assessed = assess_training(medium_fem.problem, Scaled(medium_fem.field, factor), training(*energies))
+    assert assessed.status.converged == converged
+    assert ("take more epochs" in assessed.status.message) != converged
     contact = "2.00%" if factor < 1 else "0.00%"
-    assert f"the contact misses its displacement by {contact} of the stroke" in verdict.status.message
+    assert f"the contact misses its displacement by {contact} of the stroke" in assessed.status.message

@@ -1,4 +1,4 @@
-"""Processes that torchrun started: they share the points of a training and add up their gradients."""
+"""Several processes started by torchrun, which share a training's points and sum their gradients."""
 
 import os
 from dataclasses import dataclass
@@ -8,20 +8,20 @@ import torch.distributed
 
 
 @dataclass(frozen=True)
-class Processes:
-    """This process among all.
+class ProcessGroup:
+    """This process and the number of all.
 
     Attributes:
         rank: Its number; 0 reports and writes.
-        count: How many there are.
+        count: Number of processes.
     """
 
     rank: int
     count: int
 
     @classmethod
-    def of_environment(cls) -> "Processes":
-        """Those of torchrun (RANK, WORLD_SIZE), connected by Gloo, or this one alone."""
+    def from_environment(cls) -> "ProcessGroup":
+        """The processes of torchrun (RANK, WORLD_SIZE), connected by Gloo, or this one alone."""
         count = int(os.environ.get("WORLD_SIZE", "1"))
         if count == 1:
             return ONE_PROCESS
@@ -36,4 +36,4 @@ class Processes:
                 torch.distributed.all_reduce(tensor)
 
 
-ONE_PROCESS = Processes(0, 1)
+ONE_PROCESS = ProcessGroup(0, 1)

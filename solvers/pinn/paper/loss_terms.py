@@ -1,7 +1,10 @@
-"""The terms of the loss: what they add to it, and to its derivatives over the parameters."""
+"""Terms of the loss, with their gradients in the networks' parameters.
+
+Terms of one name are added and have one factor in the loss. `add` returns the contribution of some rows of a
+term's points and adds factor times its gradient in the parameters in logistic form to `sums`.
+"""
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import torch
@@ -12,59 +15,29 @@ from solvers.pinn.paper.mlp_passes import MlpPass
 from solvers.pinn.paper.modified_mlp import Weights
 
 
-class LossTerm(Protocol):
-    """A sum over points of something that two networks, for u and v, determine there."""
-
-    @property
-    def name(self) -> str:
-        """Terms of one name are added and have one factor in the loss."""
-        ...
-
-    @property
-    def points(self) -> torch.Tensor:
-        """Shape (n, 2), mm."""
-        ...
-
-    @property
-    def divisible(self) -> bool:
-        """Whether its points can be evaluated in pieces."""
-        ...
-
-    def add(self, networks: MlpPass, rows: slice, factor: float, sums: Weights) -> float:
-        """What the points `rows` contribute; factor times its derivatives are added to `sums`.
-
-        Args:
-            networks: Both networks at these points.
-            rows: Which of the points they are.
-            factor: Of the term in the loss.
-            sums: Derivatives over the parameters in logistic form.
-        """
-        ...
-
-
 @dataclass(frozen=True, eq=False)
 class EnergyTerm:
     """The mean strain energy density, MPa: the paper's L_PDE, with no external work.
 
     Attributes:
         points: Shape (n, 2), mm.
-        shares: Share of each point in the mean, shape (n,).
-        stiffness: What multiplies (du/dx, du/dy, dv/dx, dv/dy) to give the stress, shape (4, 4), MPa.
+        weights: Of the points in the mean, shape (n,).
+        stiffness: Matrix from (du/dx, du/dy, dv/dx, dv/dy) to stress, shape (4, 4), MPa.
         name: Of the term.
-        divisible: Points can be evaluated in pieces.
+        divisible: Points can be evaluated in chunks.
     """
 
     points: torch.Tensor
-    shares: torch.Tensor
+    weights: torch.Tensor
     stiffness: torch.Tensor
     name: str = "PDE"
     divisible: bool = True
 
     def add(self, networks: MlpPass, rows: slice, factor: float, sums: Weights) -> float:
-        """Half of stress times displacement gradient, whose derivative along that gradient is the stress."""
-        gradient = networks.slopes().transpose(0, 1).flatten(1)
-        stress = (gradient @ self.stiffness).mul_(self.shares[rows, None])
-        networks.add_slope_gradient((factor * stress).unflatten(1, (2, 2)).transpose(0, 1), sums)
+        """Half of stress times displacement gradient; its derivative by that gradient is the stress."""
+        gradient = networks.input_gradients().transpose(0, 1).flatten(1)
+        stress = (gradient @ self.stiffness).mul_(self.weights[rows, None])
+        networks.backward_input_gradients((factor * stress).unflatten(1, (2, 2)).transpose(0, 1), sums)
         return 0.5 * float((stress * gradient).sum())
 
 
@@ -77,7 +50,7 @@ class DisplacementTerm:
         points: Shape (n, 2), mm.
         targets: Prescribed displacements, shape (2, m), mm; m = n without a functional.
         weights: Shape (2, m); zero where a component is free.
-        functional: What is prescribed is this linear functional of the displacement, shape (m, n).
+        functional: Linear functional of the displacement that is prescribed, shape (m, n).
     """
 
     name: str
@@ -88,7 +61,7 @@ class DisplacementTerm:
 
     @property
     def divisible(self) -> bool:
-        """Whether every point counts for itself."""
+        """False with a functional, which couples the points."""
         return self.functional is None
 
     def add(self, networks: MlpPass, rows: slice, factor: float, sums: Weights) -> float:
@@ -102,8 +75,11 @@ class DisplacementTerm:
             difference = values @ self.functional.T - self.targets
             weighted = self.weights * difference
             factors = weighted @ self.functional
-        networks.add_value_gradient(2 * factor * factors, sums)
+        networks.backward_values(2 * factor * factors, sums)
         return float((weighted * difference).sum())
+
+
+LossTerm = EnergyTerm | DisplacementTerm
 
 
 def stiffness_matrix(lame: Lame) -> FloatArray:

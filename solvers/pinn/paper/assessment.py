@@ -1,4 +1,4 @@
-"""What a gradient-trained network amounts to: energy, reaction, and whether the training has settled."""
+"""Energy, reaction and convergence status of a gradient-trained network."""
 
 from typing import NamedTuple
 
@@ -13,22 +13,22 @@ from solvers.section_force import section_force
 from solvers.solution import DisplacementField, Status
 
 ENERGY_CHANGE = 0.01
-"""Relative change of the energy over the last tenth of the epochs below which it has settled."""
+"""Largest relative change of the energy over the last tenth of the epochs of a converged training."""
 
 VIOLATION = 0.01
-"""Share of the stroke by which base and contact may miss their prescribed displacement."""
+"""Largest error of the displacement of base and contact, as a share of the stroke."""
 
 
-class Verdict(NamedTuple):
-    """Energy per depth, N mm/mm; the indenter's force per depth, shape (2,), N/mm; how the training ended."""
+class TrainingAssessment(NamedTuple):
+    """Energy per depth, N mm/mm; the indenter's force per depth, shape (2,), N/mm; convergence status."""
 
     energy: float
     reaction: FloatArray
     status: Status
 
 
-def judge(problem: Problem, field: DisplacementField, training: Training) -> Verdict:
-    """Energy and reaction by the element rule, and the status by two criteria."""
+def assess_training(problem: Problem, field: DisplacementField, training: Training) -> TrainingAssessment:
+    """Energy and reaction by quadrature in the elements; status by energy change and boundary conditions."""
     rule = body_quadrature(problem.mesh)
     gradient = field.gradient(rule.location)
     energy = float((rule.weights * linear_energy_density(gradient, problem.material.lame)).sum())
@@ -46,11 +46,11 @@ def judge(problem: Problem, field: DisplacementField, training: Training) -> Ver
         if converged
         else "so the training has not settled: take more epochs"
     )
-    return Verdict(energy, reaction, Status(converged, message))
+    return TrainingAssessment(energy, reaction, Status(converged, message))
 
 
 def _late_change(energy: FloatArray) -> float:
-    """Relative change from the last but one to the last twentieth, of their means: training is noisy."""
+    """Relative change of the mean energy from the last but one to the last twentieth of the epochs."""
     count = max(len(energy) // 20, 1)
     if len(energy) < 2 * count:
         return float("inf")

@@ -1,0 +1,121 @@
+"""Weighting of the markers' misfit: the settings for it, the L-curve, and the choice of a factor on it."""
+
+from dataclasses import dataclass, fields
+from typing import Literal, get_args
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from solvers.assimilation.marker_forces import MarkerForces, root_mean_square
+from solvers.assimilation.misfit import Misfit, Weighting, misfit_of
+from solvers.problem import Problem
+from solvers.solver import Solver
+
+Choice = Literal["given", "left-out", "evidence"]
+
+FACTORS: FloatArray = 10.0 ** np.arange(-9, 3.25, 0.25)
+"""Factors of the weights on the L-curve, among which one can be chosen."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MarkerWeighting:
+    """Weights of the misfit that a solver minimises together with the energy.
+
+    All but the first are settings of the solver.
+
+    Attributes:
+        solver_name: For messages.
+        weights: "paper" or "precision", see `misfit_of`.
+        asm_weight: The paper's λ_ASM, MPa/mm², for "paper".
+        scale: The model's own error as an energy per depth, N mm/mm, for "precision".
+        marker_radius: Radius of the disc over which a marker's displacement is averaged, mm; None: that of
+            the observations; 0: its centre.
+        contact_deviation: Standard deviation of the contact's displacement about the prescribed one, mm,
+            where the prior is exp(-E / scale): a spring of stiffness scale / contact_deviation² between
+            contact and indenter. Zero: the contact moves as prescribed.
+        choose: Factor of the weights. "given": one; "left-out": that of `FACTORS` with the least error at
+            markers left out one at a time; "evidence": that of the largest evidence, for "precision".
+    """
+
+    solver_name: str
+    weights: Weighting
+    asm_weight: float
+    scale: float
+    marker_radius: float | None
+    contact_deviation: float = 0.0
+    choose: Choice = "given"
+
+    def __post_init__(self) -> None:
+        for setting, kind in (("weights", Weighting), ("choose", Choice)):
+            names, value = get_args(kind), getattr(self, setting)
+            if value not in names:
+                raise UserError(f"{self.solver_name}: {setting} must be {' or '.join(names)}, got {value!r}")
+        for setting in ("asm_weight", "scale", "marker_radius", "contact_deviation"):
+            value = getattr(self, setting)
+            if value is not None and not 0 <= value < np.inf:
+                raise UserError(f"{self.solver_name}: {setting} must be zero or more, got {value}")
+        if self.choose == "evidence" and self.weights != "precision":
+            raise UserError(
+                f"{self.solver_name}: choose=evidence needs weights=precision: the paper's are no precision"
+            )
+
+    @classmethod
+    def of(cls, solver: Solver) -> "MarkerWeighting":
+        """The weighting by a solver's settings.
+
+        Raises:
+            UserError: If a setting is out of its range.
+        """
+        names = [entry.name for entry in fields(cls) if hasattr(solver, entry.name)]
+        return cls(solver_name=solver.name, **{name: getattr(solver, name) for name in names})
+
+    @property
+    def slack(self) -> float:
+        """Compliance of the springs between contact and indenter, mm per N/mm."""
+        return self.contact_deviation**2 / self.scale
+
+    def misfit(self, problem: Problem) -> Misfit | None:
+        """The misfit to a problem's markers; None without markers, or with weights of zero.
+
+        Raises:
+            UserError: If a factor is to be chosen at finite strain, or a patch is to have a deviation.
+        """
+        if problem.observations is None or not self.asm_weight * self.scale:
+            return None
+        if problem.material.law != "linear" and self.choose != "given":
+            raise UserError(f"{self.solver_name}: choose={self.choose} is for the linear law; take given")
+        if problem.load.kind == "patch" and self.contact_deviation:
+            raise UserError(
+                f"{self.solver_name}: every point of a patch moves as prescribed; contact_deviation must be 0"
+            )
+        return misfit_of(
+            problem,
+            weights=self.weights,
+            asm_weight=self.asm_weight,
+            scale=self.scale,
+            marker_radius=self.marker_radius,
+        )
+
+    def curve(self, forces: MarkerForces) -> dict[str, FloatArray]:
+        """The L-curve: energy, misfits and, for "precision", evidence over the factors of the weights."""
+        fits = [forces.fit(factor) for factor in FACTORS]
+        columns = {
+            "weight_factor": FACTORS,
+            "curve_energy": np.array([fit.energy for fit in fits]),
+            "curve_in_sample_mm": np.array([root_mean_square(fit.residual) for fit in fits]),
+            "curve_left_out_mm": np.array([root_mean_square(fit.left_out) for fit in fits]),
+        }
+        if self.weights == "precision":
+            evidence = [forces.log_evidence(self.scale, factor) for factor in FACTORS]
+            columns["curve_log_evidence"] = np.array(evidence)
+        return columns
+
+    def factor(self, forces: MarkerForces) -> float:
+        """The factor chosen."""
+        if self.choose == "given":
+            return 1.0
+        curve = self.curve(forces)
+        if self.choose == "left-out":
+            return float(FACTORS[curve["curve_left_out_mm"].argmin()])
+        return float(FACTORS[curve["curve_log_evidence"].argmax()])

@@ -1,0 +1,226 @@
+"""Energy of a finite-basis network plus quadratic terms for load and markers, and its Newton step."""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+import torch
+
+from geometry.arrays import FloatArray, IntArray
+from solvers.assimilation.marker_forces import MarkerForces
+from solvers.assimilation.marker_weighting import MarkerWeighting
+from solvers.assimilation.misfit import Misfit
+from solvers.pinn.finite_basis.energy import NetworkEnergy
+from solvers.pinn.finite_basis.load_conditions import load_conditions
+from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
+from solvers.problem import Problem
+
+REGULARISATION = 1e-12
+"""Added to the unit diagonal of the scaled system, against nearly dependent basis functions."""
+
+
+class NewtonIterate(NamedTuple):
+    """Result of a Newton step.
+
+    Attributes:
+        output: Output layer, shape (c, 2, m + 1), mm.
+        forces: Of the springs, shape (n,), N/mm.
+        change: Twice the energy of the step over the work of the load: small where Newton has converged.
+        markers: The forces at the markers for all factors of their weights; None at finite strain.
+        factor: The factor taken.
+    """
+
+    output: torch.Tensor
+    forces: FloatArray
+    change: float
+    markers: MarkerForces | None = None
+    factor: float = 1.0
+
+
+class LinearResponse(NamedTuple):
+    """Response of a network that is linearised at some output layer.
+
+    Attributes:
+        residual: First derivative of the energy there, shape (U,), N/mm.
+        free: Newton's step without springs, shape (U,), mm.
+        unit: Steps by unit forces of the springs, shape (n, U), mm per N/mm.
+    """
+
+    residual: FloatArray
+    free: FloatArray
+    unit: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ConstrainedNetwork:
+    """A network with springs, each of which pulls a functional of its displacement to a target.
+
+    Springs of the load are rigid, or nearly so; those of the markers have the compliance 1 / weight, which
+    makes their energy the misfit.
+
+    Attributes:
+        energy: The elastic energy.
+        functionals: Of the output layer, shape (n, U): the load's, then the markers'.
+        targets: Their prescribed or observed values, shape (n,), mm.
+        compliance: Of the springs, shape (n,), mm per N/mm.
+        load_shape: Shape (a, k) of the load's functionals: k for each of a components.
+        weighting: Chooses a factor of the markers' weights; None without markers.
+    """
+
+    energy: NetworkEnergy
+    functionals: FloatArray
+    targets: FloatArray
+    compliance: FloatArray
+    load_shape: tuple[int, ...]
+    weighting: MarkerWeighting | None
+
+    @classmethod
+    def of(
+        cls,
+        basis: FiniteBasis,
+        problem: Problem,
+        points: FloatArray,
+        weights: FloatArray,
+        weighting: MarkerWeighting | None = None,
+    ) -> "ConstrainedNetwork":
+        """The network of a basis with a quadrature: points (q, 2), mm, and weights (q,), mm^2."""
+        conditions = load_conditions(problem)
+        functionals = _functionals(basis, conditions.points, conditions.weights, problem.load.prescribed)
+        size, targets = functionals.shape[-1], conditions.values.ravel()
+        functionals, compliance = functionals.reshape(-1, size), np.zeros(len(targets))
+        misfit = None if weighting is None else weighting.misfit(problem)
+        if weighting is not None and misfit is not None:
+            of_markers = _functionals(basis, *misfit.sampling(), [0, 1]).swapaxes(0, 1).reshape(-1, size)
+            functionals = np.concatenate([functionals, of_markers])
+            targets = np.concatenate([targets, misfit.observed.ravel()])
+            compliance = np.concatenate([compliance + weighting.slack, 1 / misfit.weights.ravel()])
+        return cls(
+            NetworkEnergy.of(basis, problem.material, points, weights),
+            functionals,
+            targets,
+            compliance,
+            conditions.values.shape,
+            weighting if misfit else None,
+        )
+
+    @property
+    def zero_output(self) -> torch.Tensor:
+        """The output layer without displacement."""
+        basis = self.energy.basis
+        return torch.zeros(basis.windows.count, 2, basis.per_window, dtype=torch.float64)
+
+    @property
+    def load_count(self) -> int:
+        """Number of springs of the load, a k: the first ones."""
+        return int(np.prod(self.load_shape))
+
+    def reaction(self, forces: FloatArray) -> FloatArray:
+        """The indenter's force for each prescribed component, shape (a,), N/mm, from the springs' (n,)."""
+        of_load: FloatArray = forces[: self.load_count].reshape(self.load_shape)
+        return of_load[:, 0]
+
+    def marker_stats(self, state: NewtonIterate) -> dict[str, float]:
+        """The factor of the weights, the misfit, N mm / mm, and the largest force at a marker, N/mm."""
+        if self.weighting is None:
+            return {}
+        forces = state.forces[self.load_count :].reshape(-1, 2)
+        compliance = self.compliance[self.load_count :].reshape(-1, 2) / state.factor
+        return {
+            "weight_factor": state.factor,
+            "misfit": 0.5 * float((compliance * forces**2).sum()),
+            "marker_force": float(np.linalg.norm(forces, axis=1).max()),
+        }
+
+    def field(self, output: torch.Tensor) -> FiniteBasisField:
+        """The displacement field of an output layer."""
+        return FiniteBasisField(self.energy.basis, output)
+
+    def step(self, output: torch.Tensor, fraction: float = 1.0) -> NewtonIterate | None:
+        """One Newton step to equilibrium under a fraction of the load; for a linear law it is the solution.
+
+        With K the second derivative of the energy and r its first, y = K^-1 (-r) and x_k = K^-1 b_k for the
+        functionals b_k; the step is y + f_k x_k with the forces f by which every spring with compliance s_k
+        is short of its target by s_k f_k.
+
+        Returns:
+            None if a point of the quadrature is inside out.
+        """
+        response = self.linear_response(output)
+        return None if response is None else self.constrained_step(output, response, fraction)
+
+    def linear_response(self, output: torch.Tensor) -> LinearResponse | None:
+        """One factorisation, and one solve for every spring; None as in `step`."""
+        gradient, hessian = self.energy.derivatives(output)
+        if not torch.isfinite(gradient).all():
+            return None
+        residual = gradient.numpy().ravel()
+        free, *unit = hessian.solve(
+            np.concatenate([-residual[None], self.functionals]),
+            REGULARISATION,
+            definite=self.energy.material.law == "linear",
+        )
+        return LinearResponse(residual, free, np.array(unit))
+
+    def constrained_step(
+        self, output: torch.Tensor, response: LinearResponse, fraction: float = 1.0
+    ) -> NewtonIterate:
+        """The Newton step by the springs' forces that close their gaps."""
+        residual, free, unit = response
+        gap = fraction * self.targets - self.functionals @ (output.numpy().ravel() + free)
+        load, soft = slice(self.load_count), slice(self.load_count, None)
+        compliance = self.functionals @ unit.T
+        compliance[load, load] += np.diag(self.compliance[load])
+        markers = self._marker_forces(compliance, gap)
+        factor = self.weighting.factor(markers) if self.weighting and markers else 1.0
+        compliance[soft, soft] += np.diag(self.compliance[soft]) / factor
+        forces = np.linalg.solve(compliance, gap)
+        change = free + forces @ unit
+        decrement = (forces @ self.functionals - residual) @ change
+        return NewtonIterate(
+            output + torch.from_numpy(change).view_as(output),
+            forces,
+            float(abs(decrement / (fraction * self.targets @ forces))),
+            markers,
+            factor,
+        )
+
+    def with_misfit(self, misfit: Misfit, rows: IntArray) -> "ConstrainedNetwork":
+        """The network with some of its springs, all of the load's among them, and another misfit's values."""
+        count = self.load_count
+        return replace(
+            self,
+            functionals=self.functionals[rows],
+            targets=np.concatenate([self.targets[:count], misfit.observed.ravel()]),
+            compliance=np.concatenate([self.compliance[:count], 1 / misfit.weights.ravel()]),
+        )
+
+    def _marker_forces(self, compliance: FloatArray, gap: FloatArray) -> MarkerForces | None:
+        """The forces at the markers, the load's forces eliminated.
+
+        Args:
+            compliance: Of the functionals and of the load's springs, shape (n, n), mm per N/mm.
+            gap: Of the springs, shape (n,), mm.
+        """
+        if self.energy.material.law != "linear" or self.weighting is None:
+            return None
+        load, soft = slice(self.load_count), slice(self.load_count, None)
+        held = np.linalg.solve(compliance[load, load], np.column_stack([compliance[load, soft], gap[load]]))
+        rest = np.column_stack([compliance[soft, soft], gap[soft]]) - compliance[soft, load] @ held
+        reduced = 0.5 * (rest[:, :-1] + rest[:, :-1].T)
+        return MarkerForces(reduced, 1 / self.compliance[soft].reshape(-1, 2), rest[:, -1].reshape(-1, 2))
+
+    def project(self, field: FiniteBasisField) -> torch.Tensor:
+        """The output layer whose displacement is nearest to another network's in the linear energy."""
+        material = self.energy.material.model_copy(update={"law": "linear"})
+        found = replace(self, energy=replace(self.energy, material=material, origin=field)).step(
+            self.zero_output
+        )
+        return self.zero_output if found is None else found.output
+
+
+def _functionals(basis: FiniteBasis, points: FloatArray, weights: FloatArray, axes: list[int]) -> FloatArray:
+    """Sums of weights (k, q) times components of the displacement at points (q, 2): (a, k, U)."""
+    found = np.zeros((len(axes), len(weights), basis.windows.count, 2, basis.per_window))
+    for row, axis in enumerate(axes):
+        found[row, :, :, axis] = basis.functionals(points, weights)
+    return found.reshape(len(axes), len(weights), -1)
