@@ -27,8 +27,8 @@ from solvers.pinn.finite_basis.point_spacing import (
     graded_triangles,
     spread_points,
 )
+from solvers.pinn.finite_basis.shepard_windows import ShepardWindows
 from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
-from solvers.pinn.finite_basis.windows import ShepardWindows
 from solvers.problem import Load, Material, Problem
 from solvers.solution import State
 from tests.solvers.conftest import bar_mesh

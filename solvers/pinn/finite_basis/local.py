@@ -8,8 +8,8 @@ import torch
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
+from solvers.pinn.finite_basis.shepard_windows import ShepardWindows
 from solvers.pinn.finite_basis.solver import FiniteBasisSolver
-from solvers.pinn.finite_basis.windows import ShepardWindows
 
 
 @dataclass(frozen=True, kw_only=True)

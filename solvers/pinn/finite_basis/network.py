@@ -14,10 +14,14 @@ import torch
 
 from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
+from solvers.pinn.finite_basis.gate_tree import GateTree
 from solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from solvers.pinn.finite_basis.patches import boxes_around, cut_into_patches
-from solvers.pinn.finite_basis.windows import Windows
+from solvers.pinn.finite_basis.shepard_windows import ShepardWindows
 from solvers.pinn.threading import imap_in_threads
+
+Windows = ShepardWindows | GateTree
+"""A partition of unity by windows."""
 
 
 @dataclass(frozen=True, eq=False)

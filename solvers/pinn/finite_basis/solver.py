@@ -16,7 +16,7 @@ from solvers.assimilation.marker_weighting import MarkerWeighting
 from solvers.assimilation.misfit import Misfit, assimilates, leave_one_out_displacements
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
 from solvers.pinn.finite_basis.hard_constraint import HardConstraint
-from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
+from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField, Windows
 from solvers.pinn.finite_basis.newton import LoadStep, find_equilibrium, follow_load
 from solvers.pinn.finite_basis.point_spacing import (
     PointSpacing,
@@ -24,7 +24,6 @@ from solvers.pinn.finite_basis.point_spacing import (
     graded_triangles,
     spread_points,
 )
-from solvers.pinn.finite_basis.windows import Windows
 from solvers.pinn.threading import pool
 from solvers.problem import Problem
 from solvers.solution import Solution, Status

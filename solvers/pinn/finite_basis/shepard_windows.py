@@ -1,38 +1,10 @@
-"""Windows: smooth functions of local support that sum to one everywhere in the body."""
+"""Shepard's windows: round bumps of local support, normalised to sum to one everywhere in the body."""
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import torch
 
 from geometry.errors import UserError
-
-
-class Windows(Protocol):
-    """A partition of unity by c windows."""
-
-    @property
-    def count(self) -> int:
-        """Number of windows, c."""
-        ...
-
-    def near(self, boxes: torch.Tensor) -> list[torch.Tensor]:
-        """Numbers of the windows that reach each of some boxes, ascending, (w,) each.
-
-        Args:
-            boxes: Their lower left and upper right corners, shape (b, 2, 2), mm.
-        """
-        ...
-
-    def values(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
-        """The windows `near` (w,) at points (n, 2), mm: (n, w)."""
-        ...
-
-    def values_and_gradients(
-        self, points: torch.Tensor, near: torch.Tensor
-    ) -> tuple[torch.Tensor, torch.Tensor]:
-        """The same (n, w) and their derivatives with respect to x and y, (2, n, w), 1/mm."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +28,11 @@ class ShepardWindows:
         return len(self.centres)
 
     def near(self, boxes: torch.Tensor) -> list[torch.Tensor]:
-        """Numbers of the windows that reach each of some boxes (b, 2, 2), mm, ascending, (w,) each."""
+        """Numbers of the windows that reach each of some boxes, ascending, (w,) each.
+
+        Args:
+            boxes: Their lower left and upper right corners, shape (b, 2, 2), mm.
+        """
         found = []
         for low, high in boxes:
             distance = self.centres.clamp(low, high).sub_(self.centres)
