@@ -165,8 +165,9 @@ class SolverOptions:
         str | None,
         Parameter(
             show_default=False,
-            help="Of the solvers that have it. paper: pinn-std exactly as in the paper, and the paper's job: "
-            "a uniform mesh of 91,006 nodes and --load point, unless --mesh-size or --load is given. On a "
+            help="Of pinn-std and pinn-asm. fast, the default: networks with random hidden weights whose "
+            "output layer is solved exactly. paper: the paper's networks and training, and its problem: a "
+            "uniform mesh of 91,006 nodes and --load point, unless --mesh-size or --load is given. On a "
             "CPU its 60,000 epochs take many hours.",
         ),
     ] = None

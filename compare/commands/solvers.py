@@ -4,7 +4,11 @@ from rich.console import Console
 
 
 def solvers() -> int:
-    """List the solvers, with the material laws and loads that each has, its presets and their settings."""
+    """List the solvers with their material laws, loads, presets and settings.
+
+    The networks pinn-std, pinn-local, pinn-asm and pinn-local-asm have random hidden weights and an output
+    layer that is solved exactly; the preset paper of pinn-std and pinn-asm is the paper's training.
+    """
     from rich.table import Table
 
     from solvers.registry import PRESETS, make_solver, usable_solvers
