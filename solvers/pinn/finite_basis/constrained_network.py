@@ -10,6 +10,7 @@ from geometry.arrays import FloatArray, IntArray
 from solvers.assimilation.marker_forces import MarkerForces
 from solvers.assimilation.marker_weighting import MarkerWeighting
 from solvers.assimilation.misfit import Misfit
+from solvers.constrained_elimination import ConstrainedElimination
 from solvers.pinn.finite_basis.energy import NetworkEnergy
 from solvers.pinn.finite_basis.load_conditions import load_conditions
 from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
@@ -166,15 +167,12 @@ class ConstrainedNetwork:
     ) -> NewtonIterate:
         """The Newton step by the springs' forces that close their gaps."""
         residual, free, unit = response
-        gap = fraction * self.targets - self.functionals @ (output.numpy().ravel() + free)
-        load, soft = slice(self.load_count), slice(self.load_count, None)
-        compliance = self.functionals @ unit.T
-        compliance[load, load] += np.diag(self.compliance[load])
-        markers = self._marker_forces(compliance, gap)
+        springs = ConstrainedElimination(self.functionals, unit, self.compliance)
+        values = fraction * self.targets - springs.values(output.numpy())
+        markers = self._marker_forces(springs, values - springs.values(free))
         factor = self.weighting.factor(markers) if self.weighting and markers else 1.0
-        compliance[soft, soft] += np.diag(self.compliance[soft]) / factor
-        forces = np.linalg.solve(compliance, gap)
-        change = free + forces @ unit
+        scaled = np.append(self.compliance[: self.load_count], self.compliance[self.load_count :] / factor)
+        change, forces = replace(springs, compliance=scaled).solution(free, values)
         decrement = (forces @ self.functionals - residual) @ change
         return NewtonIterate(
             output + torch.from_numpy(change).view_as(output),
@@ -194,18 +192,19 @@ class ConstrainedNetwork:
             compliance=np.concatenate([self.compliance[:count], 1 / misfit.weights.ravel()]),
         )
 
-    def _marker_forces(self, compliance: FloatArray, gap: FloatArray) -> MarkerForces | None:
+    def _marker_forces(self, springs: ConstrainedElimination, gap: FloatArray) -> MarkerForces | None:
         """The forces at the markers, the load's forces eliminated.
 
         Args:
-            compliance: Of the functionals and of the load's springs, shape (n, n), mm per N/mm.
-            gap: Of the springs, shape (n,), mm.
+            springs: All springs.
+            gap: To be closed by the springs, shape (n,), mm.
         """
         if self.energy.material.law != "linear" or self.weighting is None:
             return None
         load, soft = slice(self.load_count), slice(self.load_count, None)
-        held = np.linalg.solve(compliance[load, load], np.column_stack([compliance[load, soft], gap[load]]))
-        rest = np.column_stack([compliance[soft, soft], gap[soft]]) - compliance[soft, load] @ held
+        flexibility, stiff = springs.flexibility, springs.schur_complement[load, load]
+        held = np.linalg.solve(stiff, np.column_stack([flexibility[load, soft], gap[load]]))
+        rest = np.column_stack([flexibility[soft, soft], gap[soft]]) - flexibility[soft, load] @ held
         reduced = 0.5 * (rest[:, :-1] + rest[:, :-1].T)
         return MarkerForces(reduced, 1 / self.compliance[soft].reshape(-1, 2), rest[:, -1].reshape(-1, 2))
 
