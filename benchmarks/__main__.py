@@ -22,7 +22,7 @@ BENCHMARKS = {
     "live": "live_tracking",
     "localisation": "localisation",
 }
-"""Names and modules; the modules' docstrings say what they do and how long they take."""
+"""Names and modules; the modules' docstrings have descriptions and times."""
 
 SHORT = ("fem", "pinn")
 TIMED = ("deepxde", "recipes")

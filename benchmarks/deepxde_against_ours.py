@@ -1,8 +1,8 @@
 """Error against wall time: DeepXDE, `pinn-std` and `pinn-local` on the default finger, in one run.
 
-DeepXDE trains under the default load and under a point load, each judged by finite elements under that
-load; the better of the two is what ours is compared with. Our curves are runs of growing size, each from
-its start. Takes twice `seconds` and about two minutes.
+DeepXDE trains under the default load and under a point load, each compared with finite elements under the
+same load; ours are compared with the better of the two. Our curves are separate runs of growing size. Takes
+twice `seconds` and about two minutes.
 """
 
 import time
@@ -29,7 +29,7 @@ POINT_SPACING = 1.0
 """Size of the elements that DeepXDE's points are the centroids of, mm."""
 
 SCALES = (6.0, 4.0, 2.5, 1.5, 1.0)
-"""Spacings of our networks, in those of the default settings."""
+"""Spacings of our networks, as multiples of the default ones."""
 
 OURS: Mapping[str, Sequence[Solver]] = {
     kind.name: [
@@ -85,7 +85,7 @@ def main(seconds: float = SECONDS) -> Table:
 
 
 def deepxde_curve(load: Load, seconds: float) -> list[Judged]:
-    """Train DeepXDE's networks with as many threads as serve it best."""
+    """Train DeepXDE's networks with the faster number of threads, one or all."""
     judge = Judge.of(load)
     problem = Problem(finger_mesh(Design(), settings=MeshSettings(size=POINT_SPACING)), load=load)
     threads = torch.get_num_threads()

@@ -1,8 +1,8 @@
 """Time of an epoch of the paper's training: ours, plain automatic differentiation, and DeepXDE.
 
 The same two modified MLPs (4 gates of 64 neurons), the same nodes with equal weights, the same energy, soft
-conditions with the point load, which DeepXDE has a class for, single precision, Adam; each with one thread
-and with all, of which the faster counts. Takes about two minutes.
+conditions with the point load, for which DeepXDE has a class, single precision, Adam; the faster of one
+thread and all. Takes about two minutes.
 """
 
 import contextlib
@@ -26,7 +26,7 @@ from solvers.problem import Load, Problem, contact_functional
 from tests.solvers.autograd_reference import PlainMlp, PlainPinn
 
 SIZES = {0.25: 10, 0.083: 3}
-"""Element sizes, mm: of the shared mesh and of the paper's; and how many epochs are timed."""
+"""Element sizes, mm, of the shared mesh and of the paper's, with the number of timed epochs."""
 
 
 def main() -> Table:
@@ -108,7 +108,7 @@ def _seconds(
     epochs: int,
     during: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
 ) -> float:
-    """Mean time of a step with so many threads, the first not counted."""
+    """Mean time of a step with a number of threads, without the first step."""
     before = torch.get_num_threads()
     torch.set_num_threads(threads)
     try:

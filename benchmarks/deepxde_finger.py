@@ -1,15 +1,15 @@
-"""The finger in DeepXDE, set up as well as its users could: two networks that minimise the strain energy.
+"""The finger in DeepXDE, set up as well as its interface allows: two networks minimise the strain energy.
 
 The energy is a sum of squares of four residuals at the centroids of coarse elements, weighted by the square
 roots of their areas; coordinates are scaled to the finger's length and displacements to the stroke; the
 clamp is the factor d / (d + 5 mm) of the distance to the base. The load is one of
 
-- `mean`, the default load of this project, exactly: both networks are shifted by what makes the mean over the
-  contact right;
-- `point`: the factor r² / (r² + 25 mm²) of the distance r to the middle of the contact, and what is
-  prescribed there.
+- `mean`, the default load of this project, exactly: both networks are shifted such that the mean over the
+  contact is the prescribed one;
+- `point`: the factor r² / (r² + 25 mm²) of the distance r to the middle of the contact, and the prescribed
+  displacement there.
 
-Each is to be judged by finite elements under its own load.
+Each is compared with finite elements under the same load.
 """
 
 import contextlib
@@ -57,12 +57,12 @@ class NetworkField:
 
 
 def train(problem: Problem, watch: Callable[[NetworkField], bool], *, seed: int = 0) -> None:
-    """Train on the problem for as long as `watch` wants.
+    """Train on the problem until `watch` returns False.
 
     Args:
-        problem: On the mesh whose centroids are used.
-        watch: Is shown the field after every iteration; says whether to go on.
-        seed: Of the initial weights.
+        problem: On the mesh whose centroids are the collocation points.
+        watch: Takes the field after every iteration; returns whether to go on.
+        seed: Seed of the initial weights.
     """
     import deepxde as dde
 

@@ -43,7 +43,7 @@ def scikit_fem_energy(problem: Problem, degree: int) -> float:
 
 
 def factorisation_and_solves(problem: Problem, degree: int) -> float:
-    """Time that MUMPS needs for the factorisation and two back-substitutions, s."""
+    """Time of MUMPS for the factorisation and two back-substitutions, s."""
     equilibrium = LinearEquilibrium.of(
         LinearElasticity.of(problem, LagrangeSpace(problem.mesh, degree), "direct")
     )
@@ -61,7 +61,7 @@ def factorisation_and_solves(problem: Problem, degree: int) -> float:
 
 
 def main() -> Table:
-    """Time both and compare their energies; then what solving again takes."""
+    """Time both and compare their energies; then time further solves."""
     table = Table(
         title=f"The default problem, best of {REPEATS}: fem (assembly and solve), its factorisation with two "
         "back-substitutions alone, scikit-fem; and fem for other loads with one factorisation"

@@ -2,7 +2,7 @@
 
 Two modified MLPs N of the scaled position give u = f (N - m(f N) / m(f) + t / m(f)), with the factor f of the
 clamp and the load's functional m, which is t, whatever the weights. The elastic energy is |r|² / 2 with three
-residuals at each quadrature point. Derivatives over the weights are torch's.
+residuals at each quadrature point. torch differentiates with respect to the weights.
 """
 
 from dataclasses import dataclass
@@ -29,9 +29,9 @@ class FingerNetwork:
     """Networks for a problem; parameters are flat, of shape (p,).
 
     Attributes:
-        problem: What is solved, on the mesh whose element rule is used.
+        problem: The problem, on the mesh of the quadrature rule.
         shape: The networks.
-        degree: Of the element rule.
+        degree: Degree of the quadrature rule.
     """
 
     problem: Problem

@@ -1,7 +1,7 @@
 """Points a second that the trained networks evaluate, beside finite elements on the shared mesh.
 
-The points are drawn evenly in the default finger and located in the mesh beforehand. The preset `paper` is
-timed untrained: its speed does not depend on its weights. Half a minute.
+The points are uniformly distributed in the default finger and located in the mesh beforehand. The preset
+`paper` is timed untrained: its speed does not depend on its weights. Half a minute.
 """
 
 import time

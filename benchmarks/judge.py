@@ -1,4 +1,4 @@
-"""The default finger, and how far a displacement field is from graded finite elements."""
+"""Errors of displacement fields of the default finger, against graded finite elements."""
 
 import time
 from collections.abc import Iterable
@@ -24,10 +24,10 @@ CORNER_SIZE = 0.02
 
 
 class Judged(NamedTuple):
-    """A field against the reference.
+    """Errors of a field.
 
     Attributes:
-        seconds: Time that its training took, without the judging.
+        seconds: Time of its training, without the evaluation of errors.
         displacement: Relative L2 error, %.
         von_mises: Relative L2 error, %.
         energy: Elastic energy over the reference's, minus one, %.
@@ -45,7 +45,7 @@ class Judge:
 
     Attributes:
         load: The load.
-        mesh: Where fields are compared: the shared mesh.
+        mesh: The shared mesh, where fields are compared.
     """
 
     load: Load
@@ -58,22 +58,22 @@ class Judge:
 
     @cached_property
     def problem(self) -> Problem:
-        """What is solved."""
+        """The problem."""
         return Problem(self.mesh, load=self.load)
 
     def prepare(self) -> None:
-        """Find the reference."""
+        """Solve for the reference."""
         self._reference  # noqa: B018 (cached)
 
     @cached_property
     def _reference(self) -> Evaluation:
-        # The limit of a point load does not exist: there the shared mesh says what the point is.
+        # A point load has no limit: its reference is on the shared mesh.
         graded = finger_mesh(Design(), settings=MeshSettings(corner_size=CORNER_SIZE))
         mesh = self.mesh if self.load.kind == "point" else graded
         return Evaluation.of(FemSolver().solve(Problem(mesh, load=self.load)), self.mesh)
 
     def __call__(self, seconds: float, field: DisplacementField) -> Judged:
-        """Compare a field that was found in so many seconds."""
+        """Errors of a field after a time of training, s."""
         rule, reference = body_quadrature(self.mesh), self._reference
         state = State.from_gradient(field.gradient(rule.location), self.problem)
         displacement = field_difference(
@@ -85,10 +85,10 @@ class Judge:
 
 
 class Watch:
-    """Judges a training at a few times, evenly spaced in the logarithm; its clock stops meanwhile.
+    """Evaluates a training at a few times, evenly spaced in the logarithm; its clock stops meanwhile.
 
     Attributes:
-        curve: What was judged so far; the last is the result.
+        curve: The errors so far; the last are the result.
     """
 
     def __init__(self, judge: Judge, budget: float, looks: int = 12) -> None:
@@ -96,8 +96,8 @@ class Watch:
 
         Args:
             judge: The reference.
-            budget: Seconds that the training has.
-            looks: How often it is judged.
+            budget: Time of the training, s.
+            looks: Number of evaluations.
         """
         self.curve: list[Judged] = []
         self._judge, self._budget = judge, budget
@@ -106,11 +106,11 @@ class Watch:
         self._paused, self._started = 0.0, time.perf_counter()
 
     def seconds(self) -> float:
-        """Time that the training has had so far."""
+        """Time of the training so far, s."""
         return time.perf_counter() - self._started - self._paused
 
     def __call__(self, field: DisplacementField) -> bool:
-        """Show the field as it is now, after a step; whether time is left for another."""
+        """Evaluate the field after a step if it is due; returns whether time is left for another step."""
         seconds = self.seconds()
         if seconds >= self._due[0]:
             self.curve.append(self._judge(seconds, field))
@@ -119,7 +119,7 @@ class Watch:
         return bool(self._due)
 
     def follow(self, training: Iterable[DisplacementField]) -> list[Judged]:
-        """Watch a training that yields its field after every step, to its end or until time is up."""
+        """Evaluate a training that yields its field after every step, until it ends or time is up."""
         field = None
         for field in training:
             if not self(field):

@@ -1,8 +1,8 @@
-"""Kernels of `gp` and `statfem`: their evidence, and what they say of markers that are left out.
+"""Kernels of `gp` and `statfem`: evidence, and leave-one-out errors at the markers.
 
-Four designs with markers along the front wall and at the joints, pressed by the virtual experiment, with
-noise of 0.005 mm. The evidence, from the given markers alone, chooses the default kernel; the errors of
-left-out markers have no say in it. A minute.
+Four designs with markers along the front wall and at the joints, in the virtual experiment, with noise of
+0.005 mm. The evidence of the given markers chooses the default kernel; the leave-one-out errors do not. A
+minute.
 """
 
 from dataclasses import replace
@@ -24,7 +24,7 @@ from solvers.statistics.statistical_fem import StatFemSolver
 LAYOUTS = ("front", "joints")
 ELEMENT = 0.7
 NOISE = 0.005
-"""Of a coordinate, mm."""
+"""Standard deviation of a coordinate, mm."""
 
 
 def main() -> Table:

@@ -1,8 +1,8 @@
-"""How many frames a second are tracked, once the markers are locked, at 1280x720 pixels.
+"""Tracking speed, frames a second at 1280x720 pixels, once the markers are locked.
 
 A film of the virtual rig is played to and fro, so that markers move by some 5 pixels between frames. Frames
-that are in memory show the tracker alone; the same frames read from videos show it with the decoder. About a
-minute, most of it for the rig.
+in memory time the tracker alone; the same frames from videos time it with the decoder. About a minute,
+mostly for the rig.
 """
 
 import time

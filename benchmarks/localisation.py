@@ -1,8 +1,8 @@
 """Sub-pixel centres of discs against the Cramér-Rao bound, with the paper's Hough circles beside them.
 
-Exactly drawn discs at random places within a pixel, noise added. The bound follows from the derivatives of
-the drawn picture by everything that is unknown: place, size and shape of the disc, levels, blur, gradient of
-the light, straight edges. One minute; the table is kept in `localisation.md`.
+Exactly drawn discs at random places within a pixel, with noise. The bound follows from the derivatives of the
+drawn picture with respect to all unknowns: place, size and shape of the disc, levels, blur, gradient of the
+light, straight edges. One minute; writes `localisation.md`.
 """
 
 import platform
@@ -27,15 +27,15 @@ REPORT = Path("benchmarks/localisation.md")
 SEED = 1
 PLACES = 500
 ROW = 25
-"""Discs side by side in a picture."""
+"""Number of discs side by side in a picture."""
 
 STEP = 1e-4
-"""Of central differences, pixels, or relative."""
+"""Step of central differences, pixels, or relative."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """Discs of a kind, and what is done to their picture."""
+    """Discs of one kind, and the disturbances of their picture."""
 
     image: DiscImage
     noise: float = 2.0
@@ -44,7 +44,7 @@ class Case:
 
 
 def _wall(level: float, **values: float) -> DiscImage:
-    """On a wall of 2 mm, whose edges are 1.9 pixels from the disc, before a ground of that level."""
+    """A disc on a wall of 2 mm, whose edges are 1.9 pixels from the disc, before a ground of a grey level."""
     across = 20 * (np.cos(0.4) + np.sin(0.4))
     edges = (Edge(0.4, across + 9.9, level), Edge(0.4 + np.pi, 9.9 - across, level))
     return DiscImage(edges=edges, **values)
@@ -86,7 +86,7 @@ HEADER = (
     "Hough rms, px",
 )
 SHOWN = 6
-"""Columns that a terminal has room for."""
+"""Number of columns that fit a terminal."""
 
 
 def main() -> Table:
@@ -136,7 +136,7 @@ def _measured(case: Case) -> tuple[str, ...]:
 
 
 def _sheet(case: Case, count: int, rng: np.random.Generator) -> tuple[GreyImage, FloatArray]:
-    """A picture of so many discs side by side, through the codec, and where they are."""
+    """A picture of discs side by side, through the codec, and their centres."""
     centres = case.image.centre + rng.uniform(-0.5, 0.5, (count, 2))
     tiles = [replace(case.image, centre=tuple(centre)).noisy(case.noise, rng) for centre in centres]
     centres[:, 0] += case.image.size[0] * np.arange(count)
@@ -199,7 +199,7 @@ def _other_edge(image: DiscImage, number: int, edge: Edge, name: str, change: fl
 
 
 def _milliseconds(image: DiscImage, count: int = 16) -> float:
-    """Of a batch on one core, the best of twenty: others may be at work on this machine."""
+    """Time of a batch on one core, the best of twenty."""
     cv2.setNumThreads(1)
     picture, centres = _sheet(Case(image), count, np.random.default_rng(SEED))
     guesses = np.column_stack([centres + 0.5, np.full(count, image.radius)])
@@ -245,12 +245,11 @@ def _report(rows: list[tuple[str, ...]], speeds: dict[str, float]) -> str:
         "",
         f"{PLACES} discs each at random places within a pixel; unless a row says otherwise of radius 8 px, "
         "levels 180 around and 60 within, blur 0.8 px besides the pixels' own width, noise 2. "
-        "Errors are distances in the image. The bound is Cramér and Rao's with everything unknown "
-        "that the fit estimates; the closed form, 2 (σ/A) √(s/(r √π)), takes all but the place "
-        "for known and all of the edge for seen. Bounds are for noise without a codec. Columns "
-        "with sd: how many errors of a coordinate the reported standard deviations cover, 68 and "
-        "95 % if they are right; more where the radius is better known than the 1 % that is "
-        "assumed.",
+        "Errors are distances in the image. The bound is that of Cramér and Rao for all unknowns of the fit; "
+        "the closed form, 2 (σ/A) √(s/(r √π)), is for a known disc with a fully visible edge and an unknown "
+        "place. Bounds are without a codec. Columns with sd: share of the errors of a coordinate within the "
+        "reported standard deviations, 68 and 95 % if they are right; more where the radius is known better "
+        "than the assumed 1 %.",
         "",
         "| " + " | ".join(HEADER) + " |",
         "|---|" + "---:|" * (len(HEADER) - 1),

@@ -1,6 +1,6 @@
 """A finger of a million triangles on one and on two MPI ranks, factorised and iterated: time and memory.
 
-Takes several minutes, and 8 GB of memory. The mesh is made once and kept; its time is in the title if it was.
+Takes several minutes and 8 GB of memory. The mesh is cached; the title has the time to make or read it.
 """
 
 import json
@@ -35,7 +35,7 @@ CASES = [
 
 
 def main() -> Table:
-    """Solve in processes of their own, so that the memory of each is its own."""
+    """Solve each case in its own process, so that its memory can be measured."""
     started = time.perf_counter()
     mesh = finger_mesh(Design(), settings=MeshSettings(size=SIZE_MM), timeout_s=PATIENCE_S)
     seconds = time.perf_counter() - started
@@ -82,7 +82,7 @@ def _on_ranks(ranks: int, path: Path, degree: int, linear_solver: str) -> dict:
 
 
 def _solve(path: str, degree: str, linear_solver: str) -> None:
-    """What every rank does."""
+    """Solve on every rank; the first prints the result as JSON."""
     from mpi4py import MPI
 
     started = time.perf_counter()

@@ -1,4 +1,4 @@
-"""Cost and error of the networks against their units, their quadrature points and the finger's ribs.
+"""Cost and error of the networks over their units, their quadrature points and the finger's ribs.
 
 Three pairs of curves in `out/benchmarks/sizes.png`; the reference of each finger has quadratic elements
 graded to 0.01 mm at the corners. Five minutes.
@@ -25,7 +25,7 @@ from solvers.problem import Problem
 PICTURE = Path("out/benchmarks/sizes.png")
 KINDS: tuple[type[FiniteBasisSolver], ...] = (PinnStdSolver, PinnLocalSolver)
 ONE_PAIR = {"tolerance": 1e9}
-"""Two levels, never a third."""
+"""Settings for two levels, never a third."""
 
 
 def _scaled(kind: type[FiniteBasisSolver], scale: float) -> FiniteBasisSolver:

@@ -1,7 +1,7 @@
-"""The networks, untouched, on twelve fingers drawn from the allowed range, against graded finite elements.
+"""The networks with default settings on twelve random admissible fingers, against graded finite elements.
 
 The reference has quadratic elements graded to 0.01 mm at the corners and an eighth of the contact's width
-there. "Own estimate" is the error that a network states itself. Allow ten minutes.
+there. "Own estimate" is the network's own error estimate. Allow ten minutes.
 """
 
 from rich.table import Table

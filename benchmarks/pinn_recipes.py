@@ -1,8 +1,8 @@
-"""Recipes for training the networks: error against wall time on the default finger, in pinn_recipes.md.
+"""Training recipes for the networks: error over wall time on the default finger, in pinn_recipes.md.
 
-To add one, put a function into RECIPES: it is given the problem on the training mesh and a clock that says
-what share of its time is spent, and yields its field after every step. The clock stops while a field is
-judged. Each recipe takes `seconds`, and about ten more.
+To add one, put a function into RECIPES: it takes the problem on the training mesh and a clock, which returns
+the used share of the time, and yields its field after every step. The clock stops while errors are evaluated.
+Each recipe takes `seconds`, and about ten more.
 """
 
 import math
@@ -36,14 +36,14 @@ from solvers.solver import Solver
 
 SECONDS = 60.0
 TRAINING_SIZE = 1.0
-"""Size of the elements whose rule of degree 2 is used, mm."""
+"""Size of the elements for quadrature (of degree 2), mm."""
 
 SEED = 0
 REPORT = Path(__file__).with_name("pinn_recipes.md")
 
 Fields = Iterator[DisplacementField]
 Clock = Callable[[], float]
-"""The share of the budget that is spent."""
+"""Returns the used share of the time."""
 
 Recipe = Callable[[Problem, Clock], Fields]
 
@@ -65,7 +65,7 @@ def by_gradients(
         optimiser: Adam, SOAP, ...
         rate: Learning rate at the start.
         slope: Steepness of the first layers, 1/mm, whose neurons then go through points of the body.
-        finish: Whether the output layer is solved for exactly when nine tenths of the budget are spent.
+        finish: Whether the output layer is solved exactly after nine tenths of the time.
     """
 
     def train(problem: Problem, clock: Clock) -> Fields:
@@ -104,7 +104,7 @@ def through_points(network: FingerNetwork, slope: float) -> torch.Tensor:
 
 
 def with_exact_output(network: FingerNetwork, parameters: torch.Tensor) -> torch.Tensor:
-    """The parameters with the output layers of least energy: the residuals are affine in them."""
+    """The parameters with output layers of least energy, in which the residuals are affine."""
     result = parameters.clone()
     output = network.output_layers(result)
     residuals = everywhere(network)
@@ -136,7 +136,7 @@ def l_bfgs(problem: Problem, clock: Clock) -> Fields:
 
 
 def broyden(problem: Problem, clock: Clock) -> Fields:
-    """Self-scaled Broyden, double precision, after Adam for a fifth of the budget, as is usual."""
+    """Self-scaled Broyden, double precision, after Adam for a fifth of the time, as usual."""
     network = _network(problem)
     field = None
     for field in by_gradients(torch.optim.Adam, 1e-2)(problem, lambda: 5 * clock()):
@@ -172,7 +172,7 @@ def neurons_by_l_bfgs(problem: Problem, clock: Clock) -> Fields:
 
 
 def whole(solver: Solver) -> Recipe:
-    """One of the project's own solvers, judged once, at its end; it sees the shared mesh."""
+    """One of the project's own solvers, on the shared mesh, evaluated once at its end."""
 
     def train(problem: Problem, clock: Clock) -> Fields:
         yield solver.solve(Problem(finger_mesh(Design()), problem.material, problem.load)).field
@@ -198,24 +198,22 @@ RECIPES: dict[str, Recipe] = {
 REMARKS = {
     "Adam, 1e-2": "far from converged: stiffness and bending differ by orders of magnitude",
     "Adam, 1e-2, slopes 0.1/mm through points of the body": (
-        "a start that knows the body gains most, then it stalls"
+        "initial neurons through the body gain most, then it stalls"
     ),
-    "Adam, 1e-2, output layer exact at the end": "hardly helps: the hidden features are the bottleneck",
+    "Adam, 1e-2, output layer exact at the end": "hardly helps: the hidden features limit the accuracy",
     "SOAP, 1e-2": "the best of the gradient methods here; the rate was not tuned",
     "L-BFGS": "line searches stall",
     "Adam, then self-scaled Broyden": "a dense matrix of all parameters; ahead of L-BFGS",
-    "SPRING, 300 random points": (
-        "the fastest start of all from random weights; the noise of the samples limits the end"
-    ),
+    "SPRING, 300 random points": ("the fastest start from random weights; sampling noise limits the end"),
     "Levenberg-Marquardt, width 16": "still falling, but a step costs the square of the parameters",
     "random gates that do not sum to one, dense exact output layer": (
         "exact output layer, no training: a dense system limits the number of units"
     ),
     "pinn-std at twice the spacing, neurons trained by L-BFGS": (
-        "variable projection works, and pays less than twice the units"
+        "variable projection works, but gains less than twice the units"
     ),
-    "pinn-std, preset fast": "gates that sum to one, sparse exact output layer",
-    "pinn-local": "the same with bumps instead of gates",
+    "pinn-std, preset fast": "random hidden weights, gates that sum to one, sparse exact output layer",
+    "pinn-local": "the same with windows instead of gates",
 }
 """The lesson of each recipe, in a sentence."""
 
@@ -229,7 +227,7 @@ def main(seconds: float = SECONDS) -> Table:
         watch = Watch(judge, seconds)
         try:
             curves[name] = watch.follow(recipe(problem, _clock(watch, seconds)))
-        except torch.linalg.LinAlgError:  # the optimiser's matrices broke down: what it had is its result
+        except torch.linalg.LinAlgError:  # the optimiser's matrices are singular: keep the result so far
             curves[name] = watch.curve
     header = ("recipe", "time, s", "L2 at 1/4, %", "at 1/2, %", "L2, %", "von Mises, %", "energy, %")
     rows = [(name, *_columns(curve, seconds)) for name, curve in curves.items() if curve]

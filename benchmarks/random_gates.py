@@ -1,7 +1,7 @@
 """Random gates whose windows do not sum to one: `pinn-std` before its gates became a tree.
 
-Unit j is (1 - Z_j) A_j + Z_j B_j with a neuron A_j, its negative B_j, and a gate that opens where two crossed
-strips around a random point of the body meet. The output layer is solved for exactly, as a dense system.
+Unit j is (1 - Z_j) A_j + Z_j B_j with a neuron A_j, its negative B_j, and a gate that opens at the crossing
+of two strips around a random point of the body. The output layer is solved exactly, as a dense system.
 """
 
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ WIDTH, SLOPE, STEEPNESS = 3.0, 0.3, 2.0
 """Half width of the strips, mm; steepness of the neurons, 1/mm; steepness of the gates."""
 
 ROUND = 500
-"""Units that are added at a time."""
+"""Units added in one round."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Films of the virtual rig that are kept in memory, tracked, and scored against their truth."""
+"""Films of the virtual rig in memory, tracked and compared with their truth."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -17,15 +17,15 @@ from vision.rig.recording import FrameTruth
 from vision.tracking.trajectories import Tracking
 
 ELEMENT = 1.0
-"""Size of the elements whose displacements are filmed, mm; with 0.5 they move the markers by 0.0003 mm."""
+"""Element size of the filmed solution, mm; 0.5 changes the markers by 0.0003 mm."""
 
 HIDDEN = 0.02
-"""Share of a marker's picture below which it is wholly hidden."""
+"""Visible share of a marker below which it counts as hidden."""
 
 
 @dataclass(frozen=True)
 class Finger:
-    """A finger, and how its mesh's nodes move when it is pressed, shape (n, 2), mm."""
+    """A finger with the displacements of its mesh's nodes under the load, shape (n, 2), mm."""
 
     parameters: Parameters
     mesh: TriangleMesh
@@ -33,7 +33,7 @@ class Finger:
 
     @classmethod
     def pressed(cls, parameters: Parameters) -> "Finger":
-        """By the default indenter, at finite strain."""
+        """The finger under the default indenter, at finite strain."""
         mesh = finger_mesh(parameters, settings=MeshSettings(size=ELEMENT))
         solution = simulate(Problem(mesh))
         return cls(parameters, mesh, solution.displacement(mesh.at_nodes()))
@@ -41,15 +41,15 @@ class Finger:
 
 @dataclass(frozen=True)
 class Score:
-    """What was measured of the m markers of a film, and what is true.
+    """Measured and true displacements of the m markers of a film.
 
     Attributes:
-        true: How their discs moved, shape (m, 2), mm.
-        centres: How the points in the middle of the discs before loading moved, shape (m, 2), mm.
-        measured: What the tracker says, shape (m, 2), mm; nan for those that it reports missing.
-        covariances: Of every marker's displacement, as the tracker has it, shape (m, 2, 2), mm².
-        swapped: How many markers were, in some frame, nearer to another one's place than to their own.
-        invented: How many were reported in a frame in which they were wholly hidden.
+        true: Displacements of the centroids of their discs, shape (m, 2), mm.
+        centres: Displacements of the material points at their centres, shape (m, 2), mm.
+        measured: The tracker's displacements, shape (m, 2), mm; nan for missing markers.
+        covariances: The tracker's covariance of every displacement, shape (m, 2, 2), mm².
+        swapped: Number of markers that were, in some frame, nearer to another one's place than to their own.
+        invented: Number of markers reported in a frame in which they were hidden.
         overall: Mean of the squares over all displacements, weighted by the inverse of their covariance; 1 if
             that is right.
     """
@@ -64,7 +64,7 @@ class Score:
 
     @classmethod
     def of(cls, tracking: Tracking, truths: Sequence[FrameTruth]) -> "Score":
-        """Compare what was tracked in a film with the truth of its frames."""
+        """Compare the tracking of a film with the truth of its frames."""
         first, last = truths[0], truths[-1]
         seen = tracking.visible
         covariance = tracking.displacement_covariance
@@ -93,7 +93,7 @@ class Score:
 
     @property
     def seen(self) -> BoolArray:
-        """Which markers are not reported missing, shape (m,)."""
+        """Mask of the markers not reported missing, shape (m,)."""
         return np.asarray(np.isfinite(self.measured).all(axis=1))
 
     @property
@@ -131,7 +131,7 @@ def coverage(ratios: FloatArray) -> tuple[float, float]:
 
 
 def film_of(pictures: Sequence[Image], *, rate: float = 30.0) -> Frames:
-    """Images as a film of so many frames a second."""
+    """Images as a film with a frame rate, 1/s."""
 
     def shots() -> Iterator[CapturedImage]:
         for number, picture in enumerate(pictures):

@@ -1,4 +1,4 @@
-"""The tracker on random scenes of the virtual rig: its errors, and whether its standard deviations are right.
+"""The tracker on random scenes of the virtual rig: its errors, and the coverage of its standard deviations.
 
 Ten cameras, each calibrated from twenty rendered photographs of a board, see the default finger twenty times:
 tilted by up to 5 degrees in any direction, turned by up to 10 degrees or upside down, with the markers up to
@@ -6,8 +6,8 @@ tilted by up to 5 degrees in any direction, turned by up to 10 degrees or upside
 up to 30 %, and 20 to 120 % of the stroke. Five frames at rest and five that are held. Five minutes on two
 cores.
 
-Errors are those of the discs' middles, which are what a camera sees; in a wall that bends they are not quite
-where the discs' centres were printed. Environment: SCENES, how many instead of 200.
+Errors are those of the discs' centroids, which a camera sees; in a bent wall they differ slightly from the
+printed centres. Environment: SCENES, their number instead of 200.
 """
 
 import os
@@ -42,14 +42,14 @@ SCENES, CAMERAS, PHOTOGRAPHS = 200, 10, 20
 BOARD = Board(9, 6, 8.0)
 MOTION = Motion(rest=5, moving=0, held=5)
 ALLOWED = 0.02
-"""Mean |du| + |dv| that is asked for, mm."""
+"""Required mean |du| + |dv|, mm."""
 
 
 class Scored(NamedTuple):
-    """A scene that was tracked: its number, what it was, and how well that went."""
+    """A tracked scene: its number, description and score."""
 
     number: int
-    said: str
+    description: str
     score: Score
 
 
@@ -91,7 +91,7 @@ def random_exposure(rng: np.random.Generator) -> Exposure:
 
 
 def calibrated(camera: Camera, exposure: Exposure, seed: int) -> Camera:
-    """What photographs of a board say about a camera."""
+    """The camera as calibrated from photographs of a board."""
     scene = board_scene(BOARD)
     poses = board_poses(BOARD, camera, PHOTOGRAPHS, seed=seed)
     images = (
@@ -102,7 +102,7 @@ def calibrated(camera: Camera, exposure: Exposure, seed: int) -> Camera:
 
 
 def random_recording(finger: Finger, camera: Camera, rng: np.random.Generator, seed: int) -> Recording:
-    """A film of the finger in random circumstances."""
+    """A film of the finger with random pose, light and load."""
     workspace = default_workspace(finger.parameters)
     workspace = workspace.model_copy(update={"marker_plane": rng.uniform(0, 8)})
     pose = viewing_pose(
@@ -124,7 +124,7 @@ def random_recording(finger: Finger, camera: Camera, rng: np.random.Generator, s
 
 
 def scored(recording: Recording, camera: Camera) -> Score:
-    """Track a film with a camera that is nearly the one that took it."""
+    """Track a film with a calibrated camera."""
     bench = recording.bench
     scene = FilmedScene(bench.parameters, bench.workspace, camera)
     pictures, truths = zip(*recording.frames(), strict=True)
@@ -136,7 +136,7 @@ def _alone() -> None:
 
 
 def _seen(finger: Finger, scenes: int, number: int) -> list[Scored]:
-    """What a camera sees of its share of the scenes."""
+    """Film and track one camera's share of the scenes."""
     rng = np.random.default_rng([5, number])
     camera = random_camera(rng)
     known = calibrated(camera, random_exposure(rng), 1000 + number)
@@ -144,11 +144,11 @@ def _seen(finger: Finger, scenes: int, number: int) -> list[Scored]:
     for scene in range(number, scenes, CAMERAS):
         recording = random_recording(finger, camera, np.random.default_rng([6, scene]), scene)
         exposure = recording.exposure
-        said = (
+        description = (
             f"blur {exposure.blur:.2f} px, noise {exposure.noise:.1f}, gradient {exposure.gradient:.0%}, "
             f"white {exposure.white:.0f}, markers at {recording.bench.workspace.marker_plane:.1f} mm"
         )
-        results.append(Scored(scene, said, scored(recording, known)))
+        results.append(Scored(scene, description, scored(recording, known)))
     return results
 
 
@@ -164,7 +164,7 @@ def _table(results: list[list[Scored]], seconds: float) -> Table:
         f"{sum(scene.score.swapped for scene in every)} swapped; {seconds:.0f} s",
         caption=f"error: mean |du| + |dv|, asked for: {ALLOWED} mm; to the discs' centres "
         f"{np.abs(centres).sum(axis=1).mean():.4f} mm. Below 1 and 1.96 standard deviations: asked for 68 "
-        f"and 95 within 5. Worst scene: {worst.number}, {worst.said}.",
+        f"and 95 within 5. Worst scene: {worst.number}, {worst.description}.",
     )
     for column in (
         *("camera", "error, mm", "worst scene", "worst marker", "std, mm", "below 1, %", "below 1.96, %"),

@@ -1,4 +1,4 @@
-"""The tracker under one adversity at a time, and under several: errors; markers missed, swapped, invented.
+"""The tracker under one or several disturbances: errors; markers missed, swapped, invented.
 
 The default finger is filmed by the virtual rig at rest, while it is pressed, and held; two films for every
 case, whose noise and tilt differ. The camera is known exactly. Both methods see the same films. Six minutes
@@ -48,7 +48,7 @@ FILMS = 2
 MOTION = Motion(rest=5, moving=3, held=5)
 JUMP = Motion(rest=5, moving=0, held=5)
 PATCH = 3.0
-"""Half the side of what hides a fiducial, mm."""
+"""Half the side of the occluder of a fiducial, mm."""
 
 Hide = Callable[[Recording], Callable[[int], Sequence[Shape]]]
 
@@ -82,7 +82,7 @@ def crossing(film: Recording) -> Callable[[int], Sequence[Shape]]:
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A film and how it is tracked; what is not named is as in the base case."""
+    """A film and its tracking; the defaults are the base case."""
 
     exposure: Mapping[str, Any] = field(default_factory=dict)
     size: tuple[int, int] = (1280, 720)
@@ -137,7 +137,7 @@ CASES: dict[tuple[str, str], Case] = {
         exposure={"noise": 6}, size=(640, 360), codec="mp4v", motion=JUMP
     ),
 }
-"""What is varied, and to what."""
+"""Cases by the varied quantity and its value."""
 
 HEADER = (
     *("varied", "to", "error, mm", "worst marker", "hidden", "missed", "swapped", "invented"),
@@ -145,11 +145,11 @@ HEADER = (
 )
 
 SHOWN = 8
-"""Columns that a terminal has room for."""
+"""Number of columns that fit a terminal."""
 
 
 class Outcome(NamedTuple):
-    """The scores of methods, or why there is none, and how many markers were hidden at rest or held."""
+    """Scores of the methods, or messages of refusal, and the number of markers hidden at rest or held."""
 
     scores: Mapping[DetectionMethod, Score | str]
     hidden: int
@@ -191,7 +191,7 @@ def filmed(case: Case, finger: Finger, number: int) -> Recording:
 
 
 def seen(case: Case, recording: Recording, methods: Sequence[DetectionMethod] = METHODS) -> Outcome:
-    """What methods make of a film; one line where one refuses."""
+    """Scores of methods on a film, or the line of a method that refuses it."""
     scores: dict[DetectionMethod, Score | str] = {}
     with _film(case, recording) as (frames, truths):
         with frames() as film:
@@ -216,7 +216,7 @@ def seen(case: Case, recording: Recording, methods: Sequence[DetectionMethod] = 
 
 @contextmanager
 def _film(case: Case, recording: Recording) -> Iterator[tuple[Callable[[], Frames], Sequence[FrameTruth]]]:
-    """What opens the film, and its truth."""
+    """A function that opens the film, and its truth."""
     if not case.codec:
         pictures, truths = zip(*recording.frames(), strict=True)
         yield partial(film_of, pictures), truths
@@ -275,11 +275,11 @@ def _report(rows: Sequence[Sequence[str]]) -> str:
         f"{FILMS} films of the default finger a row, with nine markers each, by the virtual rig. Base: "
         "1280x720, noise of 2 grey levels, blur 0.8 px, light that grows by 10 % to a side, tilt 2 degrees, "
         f"{MOTION.rest} frames at rest, {MOTION.moving} moving, {MOTION.held} held after 10 mm. The camera "
-        "is known exactly. Error: mean |du| + |dv| over the markers, to how the discs really moved; worst: "
-        "of one marker. Hidden: wholly, in the first or last frame; missed: reported missing, or in a film "
-        "that was refused. Swapped: nearer to another marker than to its own, in any frame; invented: "
-        "reported in a frame in which it was wholly hidden. Std: the median standard deviation that is "
-        "reported, and how many errors lie below it; 68 and 95 % if it is right.",
+        "is known exactly. Error: mean |du| + |dv| over the markers, from the true displacements of the "
+        "discs; worst: of one marker. Hidden: wholly, in the first or last frame; missed: reported "
+        "missing, or in a refused film. Swapped: nearer to another marker than to its own, in any frame; "
+        "invented: reported in a frame in which it was wholly hidden. Std: the median reported standard "
+        "deviation, and the share of errors below it; 68 and 95 % if it is right.",
         "",
         "| " + " | ".join(HEADER) + " |",
         "|---|---|" + "---:|" * (len(HEADER) - 2),

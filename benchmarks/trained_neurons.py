@@ -1,4 +1,4 @@
-"""The neurons of `pinn-std` trained by L-BFGS, with the output layer solved for exactly at each step.
+"""The neurons of `pinn-std` trained by L-BFGS, with the output layer solved exactly at each step.
 
 This is variable projection: the output layer c(r) of least energy is a function of the neurons r, and by the
 envelope theorem the derivative of E(c(r), r) is that of the Lagrangian at fixed c and forces.

@@ -1,1 +1,1 @@
-"""Optimisers that serve generally, one a file; Adam and L-BFGS are torch's."""
+"""Optimisers that torch lacks, one a file, for the training recipes."""

@@ -6,7 +6,7 @@ import torch
 
 
 class Residuals(Protocol):
-    """Functions r of n parameters; minimised is |r|² / 2."""
+    """Functions r of n parameters, whose |r|² / 2 is minimised."""
 
     def values(self, parameters: torch.Tensor) -> torch.Tensor:
         """Residuals at parameters of shape (n,): shape (m,)."""
@@ -22,7 +22,7 @@ class Iterate(NamedTuple):
 
     Attributes:
         parameters: Shape (n,).
-        value: What is minimised, there.
+        value: The objective there.
     """
 
     parameters: torch.Tensor

@@ -18,7 +18,7 @@ LARGEST_DAMPING = 1e20
 def levenberg_marquardt(
     residuals: Residuals, start: torch.Tensor, *, damping: float = 1e-3
 ) -> Iterator[Iterate]:
-    """Minimise |r|² / 2; yields after every step that was taken and ends where no step helps.
+    """Minimise |r|² / 2; yields after every accepted step and ends where no step decreases it.
 
     Args:
         residuals: The functions.

@@ -1,4 +1,4 @@
-"""The self-scaled Broyden method: quasi-Newton with the whole inverse Hessian approximation H, (n, n).
+"""The self-scaled Broyden method: quasi-Newton with a full approximation H of the inverse Hessian, (n, n).
 
 With the step s, the change y of the gradient g, and
 

@@ -20,7 +20,7 @@ class Soap(torch.optim.Optimizer):
     """SOAP for tensors of any shape.
 
     Args:
-        parameters: What to train.
+        parameters: The trained tensors.
         lr: Learning rate.
         betas: Averaging of the first moment and of the second, which that of L and R shares.
         eps: Added to the root of the second moment.

@@ -1,8 +1,8 @@
 """Natural gradient by Woodbury's identity, with momentum, for sums of squares over random samples.
 
-Where a sample has fewer residuals m than there are parameters n, the damped Gauss-Newton step is found from
-a matrix of order m instead of n (energy natural gradient in the sample space, ENGD-W). With momentum,
-SPRING, a step is as near as the damping wants to μ times the one before:
+If a sample has fewer residuals m than parameters n, the damped Gauss-Newton step needs a matrix of order m
+instead of n (energy natural gradient in the sample space, ENGD-W). With momentum, SPRING, the damping
+regularises the difference from μ times the last step:
 
     φ_k = μ φ_{k-1} + J^T (J J^T + λ I)^-1 (r - μ J φ_{k-1})        θ_{k+1} = θ_k - η φ_k
 

@@ -1,7 +1,7 @@
-"""Boundary-value problems with body forces, tractions and given displacements, below the level of `fem`.
+"""Boundary-value problems with body forces, tractions and Dirichlet conditions, below the level of `fem`.
 
-A `Problem` has a clamp and an indenter and nothing else. Here DOLFINx assembles and MUMPS factorises as they
-do for `fem`; the nodal forces come from quadrature rules of high degree in NumPy.
+A `Problem` has only a clamp and an indenter. Here DOLFINx assembles and MUMPS factorises as for `fem`; the
+nodal forces come from quadrature rules of high degree in NumPy.
 """
 
 from collections.abc import Callable, Mapping
@@ -41,14 +41,14 @@ class Exact:
 
 @dataclass(frozen=True, eq=False)
 class BoundaryValue:
-    """Find the displacement of a body.
+    """A boundary-value problem of linear elasticity.
 
     Attributes:
         mesh: The body.
         material: Of linear law.
         body_force: N/mm³.
-        tractions: Stress on a boundary, by name: its traction is what the normal makes of it, MPa.
-        given: Displacement on a boundary, by name, and the components that are given.
+        tractions: Stress field whose traction acts on a boundary, by name, MPa.
+        given: Displacement prescribed on a boundary, by name, and the prescribed components.
     """
 
     mesh: TriangleMesh
@@ -68,7 +68,7 @@ class BoundaryValue:
         return LagrangeField(space, nodal)
 
     def state(self, field: LagrangeField, location: LocatedPoints) -> State:
-        """Strain and stress as every solution of a solver derives them."""
+        """Strain and stress, by the same code as for every solver."""
         return State.from_gradient(field.gradient(location), Problem(self.mesh, self.material))
 
     def errors(self, field: LagrangeField, exact: Exact) -> tuple[float, float]:

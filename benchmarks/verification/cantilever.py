@@ -1,4 +1,4 @@
-"""A cantilever that is loaded at its end, against the closed form of plane elasticity."""
+"""An end-loaded cantilever against the closed form of plane elasticity."""
 
 from itertools import product
 
@@ -87,12 +87,12 @@ CANTILEVER = Case(
     "article 21; as a benchmark: C. E. Augarde, A. J. Deeks, Finite Elements in Analysis and Design "
     "44 (2008) 595-601",
     text="""
-A beam of 8 mm by 2 mm, ν = 0.3, with a parabolic shear traction at its end and its own exact displacements at
-the root: so the closed form is the exact solution and not only that of Saint-Venant (a plain clamp would be
-singular in its corners, as Augarde and Deeks point out). The displacement is cubic; neither element contains
-it. Slopes between 16 and 32 distorted cells over the depth. The orders are those of the manufactured
-solution; that of P2 in L2 may lie above 3, since the error of the deflection as a whole, which falls with h⁴,
-is still a good part of it. The bounds of the tip deflection are 1.4 and 25 times the errors of the mesh.
+A beam of 8 mm by 2 mm, ν = 0.3, with a parabolic shear traction at its end and the exact displacements at its
+root. So the closed form is the exact solution, not only in the sense of Saint-Venant; a plain clamp would be
+singular in its corners, as Augarde and Deeks point out. The displacement is cubic and in neither element
+space. Slopes between 16 and 32 distorted cells over the depth. The orders are those of the manufactured
+solution; that of P2 in L2 may exceed 3, since much of the error is still that of the mean deflection, which
+falls with h⁴. The bounds of the tip deflection are 1.4 and 25 times the errors of the mesh.
 """,
     measure=cantilever,
 )

@@ -43,7 +43,7 @@ def cook() -> tuple[Row, ...]:
 
 
 def published(quantity: str, measured: float, value: float, part: float, degree: int, plane: str) -> Row:
-    """A row whose number may differ from a published one by a part of it."""
+    """A row with a relative tolerance about a published number."""
     return Row(quantity, float(measured), about(value, part * value), degree, plane)
 
 
@@ -65,13 +65,14 @@ COOK = Case(
     "of freedom, Computer Methods in Applied Mechanics and Engineering 50 (1985) 25-69; plane strain: CoFEA, "
     "benchmark 002, <https://cofea.readthedocs.io>",
     text="""
-The tapered panel with the corners (0, 0), (48, 44), (48, 60) and (0, 44), held at the left and sheared
-uniformly at the right, with 64 by 64 distorted cells. Plane stress: E = 1, ν = 1/3, force 1, with the
-deflection and the principal stresses in the middles of the long sides that Bergan and Felippa take for the
-best known. Plane strain: E = 70 MPa, force 100 N/mm, ν = 0.3333 and, nearly incompressible, 0.4999, with the
-deflections that Code_Aster's quadratic tetrahedra have on CoFEA's finest mesh (of CalculiX and Elmer: 32.27
-and 32.28 mm at ν = 0.33; 27.52 and 27.56 mm). The published values have three or four digits and are not
-converged to the last, as their scatter shows: deflections have to agree to 1 % and 0.5 %, stresses to 1.5 %.
+The tapered panel with the corners (0, 0), (48, 44), (48, 60) and (0, 44), clamped at the left, with a uniform
+shear traction at the right and 64 by 64 distorted cells. Plane stress: E = 1, ν = 1/3, force 1, compared with
+the best known values according to Bergan and Felippa of the deflection and of the principal stresses at the
+middles of the long sides. Plane strain: E = 70 MPa, force 100 N/mm, ν = 0.3333 and, nearly incompressible,
+0.4999, compared with the deflections of Code_Aster's quadratic tetrahedra on CoFEA's finest mesh (CalculiX
+and Elmer: 32.27 and 32.28 mm at ν = 0.33; 27.52 and 27.56 mm). The published values have three or four
+digits, and their scatter shows that the last is not converged: deflections must agree within 1 % and 0.5 %,
+stresses within 1.5 %.
 """,
     measure=cook,
 )

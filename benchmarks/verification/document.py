@@ -10,25 +10,24 @@ PAGE = Path(__file__).parents[2] / "docs" / "verification.md"
 HEAD = """\
 # Verification of the finite elements
 
-Every other number of this project is judged against `fem`. This page is the evidence that `fem` solves the
-equations that it claims to solve: problems whose answer is known from elsewhere, solved by the code that
-`fem` runs, and for finite strain `fem-nonlinear`. [Theory](theory.md) has the equations. Whether the
-equations are those of a printed finger is another question, which needs a camera.
+All other results of this project are compared with `fem`. This page verifies `fem`, and for finite strain
+`fem-nonlinear`, on problems with known solutions, solved by their own code. [Theory](theory.md) has the
+equations. Whether the equations describe a printed finger is a question of validation, which needs a camera.
 
-`make verification` solves all of it again, in less than a minute, and rewrites this page; `make test
-ARGS=tests/verification` fails if a number leaves its bounds or if the page is out of date. Body forces and
-tractions enter below `Problem`, which has only a clamp and an indenter: the stiffness is assembled and
-factorised as for every finger, the nodal forces are integrated in NumPy by a rule of degree 7 that nothing
-else uses, and Hooke's law is written once more, from E and ν alone. P1 and P2 are linear and quadratic
-triangles. Slopes are orders of convergence in the element size, beside them the error on the finest mesh;
-errors are relative; "plane" is the plane state.
+`make verification` repeats all of it in less than a minute and rewrites this page; `make test-all
+ARGS=tests/verification` fails if a number leaves its bounds or if the page is out of date. `Problem` has only
+a clamp and an indenter, so body forces and tractions are applied below it: the stiffness matrix is assembled
+and factorised as for every finger, the nodal forces are integrated in NumPy by a separate rule of degree 7,
+and Hooke's law is implemented independently, from E and ν alone. P1 and P2 are linear and quadratic
+triangles. Slopes are orders of convergence in the element size, with the error on the finest mesh; errors are
+relative; "plane" is the plane state.
 """
 
 TAIL = """\
 ## Would a mistake be seen?
 
-The tests make mistakes on purpose and demand that rows above fail: λ too large by 1 % (the slope of P2 in L2
-falls from 3 to 0), the shear's energy halved, plane strain taken for plane stress, one integration point a
+The tests make mistakes on purpose and require that rows above fail: λ too large by 1 % (the slope of P2 in L2
+falls from 3 to 0), half the shear energy, plane strain instead of plane stress, one integration point a
 triangle (`tests/verification/test_mistakes.py`).
 """
 

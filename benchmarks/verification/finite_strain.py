@@ -1,4 +1,4 @@
-"""`fem-nonlinear` against homogeneous deformations and against the equilibrium of another program."""
+"""`fem-nonlinear` against homogeneous deformations and against equilibrium in scikit-fem."""
 
 import numpy as np
 import skfem
@@ -67,10 +67,10 @@ def homogeneous(mesh: TriangleMesh, material: Material, change: tuple[float, flo
 
 
 def equilibrium_elsewhere(law: str) -> tuple[float, float, float]:
-    """What another program finds missing at the solution for a finger.
+    """Takes one Newton step of scikit-fem from our solution for a finger.
 
     Returns:
-        The largest displacement of its next Newton step and its differences in energy and in force, relative.
+        The largest displacement of the step and the differences in energy and in force, relative.
     """
     mesh = finger_mesh(Design(), settings=MeshSettings(size=1.0))
     material = Material(law=law)
@@ -101,7 +101,7 @@ def equilibrium_elsewhere(law: str) -> tuple[float, float, float]:
 
 
 def nodal_values(basis: skfem.Basis, solution: Solution) -> FloatArray:
-    """The displacement of a solution in another program's degrees of freedom."""
+    """The displacement of a solution in scikit-fem's degrees of freedom."""
     nodal = np.zeros(basis.N)
     for axis, dofs in enumerate(components(basis)):
         nodal[dofs] = solution.displacement(basis.doflocs[:, dofs].T)[:, axis]
@@ -114,14 +114,14 @@ FINITE_STRAIN = Case(
     source="the laws: J. Bonet, R. D. Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd "
     "edition, Cambridge University Press, 2008, section 6.4",
     text="""
-`fem-nonlinear` with both of its laws, at ν = 0.45 unless the row says something else. Two homogeneous
-deformations have a closed form: a stretch of 1.3 with a shear of 0.5 of a strip whose nodes are all on clamp
-or patch, and a bar without lateral contraction stretched by 1.3. Compared are the deformation gradient, the
-four components of Cauchy's stress, the force and the energy; the largest relative error is shown. Then the
-default finger with elements of 1 mm under the sliding patch, 10 mm deep: scikit-fem, with the laws written
-once more as tensors, takes the solution, sets up the equilibrium and makes one Newton step. What that step
-moves is the distance from scikit-fem's own solution, relative to the largest displacement. Both programs
-integrate by six points a triangle; 1e-8 is the tolerance of Newton's method.
+`fem-nonlinear` with both of its laws, at ν = 0.45 unless the row says otherwise. Two homogeneous deformations
+have a closed form: a stretch of 1.3 with a shear of 0.5 of a strip whose nodes are all on clamp or patch, and
+a bar without lateral contraction stretched by 1.3. The largest relative error of deformation gradient, the
+four components of the Cauchy stress, force and energy is shown. Then the default finger with elements of 1 mm
+under the sliding patch, 10 mm deep: scikit-fem, with an independent tensor form of the laws, assembles the
+equilibrium at the solution and takes one Newton step. The length of this step, relative to the largest
+displacement, is the distance from scikit-fem's own solution. Both programs use six quadrature points a
+triangle; 1e-8 is the tolerance of Newton's method.
 """,
     measure=finite_strain,
 )

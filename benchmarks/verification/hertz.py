@@ -1,4 +1,4 @@
-"""A rigid cylinder pressed on a block, against Hertz."""
+"""A rigid cylinder pressed on a block, against Hertz's solution."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ FINEST = 0.05
 
 
 def hertz() -> tuple[Row, ...]:
-    """Half-width, peak pressure and stress, over those that belong to the force."""
+    """Half-width, peak pressure and stress over those of Hertz for the same force."""
     load = Load(kind="cylinder", radius=RADIUS, displacement=(0.0, -INDENTATION))
     solution = FemNonlinearSolver().solve(Problem(block(), MATERIAL, load))
     force, modulus = -solution.reaction[1], MATERIAL.young / (1 - MATERIAL.poisson**2)
@@ -65,12 +65,12 @@ HERTZ = Case(
     answer="closed form for small strain",
     source="K. L. Johnson, Contact Mechanics, Cambridge University Press, 1985, section 4.2(c)",
     text="""
-A block of 60 mm by 30 mm, clamped below, into whose top `fem-nonlinear` presses a rigid cylinder of radius 20
-mm by 0.035 mm, without friction; ν = 0.3, distorted elements of 0.05 mm under the cylinder. The contact is
-found, not given. For the force that the solution has, Hertz gives half-width a = √(4 P R / (π E*)) and peak
-pressure 2 P / (π a), and below the contact an ellipse of pressure. He neglects strains of the size a / 2 R =
-1.4 %, and the contact ends at a node: hence half an element for the width, 1.5 % for the peak, and 3 % for
-the stress in the block from the elements' own gradient, up to 0.85 a.
+`fem-nonlinear` presses a rigid cylinder of radius 20 mm by 0.035 mm into the top of a block of 60 mm by 30
+mm, clamped below, without friction; ν = 0.3, distorted elements of 0.05 mm under the cylinder. The contact
+region is part of the solution. For the computed force, Hertz gives the half-width a = √(4 P R / (π E*)), the
+peak pressure 2 P / (π a), and an elliptic pressure distribution. He neglects strains of the size a / 2 R =
+1.4 %, and the computed contact ends at a node: hence tolerances of half an element for the width, 1.5 % for
+the peak, and 3 % for the stress in the block, from the elements' own gradient, up to 0.85 a.
 """,
     measure=hertz,
 )

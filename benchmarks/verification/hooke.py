@@ -1,4 +1,4 @@
-"""Hooke's law of the plane states from E and ν alone: it shares no formula with `solvers.elasticity`."""
+"""Hooke's law of the plane states from E and ν, independent of `solvers.elasticity`."""
 
 from dataclasses import dataclass
 

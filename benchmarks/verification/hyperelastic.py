@@ -1,6 +1,6 @@
-"""The laws of finite strain in tensors, so that they share no formula with `solvers.elasticity`.
+"""Hyperelastic laws in tensor form, independent of `solvers.elasticity`.
 
-Tensors are the last two axes; in-plane ones (2 by 2) and whole ones (3 by 3) both work, in plane strain.
+Tensors are the last two axes, 2 by 2 (in-plane) or 3 by 3, in plane strain.
 """
 
 from collections.abc import Callable

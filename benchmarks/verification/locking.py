@@ -10,7 +10,7 @@ from solvers.fem.locking import locking_factor
 from solvers.problem import Material, Problem
 
 DEFLECTION = {0.3: about(0.946, 0.02), 0.45: about(0.892, 0.02), 0.499: at_most(0.35), 0.4999: at_most(0.15)}
-"""What linear elements leave of the deflection, by Poisson's ratio."""
+"""Deflection with linear elements over the closed form, by Poisson's ratio."""
 
 
 def locking() -> tuple[Row, ...]:
@@ -53,7 +53,7 @@ def tip(poisson: float, degree: int) -> float:
 
 
 def finger_excess(poisson: float) -> float:
-    """Energy of linear elements over that of quadratic ones less one, default finger, elements of 0.5 mm."""
+    """Relative energy difference of linear from quadratic elements, default finger, elements of 0.5 mm."""
     return finger_energy(poisson, 1, 0.5) / finger_energy(poisson, 2, 0.5) - 1
 
 
@@ -70,16 +70,16 @@ LOCKING = Case(
     "chapter 4; what quadratic ones may lose: I. Babuška, M. Suri, Locking effects in the finite element "
     "approximation of elasticity problems, Numerische Mathematik 62 (1992) 439-463",
     text="""
-The end-loaded cantilever with 8 distorted cells over its depth. Linear triangles lock: they keep 95 % of the
-deflection at ν = 0.3 and 13 % at 0.4999, and their rows state it. Quadratic triangles keep all of it. Theory
-lets them lose one order as ν tends to 1/2; at 0.4999 they have not lost it on these meshes. Nor do they lock
-on the finger, whose energy depends little more on the mesh at 0.4999 than at 0.3.
+The end-loaded cantilever with 8 distorted cells over its depth. Linear triangles lock: they have 95 % of the
+deflection at ν = 0.3 and 13 % at 0.4999. Quadratic triangles have all of it. In theory they may lose one
+order as ν tends to 1/2; at 0.4999 they have not on these meshes. Nor do they lock on the finger, whose energy
+depends little more on the mesh at 0.4999 than at 0.3.
 
-`fem` with `degree=1` therefore warns in plane strain beyond ν = 0.4: its status says by what factor the
-energy is further off than at ν = 0.3. The last rows measure that factor on the default finger with elements
-of 0.5 mm, against P2 on the same mesh; what the status says is expected, give or take a quarter.
-`fem-nonlinear` says the same: under the patch, 10 mm deep, its energy is 1.6, 2.8 and 4.3 times as far off at
-these ν.
+`fem` with `degree=1` therefore warns in plane strain beyond ν = 0.4: its status gives the factor of the
+energy error over that at ν = 0.3. The last rows measure this factor on the default finger with elements of
+0.5 mm, against P2 on the same mesh; the expected value is that of the status, within a quarter.
+`fem-nonlinear` gives the same warning: under the patch, 10 mm deep, its energy error is 1.6, 2.8 and 4.3
+times that at ν = 0.3.
 """,
     measure=locking,
 )

@@ -40,7 +40,7 @@ def manufactured() -> tuple[Row, ...]:
 
 
 def waves(law: PlaneLaw) -> Exact:
-    """Displacements u_i = sin(k_i . x + φ_i) and the body force -div σ that they need."""
+    """Displacements u_i = sin(k_i . x + φ_i) with the body force -div σ."""
 
     def phase(points: FloatArray) -> FloatArray:
         return points @ WAVES.T + PHASES
@@ -57,16 +57,16 @@ def waves(law: PlaneLaw) -> Exact:
 
 MANUFACTURED = Case(
     name="manufactured solution",
-    answer="chosen, with the body force that it needs",
+    answer="chosen, with its body force",
     source="the method: P. J. Roache, Verification and Validation in Computational Science and "
     "Engineering, Hermosa, 1998; the orders: G. Strang, G. J. Fix, An Analysis of the Finite Element "
     "Method, Prentice-Hall, 1973, chapter 3",
     text="""
-u_i = sin(k_i · x + φ_i) on the quadrilateral of the patch tests, ν = 0.3, with the body force -div σ that it
-needs, displacements given on two sides and tractions on the other two; slopes between 16 and 32 distorted
-cells a side. Theory says p + 1 for the displacement in L2 and p for the stress in the energy norm. The
-tolerance of 0.1 is for the distortion, which differs from mesh to mesh; a wrong constant of the law stops the
-convergence and gives slopes far below.
+u_i = sin(k_i · x + φ_i) on the quadrilateral of the patch tests, ν = 0.3, with the body force -div σ,
+Dirichlet conditions on two sides and tractions on the other two; slopes between 16 and 32 distorted cells a
+side. The theoretical orders are p + 1 for the displacement in L2 and p for the stress in the energy norm. The
+tolerance of 0.1 allows for the distortion, which differs from mesh to mesh; a wrong constant of the law stops
+the convergence and gives much smaller slopes.
 """,
     measure=manufactured,
 )

@@ -9,11 +9,11 @@ from geometry.arrays import FloatArray
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 JITTER = 0.2
-"""How far an inner node moves at most, in elements: no two triangles are alike, none is nearly flat."""
+"""Largest shift of an inner node, in elements: all triangles differ, none is nearly flat."""
 
 
 def mapped_mesh(mapping: Callable[[FloatArray], FloatArray], columns: int, rows: int) -> TriangleMesh:
-    """The image of the unit square, inner nodes moved at random.
+    """The image of the unit square, with randomly shifted inner nodes.
 
     Args:
         mapping: Takes points of the square, shape (n, 2), to points, shape (n, 2), mm; keeps the orientation.

@@ -78,10 +78,9 @@ PATCH = Case(
     "Structural Mechanics, Wright-Patterson Air Force Base, 1965",
     text="""
 A displacement with a constant gradient (strain, shear and rotation) on a quadrilateral of 6 by 5 distorted
-cells. It belongs to both element spaces, so that displacement (in L2) and stress (in the energy norm) have to
-be exact to rounding, of which a direct solve leaves some 1e-13; the larger of the two errors is shown. The
-third kind goes the whole way through `fem`: a bar of 8 by 3 cells between clamp and rigid patch, its strain,
-reaction and energy.
+cells. It belongs to both element spaces, so displacement (in L2) and stress (in the energy norm) must be
+exact up to rounding, about 1e-13 for a direct solve; the larger of the two errors is shown. The third kind is
+solved by `fem` itself: strain, reaction and energy of a bar of 8 by 3 cells between clamp and rigid patch.
 """,
     measure=patch_tests,
 )

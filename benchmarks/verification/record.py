@@ -1,4 +1,4 @@
-"""What a case of verification hands over: numbers, each beside what it has to be."""
+"""Verification cases: measured numbers with their bounds."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Expectation:
-    """Bounds of a number, and the words for them."""
+    """Bounds of a number, and their text."""
 
     low: float
     high: float
@@ -38,7 +38,7 @@ class Row:
     Attributes:
         quantity: What was measured, with its unit if it has one.
         measured: The number.
-        expected: What it has to be.
+        expected: Its bounds.
         degree: Of the elements.
         plane: "strain" or "stress".
         error: Relative error on the finest mesh, beside a slope.
@@ -53,12 +53,12 @@ class Row:
 
     @property
     def passed(self) -> bool:
-        """Whether the number is what it has to be; a NaN is not."""
+        """Whether the number is within its bounds; a NaN is not."""
         return self.expected.low <= self.measured <= self.expected.high
 
     @property
     def shown(self) -> str:
-        """The number; only a power of ten of one that is near rounding, which differs by machine."""
+        """The number as text; a power of ten for one near rounding, which differs by machine."""
         if self.measured < 1e-6:
             return f"below 1e{np.ceil(np.log10(max(self.measured, 1e-12))):.0f}"
         number = f"{self.measured:#.5g}" if self.measured > 0.01 else f"{self.measured:.2g}"
@@ -71,9 +71,9 @@ class Case:
 
     Attributes:
         name: A few words.
-        answer: What kind of answer it is.
-        source: Where the answer comes from.
-        text: What is solved and why the bounds are what they are, in Markdown.
+        answer: Kind of the known answer.
+        source: Reference of the answer.
+        text: The problem and the reason of its bounds, in Markdown.
         measure: Solves it.
     """
 
@@ -97,14 +97,14 @@ def slope_rows(
     stress: Expectation,
     note: str = "",
 ) -> list[Row]:
-    """Orders of convergence from the last two of errors on meshes that were each refined twofold.
+    """Orders of convergence from the errors on the last two meshes, each twice as fine as the one before.
 
     Args:
         errors: Of the displacement in L2 and of the stress in the energy norm, mesh by mesh.
         degree: Of the elements.
         plane: "strain" or "stress".
-        displacement: What the order in L2 has to be.
-        stress: What the order in the energy norm has to be.
+        displacement: Bounds of the order in L2.
+        stress: Bounds of the order in the energy norm.
         note: Added to the names.
     """
     names = ("slope of displacement, L2", "slope of stress, energy norm")
