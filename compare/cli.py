@@ -1,4 +1,4 @@
-"""The command line: `compare`, the one-shot main job, and `pinnray` with every verb."""
+"""The command line: `compare`, the main job, and `pinnray` with every command."""
 
 import sys
 
@@ -9,14 +9,13 @@ from compare.commands.compare import compare
 from compare.commands.crossval import crossval
 from compare.commands.design import design
 from compare.commands.gridsearch import gridsearch
+from compare.commands.launch import EXIT_CODES, launched
 from compare.commands.mesh import mesh
 from compare.commands.pick import pick
 from compare.commands.rig import rig
 from compare.commands.solve import solve
 from compare.commands.solvers import solvers
 from compare.commands.track import track
-from compare.runtime.exits import EXIT_CODES
-from compare.runtime.launch import launched
 
 pinnray = App(
     name="pinnray",
@@ -25,8 +24,8 @@ pinnray = App(
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
-for verb in (compare, design, mesh, solve, gridsearch, crossval, solvers, calibrate, pick, rig, track):
-    pinnray.command(verb, help_epilogue=EXIT_CODES)
+for command in (compare, design, mesh, solve, gridsearch, crossval, solvers, calibrate, pick, rig, track):
+    pinnray.command(command, help_epilogue=EXIT_CODES)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -1,0 +1,57 @@
+"""Runs a command, in one process or on the ranks of `mpirun`, and turns errors into exit codes."""
+
+import os
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import pydantic
+from cyclopts import CycloptsError, UnusedCliTokensError, ValidationError
+
+from compare.runtime.exits import BAD_INPUT, INTERRUPTED, say
+from geometry.errors import UserError
+
+EXIT_CODES = (
+    "Exit codes: 0 all well; 1 a fault of the program; 2 bad input, with one line that says what and how to "
+    "mend it; 3 done, but a solver did not converge or --adapt did not reach its tolerance; 130 interrupted."
+)
+
+SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
+"""Variables in which Open MPI and the relatives of MPICH give the number of ranks."""
+
+
+def launched(command: Callable[[], Any]) -> int:
+    """Run a command and return its exit code; of several ranks one runs it, the others serve its solves."""
+    alone = all(os.environ.get(name, "1") == "1" for name in SIZES)
+    return guarded(command if alone else lambda: _on_ranks(command))
+
+
+def guarded(command: Callable[[], Any]) -> int:
+    """Run a command and return its exit code; faults of the program itself pass, with their traceback."""
+    with warnings.catch_warnings():
+        warnings.showwarning = lambda message, *_, **__: say(f"warning: {message}")
+        try:
+            return int(command() or 0)
+        except UnusedCliTokensError as error:
+            say(f"error: {' '.join(error.unused_tokens or ())!r} belongs to no option; see --help")
+        except ValidationError as error:  # of settings that are given as options
+            cause = error.__cause__
+            problems = cause.errors() if isinstance(cause, pydantic.ValidationError) else []
+            said = [problem["msg"].removeprefix("Value error, ") for problem in problems] or [str(error)]
+            say(f"error: {'; '.join(said)}")
+        except (UserError, CycloptsError) as error:
+            say(f"error: {error}")
+        except OSError as error:
+            say(f"error: {error.filename or 'input or output'}: {error.strerror or error}")
+        except KeyboardInterrupt as interrupt:
+            say(f"interrupted; {interrupt}" if interrupt.args else "interrupted")
+            return INTERRUPTED
+    return BAD_INPUT
+
+
+def _on_ranks(command: Callable[[], Any]) -> int:
+    try:
+        from solvers.fem.ranks import lead
+    except ImportError as error:
+        raise UserError(f"mpirun needs {error.name}, which comes with DOLFINx; run without it") from None
+    return lead(command, guarded)
