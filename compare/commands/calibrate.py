@@ -27,19 +27,21 @@ def calibrate(
     ],
     square: Annotated[float, Parameter(help="Side of a square, mm.")],
     marker: Annotated[float | None, Parameter(help="Side of a marker of a ChArUco board, mm.")] = None,
-    dictionary: Annotated[str, Parameter(help="Of the markers of a ChArUco board.")] = "5X5_100",
+    dictionary: Annotated[str, Parameter(help="ArUco dictionary of a ChArUco board.")] = "5X5_100",
     model: Annotated[
         Literal["brown", "fisheye"],
-        Parameter(help="The lens: brown up to about 100 degrees of view, fisheye beyond."),
+        Parameter(help="Lens model: brown up to about 100 degrees of view, fisheye beyond."),
     ] = "brown",
     k3: Annotated[bool, Parameter(negative="", help="Fit the third radial coefficient too.")] = False,
     without: Annotated[
         tuple[str, ...],
-        Parameter(negative="", show_default=False, help="A photograph to leave out; may be repeated."),
+        Parameter(negative="", show_default=False, help="Photograph to leave out; may be repeated."),
     ] = (),
-    out: Annotated[Path, Parameter(group=OUTPUT, help="The camera, JSON or YAML.")] = Path("out/camera.json"),
+    out: Annotated[Path, Parameter(group=OUTPUT, help="Camera file, .json or .yaml.")] = Path(
+        "out/camera.json"
+    ),
 ) -> int:
-    """Calibrate a camera from photographs of a chessboard or ChArUco board, and say how well it is known."""
+    """Calibrate a camera from photographs of a chessboard or ChArUco board."""
     from compare.camera.calibration_chart import draw_calibration
     from compare.camera.calibration_table import calibration_table, view_table
     from vision.calibration.board_parser import parse_board

@@ -1,4 +1,4 @@
-"""The one-shot main job: solve one finger with several solvers and compare them."""
+"""The main job: solve one finger with several solvers and compare them."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,37 +24,34 @@ def compare(
     solvers: Annotated[
         str | None,
         Parameter(
-            help="Names with commas between; `pinnray solvers` lists them. Without it those of the complete "
-            "table that can do the job."
+            help="Names of solvers, separated by commas; `pinnray solvers` lists them. Default: those "
+            "of the complete table that support the problem."
         ),
     ] = None,
     measurements: Annotated[
         str | None,
         Parameter(
             help="CSV file of marker displacements (x_mm, y_mm, u_mm, v_mm), or a video, a folder or glob of "
-            "pictures to track. Without it they are simulated by a finite-strain run, and everything that "
-            "shows them says so."
+            "pictures to track. Default: displacements simulated by a finite-strain run, labelled as such."
         ),
     ] = None,
     film: FilmOptions = FilmOptions(),
     reference: Annotated[
-        str | None, Parameter(help="Solver that the others are compared with; fem, else the first.")
+        str | None, Parameter(help="Solver that the others are compared with; default fem, else the first.")
     ] = None,
-    out: Annotated[
-        Path | None, Parameter(group=OUTPUT, help="Output folder; out/DESIGN if not given.")
-    ] = None,
+    out: Annotated[Path | None, Parameter(group=OUTPUT, help="Output folder; default out/DESIGN.")] = None,
     resume: Annotated[
-        bool, Parameter(group=OUTPUT, help="Take over solutions that an earlier run finished.")
+        bool, Parameter(group=OUTPUT, help="Reuse solutions that an earlier run finished.")
     ] = False,
-    quiet: Annotated[bool, Parameter(group=OUTPUT, help="No progress, no table.")] = False,
+    quiet: Annotated[bool, Parameter(group=OUTPUT, help="Show no progress and no table.")] = False,
     json_: Annotated[
         bool, Parameter(name="--json", group=OUTPUT, help="Print metrics.json and nothing else.")
     ] = False,
 ) -> int:
     """Solve one finger with several solvers and compare them at the markers and on the shared mesh.
 
-    Draws the finger, meshes it once, solves it with every solver, and writes a report with tables, pictures
-    and fields. Examples:
+    Draws and meshes the finger, solves it with every solver, and writes a report with tables, pictures and
+    fields. Examples:
 
     - compare --design default
     - compare --design slender --solvers fem

@@ -1,4 +1,4 @@
-"""Solvers judged by what they were not given."""
+"""Score solvers on held-out markers, loads and fields."""
 
 from pathlib import Path
 from typing import Annotated
@@ -18,34 +18,31 @@ def crossval(
     solvers: Annotated[
         str,
         Parameter(
-            help="Names with commas; one that can choose its weights is there in three ways (linear law)."
+            help="Names of solvers, separated by commas. One that can choose the weight of the markers runs "
+            "in three variants (linear law)."
         ),
     ] = "fem,fem-nonlinear,fem-asm,fem-id,gp,statfem",
     schemes: Annotated[
-        str, Parameter(help="What is held out: one-out, tip-out, random, load-out, with commas.")
+        str, Parameter(help="Hold-out schemes, separated by commas.")
     ] = "one-out,tip-out,random,load-out",
-    seeds: Annotated[int, Parameter(help="How often noise is drawn.")] = 5,
+    seeds: Annotated[int, Parameter(help="Number of noise draws.")] = 5,
     noise: Annotated[
         float, Parameter(help="Standard deviation of a simulated marker's displacement, mm.")
     ] = 0.005,
     measurements: Annotated[
         Path | None,
-        Parameter(
-            show_default=False, help="CSV file of marker displacements; without it they are simulated."
-        ),
+        Parameter(show_default=False, help="CSV file of marker displacements; default: simulated."),
     ] = None,
-    processes: Annotated[
-        int | None, Parameter(help="Solvers at a time; as many as there are cores if not given.")
-    ] = None,
+    processes: Annotated[int | None, Parameter(help="Solvers run at a time; default: one per core.")] = None,
     out: Annotated[
-        Path | None, Parameter(group=OUTPUT, help="Output folder; out/crossval-DESIGN if not given.")
+        Path | None, Parameter(group=OUTPUT, help="Output folder; default out/crossval-DESIGN.")
     ] = None,
 ) -> int:
-    """Judge solvers by markers, loads and fields that they were not given.
+    """Score solvers on markers, loads and fields that they were not given.
 
-    The truth is a finite-strain simulation with a sliding contact on a finer mesh, the markers follow it with
-    noise. Elements of 0.5 mm, not 0.25, unless --mesh-size is given. Finished folds are kept: the same
-    command again goes on where it was stopped.
+    The truth is a finite-strain simulation with a sliding contact on a finer mesh; the marker displacements
+    are taken from it with noise. The default --mesh-size is 0.5. Finished folds are kept: the same command
+    again goes on where it was stopped.
     """
     from compare.commands.crossval_options import read_finger, read_schemes, read_variants
     from compare.commands.gridsearch_options import read_processes

@@ -1,6 +1,6 @@
 """Reading of the options of `pinnray crossval`."""
 
-from compare.commands.options import FingerOptions, SolverOptions
+from compare.commands.options import FingerOptions, SolverOptions, comma_list
 from compare.crossval.folds import ALL, SCHEMES
 from compare.crossval.study import ELEMENT_SIZE, SolverVariant, solver_variants
 from geometry.errors import UserError
@@ -27,7 +27,7 @@ def read_variants(options: SolverOptions, names: str, material: Material) -> lis
 def read_schemes(text: str) -> list[str]:
     """Names of schemes with commas between them."""
     held = [scheme for scheme in SCHEMES if scheme != ALL]
-    names = [name.strip() for name in text.split(",") if name.strip()]
+    names = comma_list(text)
     if unknown := next((name for name in names if name not in held), None):
         raise UserError(f"--schemes: there is no scheme {unknown!r}; there are {', '.join(held)}")
     if not names or len(set(names)) < len(names):

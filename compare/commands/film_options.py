@@ -15,20 +15,19 @@ FILM = Group("Camera", sort_key=4)
 @Parameter(name="*", group=FILM)
 @dataclass(frozen=True, kw_only=True)
 class FilmOptions:
-    """Content of a film besides the finger, and the method that measures it."""
+    """Camera, fiducials, marker colour and tracking method of a film."""
 
     camera: Annotated[
-        Path | None, Parameter(show_default=False, help="Its file, as `pinnray calibrate` writes it.")
+        Path | None, Parameter(show_default=False, help="Camera file of `pinnray calibrate`.")
     ] = None
     workspace: Annotated[
         Path | None,
-        Parameter(
-            show_default=False, help="JSON file of the fiducials; those around the design if not given."
-        ),
+        Parameter(show_default=False, help="JSON file of the fiducials; default: those around the design."),
     ] = None
-    colour: Annotated[str, Parameter(help="Of the markers, as `pinnray pick` prints it.")] = "dark"
+    colour: Annotated[str, Parameter(help="Colour of the markers, as printed by `pinnray pick`.")] = "dark"
     method: Annotated[
-        Literal["precise", "hough"], Parameter(help="How markers are found; hough is the paper's pipeline.")
+        Literal["precise", "hough"],
+        Parameter(help="Disc detector; hough is the paper's pipeline."),
     ] = "precise"
 
     def film(self, source: str) -> Film:

@@ -1,4 +1,4 @@
-"""The paper's search for its learning rate and weights."""
+"""Repeat the paper's grid search."""
 
 from pathlib import Path
 from typing import Annotated
@@ -15,25 +15,23 @@ def gridsearch(
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
     *,
-    learning_rates: Annotated[str, Parameter(help="With commas between.")] = "1e-4,1e-3,1e-2",
+    learning_rates: Annotated[str, Parameter(help="Learning rates, separated by commas.")] = "1e-4,1e-3,1e-2",
     bc_weights: Annotated[
-        str, Parameter(help="Weights of the boundary conditions in the loss, MPa/mm², with commas.")
+        str, Parameter(help="Weights of the boundary conditions in the loss, MPa/mm².")
     ] = "0.1,1,10,100,1000",
     epochs: Annotated[
         int | None,
-        Parameter(help="Of every run; 2,000 if not given, a short training, and 60,000 with --preset paper."),
+        Parameter(help="Epochs of every run; default 2,000 (short), or 60,000 with --preset paper."),
     ] = None,
-    processes: Annotated[
-        int | None, Parameter(help="Runs at a time; as many as there are cores if not given.")
-    ] = None,
+    processes: Annotated[int | None, Parameter(help="Runs trained at a time; default: one per core.")] = None,
     out: Annotated[
-        Path | None, Parameter(group=OUTPUT, help="Output folder; out/gridsearch-DESIGN if not given.")
+        Path | None, Parameter(group=OUTPUT, help="Output folder; default out/gridsearch-DESIGN.")
     ] = None,
 ) -> int:
-    """Repeat the paper's search for the learning rate and the weight of the boundary conditions.
+    """Repeat the paper's grid search for the learning rate and the weight of the boundary conditions.
 
-    Trains the paper's networks at every point of the grid, each run in a process of its own, and ranks them
-    by their distance from `fem`. Finished runs are kept: the same command again goes on where it was stopped.
+    Trains the paper's network at every point of the grid, each in a process of its own, and ranks the runs by
+    their distance from `fem`. Finished runs are kept: the same command again goes on where it was stopped.
     """
     from compare.commands.gridsearch_options import read_processes, read_settings, read_values
     from compare.gridsearch.search import GridSearch, search_grid

@@ -1,4 +1,4 @@
-"""What the options of `pinnray gridsearch` stand for."""
+"""Reading of the options of `pinnray gridsearch`."""
 
 from dataclasses import replace
 from math import isfinite
@@ -9,13 +9,13 @@ from geometry.errors import UserError
 
 SOLVER = "pinn-std"
 SHORT = 2_000
-"""Epochs of a run unless something else is asked for: minutes on a CPU with the usual mesh."""
+"""Default epochs of a run: minutes on a CPU with the usual mesh."""
 
 SEARCHED = {"learning_rate": "--learning-rates", "bc_weight": "--bc-weights"}
 
 
 def read_settings(options: SolverOptions, epochs: int | None) -> dict[str, object]:
-    """Settings of the paper's networks that all runs share."""
+    """The settings of the paper's network that all runs share."""
     if options.preset not in (None, "paper"):
         raise UserError(f"--preset {options.preset}: the search is for the settings of the preset paper")
     keys = [text.partition("=")[0].removeprefix(f"{SOLVER}.") for text in options.solver_set]

@@ -1,12 +1,8 @@
 """Mesh the finger."""
 
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter
-from rich.console import Console
-
-from compare.commands.options import Adapt, FingerOptions, PhysicsOptions
+from compare.commands.options import Adapt, FingerOptions, OutputFolder, PhysicsOptions
 from compare.runtime.exits import NOT_CONVERGED
 from geometry.errors import UserError
 
@@ -16,11 +12,11 @@ def mesh(
     physics: PhysicsOptions = PhysicsOptions(),
     *,
     adapt: Adapt = None,
-    out: Annotated[Path, Parameter(help="Folder for the files.")] = Path("out/mesh"),
+    out: OutputFolder = Path("out/mesh"),
 ) -> int:
-    """Mesh the finger: the shared mesh as a VTU and a NumPy file, and a picture of it.
+    """Mesh the finger: write the mesh as a VTU and a NumPy file, and a picture.
 
-    Material and load matter for --adapt only.
+    Material and load matter only with --adapt.
     """
     from compare.evaluation.shared_mesh import shared_mesh, tolerance_reached, write_rounds
     from compare.figures.mesh_drawing import draw_mesh
@@ -31,7 +27,7 @@ def mesh(
     material, load = physics.read()
     if out.is_file():
         raise UserError(f"--out {out}: this is a file; name a folder")
-    with Stages(Console(stderr=True)) as stages:
+    with Stages() as stages:
         triangles, adaptation = shared_mesh(
             chosen, settings, stages, tolerance=adapt, material=material, load=load
         )

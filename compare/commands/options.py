@@ -1,4 +1,4 @@
-"""Options that several commands share, and the objects that they stand for."""
+"""Options that several commands share, and the objects that they describe."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -21,50 +21,56 @@ from solvers.registry import PRESETS, make_solver
 from solvers.solver import Solver
 
 RADIUS = 5.0
-"""Of a cylinder for which none is given, mm."""
+"""Default radius of the cylinder, mm."""
+
+PRESET_MEANINGS = {
+    "fast": "random hidden weights, output layer solved exactly",
+    "paper": "the paper's training",
+}
+"""The presets of solvers, in words."""
 
 FINGER = Group("Finger", sort_key=1)
 PHYSICS = Group("Physics", sort_key=2)
 TRAINING = Group("Solvers' settings", sort_key=3)
 OUTPUT = Group("Output", sort_key=4, default_parameter=Parameter(negative="", show_default=False))
 
+OutputFolder = Annotated[Path, Parameter(group=OUTPUT, show_default=True, help="Output folder.")]
 
 Adapt = Annotated[
     float | None,
     Parameter(
         group=FINGER,
         show_default=False,
-        help="Refine the mesh until fem knows the displacements of the markers to this, mm, by its own "
-        "estimate of its error.",
+        help="Refine the mesh until the estimated error of fem at the markers is below this, mm.",
     ),
 ]
-"""An option of the commands that solve on the mesh that they make."""
+"""Tolerance of mesh refinement, for the commands that solve."""
 
 
 @Parameter(name="*", group=FINGER)
 @dataclass(frozen=True, kw_only=True)
 class FingerOptions:
-    """Which finger, and how it is meshed."""
+    """The finger and its mesh."""
 
-    design: Annotated[str, Parameter(help="A preset (default, slender, ...) or a .toml file.")] = "default"
+    design: Annotated[str, Parameter(help="Preset (default, slender, ...) or .toml file.")] = "default"
     set: Annotated[
         tuple[str, ...],
         Parameter(
             negative="",
             show_default=False,
-            help="Change a parameter, as in --set rib_count=6 or N=6; may be repeated.",
+            help="Change a parameter, such as rib_count=6 or N=6; may be repeated.",
         ),
     ] = ()
     mesh_size: Annotated[
         float | None,
-        Parameter(help="Elements in walls and ribs, mm; up to 4 times larger in the tip; 0.25 if not given."),
+        Parameter(help="Element size in walls and ribs, mm, default 0.25; up to 4 times larger in the tip."),
     ] = None
 
     def read(self, preset: str | None = None) -> tuple[Design, MeshSettings]:
-        """The design and the mesh settings, which a preset of the solvers may have of its own."""
+        """The design and the mesh settings; a preset of the solvers may have its own mesh settings."""
         changes = parse_overrides(self.set)
         design = load_design(self.design, changes)
-        if changes and "name" not in changes:  # another finger, so another name and output folder
+        if changes and "name" not in changes:  # so that it has its own output folder
             design = design.replaced(name=_changed_name(design, changes))
         settings = job_defaults(preset).mesh.model_dump()
         if self.mesh_size is not None:
@@ -76,7 +82,7 @@ class FingerOptions:
 
 
 def _changed_name(design: Design, changes: Mapping[str, object]) -> str:
-    """The preset's name with the changes, of the letters and the length that a name may have."""
+    """The preset's name with the changes, in the letters and the length that a name may have."""
     parts = (f"-{name}-{value}" for name, value in changes.items())
     name = design.name + re.sub(r"[^A-Za-z0-9._-]", "", "".join(parts))
     return name if len(name) <= 64 else f"{name[:55]}-{design.digest[:8]}"
@@ -90,36 +96,38 @@ class PhysicsOptions:
     young: Annotated[float, Parameter(help="Young's modulus, MPa.")] = 11.4
     poisson: Annotated[float, Parameter(help="Poisson's ratio.")] = 0.45
     plane: Annotated[
-        Literal["strain", "stress"], Parameter(help="Plane strain, or plane stress as the paper's equations.")
+        Literal["strain", "stress"],
+        Parameter(help="Plane strain, or plane stress as in the paper."),
     ] = "strain"
     law: Annotated[
         LawName | None,
         Parameter(
-            show_default=False, help="Material law of the solvers that have it; each solver's usual one."
+            show_default=False, help="Material law of the solvers that have it; default: each solver's own."
         ),
     ] = None
     load: Annotated[
         Literal["mean", "point", "patch", "cylinder"] | None,
         Parameter(
-            help="mean: weighted mean displacement of the contact, the default; point: the paper's, whose "
-            "limit under refinement does not exist; patch: rigid; cylinder: rigid, frictionless."
+            help="Indenter. mean (default): prescribed weighted mean displacement of the contact; point: one "
+            "prescribed point, as in the paper, which has no limit under refinement; patch: rigid patch; "
+            "cylinder: rigid cylinder without friction."
         ),
     ] = None
     radius: Annotated[
-        float | None, Parameter(show_default=False, help="Of --load cylinder, mm; 5 if not given.")
+        float | None, Parameter(show_default=False, help="Radius of --load cylinder, mm, default 5.")
     ] = None
-    stroke: Annotated[float, Parameter(help="How far the indenter presses, mm.")] = 10.0
+    stroke: Annotated[float, Parameter(help="Travel of the indenter, mm.")] = 10.0
     direction: Annotated[
         float,
-        Parameter(help="Where it presses to: 0 straight into the finger, 90 along it to the tip, degrees."),
+        Parameter(help="Direction of the travel, degrees: 0 into the finger, 90 along it to the tip."),
     ] = 0.0
     slide: Annotated[
         bool,
-        Parameter(negative="", show_default=False, help="Let the contact slide along the finger: u free."),
+        Parameter(negative="", show_default=False, help="Let the contact slide along the finger (u free)."),
     ] = False
 
     def read(self, preset: str | None = None) -> tuple[Material, Load]:
-        """The material and the load, whose kind a preset of the solvers may choose."""
+        """The material and the load; a preset of the solvers may choose the kind of load."""
         if not 0 < self.stroke < inf:
             raise UserError(f"--stroke {self.stroke:g}: the indenter presses; give its travel, above 0 mm")
         if self.young == inf:
@@ -150,7 +158,7 @@ class PhysicsOptions:
             raise UserError(f"--{first['loc'][0]} {first['input']}: {said.lower()}") from None
 
     def check_law(self, solvers: Sequence[Solver]) -> None:
-        """Refuse a law that none of the solvers has."""
+        """Raise a `UserError` if none of the solvers has the law."""
         if self.law is not None and not any(self.law in solver.laws for solver in solvers):
             known = "; ".join(f"{solver.name} has {', '.join(solver.laws)}" for solver in solvers)
             raise UserError(f"--law {self.law}: none of the solvers has it ({known})")
@@ -159,16 +167,15 @@ class PhysicsOptions:
 @Parameter(name="*", group=TRAINING)
 @dataclass(frozen=True, kw_only=True)
 class SolverOptions:
-    """Settings of the solvers that are named elsewhere."""
+    """Settings of the chosen solvers."""
 
     preset: Annotated[
         str | None,
         Parameter(
             show_default=False,
-            help="Of pinn-std and pinn-asm. fast, the default: networks with random hidden weights whose "
-            "output layer is solved exactly. paper: the paper's networks and training, and its problem: a "
-            "uniform mesh of 91,006 nodes and --load point, unless --mesh-size or --load is given. On a "
-            "CPU its 60,000 epochs take many hours.",
+            help=f"Preset of pinn-std and pinn-asm. fast (default): {PRESET_MEANINGS['fast']}. paper: "
+            f"{PRESET_MEANINGS['paper']}, 60,000 epochs, many hours on a CPU; also takes the paper's uniform "
+            "mesh of 91,006 nodes and --load point, unless --mesh-size or --load is given.",
         ),
     ] = None
     solver_set: Annotated[
@@ -176,24 +183,24 @@ class SolverOptions:
         Parameter(
             negative="",
             show_default=False,
-            help="Change a solver's setting, as in --solver-set pinn-std.neurons=7; may be repeated.",
+            help="Change a setting of a solver, such as pinn-std.neurons=7; may be repeated.",
         ),
     ] = ()
     device: Annotated[
         str | None,
-        Parameter(show_default=False, help="cpu or cuda, for the solvers that can choose."),
+        Parameter(show_default=False, help="cpu or cuda, for the solvers that can use either."),
     ] = None
-    seed: Annotated[int, Parameter(help="Of every solver that draws random numbers.")] = 0
+    seed: Annotated[int, Parameter(help="Seed of the random numbers.")] = 0
 
     def read(self, names: str) -> list[Solver]:
-        """The solvers with these names, commas between them.
+        """The solvers with these names, separated by commas.
 
         Raises:
             UserError: If a solver, preset or setting does not exist or a text cannot be read.
         """
         if self.seed < 0:
             raise UserError(f"--seed {self.seed}: give a whole number from 0")
-        chosen = [name.strip() for name in names.split(",") if name.strip()]
+        chosen = comma_list(names)
         given = _settings(chosen, self.solver_set)
         if self.preset is not None:
             having = [name for name in given if self.preset in PRESETS.get(name, ())]
@@ -228,7 +235,7 @@ def _settings(names: list[str], texts: tuple[str, ...]) -> dict[str, dict[str, o
 
 
 def _made(name: str, given: Mapping[str, object], shared: Mapping[str, object]) -> Solver:
-    """The solver with its own settings and, of the shared ones, those that it has."""
+    """The solver with its own settings and those of the shared settings that it has."""
     try:
         solver = make_solver(name, **given)
         had = {key: value for key, value in shared.items() if key in solver.settings() and key not in given}
@@ -237,8 +244,13 @@ def _made(name: str, given: Mapping[str, object], shared: Mapping[str, object]) 
         raise UserError(f"solver {name!r} cannot be loaded: {error}") from None
 
 
+def comma_list(text: str) -> list[str]:
+    """The words of a text with commas between them."""
+    return [word for part in text.split(",") if (word := part.strip())]
+
+
 def existing(path: Path | None) -> Path | None:
-    """The path, refused if there is no such file."""
+    """The path, if it is None or a file; else a `UserError`."""
     if path is not None and not path.is_file():
         raise UserError(f"there is no file {path}")
     return path

@@ -10,7 +10,7 @@ from compare.runtime.exits import say
 from geometry.errors import UserError
 
 AMBIGUOUS = 0.05
-"""Share of the image that markers hardly have."""
+"""Share of the image above which the colour may not tell markers from the rest."""
 
 
 def pick(
@@ -24,20 +24,21 @@ def pick(
     *,
     at: Annotated[
         str | None,
-        Parameter(help="X,Y of a point in a marker, or X0,Y0,X1,Y1 of a rectangle filled by it, pixels."),
+        Parameter(help="Point X,Y in a marker, or rectangle X0,Y0,X1,Y1 inside it, pixels."),
     ] = None,
     colour: Annotated[
-        str | None, Parameter(help="A colour to look at instead: dark, or L*,L*:a*,a*:b*,b* as this prints.")
+        str | None,
+        Parameter(help="Colour to show instead: dark, or L*,L*:a*,a*:b*,b* as printed."),
     ] = None,
     radii: Annotated[
-        str | None, Parameter(help="LEAST,LARGEST radius, pixels: circles that this proposes are drawn too.")
+        str | None, Parameter(help="Radii LEAST,LARGEST, pixels: draw the circles found between them.")
     ] = None,
     frame: Annotated[int, Parameter(help="Number of the frame, from 0.")] = 0,
-    out: Annotated[Path, Parameter(group=OUTPUT, help="The picture.")] = Path("out/pick.png"),
+    out: Annotated[Path, Parameter(group=OUTPUT, help="Output picture.")] = Path("out/pick.png"),
 ) -> int:
-    """Derive the markers' colour from a point in one of them, and show what else has it.
+    """Measure the colour of the markers at a point in one of them.
 
-    Prints the colour as --colour takes it, and writes a picture in which the pixels that have it are magenta.
+    Prints the colour as --colour takes it, and writes a picture with all pixels of this colour in magenta.
     """
     from vision.discs.circle_proposals import highlight_colour, propose_circles
     from vision.discs.colour import read_colour
@@ -68,7 +69,7 @@ def pick(
 
 
 def read_numbers(option: str, text: str, *, counts: tuple[int, ...]) -> list[float]:
-    """Numbers with commas between, of which there must be as many as one of `counts`."""
+    """Numbers with commas between them; `counts` are the allowed numbers of numbers."""
     try:
         numbers = [float(part) for part in text.split(",")]
     except ValueError:

@@ -1,4 +1,4 @@
-"""What else a preset of a solver asks of a job, where the command line does not say otherwise."""
+"""Defaults of mesh, load and solvers that a preset brings with it."""
 
 from typing import Literal, NamedTuple
 
@@ -6,7 +6,7 @@ from geometry.mesh.settings import MeshSettings
 
 
 class JobDefaults(NamedTuple):
-    """Element sizes, kind of load and solvers of a job that leaves them open."""
+    """Default element sizes, kind of load and solvers."""
 
     mesh: MeshSettings = MeshSettings()
     load: Literal["mean", "point", "patch"] = "mean"

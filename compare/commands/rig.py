@@ -1,12 +1,11 @@
-"""Film the finger with a camera that does not exist."""
+"""Render a film of the finger with a virtual camera."""
 
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
-from rich.console import Console
 
-from compare.commands.options import OUTPUT, FingerOptions, PhysicsOptions, SolverOptions
+from compare.commands.options import OUTPUT, FingerOptions, OutputFolder, PhysicsOptions, SolverOptions
 from compare.commands.rig_options import EXPOSURE, MOTION, BoardOptions, CameraOptions, SceneOptions
 from vision.rig.exposure import Exposure
 from vision.rig.motion import Motion
@@ -20,8 +19,8 @@ def rig(
     solver: Annotated[
         str | None,
         Parameter(
-            help="Whose displacements are filmed; if not given, those of the finite-strain simulation that "
-            "`compare` takes for measurements."
+            help="Solver of the filmed displacements; default: the finite-strain simulation that `compare` "
+            "takes for measurements."
         ),
     ] = None,
     lens: CameraOptions = CameraOptions(),
@@ -29,16 +28,14 @@ def rig(
     motion: Annotated[Motion, Parameter(name="*", group=MOTION)] = Motion(),
     scene: SceneOptions = SceneOptions(),
     boards: BoardOptions = BoardOptions(),
-    codec: Annotated[
-        str, Parameter(group=OUTPUT, help="ffv1 or png, which lose nothing; mjpg or mp4v.")
-    ] = "ffv1",
-    out: Annotated[Path, Parameter(group=OUTPUT, help="Output folder.")] = Path("out/rig"),
+    codec: Annotated[str, Parameter(group=OUTPUT, help="ffv1 or png (lossless), mjpg or mp4v.")] = "ffv1",
+    out: OutputFolder = Path("out/rig"),
 ) -> int:
-    """Render what a camera would have seen of a finger that is pressed, with the truth beside it.
+    """Render a film of a pressed finger, and write the true marker positions beside it.
 
     Writes a video, the true positions of the markers in every frame, the camera, the workspace, and
-    photographs of a calibration board if asked for: all that is needed to track the markers and to score how
-    well that went. --seed is of the noise too. Examples:
+    photographs of a calibration board with --boards: everything needed to track the markers and to score the
+    tracking. --seed also seeds the noise. Examples:
 
     - pinnray rig --tilt 3 --noise 2 --blur 0.8 --seed 1
     - pinnray rig --boards 20 --board 9x6 --square 8
@@ -62,7 +59,7 @@ def rig(
     board, covered = boards.read(), scene.covered()
     check_codec(codec)
     check_output(out)
-    with Stages(Console(stderr=True)) as stages:
+    with Stages() as stages:
         mesh, displacement, source = filmed(
             design, mesh_settings, material, load, options.read(solver or ""), stages
         )

@@ -1,4 +1,4 @@
-"""Options of the virtual rig, and the objects that they stand for."""
+"""Options of the virtual rig, and the objects that they describe."""
 
 import re
 from dataclasses import dataclass
@@ -21,29 +21,28 @@ SCENE = Group("Scene", sort_key=7)
 BOARDS = Group("Calibration", sort_key=8)
 
 MOST_PIXELS = 4_000_000
-"""Of a frame: its cells, up to 16 to a pixel, have to fit into the memory."""
+"""Largest frame: its cells, up to 16 per pixel, have to fit into the memory."""
 
 
 @Parameter(name="*", group=CAMERA)
 @dataclass(frozen=True, kw_only=True)
 class CameraOptions:
-    """What films, and from where."""
+    """The camera and its pose."""
 
-    size: Annotated[str, Parameter(help="Of the frames, pixels.")] = "1280x720"
+    size: Annotated[str, Parameter(help="Size of the frames, pixels.")] = "1280x720"
     camera: Annotated[
-        Path | None,
-        Parameter(show_default=False, help="A calibrated camera instead of the default one of that size."),
+        Path | None, Parameter(show_default=False, help="Camera file; default: a camera of that size.")
     ] = None
     tilt: Annotated[
-        float, Parameter(help="Between the optical axis and the finger's z axis, degrees; at most 30.")
+        float, Parameter(help="Angle between the optical axis and the finger's z axis, degrees, up to 30.")
     ] = 0.0
     tilt_direction: Annotated[
-        float, Parameter(help="Of the axis of the tilt in the image, from right to down, degrees.")
+        float, Parameter(help="Direction of the tilt axis in the image, from right to down, degrees.")
     ] = 60.0
-    turn: Annotated[float, Parameter(help="Of the camera about the optical axis, degrees.")] = 0.0
+    turn: Annotated[float, Parameter(help="Rotation of the camera about its optical axis, degrees.")] = 0.0
 
     def read(self, workspace: Workspace) -> "tuple[Camera, Pose]":
-        """The camera, and where it has the workspace."""
+        """The camera and its pose."""
         from vision.calibration.camera_file import load_camera
         from vision.rig.virtual_camera import default_camera, viewing_pose
 
@@ -64,7 +63,7 @@ class CameraOptions:
 @Parameter(name="*", group=SCENE)
 @dataclass(frozen=True, kw_only=True)
 class SceneOptions:
-    """What is around the finger, and before it."""
+    """Paint and occlusion of the markers."""
 
     paint: Annotated[Literal["dark", "red", "green", "blue"], Parameter(help="Colour of the markers.")] = (
         "dark"
@@ -75,14 +74,12 @@ class SceneOptions:
         Parameter(
             negative="",
             show_default=False,
-            help="Let a cable hide a share of a marker's diameter, as in --cover 5=0.4; may be repeated.",
+            help="Cover a share of a marker's diameter with a cable, such as 5=0.4; may be repeated.",
         ),
     ] = ()
-    cover_paint: Annotated[
-        Literal["dark", "light"], Parameter(help="Of the cables, like dark markers or unlike.")
-    ] = "dark"
+    cover_paint: Annotated[Literal["dark", "light"], Parameter(help="Colour of the cables.")] = "dark"
     cover_during: Annotated[
-        Literal["all", "rest", "moving", "held"], Parameter(help="When the cables are there.")
+        Literal["all", "rest", "moving", "held"], Parameter(help="Part of the film that shows the cables.")
     ] = "all"
 
     def covered(self) -> dict[int, float]:
@@ -98,10 +95,10 @@ class SceneOptions:
 @Parameter(name="*", group=BOARDS)
 @dataclass(frozen=True, kw_only=True)
 class BoardOptions:
-    """Photographs to calibrate the camera with."""
+    """Photographs of a calibration board."""
 
     boards: Annotated[int, Parameter(help="Number of photographs of a calibration board.")] = 0
-    board: Annotated[str, Parameter(help="Such as 9x6, or charuco:8x6; as of `pinnray calibrate`.")] = "9x6"
+    board: Annotated[str, Parameter(help="Board as for `pinnray calibrate`: 9x6, charuco:8x6.")] = "9x6"
     square: Annotated[float, Parameter(help="Side of a square, mm.")] = 8.0
     marker: Annotated[
         float | None, Parameter(show_default=False, help="Side of a marker of a ChArUco board, mm.")

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
-from rich.console import Console
 
 from compare.commands.options import Adapt, FingerOptions, PhysicsOptions, SolverOptions, existing
 from compare.runtime.exits import NOT_CONVERGED
@@ -13,7 +12,7 @@ from geometry.errors import UserError
 
 
 def solve(
-    solver: Annotated[str, Parameter(help="Name of the solver; `pinnray solvers` lists them.")],
+    solver: Annotated[str, Parameter(help="Name of a solver; `pinnray solvers` lists them.")],
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
@@ -21,11 +20,11 @@ def solve(
     adapt: Adapt = None,
     measurements: Annotated[
         Path | None,
-        Parameter(help="CSV file of marker displacements, for a solver that assimilates them."),
+        Parameter(help="CSV file of marker displacements, for an assimilating solver."),
     ] = None,
-    out: Annotated[Path, Parameter(help="The VTU file for the fields.")] = Path("out/solution.vtu"),
+    out: Annotated[Path, Parameter(help="VTU file of the fields.")] = Path("out/solution.vtu"),
 ) -> int:
-    """Solve one finger with one solver and write its fields, without comparing anything."""
+    """Solve one finger with one solver and write its fields."""
     from compare.evaluation.convergence import with_certificates
     from compare.evaluation.force_displacement import force_curves, write_force_displacement
     from compare.evaluation.labels import solver_label
@@ -53,7 +52,7 @@ def solve(
         given = read_measurements(file, marker_radius=chosen.marker_radius)
     if given and not assimilates(made):
         raise UserError(f"{made.name} does not assimilate markers; `compare` compares it with --measurements")
-    with Stages(Console(stderr=True)) as stages:
+    with Stages() as stages:
         triangles, adaptation = shared_mesh(
             chosen,
             settings,

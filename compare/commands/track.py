@@ -7,7 +7,7 @@ from cyclopts import Parameter
 from rich.console import Console
 
 from compare.commands.film_options import FilmOptions
-from compare.commands.options import OUTPUT, FingerOptions
+from compare.commands.options import OUTPUT, FingerOptions, OutputFolder
 from compare.runtime.exits import say
 
 
@@ -23,17 +23,15 @@ def track(
     options: FilmOptions = FilmOptions(),
     *,
     live: Annotated[
-        bool, Parameter(negative="", help="Print the displacements of every frame as it comes.")
+        bool, Parameter(negative="", help="Show the displacements of every frame as it comes.")
     ] = False,
     without_video: Annotated[bool, Parameter(group=OUTPUT, help="Write no annotated video.")] = False,
-    out: Annotated[Path, Parameter(group=OUTPUT, help="Output folder.")] = Path("out/track"),
+    out: OutputFolder = Path("out/track"),
 ) -> int:
-    """Measure how the markers of a finger move, from a video that shows it at rest, pressed, and held.
+    """Measure marker displacements from a video that shows the finger at rest, pressed, and held.
 
-    Writes the displacements with standard deviations as `compare --measurements` reads them, the way of every
-    marker, and annotated pictures to check by eye. An interrupt from the keyboard ends a camera or a pipe.
-
-    For example:
+    Writes the displacements with standard deviations for `compare --measurements`, the trajectory of every
+    marker, and annotated pictures to check by eye. Ctrl-C ends a camera or a pipe. Examples:
 
     - pinnray track video.mkv --camera camera.json
     - pinnray track frames/ --camera camera.json --workspace workspace.json --design slender
