@@ -1,4 +1,4 @@
-"""A calibration to check by eye: its residuals, what it covers, and a photograph without its distortion."""
+"""A calibration to check by eye: residuals, coverage, and a photograph before and after undistortion."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -16,18 +16,18 @@ from vision.calibration.camera_calibration import Calibration
 
 MARGIN, GAP, HEAD, TITLE = 0.12, 0.14, 0.56, 0.2
 LONGEST = 0.05
-"""Length of the 95th percentile of the residuals in the picture, in widths of the image."""
+"""Drawn length of the 95th percentile of the residuals, in image widths."""
 COVERED = "#56b4e9"
 
 
 def draw_calibration(path: Path, calibration: Calibration, name: str, photograph: NDArray[np.uint8]) -> None:
-    """Draw the residuals of all photographs, and one of them as it was taken and undistorted.
+    """Draw the residuals of all photographs, and one photograph before and after undistortion.
 
     Args:
-        path: Of the picture.
-        calibration: What was found.
-        name: Of the photograph.
-        photograph: Shape (height, width).
+        path: The picture.
+        calibration: The calibration.
+        name: Name of the photograph.
+        photograph: Its grey levels, shape (height, width).
     """
     camera = calibration.camera
     shape = camera.height / camera.width
@@ -39,7 +39,7 @@ def draw_calibration(path: Path, calibration: Calibration, name: str, photograph
         heading(
             drawn,
             f"Calibration from {len(calibration.views)} photographs",
-            f"Lines: from every corner to where the fit puts it, {factor:g} times as long; rms "
+            f"Lines: reprojection errors of the corners, {factor:g} times as long; rms "
             f"{calibration.rms:.3f} px, held out {calibration.held_out_rms:.3f} px.\n"
             f"Blue: inside a board at least once, {100 * calibration.coverage:.0f} % of the image.",
         )
@@ -55,7 +55,7 @@ def draw_calibration(path: Path, calibration: Calibration, name: str, photograph
 
 
 def undistorted(image: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:
-    """What a pinhole with the camera's matrix would have taken, to look at, not to measure in."""
+    """The image of a pinhole camera with the same matrix, to look at, not to measure in."""
     height, width = image.shape[:2]
     pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 2)
     places = camera.distort(pixels).astype(np.float32).reshape(height, width, 2)
@@ -75,7 +75,7 @@ def _residuals(axes: Axes, calibration: Calibration, factor: float) -> None:
 
 
 def _image(axes: Axes, camera: Camera) -> Axes:
-    """Axes in pixels, y down, with a frame and nothing else."""
+    """Axes in pixels, y down, with a frame only."""
     axes.set(xlim=(-0.5, camera.width - 0.5), ylim=(camera.height - 0.5, -0.5), xticks=[], yticks=[])
     axes.spines[:].set_visible(True)
     return axes
@@ -86,6 +86,6 @@ def _all(arrays: Iterable[FloatArray]) -> FloatArray:
 
 
 def _round(factor: float) -> float:
-    """A number of one digit, 1, 2 or 5, that is no larger."""
+    """The factor rounded down to 1, 2 or 5 times a power of ten."""
     power = 10.0 ** np.floor(np.log10(factor))
     return float(power * max(digit for digit in (1, 2, 5) if digit * power <= factor))

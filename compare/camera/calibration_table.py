@@ -8,7 +8,7 @@ from vision.calibration.camera_calibration import Calibration
 
 
 def calibration_table(calibration: Calibration) -> Table:
-    """The camera with standard deviations, and how well it predicts where corners are seen."""
+    """The intrinsics with standard deviations, and the reprojection errors."""
     camera = calibration.camera
     table = Table("camera", "value", "±", "unit", box=SIMPLE_HEAD)
     deviations = camera.standard_deviations or (0.0,) * len(camera.intrinsic_names)
@@ -24,7 +24,7 @@ def calibration_table(calibration: Calibration) -> Table:
 
 
 def view_table(calibration: Calibration, *, most: int = 15) -> Table:
-    """The errors of the photographs, the worst first."""
+    """The reprojection errors of the photographs, largest first."""
     table = Table("photograph", "corners", "rms error, px", box=SIMPLE_HEAD)
     errors = sorted(calibration.view_errors.items(), key=lambda entry: -entry[1])
     for name, error in errors[:most]:

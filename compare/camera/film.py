@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from compare.runtime.provenance import file_digest
 from geometry.finger.parameters import Parameters
 
-if TYPE_CHECKING:  # OpenCV comes with it, and `--help` has to be quick
+if TYPE_CHECKING:  # it imports OpenCV, and `--help` has to be quick
     from vision.tracking.scene import FilmedScene
 
 
@@ -19,8 +19,8 @@ class Film:
         source: Video, folder or glob of pictures, number of a camera, or "-".
         camera: Camera file, as `pinnray calibrate` writes it; None if the camera is not calibrated.
         workspace: JSON file of the fiducials; those around the design if None.
-        colour: Of the markers, as `pinnray pick` prints it.
-        method: How discs are localised; "hough" is the paper's pipeline.
+        colour: Colour of the markers, as printed by `pinnray pick`.
+        method: Detector of the discs; "hough" is the paper's pipeline.
     """
 
     source: str

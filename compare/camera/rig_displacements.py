@@ -1,4 +1,4 @@
-"""The displacements that the virtual rig films."""
+"""The displacements shown in a film of the virtual rig."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ from solvers.problem import Load, Material, Problem
 from solvers.solver import Solver, with_law
 
 
-def filmed(
+def rig_displacements(
     design: Design,
     settings: MeshSettings,
     material: Material,
@@ -22,18 +22,18 @@ def filmed(
     solvers: Sequence[Solver],
     stages: Stages,
 ) -> tuple[TriangleMesh, FloatArray, str]:
-    """The mesh, its nodes' displacements, shape (n, 2), mm, and one sentence on where they come from.
+    """The mesh, its nodal displacements, shape (n, 2), mm, and one sentence on their source.
 
     Args:
         design: The finger.
-        settings: Of its mesh.
-        material: Its elastic law, for a solver that has it.
-        load: What moves the finger.
-        solvers: Whose displacements they are; the virtual experiment's if there is none.
-        stages: Told of the progress.
+        settings: Element sizes.
+        material: The elastic law; a solver without it takes its own.
+        load: The prescribed displacement of the contact.
+        solvers: The solver of the displacements; none for the virtual experiment.
+        stages: Shows the progress.
 
     Raises:
-        UserError: If there are several solvers, or the one does not converge.
+        UserError: If there are several solvers, or the solver does not converge.
     """
     if len(solvers) > 1:
         raise UserError("the rig films one finger; name one --solver")
@@ -47,6 +47,6 @@ def filmed(
     with stages.stage(solver.name) as progress:
         solution = solver.solve(problem, progress)
     if not solution.status.converged:
-        raise UserError(f"{solver.name} {solution.status.message}; what it gave is not filmed")
+        raise UserError(f"{solver.name} {solution.status.message}; its displacements are not filmed")
     source = f"displacements of {solver.name}, rendered by the virtual rig; no camera was involved"
     return mesh, solution.displacement(mesh.at_nodes()), source

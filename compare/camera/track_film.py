@@ -1,4 +1,4 @@
-"""Track a video and write what came of it: numbers, and pictures to check them by eye."""
+"""Tracks a film and writes the displacements, the trajectories and pictures to check them by eye."""
 
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -6,15 +6,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from compare.camera.film import Film
+from compare.evaluation.number_format import NONE
 from compare.figures import Figure
 from compare.runtime.csv_files import Cell, write_csv
+from compare.runtime.terminal_table import terminal_table
 from geometry.atomic import write_json
 from geometry.finger.parameters import Parameters
 from geometry.observations import Observations
+from solvers.solver import Progress
 from vision.frames.frame import Frame, Image
 from vision.frames.pictures import write_picture
 from vision.frames.video import VideoWriter, open_frames
@@ -24,31 +26,28 @@ from vision.tracking.frame_tracker import FrameDetections
 from vision.tracking.tracker import track
 from vision.tracking.trajectories import Tracking
 
-Report = Callable[[float, str], None]
-Watch = Callable[[Frame, FrameDetections], None]
-
 
 def track_film(
     film: Film,
     design: Parameters,
     folder: Path,
-    report: Report,
+    report: Progress,
     *,
     video: bool = True,
-    watch: Watch | None = None,
+    watch: Callable[[Frame, FrameDetections], None] | None = None,
 ) -> tuple[Tracking, Observations]:
     """Track a film and write `observations.csv`, `tracks.csv`, `track.json` and pictures into a folder.
 
     Args:
-        film: What is tracked.
+        film: The film.
         design: The finger in it.
-        folder: That exists.
-        report: Is told the share that is done.
-        video: Whether the annotated video is written too.
-        watch: Is told what every frame shows.
+        folder: An existing folder.
+        report: Called with the fraction done and a short text.
+        video: Whether to write the annotated video too.
+        watch: Called with every frame and its detections.
 
     Raises:
-        UserError: If the film does not show what it should.
+        UserError: If the film cannot be read or tracked.
     """
     scene = film.scene(design)
     kept: dict[str, tuple[Image, FrameDetections]] = {}
@@ -84,7 +83,7 @@ def track_film(
 
 
 def _sentence(film: Film, tracking: Tracking) -> str:
-    """Where the numbers come from and how good they are."""
+    """One sentence on the source and the accuracy of the displacements."""
     initial, final = (len(end) for end in tracking.rest)
     deviations = np.sqrt(np.diag(tracking.displacement_covariance)) if tracking.visible.any() else np.zeros(1)
     camera = "a calibrated camera" if film.camera else "no calibrated camera"
@@ -96,27 +95,21 @@ def _sentence(film: Film, tracking: Tracking) -> str:
 
 
 def track_rows(tracking: Tracking) -> list[dict[str, Cell]]:
-    """A row for every marker in every frame; empty cells where it was not seen."""
-    rows: list[dict[str, Cell]] = []
-    positions = tracking.positions
+    """A row for every marker in every frame; empty cells where it was not detected."""
+    names = ("x_px", "y_px", "std_x_px", "std_y_px", "x_mm", "y_mm")
     deviations = np.sqrt(np.diagonal(tracking.covariances, axis1=2, axis2=3))
-    for frame, time in enumerate(tracking.times.tolist()):
-        for marker in range(len(tracking.expected)):
-            seen = bool(np.isfinite(tracking.pixels[frame, marker]).all())
-            values = [*tracking.pixels[frame, marker], *deviations[frame, marker], *positions[frame, marker]]
-            names = ("x_px", "y_px", "std_x_px", "std_y_px", "x_mm", "y_mm")
-            row: dict[str, Cell] = {
-                "frame": frame,
-                "time_s": time,
-                "marker": marker + 1,
-                "visible": int(seen),
-            }
-            rows.append(row | {name: float(v) if seen else "" for name, v in zip(names, values, strict=True)})
-    return rows
+    values = np.concatenate([tracking.pixels, deviations, tracking.positions], axis=2).tolist()
+    detected = np.isfinite(tracking.pixels).all(axis=2)
+    return [
+        {"frame": frame, "time_s": time, "marker": marker + 1, "visible": int(seen)}
+        | {name: value if seen else "" for name, value in zip(names, row, strict=True)}
+        for frame, time in enumerate(tracking.times.tolist())
+        for marker, (seen, row) in enumerate(zip(detected[frame], values[frame], strict=True))
+    ]
 
 
 def track_summary(tracking: Tracking, observations: Observations) -> dict[str, Any]:
-    """What was found, as JSON holds it."""
+    """The content of `track.json`, but for the film."""
     initial, final = tracking.rest
     return {
         "schema": 1,
@@ -134,25 +127,22 @@ def track_summary(tracking: Tracking, observations: Observations) -> dict[str, A
 
 def track_table(tracking: Tracking, observations: Observations) -> Table:
     """The displacements, for the terminal."""
-    table = Table(
-        title="Displacements of the markers, mm",
-        caption="±: one standard deviation; frames: in which the marker was seen",
-        box=SIMPLE_HEAD,
-        title_justify="left",
-        caption_justify="left",
-    )
-    for heading in ("marker", "x", "y", "u", "v", "frames"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    seen = np.isfinite(tracking.pixels[:, :, 0]).sum(axis=0)
+    frames = np.isfinite(tracking.pixels[:, :, 0]).sum(axis=0)
+    rows = []
     for number, (x, y) in enumerate(observations.points):
-        cells = ["–", "–"]
+        cells = [NONE, NONE]
         if observations.visible[number]:
             pairs = zip(
                 observations.displacements[number], observations.standard_deviations[number], strict=True
             )
             cells = [f"{value:.3f} ±{deviation:.3f}" for value, deviation in pairs]
-        table.add_row(str(number + 1), f"{x:.3f}", f"{y:.3f}", *cells, str(seen[number]))
-    return table
+        rows.append([str(number + 1), f"{x:.3f}", f"{y:.3f}", *cells, str(frames[number])])
+    return terminal_table(
+        "Displacements of the markers, mm",
+        ("marker", "x", "y", "u", "v", "frames"),
+        rows,
+        caption="±: one standard deviation; frames: in which the marker was seen",
+    )
 
 
 def track_figures(folder: Path, tracking: Tracking) -> list[Figure]:
@@ -168,6 +158,6 @@ def track_figures(folder: Path, tracking: Tracking) -> list[Figure]:
         Figure(
             folder / "final.png",
             "The finger pressed, as the camera saw it",
-            f"Magenta: the way of every marker. {seen} of {count} markers are measured. {remarks}".strip(),
+            f"Magenta: trajectories of the markers. {seen} of {count} markers are measured. {remarks}".strip(),
         ),
     ]

@@ -41,7 +41,7 @@ def rig(
     - pinnray rig --boards 20 --board 9x6 --square 8
     - pinnray rig --moving 0 --cover 5=0.4 --codec mjpg --size 640x480
     """
-    from compare.camera.rig_displacements import filmed
+    from compare.camera.rig_displacements import rig_displacements
     from compare.runtime.output_folder import check_output, replaced_folder, write_run
     from compare.runtime.provenance import machine, package_versions
     from compare.runtime.stages import Stages
@@ -60,7 +60,7 @@ def rig(
     check_codec(codec)
     check_output(out)
     with Stages() as stages:
-        mesh, displacement, source = filmed(
+        mesh, displacement, source = rig_displacements(
             design, mesh_settings, material, load, options.read(solver or ""), stages
         )
         bench = Bench(mesh, design, workspace, scene.paint)

@@ -1,10 +1,12 @@
 """Track markers through a video."""
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 from rich.console import Console
+from rich.live import Live
 
 from compare.commands.film_options import FilmOptions
 from compare.commands.options import OUTPUT, FingerOptions, OutputFolder
@@ -37,7 +39,7 @@ def track(
     - pinnray track frames/ --camera camera.json --workspace workspace.json --design slender
     - pinnray track 0 --camera camera.json --live
     """
-    from compare.camera.live_display import LiveLine
+    from compare.camera.live_display import displacement_line
     from compare.camera.track_film import track_film, track_table
     from compare.runtime.output_folder import check_output, replaced_folder, write_run
     from compare.runtime.provenance import machine, package_versions
@@ -48,13 +50,12 @@ def track(
     check_output(out)
     console = Console(stderr=True)
     with replaced_folder(out) as folder:
-        with (
-            Stages(console, quiet=live) as stages,
-            LiveLine(console, shown=live) as line,
-            stages.stage("track") as report,
-        ):
+        with Stages(console, quiet=live) as stages, ExitStack() as stack:
+            line = stack.enter_context(Live(console=console, refresh_per_second=10)) if live else None
+            watch = displacement_line(line) if line else None
+            report = stack.enter_context(stages.stage("track"))
             tracking, observations = track_film(
-                film, design, folder, report, video=not without_video, watch=line
+                film, design, folder, report, video=not without_video, watch=watch
             )
         provenance = {"design": design.model_dump(), "versions": package_versions(), "machine": machine()}
         write_run(folder, provenance | {"seconds": stages.seconds})

@@ -1,4 +1,4 @@
-"""A grid search as two maps: how far each run is from `fem`, and how well it keeps the conditions."""
+"""A grid search as two maps: distance from `fem`, and violation of the boundary conditions."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The runs of a grid search: ranked, as a CSV file and as a table for the terminal."""
+"""The runs of a grid search, ranked, as a CSV file and as a table for the terminal."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, fields
@@ -7,8 +7,10 @@ from pathlib import Path
 
 from rich.table import Table
 
+from compare.evaluation.number_format import NONE
 from compare.gridsearch.training_run import TrainingMetrics, TrainingRun
 from compare.runtime.csv_files import Cell, write_csv
+from compare.runtime.terminal_table import terminal_table
 
 UNITS = {
     "base_violation": "mm",
@@ -17,14 +19,11 @@ UNITS = {
     "loss": "MPa",
     "seconds": "s",
 }
-"""Of the columns that have one."""
+"""Units of the columns."""
 
 
 def ranked(runs: Sequence[TrainingRun]) -> list[TrainingRun]:
-    """The runs by their distance from `fem`, those that were not trained last.
-
-    Not by their loss, which is not comparable between weights.
-    """
+    """The runs by their distance from `fem`, failed runs last; losses do not compare between weights."""
     return sorted(runs, key=lambda run: run.measured.rel_l2_displacement if run.measured else inf)
 
 
@@ -44,7 +43,7 @@ def run_note(run: TrainingRun) -> str:
 
 
 def write_runs(path: Path, runs: Sequence[TrainingRun]) -> None:
-    """Write a row a run, units in the header; what is not known is empty."""
+    """Write a row for each run, with units in the header; unknown values are empty."""
     write_csv(path, [{"rank": rank, **_row(run)} for rank, run in enumerate(ranked(runs), start=1)])
 
 
@@ -62,28 +61,9 @@ def _row(run: TrainingRun) -> dict[str, Cell]:
 
 def runs_table(runs: Sequence[TrainingRun]) -> Table:
     """The runs for the terminal."""
-    table = Table(
-        title="Runs by their distance from fem",
-        caption=(
-            "L²: relative difference of the displacement field from fem on the same mesh. Violation: of base "
-            "or load, over the stroke. Losses do not compare between weights; the order of short trainings "
-            "need not be that of long ones."
-        ),
-        title_justify="left",
-        caption_justify="left",
-    )
-    headings = (
-        "learning\nrate",
-        "BC weight\nMPa/mm²",
-        "L²\n%",
-        "energy\nof fem's",
-        "violation\n%",
-        "loss\nMPa",
-    )
-    for heading in (*headings, "time\ns"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    rows = []
     for run in ranked(runs):
-        numbers = [run.status, *["–"] * 4]
+        numbers = [run.status, *[NONE] * 4]
         if measured := run.measured:
             numbers = [
                 f"{100 * measured.rel_l2_displacement:.3g}",
@@ -92,5 +72,20 @@ def runs_table(runs: Sequence[TrainingRun]) -> Table:
                 f"{measured.loss:.3g}",
                 f"{measured.seconds:.0f}",
             ]
-        table.add_row(f"{run.point.learning_rate:g}", f"{run.point.bc_weight:g}", *numbers)
-    return table
+        rows.append([f"{run.point.learning_rate:g}", f"{run.point.bc_weight:g}", *numbers])
+    return terminal_table(
+        "Runs by their distance from fem",
+        [
+            "learning\nrate",
+            "BC weight\nMPa/mm²",
+            "L²\n%",
+            "energy\nof fem's",
+            "violation\n%",
+            "loss\nMPa",
+            "time\ns",
+        ],
+        rows,
+        caption="L²: relative difference of the displacement field from fem on the same mesh. Violation: of "
+        "base or load, over the stroke. Losses do not compare between weights; the order of short trainings "
+        "need not be that of long ones.",
+    )

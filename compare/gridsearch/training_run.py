@@ -1,4 +1,4 @@
-"""One run of a grid search: train the paper's networks and measure how far they are from `fem`."""
+"""One run of a grid search: trains the paper's network and measures its distance from `fem`."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -28,7 +28,7 @@ class GridPoint:
     """A point of the grid.
 
     Attributes:
-        learning_rate: Of the optimiser.
+        learning_rate: Learning rate of the optimiser.
         bc_weight: Weight of the boundary conditions in the loss, MPa/mm².
     """
 
@@ -37,17 +37,17 @@ class GridPoint:
 
     @property
     def name(self) -> str:
-        """A name for people and for a folder."""
+        """Its name in messages, and its folder."""
         return f"lr-{self.learning_rate}_bc-{self.bc_weight}"
 
 
 @dataclass(frozen=True, eq=False)
 class ReferenceSolution:
-    """What the runs are compared with: a solution on the shared mesh.
+    """The solution on the shared mesh that runs are compared with.
 
     Attributes:
         energy: Elastic energy per depth, N mm/mm.
-        displacement: At the points of `body_quadrature`, shape (q, 2), mm.
+        displacement: Displacement at the points of `body_quadrature`, shape (q, 2), mm.
     """
 
     energy: float
@@ -62,17 +62,17 @@ class ReferenceSolution:
 
 @dataclass(frozen=True, eq=False)
 class TrainingTask:
-    """All that a process needs for one run.
+    """All that a process needs to train one run.
 
     Attributes:
         point: The point of the grid.
         settings: The other settings of the solver.
         mesh: File of the shared mesh.
         material: The elastic law.
-        load: What moves the finger.
+        load: The prescribed displacement of the contact.
         reference: The solution to compare with.
-        folder: Where the run keeps its checkpoints and its result.
-        threads: Of the processor.
+        folder: Folder of checkpoints and result.
+        threads: Threads of torch.
     """
 
     point: GridPoint
@@ -87,14 +87,14 @@ class TrainingTask:
 
 @dataclass(frozen=True)
 class TrainingMetrics:
-    """What a finished training is worth.
+    """Errors and costs of a finished training.
 
     Attributes:
         rel_l2_displacement: Relative L2 difference of the displacement from the reference.
-        rel_energy: Relative difference of the energy, with its sign.
+        rel_energy: Signed relative difference of the energy.
         boundary_violation: The larger of the next two over the stroke.
         base_violation: Root mean square of the displacement along the base, mm.
-        load_violation: Distance of the load's functional from what is prescribed, mm.
+        load_violation: Distance of the load's functional from its prescribed value, mm.
         energy: Elastic energy per depth, N mm/mm.
         loss: Last value of the total loss, MPa.
         epochs: Epochs trained.
@@ -114,13 +114,13 @@ class TrainingMetrics:
 
 @dataclass(frozen=True)
 class TrainingRun:
-    """How the training at a point of the grid ended.
+    """The end of the training at a point of the grid.
 
     Attributes:
         point: The point.
         status: `TRAINED`, `DIVERGED` or `FAILED`.
         message: A sentence.
-        measured: What it is worth; None unless trained.
+        measured: Its errors and costs; None unless trained.
     """
 
     point: GridPoint
@@ -135,9 +135,9 @@ class TrainingRun:
 
 
 def train(task: TrainingTask, progress: Progress) -> TrainingRun:
-    """Train at one point of the grid, going on from a checkpoint if there is one, and write the result.
+    """Train at one point of the grid, from the last checkpoint if there is one, and write the result.
 
-    A run that failed for another reason than that it diverged writes none, so that it can be tried again.
+    A run that fails for another reason than divergence writes no result, so that it is tried again.
     """
     import torch
 
@@ -159,7 +159,7 @@ def train(task: TrainingTask, progress: Progress) -> TrainingRun:
 
 
 def measure(solution: Solution, reference: ReferenceSolution) -> TrainingMetrics:
-    """Distance of a solution from the reference and from its own conditions."""
+    """Errors of a solution against the reference and its own boundary conditions."""
     rule = body_quadrature(solution.problem.mesh)
     displacement = solution.displacement(rule.location)
     base, load = boundary_violations(solution)
@@ -178,7 +178,7 @@ def measure(solution: Solution, reference: ReferenceSolution) -> TrainingMetrics
 
 
 def boundary_violations(solution: Solution) -> tuple[float, float]:
-    """Root mean square of the displacement along the base, and the miss of the load's functional, mm."""
+    """Root mean square of the displacement along the base, and the error of the load's functional, mm."""
     problem = solution.problem
     points, lengths = edge_quadrature(problem.mesh, "base")
     squares = (solution.displacement(points) ** 2).sum(axis=1)
