@@ -158,6 +158,6 @@ def track_figures(folder: Path, tracking: Tracking) -> list[Figure]:
         Figure(
             folder / "final.png",
             "The finger pressed, as the camera saw it",
-            f"Magenta: trajectories of the markers. {seen} of {count} markers are measured. {remarks}".strip(),
+            f"Magenta: the marker trajectories. {seen} of {count} markers are measured. {remarks}".strip(),
         ),
     ]

@@ -1,12 +1,11 @@
 """Calibrate a camera."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
-from cyclopts import Parameter
 from rich.console import Console
 
-from compare.commands.options import OUTPUT
+from compare.commands.options import Flag, OutputPath, Repeated
 from compare.runtime.exits import say
 from compare.runtime.provenance import package_versions
 from geometry.errors import UserError
@@ -15,33 +14,30 @@ VERSIONS = ("python", "pinn-ray", "numpy", "scipy", "opencv-python-headless")
 
 
 def calibrate(
-    *images: Annotated[
-        Path, Parameter(help="Photographs of the board, all of one size: pictures, folders, or a video.")
-    ],
-    board: Annotated[
-        str,
-        Parameter(
-            help="Inner corners of a chessboard along either side, such as 9x6, or squares of a ChArUco "
-            "board, such as charuco:8x6."
-        ),
-    ],
-    square: Annotated[float, Parameter(help="Side of a square, mm.")],
-    marker: Annotated[float | None, Parameter(help="Side of a marker of a ChArUco board, mm.")] = None,
-    dictionary: Annotated[str, Parameter(help="ArUco dictionary of a ChArUco board.")] = "5X5_100",
-    model: Annotated[
-        Literal["brown", "fisheye"],
-        Parameter(help="Lens model: brown up to about 100 degrees of view, fisheye beyond."),
-    ] = "brown",
-    k3: Annotated[bool, Parameter(negative="", help="Fit the third radial coefficient too.")] = False,
-    without: Annotated[
-        tuple[str, ...],
-        Parameter(negative="", show_default=False, help="Photograph to leave out; may be repeated."),
-    ] = (),
-    out: Annotated[Path, Parameter(group=OUTPUT, help="Camera file, .json or .yaml.")] = Path(
-        "out/camera.json"
-    ),
+    *images: Path,
+    board: str,
+    square: float,
+    marker: float | None = None,
+    dictionary: str = "5X5_100",
+    model: Literal["brown", "fisheye"] = "brown",
+    k3: Flag = False,
+    without: Repeated = (),
+    out: OutputPath = Path("out/camera.json"),
 ) -> int:
-    """Calibrate a camera from photographs of a chessboard or ChArUco board."""
+    """Calibrate a camera from photographs of a chessboard or ChArUco board.
+
+    Args:
+        images: Photographs of the board, all of one size: pictures, folders, or a video.
+        board: Inner corners of a chessboard along either side, such as 9x6, or squares of a ChArUco board,
+            such as charuco:8x6.
+        square: Side of a square, mm.
+        marker: Side of a marker of a ChArUco board, mm.
+        dictionary: ArUco dictionary of a ChArUco board.
+        model: Lens model: brown up to about 100 degrees of view, fisheye beyond.
+        k3: Fit the third radial coefficient too.
+        without: Photograph to leave out; may be repeated.
+        out: Camera file, .json or .yaml.
+    """
     from compare.camera.calibration_chart import draw_calibration
     from compare.camera.calibration_table import calibration_table, view_table
     from vision.calibration.board_parser import parse_board

@@ -9,7 +9,16 @@ from rich.console import Console
 
 from compare.camera.film import Film
 from compare.commands.film_options import FilmOptions
-from compare.commands.options import OUTPUT, Adapt, FingerOptions, PhysicsOptions, SolverOptions, existing
+from compare.commands.options import (
+    OUTPUT,
+    Adapt,
+    FingerOptions,
+    OptionalOutputPath,
+    OutputFlag,
+    PhysicsOptions,
+    SolverOptions,
+    existing,
+)
 from compare.runtime.exits import NOT_CONVERGED, say
 from geometry.errors import UserError
 from solvers.solver import Solver
@@ -21,32 +30,14 @@ def compare(
     options: SolverOptions = SolverOptions(),
     *,
     adapt: Adapt = None,
-    solvers: Annotated[
-        str | None,
-        Parameter(
-            help="Names of solvers, separated by commas; `pinnray solvers` lists them. Default: those "
-            "of the complete table that support the problem."
-        ),
-    ] = None,
-    measurements: Annotated[
-        str | None,
-        Parameter(
-            help="CSV file of marker displacements (x_mm, y_mm, u_mm, v_mm), or a video, a folder or glob of "
-            "pictures to track. Default: displacements simulated by a finite-strain run, labelled as such."
-        ),
-    ] = None,
+    solvers: str | None = None,
+    measurements: str | None = None,
     film: FilmOptions = FilmOptions(),
-    reference: Annotated[
-        str | None, Parameter(help="Solver that the others are compared with; default fem, else the first.")
-    ] = None,
-    out: Annotated[Path | None, Parameter(group=OUTPUT, help="Output folder; default out/DESIGN.")] = None,
-    resume: Annotated[
-        bool, Parameter(group=OUTPUT, help="Reuse solutions that an earlier run finished.")
-    ] = False,
-    quiet: Annotated[bool, Parameter(group=OUTPUT, help="Show no progress and no table.")] = False,
-    json_: Annotated[
-        bool, Parameter(name="--json", group=OUTPUT, help="Print metrics.json and nothing else.")
-    ] = False,
+    reference: str | None = None,
+    out: OptionalOutputPath = None,
+    resume: OutputFlag = False,
+    quiet: OutputFlag = False,
+    json_: Annotated[bool, Parameter(name="--json", group=OUTPUT)] = False,
 ) -> int:
     """Solve one finger with several solvers and compare them at the markers and on the shared mesh.
 
@@ -58,6 +49,18 @@ def compare(
     - compare --set rib_count=6 --set height=110 --measurements markers.csv
     - compare --design default --measurements video.mkv --camera camera.json
     - compare --preset paper --device cuda
+
+    Args:
+        adapt: Refine the mesh until the estimated error of fem at the markers is below this, mm.
+        solvers: Names of solvers, separated by commas; `pinnray solvers` lists them. Default: those of the
+            complete table that support the problem.
+        measurements: CSV file of marker displacements (x_mm, y_mm, u_mm, v_mm), or a video, a folder or
+            glob of pictures to track. Default: simulated by a finite-strain run, and labelled as such.
+        reference: Solver that the others are compared with; default fem, else the first.
+        out: Output folder; default out/DESIGN.
+        resume: Reuse solutions that an earlier run finished.
+        quiet: Show no progress and no table.
+        json_: Print metrics.json and nothing else.
     """
     from compare.commands.preset_jobs import job_defaults
     from compare.evaluation.shared_mesh import tolerance_reached

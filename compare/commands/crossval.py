@@ -1,12 +1,16 @@
 """Score solvers on held-out markers, loads and fields."""
 
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter
 from rich.console import Console
 
-from compare.commands.options import OUTPUT, FingerOptions, PhysicsOptions, SolverOptions, existing
+from compare.commands.options import (
+    FingerOptions,
+    OptionalOutputPath,
+    PhysicsOptions,
+    SolverOptions,
+    existing,
+)
 from compare.runtime.exits import NOT_CONVERGED, say
 
 
@@ -15,34 +19,29 @@ def crossval(
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
     *,
-    solvers: Annotated[
-        str,
-        Parameter(
-            help="Names of solvers, separated by commas. One that can choose the weight of the markers runs "
-            "in three variants (linear law)."
-        ),
-    ] = "fem,fem-nonlinear,fem-asm,fem-id,gp,statfem",
-    schemes: Annotated[
-        str, Parameter(help="Hold-out schemes, separated by commas.")
-    ] = "one-out,tip-out,random,load-out",
-    seeds: Annotated[int, Parameter(help="Number of noise draws.")] = 5,
-    noise: Annotated[
-        float, Parameter(help="Standard deviation of a simulated marker's displacement, mm.")
-    ] = 0.005,
-    measurements: Annotated[
-        Path | None,
-        Parameter(show_default=False, help="CSV file of marker displacements; default: simulated."),
-    ] = None,
-    processes: Annotated[int | None, Parameter(help="Solvers run at a time; default: one per core.")] = None,
-    out: Annotated[
-        Path | None, Parameter(group=OUTPUT, help="Output folder; default out/crossval-DESIGN.")
-    ] = None,
+    solvers: str = "fem,fem-nonlinear,fem-asm,fem-id,gp,statfem",
+    schemes: str = "one-out,tip-out,random,load-out",
+    seeds: int = 5,
+    noise: float = 0.005,
+    measurements: Path | None = None,
+    processes: int | None = None,
+    out: OptionalOutputPath = None,
 ) -> int:
     """Score solvers on markers, loads and fields that they were not given.
 
     The truth is a finite-strain simulation with a sliding contact on a finer mesh; the marker displacements
     are taken from it with noise. The default --mesh-size is 0.5. Finished folds are kept: the same command
     again goes on where it was stopped.
+
+    Args:
+        solvers: Names of solvers, separated by commas. One that can choose the weight of the markers runs in
+            three variants (linear law).
+        schemes: Hold-out schemes, separated by commas.
+        seeds: Number of noise draws.
+        noise: Standard deviation of a simulated marker's displacement, mm.
+        measurements: CSV file of marker displacements; default: simulated.
+        processes: Solvers run at a time; default: one per core.
+        out: Output folder; default out/crossval-DESIGN.
     """
     from compare.commands.crossval_options import read_finger, read_schemes, read_variants
     from compare.commands.gridsearch_options import read_processes

@@ -1,22 +1,22 @@
 """Draw the finger."""
 
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter
-
-from compare.commands.options import FingerOptions, OutputFolder, comma_list
+from compare.commands.options import FingerOptions, OutputPath, comma_list
 
 
 def design(
     finger: FingerOptions = FingerOptions(),
     *,
-    out: OutputFolder = Path("out/cad"),
-    formats: Annotated[
-        str, Parameter(help="File formats, separated by commas: step, stl, dxf, svg.")
-    ] = "step,stl,dxf,svg",
+    out: OutputPath = Path("out/cad"),
+    formats: str = "step,stl,dxf,svg",
 ) -> int:
-    """Draw the finger: CAD files of the body and its markers, and a dimensioned picture."""
+    """Draw the finger: CAD files of the body and its markers, and a dimensioned picture.
+
+    Args:
+        out: Output folder.
+        formats: File formats, separated by commas: step, stl, dxf, svg.
+    """
     from compare.figures.design_drawing import draw_design
     from geometry.cache import cad_files
 

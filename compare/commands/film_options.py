@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 from cyclopts import Group, Parameter
 
@@ -15,20 +15,19 @@ FILM = Group("Camera", sort_key=4)
 @Parameter(name="*", group=FILM)
 @dataclass(frozen=True, kw_only=True)
 class FilmOptions:
-    """Camera, fiducials, marker colour and tracking method of a film."""
+    """Camera, fiducials, marker colour and tracking method of a film.
 
-    camera: Annotated[
-        Path | None, Parameter(show_default=False, help="Camera file of `pinnray calibrate`.")
-    ] = None
-    workspace: Annotated[
-        Path | None,
-        Parameter(show_default=False, help="JSON file of the fiducials; default: those around the design."),
-    ] = None
-    colour: Annotated[str, Parameter(help="Colour of the markers, as printed by `pinnray pick`.")] = "dark"
-    method: Annotated[
-        Literal["precise", "hough"],
-        Parameter(help="Disc detector; hough is the paper's pipeline."),
-    ] = "precise"
+    Attributes:
+        camera: Camera file of `pinnray calibrate`.
+        workspace: JSON file of the fiducials; default: those around the design.
+        colour: Colour of the markers, as printed by `pinnray pick`.
+        method: Disc detector; hough is the paper's pipeline.
+    """
+
+    camera: Path | None = None
+    workspace: Path | None = None
+    colour: str = "dark"
+    method: Literal["precise", "hough"] = "precise"
 
     def film(self, source: str) -> Film:
         """The film from `source`.

@@ -1,12 +1,10 @@
 """Repeat the paper's grid search."""
 
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter
 from rich.console import Console
 
-from compare.commands.options import OUTPUT, FingerOptions, PhysicsOptions, SolverOptions
+from compare.commands.options import FingerOptions, OptionalOutputPath, PhysicsOptions, SolverOptions
 from compare.runtime.exits import NOT_CONVERGED, say
 
 
@@ -15,23 +13,23 @@ def gridsearch(
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
     *,
-    learning_rates: Annotated[str, Parameter(help="Learning rates, separated by commas.")] = "1e-4,1e-3,1e-2",
-    bc_weights: Annotated[
-        str, Parameter(help="Weights of the boundary conditions in the loss, MPa/mm².")
-    ] = "0.1,1,10,100,1000",
-    epochs: Annotated[
-        int | None,
-        Parameter(help="Epochs of every run; default 2,000 (short), or 60,000 with --preset paper."),
-    ] = None,
-    processes: Annotated[int | None, Parameter(help="Runs trained at a time; default: one per core.")] = None,
-    out: Annotated[
-        Path | None, Parameter(group=OUTPUT, help="Output folder; default out/gridsearch-DESIGN.")
-    ] = None,
+    learning_rates: str = "1e-4,1e-3,1e-2",
+    bc_weights: str = "0.1,1,10,100,1000",
+    epochs: int | None = None,
+    processes: int | None = None,
+    out: OptionalOutputPath = None,
 ) -> int:
     """Repeat the paper's grid search for the learning rate and the weight of the boundary conditions.
 
     Trains the paper's network at every point of the grid, each in a process of its own, and ranks the runs by
     their distance from `fem`. Finished runs are kept: the same command again goes on where it was stopped.
+
+    Args:
+        learning_rates: Learning rates, separated by commas.
+        bc_weights: Weights of the boundary conditions in the loss, MPa/mm².
+        epochs: Epochs of every run; default 2,000 (short), or 60,000 with --preset paper.
+        processes: Runs trained at a time; default: one per core.
+        out: Output folder; default out/gridsearch-DESIGN.
     """
     from compare.commands.gridsearch_options import read_processes, read_settings, read_values
     from compare.gridsearch.search import GridSearch, search_grid

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from compare.commands.options import Adapt, FingerOptions, OutputFolder, PhysicsOptions
+from compare.commands.options import Adapt, FingerOptions, OutputPath, PhysicsOptions
 from compare.runtime.exits import NOT_CONVERGED
 from geometry.errors import UserError
 
@@ -12,11 +12,15 @@ def mesh(
     physics: PhysicsOptions = PhysicsOptions(),
     *,
     adapt: Adapt = None,
-    out: OutputFolder = Path("out/mesh"),
+    out: OutputPath = Path("out/mesh"),
 ) -> int:
     """Mesh the finger: write the mesh as a VTU and a NumPy file, and a picture.
 
     Material and load matter only with --adapt.
+
+    Args:
+        adapt: Refine the mesh until the estimated error of fem at the markers is below this, mm.
+        out: Output folder.
     """
     from compare.evaluation.shared_mesh import shared_mesh, tolerance_reached, write_rounds
     from compare.figures.mesh_drawing import draw_mesh

@@ -23,48 +23,33 @@ from solvers.solver import Solver
 RADIUS = 5.0
 """Default radius of the cylinder, mm."""
 
-PRESET_MEANINGS = {
-    "fast": "random hidden weights, output layer solved exactly",
-    "paper": "the paper's training",
-}
-"""The presets of solvers, in words."""
-
 FINGER = Group("Finger", sort_key=1)
 PHYSICS = Group("Physics", sort_key=2)
 TRAINING = Group("Solvers' settings", sort_key=3)
 OUTPUT = Group("Output", sort_key=4, default_parameter=Parameter(negative="", show_default=False))
 
-OutputFolder = Annotated[Path, Parameter(group=OUTPUT, show_default=True, help="Output folder.")]
-
-Adapt = Annotated[
-    float | None,
-    Parameter(
-        group=FINGER,
-        show_default=False,
-        help="Refine the mesh until the estimated error of fem at the markers is below this, mm.",
-    ),
-]
-"""Tolerance of mesh refinement, for the commands that solve."""
+Repeated = Annotated[tuple[str, ...], Parameter(negative="", show_default=False)]
+Flag = Annotated[bool, Parameter(negative="", show_default=False)]
+OutputFlag = Annotated[bool, Parameter(group=OUTPUT)]
+OutputPath = Annotated[Path, Parameter(group=OUTPUT, show_default=True)]
+OptionalOutputPath = Annotated[Path | None, Parameter(group=OUTPUT)]
+Adapt = Annotated[float | None, Parameter(group=FINGER)]
 
 
 @Parameter(name="*", group=FINGER)
 @dataclass(frozen=True, kw_only=True)
 class FingerOptions:
-    """The finger and its mesh."""
+    """The finger and its mesh.
 
-    design: Annotated[str, Parameter(help="Preset (default, slender, ...) or .toml file.")] = "default"
-    set: Annotated[
-        tuple[str, ...],
-        Parameter(
-            negative="",
-            show_default=False,
-            help="Change a parameter, such as rib_count=6 or N=6; may be repeated.",
-        ),
-    ] = ()
-    mesh_size: Annotated[
-        float | None,
-        Parameter(help="Element size in walls and ribs, mm, default 0.25; up to 4 times larger in the tip."),
-    ] = None
+    Attributes:
+        design: Preset (default, slender, ...) or .toml file.
+        set: Change a parameter, such as rib_count=6 or N=6; may be repeated.
+        mesh_size: Element size in walls and ribs, mm, default 0.25; up to 4 times larger in the tip.
+    """
+
+    design: str = "default"
+    set: Repeated = ()
+    mesh_size: float | None = None
 
     def read(self, preset: str | None = None) -> tuple[Design, MeshSettings]:
         """The design and the mesh settings; a preset of the solvers may have its own mesh settings."""
@@ -91,40 +76,31 @@ def _changed_name(design: Design, changes: Mapping[str, object]) -> str:
 @Parameter(name="*", group=PHYSICS)
 @dataclass(frozen=True, kw_only=True)
 class PhysicsOptions:
-    """Material and load."""
+    """Material and load.
 
-    young: Annotated[float, Parameter(help="Young's modulus, MPa.")] = 11.4
-    poisson: Annotated[float, Parameter(help="Poisson's ratio.")] = 0.45
-    plane: Annotated[
-        Literal["strain", "stress"],
-        Parameter(help="Plane strain, or plane stress as in the paper."),
-    ] = "strain"
-    law: Annotated[
-        LawName | None,
-        Parameter(
-            show_default=False, help="Material law of the solvers that have it; default: each solver's own."
-        ),
-    ] = None
-    load: Annotated[
-        Literal["mean", "point", "patch", "cylinder"] | None,
-        Parameter(
-            help="Indenter. mean (default): prescribed weighted mean displacement of the contact; point: one "
-            "prescribed point, as in the paper, which has no limit under refinement; patch: rigid patch; "
-            "cylinder: rigid cylinder without friction."
-        ),
-    ] = None
-    radius: Annotated[
-        float | None, Parameter(show_default=False, help="Radius of --load cylinder, mm, default 5.")
-    ] = None
-    stroke: Annotated[float, Parameter(help="Travel of the indenter, mm.")] = 10.0
-    direction: Annotated[
-        float,
-        Parameter(help="Direction of the travel, degrees: 0 into the finger, 90 along it to the tip."),
-    ] = 0.0
-    slide: Annotated[
-        bool,
-        Parameter(negative="", show_default=False, help="Let the contact slide along the finger (u free)."),
-    ] = False
+    Attributes:
+        young: Young's modulus, MPa.
+        poisson: Poisson's ratio.
+        plane: Plane strain, or plane stress as in the paper.
+        law: Material law of the solvers that have it; default: each solver's own.
+        load: Indenter. mean (default): prescribed weighted mean displacement of the contact; point: one
+            prescribed point, as in the paper, which has no limit under refinement; patch: rigid patch;
+            cylinder: rigid cylinder without friction.
+        radius: Radius of --load cylinder, mm, default 5.
+        stroke: Travel of the indenter, mm.
+        direction: Direction of the travel, degrees: 0 into the finger, 90 along it to the tip.
+        slide: Let the contact slide along the finger (u free).
+    """
+
+    young: float = 11.4
+    poisson: float = 0.45
+    plane: Literal["strain", "stress"] = "strain"
+    law: LawName | None = None
+    load: Literal["mean", "point", "patch", "cylinder"] | None = None
+    radius: float | None = None
+    stroke: float = 10.0
+    direction: float = 0.0
+    slide: Flag = False
 
     def read(self, preset: str | None = None) -> tuple[Material, Load]:
         """The material and the load; a preset of the solvers may choose the kind of load."""
@@ -167,30 +143,21 @@ class PhysicsOptions:
 @Parameter(name="*", group=TRAINING)
 @dataclass(frozen=True, kw_only=True)
 class SolverOptions:
-    """Settings of the chosen solvers."""
+    """Settings of the chosen solvers.
 
-    preset: Annotated[
-        str | None,
-        Parameter(
-            show_default=False,
-            help=f"Preset of pinn-std and pinn-asm. fast (default): {PRESET_MEANINGS['fast']}. paper: "
-            f"{PRESET_MEANINGS['paper']}, 60,000 epochs, many hours on a CPU; also takes the paper's uniform "
-            "mesh of 91,006 nodes and --load point, unless --mesh-size or --load is given.",
-        ),
-    ] = None
-    solver_set: Annotated[
-        tuple[str, ...],
-        Parameter(
-            negative="",
-            show_default=False,
-            help="Change a setting of a solver, such as pinn-std.neurons=7; may be repeated.",
-        ),
-    ] = ()
-    device: Annotated[
-        str | None,
-        Parameter(show_default=False, help="cpu or cuda, for the solvers that can use either."),
-    ] = None
-    seed: Annotated[int, Parameter(help="Seed of the random numbers.")] = 0
+    Attributes:
+        preset: Preset of pinn-std and pinn-asm. fast (default): random hidden weights, output layer solved
+            exactly. paper: the paper's training, 60,000 epochs, many hours on a CPU; also takes the paper's
+            uniform mesh of 91,006 nodes and --load point, unless --mesh-size or --load is given.
+        solver_set: Change a setting of a solver, such as pinn-std.neurons=7; may be repeated.
+        device: cpu or cuda, for the solvers that can use either.
+        seed: Seed of the random numbers.
+    """
+
+    preset: str | None = None
+    solver_set: Repeated = ()
+    device: str | None = None
+    seed: int = 0
 
     def read(self, names: str) -> list[Solver]:
         """The solvers with these names, separated by commas.

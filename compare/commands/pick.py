@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from compare.commands.options import OUTPUT
+from compare.commands.options import OutputPath
 from compare.runtime.exits import say
 from geometry.errors import UserError
 
@@ -14,31 +14,25 @@ AMBIGUOUS = 0.05
 
 
 def pick(
-    source: Annotated[
-        str,
-        Parameter(
-            allow_leading_hyphen=True,
-            help="Picture, video, folder or glob of pictures, number of a camera, or - for a pipe.",
-        ),
-    ],
+    source: Annotated[str, Parameter(allow_leading_hyphen=True)],
     *,
-    at: Annotated[
-        str | None,
-        Parameter(help="Point X,Y in a marker, or rectangle X0,Y0,X1,Y1 inside it, pixels."),
-    ] = None,
-    colour: Annotated[
-        str | None,
-        Parameter(help="Colour to show instead: dark, or L*,L*:a*,a*:b*,b* as printed."),
-    ] = None,
-    radii: Annotated[
-        str | None, Parameter(help="Radii LEAST,LARGEST, pixels: draw the circles found between them.")
-    ] = None,
-    frame: Annotated[int, Parameter(help="Number of the frame, from 0.")] = 0,
-    out: Annotated[Path, Parameter(group=OUTPUT, help="Output picture.")] = Path("out/pick.png"),
+    at: str | None = None,
+    colour: str | None = None,
+    radii: str | None = None,
+    frame: int = 0,
+    out: OutputPath = Path("out/pick.png"),
 ) -> int:
     """Measure the colour of the markers at a point in one of them.
 
     Prints the colour as --colour takes it, and writes a picture with all pixels of this colour in magenta.
+
+    Args:
+        source: Picture, video, folder or glob of pictures, number of a camera, or - for a pipe.
+        at: Point X,Y in a marker, or rectangle X0,Y0,X1,Y1 inside it, pixels.
+        colour: Colour to show instead: dark, or L*,L*:a*,a*:b*,b* as printed.
+        radii: Radii LEAST,LARGEST, pixels: draw the circles found between them.
+        frame: Number of the frame, from 0.
+        out: Output picture.
     """
     from vision.discs.circle_proposals import highlight_colour, propose_circles
     from vision.discs.colour import read_colour

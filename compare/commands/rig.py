@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from compare.commands.options import OUTPUT, FingerOptions, OutputFolder, PhysicsOptions, SolverOptions
+from compare.commands.options import OUTPUT, FingerOptions, OutputPath, PhysicsOptions, SolverOptions
 from compare.commands.rig_options import EXPOSURE, MOTION, BoardOptions, CameraOptions, SceneOptions
 from vision.rig.exposure import Exposure
 from vision.rig.motion import Motion
@@ -16,20 +16,14 @@ def rig(
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
     *,
-    solver: Annotated[
-        str | None,
-        Parameter(
-            help="Solver of the filmed displacements; default: the finite-strain simulation that `compare` "
-            "takes for measurements."
-        ),
-    ] = None,
+    solver: str | None = None,
     lens: CameraOptions = CameraOptions(),
     exposure: Annotated[Exposure, Parameter(name="*", group=EXPOSURE)] = Exposure(),
     motion: Annotated[Motion, Parameter(name="*", group=MOTION)] = Motion(),
     scene: SceneOptions = SceneOptions(),
     boards: BoardOptions = BoardOptions(),
-    codec: Annotated[str, Parameter(group=OUTPUT, help="ffv1 or png (lossless), mjpg or mp4v.")] = "ffv1",
-    out: OutputFolder = Path("out/rig"),
+    codec: Annotated[str, Parameter(group=OUTPUT)] = "ffv1",
+    out: OutputPath = Path("out/rig"),
 ) -> int:
     """Render a film of a pressed finger, and write the true marker positions beside it.
 
@@ -40,6 +34,11 @@ def rig(
     - pinnray rig --tilt 3 --noise 2 --blur 0.8 --seed 1
     - pinnray rig --boards 20 --board 9x6 --square 8
     - pinnray rig --moving 0 --cover 5=0.4 --codec mjpg --size 640x480
+
+    Args:
+        solver: Solver of the filmed displacements; default: the finite-strain simulation of `compare`.
+        codec: ffv1 or png (lossless), mjpg or mp4v.
+        out: Output folder.
     """
     from compare.camera.rig_displacements import rig_displacements
     from compare.runtime.output_folder import check_output, replaced_folder, write_run

@@ -3,10 +3,11 @@
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
 from cyclopts import Group, Parameter
 
+from compare.commands.options import Repeated
 from geometry.errors import UserError
 from vision.tracking.workspace import Workspace
 
@@ -27,19 +28,21 @@ MOST_PIXELS = 4_000_000
 @Parameter(name="*", group=CAMERA)
 @dataclass(frozen=True, kw_only=True)
 class CameraOptions:
-    """The camera and its pose."""
+    """The camera and its pose.
 
-    size: Annotated[str, Parameter(help="Size of the frames, pixels.")] = "1280x720"
-    camera: Annotated[
-        Path | None, Parameter(show_default=False, help="Camera file; default: a camera of that size.")
-    ] = None
-    tilt: Annotated[
-        float, Parameter(help="Angle between the optical axis and the finger's z axis, degrees, up to 30.")
-    ] = 0.0
-    tilt_direction: Annotated[
-        float, Parameter(help="Direction of the tilt axis in the image, from right to down, degrees.")
-    ] = 60.0
-    turn: Annotated[float, Parameter(help="Rotation of the camera about its optical axis, degrees.")] = 0.0
+    Attributes:
+        size: Size of the frames, pixels.
+        camera: Camera file; default: a camera of that size.
+        tilt: Angle between the optical axis and the finger's z axis, degrees, up to 30.
+        tilt_direction: Direction of the tilt axis in the image, from right to down, degrees.
+        turn: Rotation of the camera about its optical axis, degrees.
+    """
+
+    size: str = "1280x720"
+    camera: Path | None = None
+    tilt: float = 0.0
+    tilt_direction: float = 60.0
+    turn: float = 0.0
 
     def read(self, workspace: Workspace) -> "tuple[Camera, Pose]":
         """The camera and its pose."""
@@ -63,24 +66,21 @@ class CameraOptions:
 @Parameter(name="*", group=SCENE)
 @dataclass(frozen=True, kw_only=True)
 class SceneOptions:
-    """Paint and occlusion of the markers."""
+    """Paint and occlusion of the markers.
 
-    paint: Annotated[Literal["dark", "red", "green", "blue"], Parameter(help="Colour of the markers.")] = (
-        "dark"
-    )
-    marker_plane: Annotated[float, Parameter(help="Height of the markers above the fiducials, mm.")] = 0.0
-    cover: Annotated[
-        tuple[str, ...],
-        Parameter(
-            negative="",
-            show_default=False,
-            help="Cover a share of a marker's diameter with a cable, such as 5=0.4; may be repeated.",
-        ),
-    ] = ()
-    cover_paint: Annotated[Literal["dark", "light"], Parameter(help="Colour of the cables.")] = "dark"
-    cover_during: Annotated[
-        Literal["all", "rest", "moving", "held"], Parameter(help="Part of the film that shows the cables.")
-    ] = "all"
+    Attributes:
+        paint: Colour of the markers.
+        marker_plane: Height of the markers above the fiducials, mm.
+        cover: Cover a share of a marker's diameter with a cable, such as 5=0.4; may be repeated.
+        cover_paint: Colour of the cables.
+        cover_during: Part of the film that shows the cables.
+    """
+
+    paint: Literal["dark", "red", "green", "blue"] = "dark"
+    marker_plane: float = 0.0
+    cover: Repeated = ()
+    cover_paint: Literal["dark", "light"] = "dark"
+    cover_during: Literal["all", "rest", "moving", "held"] = "all"
 
     def covered(self) -> dict[int, float]:
         """The shares of --cover by the numbers of the markers."""
@@ -95,14 +95,19 @@ class SceneOptions:
 @Parameter(name="*", group=BOARDS)
 @dataclass(frozen=True, kw_only=True)
 class BoardOptions:
-    """Photographs of a calibration board."""
+    """Photographs of a calibration board.
 
-    boards: Annotated[int, Parameter(help="Number of photographs of a calibration board.")] = 0
-    board: Annotated[str, Parameter(help="Board as for `pinnray calibrate`: 9x6, charuco:8x6.")] = "9x6"
-    square: Annotated[float, Parameter(help="Side of a square, mm.")] = 8.0
-    marker: Annotated[
-        float | None, Parameter(show_default=False, help="Side of a marker of a ChArUco board, mm.")
-    ] = None
+    Attributes:
+        boards: Number of photographs.
+        board: Board as for `pinnray calibrate`: 9x6, charuco:8x6.
+        square: Side of a square, mm.
+        marker: Side of a marker of a ChArUco board, mm.
+    """
+
+    boards: int = 0
+    board: str = "9x6"
+    square: float = 8.0
+    marker: float | None = None
 
     def read(self) -> "Board":
         """The board."""

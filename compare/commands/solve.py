@@ -2,29 +2,30 @@
 
 from functools import partial
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter
-
-from compare.commands.options import Adapt, FingerOptions, PhysicsOptions, SolverOptions, existing
+from compare.commands.options import Adapt, FingerOptions, OutputPath, PhysicsOptions, SolverOptions, existing
 from compare.runtime.exits import NOT_CONVERGED
 from geometry.errors import UserError
 
 
 def solve(
-    solver: Annotated[str, Parameter(help="Name of a solver; `pinnray solvers` lists them.")],
+    solver: str,
     finger: FingerOptions = FingerOptions(),
     physics: PhysicsOptions = PhysicsOptions(),
     options: SolverOptions = SolverOptions(),
     *,
     adapt: Adapt = None,
-    measurements: Annotated[
-        Path | None,
-        Parameter(help="CSV file of marker displacements, for an assimilating solver."),
-    ] = None,
-    out: Annotated[Path, Parameter(help="VTU file of the fields.")] = Path("out/solution.vtu"),
+    measurements: Path | None = None,
+    out: OutputPath = Path("out/solution.vtu"),
 ) -> int:
-    """Solve one finger with one solver and write its fields."""
+    """Solve one finger with one solver and write its fields.
+
+    Args:
+        solver: Name of a solver; `pinnray solvers` lists them.
+        adapt: Refine the mesh until the estimated error of fem at the markers is below this, mm.
+        measurements: CSV file of marker displacements, for an assimilating solver.
+        out: VTU file of the fields.
+    """
     from compare.evaluation.convergence import with_certificates
     from compare.evaluation.force_displacement import force_curves, write_force_displacement
     from compare.evaluation.labels import solver_label

@@ -2,7 +2,10 @@
 
 from rich.console import Console
 
-from compare.commands.options import PRESET_MEANINGS
+PRESET_MEANINGS = {
+    "fast": "random hidden weights, output layer solved exactly",
+    "paper": "the paper's training",
+}
 
 
 def solvers() -> int:

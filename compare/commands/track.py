@@ -9,26 +9,18 @@ from rich.console import Console
 from rich.live import Live
 
 from compare.commands.film_options import FilmOptions
-from compare.commands.options import OUTPUT, FingerOptions, OutputFolder
+from compare.commands.options import FingerOptions, Flag, OutputFlag, OutputPath
 from compare.runtime.exits import say
 
 
 def track(
-    source: Annotated[
-        str,
-        Parameter(
-            allow_leading_hyphen=True,
-            help="Video, folder or glob of pictures, number of a camera, or - for a pipe.",
-        ),
-    ],
+    source: Annotated[str, Parameter(allow_leading_hyphen=True)],
     finger: FingerOptions = FingerOptions(),
     options: FilmOptions = FilmOptions(),
     *,
-    live: Annotated[
-        bool, Parameter(negative="", help="Show the displacements of every frame as it comes.")
-    ] = False,
-    without_video: Annotated[bool, Parameter(group=OUTPUT, help="Write no annotated video.")] = False,
-    out: OutputFolder = Path("out/track"),
+    live: Flag = False,
+    without_video: OutputFlag = False,
+    out: OutputPath = Path("out/track"),
 ) -> int:
     """Measure marker displacements from a video that shows the finger at rest, pressed, and held.
 
@@ -38,6 +30,12 @@ def track(
     - pinnray track video.mkv --camera camera.json
     - pinnray track frames/ --camera camera.json --workspace workspace.json --design slender
     - pinnray track 0 --camera camera.json --live
+
+    Args:
+        source: Video, folder or glob of pictures, number of a camera, or - for a pipe.
+        live: Show the displacements of every frame as it comes.
+        without_video: Write no annotated video.
+        out: Output folder.
     """
     from compare.camera.live_display import displacement_line
     from compare.camera.track_film import track_film, track_table
