@@ -9,7 +9,11 @@ PRESET_MEANINGS = {
 
 
 def solvers() -> int:
-    """List the solvers with their material laws, loads, presets and settings."""
+    """List the solvers with their material laws, loads, presets and settings.
+
+    The networks pinn-std, pinn-local, pinn-asm and pinn-local-asm have random hidden weights and an output
+    layer that is solved exactly; the preset paper of pinn-std and pinn-asm is the paper's training.
+    """
     from rich.table import Table
 
     from solvers.registry import PRESETS, make_solver, usable_solvers
@@ -20,8 +24,7 @@ def solvers() -> int:
         _, *others = PRESETS.get(name, [""])
         for solver in [usual, *(make_solver(name, preset=preset) for preset in others)]:
             settings = [f"{key}={value}" for key, value in solver.settings().items()]
-            meaning = PRESET_MEANINGS.get(str(solver.settings().get("preset")))
-            if meaning:
+            if meaning := PRESET_MEANINGS.get(str(solver.settings().get("preset"))):
                 settings.insert(0, f"({meaning})")
             table.add_row(name, *map("\n".join, (solver.laws, solver.loads, settings)))
     Console().print(table)
