@@ -1,4 +1,4 @@
-"""The main job: mesh, measure, solve, evaluate, draw, report."""
+"""The main job: mesh, measure, solve, evaluate; then draw and write."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
@@ -8,16 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from compare.camera.film import Film
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.convergence import with_certificates
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.force_displacement import force_curves, write_force_displacement
 from compare.evaluation.metrics import pick_reference
 from compare.evaluation.shared_mesh import check_inside, shared_mesh, write_rounds
-from compare.evaluation.solver_selection import left_out_remarks, supported_solvers
+from compare.evaluation.solver_selection import supported_solvers
 from compare.evaluation.uncertainty import evaluated
 from compare.evaluation.virtual_experiment import virtual_experiment
-from compare.figures import Figure, draw_all
-from compare.report.html_report import ReportContent, write_report
+from compare.figures import Picture, draw_all
+from compare.report.html_report import write_report
 from compare.report.metrics_json import metrics
 from compare.report.table_one import write_table_one
 from compare.report.tables import write_markers, write_summary
@@ -38,7 +39,7 @@ from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
-from solvers.adaptation import Adaptation, check_adaptable
+from solvers.adaptation import check_adaptable
 from solvers.assimilation.misfit import assimilates
 from solvers.problem import Load, Material, Problem
 from solvers.solver import Solver, UnsupportedProblemError, with_law
@@ -46,22 +47,22 @@ from solvers.training import TrainedSolver, TrainingContext
 from vision.measurements import read_measurements, write_measurements
 
 TRACK = "track"
-"""Folder of what tracking a film wrote."""
+"""Folder of the files of the marker tracking."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What to compare.
+    """A comparison to make.
 
     Attributes:
         design: The finger.
         solvers: The solvers, in the order of tables and pictures.
-        spare: Names of those that are left out, with a remark, if they cannot do the job.
+        spare: Names of those that are left out, with a remark, if they do not support the problem.
         mesh: Element sizes.
         adapt: Tolerance to which `fem` shall know the markers, mm, for which the mesh is refined; None: not.
         material: The elastic constants; each solver takes the law that it has.
         load: What moves the finger.
-        measurements: CSV file of marker displacements, or a film to track; None for a virtual experiment.
+        measurements: Marker displacements, their CSV file, or a film to track; None for a virtual experiment.
         reference: Name of the solver that the others are compared with; `fem`, else the first, if None.
         out: Output folder.
         resume: Whether to take over solutions that an earlier run of the same job finished.
@@ -74,205 +75,195 @@ class Job:
     adapt: float | None = None
     material: Material = field(default_factory=Material)
     load: Load = field(default_factory=Load)
-    measurements: Path | Film | None = None
+    measurements: Observations | Path | Film | None = None
     reference: str | None = None
     out: Path = Path("out/default")
     resume: bool = False
 
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """A finished comparison; its files are in the job's output folder.
-
-    Attributes:
-        metrics: The content of `metrics.json`.
-        evaluations: One for each solver.
-        observations: What they were compared with.
-        reference: One of the evaluations.
-        adaptation: How the mesh was refined, if that was asked for.
-        truth: The fields of the virtual experiment, if the markers are simulated.
-        remarks: Which solvers were left out and why, and what tracking a film had to say.
-    """
-
-    metrics: dict[str, Any]
-    evaluations: Sequence[Evaluation]
-    observations: Observations
-    reference: Evaluation
-    adaptation: Adaptation | None = None
-    truth: Evaluation | None = None
-    remarks: Sequence[str] = ()
+    @property
+    def names(self) -> list[str]:
+        """Names of the solvers."""
+        return [solver.name for solver in self.solvers]
 
 
-def run(job: Job, stages: Stages) -> Outcome:
-    """Run the comparison and write its output folder.
+def run(job: Job, stages: Stages) -> Comparison:
+    """Make the comparison and write its output folder.
 
     Raises:
         UserError: If the job cannot be done; the output folder is as it was.
     """
     started = datetime.now(UTC)
-    _check(job)
-    chosen, left_out = supported_solvers(job.solvers, job.spare, job.material, job.load)
-    radius = job.design.marker_radius
-    given = None
-    if isinstance(job.measurements, Path):
-        given = read_measurements(job.measurements, marker_radius=radius)
-    shots: list[Figure] = []
-    remarks: Sequence[str] = ()
-    with replaced_folder(job.out, keep=_names(job) if job.resume else ()) as folder:
-        if isinstance(job.measurements, Film):
+    job = checked(job)
+    check_output(job.out)
+    with replaced_folder(job.out, keep=job.names if job.resume else ()) as folder:
+        photographs: list[Picture] = []
+        warnings: Sequence[str] = ()
+        measurements = job.measurements
+        if isinstance(measurements, Film):
             from compare.camera.track_film import track_figures, track_film  # needs OpenCV
 
             with stages.stage("track") as progress:
                 (folder / TRACK).mkdir()
-                tracking, given = track_film(
-                    job.measurements, job.design, folder / TRACK, progress, video=False
+                tracking, measurements = track_film(
+                    measurements, job.design, folder / TRACK, progress, video=False
                 )
-            shots, remarks = track_figures(folder / TRACK, tracking), tracking.warnings
-        mesh, adaptation = shared_mesh(
-            job.design,
-            job.mesh,
-            stages,
-            tolerance=job.adapt,
-            material=job.material,
-            load=job.load,
-            solvers=chosen,
-            check=partial(check_inside, given) if given else None,
-        )
-        if adaptation is not None:
-            write_rounds(folder / "adapt.csv", adaptation)
-        problem = Problem(mesh, job.material, job.load)
-        with stages.stage("measurements") as progress:
-            observations, truth = (given, None) if given else virtual_experiment(problem, radius, progress)
-            write_measurements(folder / "observations.csv", observations)
-        evaluations: list[Evaluation] = []
-        for solver in chosen:
-            known = _in_context(solver, job, folder, evaluations)
-            try:
-                evaluations.append(_evaluate(job, known, problem, observations, folder, stages))
-            except UnsupportedProblemError as error:
-                if solver.name not in job.spare:
-                    raise
-                left_out[solver.name] = str(error)
-        with stages.stage("certificate"):
-            evaluations = with_certificates(evaluations, problem)
-        reference = pick_reference(evaluations, job.reference)
-        with stages.stage("pictures") as progress:
-            figures = draw_all(
-                folder / "figures",
-                design=job.design,
-                mesh=mesh,
-                load=job.load,
-                evaluations=evaluations,
-                observations=observations,
-                reference=reference,
-                progress=progress,
-            )
-        with stages.stage("report"):
-            for evaluation in evaluations:
-                write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", mesh, evaluation)
-            write_markers(folder / "markers.csv", evaluations=evaluations, observations=observations)
-            write_table_one(folder / "table1.csv", evaluations=evaluations, observations=observations)
-            write_summary(
-                folder / "summary.csv",
-                evaluations=evaluations,
-                observations=observations,
-                reference=reference,
-                truth=truth,
-            )
-            if curves := force_curves(evaluations, job.load):
-                write_force_displacement(
-                    folder / "force_displacement.csv", curves, job.load, depth=job.design.depth
-                )
-            numbers = metrics(
-                design=job.design,
-                material=job.material,
-                load=job.load,
-                observations=observations,
-                evaluations=evaluations,
-                reference=reference,
-                truth=truth,
-            )
-            write_json(folder / "metrics.json", numbers)
-            provenance = {
-                "started": started.isoformat(timespec="seconds"),
-                "seconds": {name: round(seconds, 2) for name, seconds in stages.seconds.items()},
-                "design_sha256": job.design.digest,
-                "mesh_sha256": mesh.digest,
-                "problem_sha256": problem.digest,
-                "mesh": job.mesh.model_dump(),
-                "adapt": adaptation and {"tolerance_mm": adaptation.tolerance, "end": adaptation.message},
-                "material": job.material.model_dump(),
-                "load": job.load.model_dump(),
-                "measurements_sha256": file_digest(folder / "observations.csv"),
-                "film": job.measurements.provenance() if isinstance(job.measurements, Film) else None,
-                "solvers": {
-                    solver.name: solver.settings() for solver in chosen if solver.name not in left_out
-                },
-                "left_out": left_out,
-                "seed": {
-                    solver.name: solver.settings()["seed"] for solver in chosen if "seed" in solver.settings()
-                },
-                "device": {
-                    evaluation.solver: evaluation.stats.get("device", "cpu") for evaluation in evaluations
-                },
-                "versions": package_versions(),
-                "machine": machine(),
-            }
-            write_report(
-                folder / "report.html",
-                ReportContent(
-                    design=job.design,
-                    material=job.material,
-                    load=job.load,
-                    mesh=mesh,
-                    observations=observations,
-                    evaluations=evaluations,
-                    reference=reference,
-                    figures=[*figures, *shots],
-                    provenance=provenance,
-                    adaptation=adaptation,
-                    left_out=left_out_remarks(left_out),
-                    truth=truth,
-                ),
-            )
-            write_run(folder, provenance)
-    remarks = [*left_out_remarks(left_out), *remarks]
-    return Outcome(numbers, evaluations, observations, reference, adaptation, truth, remarks)
+            photographs, warnings = track_figures(folder / TRACK, tracking), tracking.warnings
+        comparison = compute(replace(job, measurements=measurements), stages, folder)
+        comparison = replace(comparison, warnings=warnings)
+        write(folder, job, comparison, stages, started=started, photographs=photographs)
+    return comparison
 
 
-def _check(job: Job) -> None:
-    """Refuse what cannot be done before anything is computed."""
+def checked(job: Job) -> Job:
+    """The job with its measurements read, refused if it cannot be done, before anything is computed."""
     if not job.solvers:
         raise UserError("no solver was asked for; name at least one")
-    names = _names(job)
-    if len(set(names)) < len(names):
-        raise UserError(f"a solver is named twice: {', '.join(names)}")
+    if len(set(job.names)) < len(job.names):
+        raise UserError(f"a solver is named twice: {', '.join(job.names)}")
     if job.adapt is not None:
         check_adaptable(job.adapt, job.load)
-    if job.reference is not None and job.reference not in names:
-        raise UserError(f"the reference {job.reference!r} is not among the solvers {', '.join(names)}")
-    check_output(job.out)
+    if job.reference is not None and job.reference not in job.names:
+        raise UserError(f"the reference {job.reference!r} is not among the solvers {', '.join(job.names)}")
+    supported_solvers(job.solvers, job.spare, job.material, job.load)
+    if isinstance(job.measurements, Path):
+        radius = job.design.marker_radius
+        return replace(job, measurements=read_measurements(job.measurements, marker_radius=radius))
+    return job
 
 
-def _names(job: Job) -> list[str]:
-    return [solver.name for solver in job.solvers]
+def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
+    """Mesh, solve and evaluate, without pictures and report.
+
+    Args:
+        job: Checked, with its film tracked.
+        stages: Told of the progress.
+        folder: For solutions and checkpoints as they are finished, from which a resumed run goes on.
+
+    Raises:
+        UserError: If the mesh, the virtual experiment or a solver refuses.
+    """
+    given = job.measurements if isinstance(job.measurements, Observations) else None
+    solvers, left_out = supported_solvers(job.solvers, job.spare, job.material, job.load)
+    mesh, adaptation = shared_mesh(
+        job.design,
+        job.mesh,
+        stages,
+        tolerance=job.adapt,
+        material=job.material,
+        load=job.load,
+        solvers=solvers,
+        check=partial(check_inside, given) if given else None,
+    )
+    problem = Problem(mesh, job.material, job.load)
+    with stages.stage("measurements") as progress:
+        observations, truth = (
+            (given, None) if given else virtual_experiment(problem, job.design.marker_radius, progress)
+        )
+    evaluations: list[Evaluation] = []
+    settings: dict[str, dict[str, object]] = {}
+    for solver in solvers:
+        trained = _in_context(solver, job, folder, evaluations)
+        try:
+            evaluations.append(_evaluate(job, trained, problem, observations, folder, stages))
+            settings[solver.name] = solver.settings()
+        except UnsupportedProblemError as error:
+            if solver.name not in job.spare:
+                raise
+            left_out[solver.name] = str(error)
+    with stages.stage("certificate"):
+        evaluations = with_certificates(evaluations, problem)
+    return Comparison(
+        design=job.design,
+        mesh=mesh,
+        observations=observations,
+        evaluations=evaluations,
+        reference=pick_reference(evaluations, job.reference),
+        material=job.material,
+        load=job.load,
+        truth=truth,
+        adaptation=adaptation,
+        settings=settings,
+        left_out=left_out,
+    )
+
+
+def write(
+    folder: Path,
+    job: Job,
+    comparison: Comparison,
+    stages: Stages,
+    *,
+    started: datetime,
+    photographs: Sequence[Picture] = (),
+) -> None:
+    """Write every file of a comparison but its solutions, which `compute` has written.
+
+    Args:
+        folder: Where to write.
+        job: What was asked for.
+        comparison: What was found.
+        stages: Told of the progress.
+        started: When the run started.
+        photographs: Pictures of the marker tracking, for the report.
+    """
+    if comparison.adaptation is not None:
+        write_rounds(folder / "adapt.csv", comparison.adaptation)
+    write_measurements(folder / "observations.csv", comparison.observations)
+    with stages.stage("pictures") as progress:
+        pictures = draw_all(folder / "figures", comparison, progress)
+    with stages.stage("report"):
+        for evaluation in comparison.evaluations:
+            write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", comparison.mesh, evaluation)
+        write_markers(folder / "markers.csv", comparison)
+        write_table_one(folder / "table1.csv", comparison)
+        write_summary(folder / "summary.csv", comparison)
+        if curves := force_curves(comparison.evaluations, job.load):
+            write_force_displacement(
+                folder / "force_displacement.csv", curves, job.load, depth=job.design.depth
+            )
+        write_json(folder / "metrics.json", metrics(comparison))
+        provenance = _provenance(folder, job, comparison, stages, started)
+        write_report(folder / "report.html", comparison, [*pictures, *photographs], provenance)
+        write_run(folder, provenance)
+
+
+def _provenance(
+    folder: Path, job: Job, comparison: Comparison, stages: Stages, started: datetime
+) -> dict[str, Any]:
+    """Times, and what the numbers depend on: hashes, settings, seeds, devices, versions, machine."""
+    adaptation, settings = comparison.adaptation, comparison.settings
+    return {
+        "started": started.isoformat(timespec="seconds"),
+        "seconds": {name: round(seconds, 2) for name, seconds in stages.seconds.items()},
+        "design_sha256": job.design.digest,
+        "mesh_sha256": comparison.mesh.digest,
+        "problem_sha256": Problem(comparison.mesh, job.material, job.load).digest,
+        "mesh": job.mesh.model_dump(),
+        "adapt": adaptation and {"tolerance_mm": adaptation.tolerance, "end": adaptation.message},
+        "material": job.material.model_dump(),
+        "load": job.load.model_dump(),
+        "measurements_sha256": file_digest(folder / "observations.csv"),
+        "film": job.measurements.provenance() if isinstance(job.measurements, Film) else None,
+        "solvers": settings,
+        "left_out": comparison.left_out,
+        "seed": {name: own["seed"] for name, own in settings.items() if "seed" in own},
+        "device": {each.solver: each.stats.get("device", "cpu") for each in comparison.evaluations},
+        "versions": package_versions(),
+        "machine": machine(),
+    }
 
 
 def _in_context(solver: Solver, job: Job, folder: Path, finished: Sequence[Evaluation]) -> Solver:
-    """The solver, told where to save its training and what is known, if it is one that asks."""
+    """The solver, told where to save its training and the energy of `fem`, if it takes that."""
     if not isinstance(solver, TrainedSolver):
         return solver
-    left = folder / TRAINING / solver.name
-    if job.resume and not left.exists():
+    checkpoints = folder / TRAINING / solver.name
+    if job.resume and not checkpoints.exists():
         take_training(solver.name, job.out, folder)
     law = with_law(job.material, solver).law
     energies = [entry.energy for entry in finished if (entry.solver, entry.law) == ("fem", law)]
-    context = TrainingContext(
-        folder=left,
-        resume=job.resume,
-        reference_energy=energies[0] if energies else None,
-    )
-    return solver.in_context(context)
+    reference = energies[0] if energies else None
+    return solver.in_context(TrainingContext(checkpoints, job.resume, reference))
 
 
 def _evaluate(

@@ -9,8 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
-from compare.figures.style import INK, MEASURED, MUTED, WIDTH, axes_at, figure, heading
+from compare.figures.style import axes_at, heading
 from geometry.arrays import FloatArray
+from geometry.figure import INK, MEASURED, MUTED, WIDTH, Figure, figure
 from vision.calibration.camera import Camera
 from vision.calibration.camera_calibration import Calibration
 
@@ -20,11 +21,10 @@ LONGEST = 0.05
 COVERED = "#56b4e9"
 
 
-def draw_calibration(path: Path, calibration: Calibration, name: str, photograph: NDArray[np.uint8]) -> None:
+def draw_calibration(calibration: Calibration, name: str, photograph: NDArray[np.uint8]) -> Figure:
     """Draw the residuals of all photographs, and one photograph before and after undistortion.
 
     Args:
-        path: The picture.
         calibration: The calibration.
         name: Name of the photograph.
         photograph: Its grey levels, shape (height, width).
@@ -35,7 +35,7 @@ def draw_calibration(path: Path, calibration: Calibration, name: str, photograph
     below = HEAD + wide * shape + GAP + TITLE
     longest = np.nanquantile(np.linalg.norm(_all(calibration.residuals.values()), axis=1), 0.95)
     factor = _round(LONGEST * camera.width / max(longest, 1e-9))
-    with figure(path, below + half * shape + MARGIN) as drawn:
+    with figure(below + half * shape + MARGIN) as drawn:
         heading(
             drawn,
             f"Calibration from {len(calibration.views)} photographs",
@@ -52,6 +52,7 @@ def draw_calibration(path: Path, calibration: Calibration, name: str, photograph
             _image(axes, camera).imshow(image, cmap="gray", vmin=0, vmax=255, interpolation="antialiased")
             axes.plot(*corners.T, ".", ms=1.5, color=MEASURED)
             axes.set_title(f"{Path(name).name} {title}", size=7.5, color=MUTED, pad=3)
+    return drawn
 
 
 def undistorted(image: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from compare.camera.film import Film
 from compare.evaluation.number_format import NONE
-from compare.figures import Figure
+from compare.figures import Picture
 from compare.runtime.csv_files import Cell, write_csv
 from compare.runtime.terminal_table import terminal_table
 from geometry.atomic import write_json
@@ -145,17 +145,17 @@ def track_table(tracking: Tracking, observations: Observations) -> Table:
     )
 
 
-def track_figures(folder: Path, tracking: Tracking) -> list[Figure]:
+def track_figures(folder: Path, tracking: Tracking) -> list[Picture]:
     """The annotated pictures of a track, for a report."""
     seen, count = int(tracking.visible.sum()), len(tracking.visible)
     remarks = " ".join(f"{warning[:1].upper()}{warning[1:]}." for warning in tracking.warnings)
     return [
-        Figure(
+        Picture(
             folder / "initial.png",
             "The finger at rest, as the camera saw it",
             "Green: the markers with their numbers; blue: the fiducials that give the plane.",
         ),
-        Figure(
+        Picture(
             folder / "final.png",
             "The finger pressed, as the camera saw it",
             f"Magenta: the marker trajectories. {seen} of {count} markers are measured. {remarks}".strip(),

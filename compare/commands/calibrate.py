@@ -58,7 +58,7 @@ def calibrate(
     worst = max(errors, key=errors.__getitem__)
     picture = out.with_suffix(".png")
     photograph = next(image for name, image in photographs(images, without=without) if name == worst)
-    draw_calibration(picture, calibration, worst, photograph)
+    draw_calibration(calibration, worst, photograph).save(picture)
     if calibration.boardless:
         say(f"warning: no board of {chosen} was found in {', '.join(calibration.boardless)}")
     if better := better_lens(calibration, lens):

@@ -87,25 +87,24 @@ def compare(
     )
     try:
         with Stages(Console(stderr=True), quiet=quiet or json_) as stages:
-            outcome = run(job, stages)
+            comparison = run(job, stages)
     except KeyboardInterrupt:
         kept = job.out.with_name(f"{job.out.name}.partial").exists()
         note = "what was finished is kept; --resume goes on from it" if kept else "nothing was finished yet"
         raise KeyboardInterrupt(note) from None
-    for remark in outcome.remarks:
+    for remark in comparison.remarks:
         say(f"warning: {remark}")
     if json_:
         print((job.out / "metrics.json").read_text(encoding="utf-8"), end="")
     elif not quiet:
         console = Console()
-        console.print(marker_table(outcome.evaluations, outcome.observations))
+        console.print(marker_table(comparison))
         console.print()
-        console.print(body_table(outcome.evaluations, outcome.reference, outcome.truth))
+        console.print(body_table(comparison))
         console.print(f"report: {job.out / 'report.html'}", soft_wrap=True, highlight=False)
-    unconverged = [evaluation for evaluation in outcome.evaluations if not evaluation.converged]
-    for evaluation in unconverged:
+    for evaluation in comparison.unconverged:
         say(f"error: {evaluation.solver} did not converge: {evaluation.message}")
-    return NOT_CONVERGED if unconverged or not tolerance_reached(outcome.adaptation) else 0
+    return NOT_CONVERGED if comparison.unconverged or not tolerance_reached(comparison.adaptation) else 0
 
 
 def _nobodys(solvers: Sequence[Solver], options: SolverOptions, reference: str | None) -> list[str]:

@@ -21,9 +21,8 @@ def design(
     from geometry.cache import cad_files
 
     chosen, _ = finger.read()
-    picture = out / "design.png"
     paths = cad_files(chosen, out, formats=comma_list(formats))
-    draw_design(picture, chosen)
+    picture = draw_design(chosen).save(out / "design.png")
     for path in [*paths, picture]:
         print(path)
     return 0

@@ -40,7 +40,7 @@ def mesh(
         write_rounds(out / "adapt.csv", adaptation)
     write_mesh(out / "mesh.vtu", triangles)
     triangles.save(out / "mesh.npz")
-    draw_mesh(out / "mesh.png", triangles)
+    draw_mesh(triangles).save(out / "mesh.png")
     nodes, area = len(triangles.points), triangles.areas.sum()
     print(f"{nodes} nodes, {len(triangles.triangles)} triangles, area {area:.4f} mm^2")
     for name in ("mesh.vtu", "mesh.npz", "mesh.png", *(["adapt.csv"] if adaptation else [])):

@@ -74,7 +74,7 @@ def solve(
         if curves := force_curves([evaluation], load):
             written += [out.with_name(f"{out.stem}_force_displacement.{kind}") for kind in ("csv", "png")]
             write_force_displacement(written[1], curves, load, depth=chosen.depth)
-            draw_force_displacement(written[2], curves=curves, depth=chosen.depth)
+            draw_force_displacement(curves, depth=chosen.depth).save(written[2])
     print(f"{solver_label(evaluation)}: {evaluation.message}")
     u, v = solution.reaction
     print(f"energy {solution.energy:.6g} N mm/mm, reaction ({u:.6g}, {v:.6g}) N/mm")

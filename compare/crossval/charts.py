@@ -1,7 +1,6 @@
 """Charts of a cross-validation: errors at markers, distances from the truth, marker weights."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 from matplotlib.axes import Axes
 
@@ -9,14 +8,13 @@ from compare.crossval.scores import Score
 from compare.figures.style import (
     LEGEND_LINE,
     SOLVER_COLOURS,
-    WIDTH,
     axes_at,
-    figure,
     heading,
     legend_above,
     legend_height,
     solver_colour,
 )
+from geometry.figure import WIDTH, Figure, figure
 
 HEAD, HEIGHT, FOOT, LEFT, GAP = 0.5, 2.2, 0.5, 0.72, 0.5
 """Heights, the left margin and the gap between charts, inches."""
@@ -33,10 +31,10 @@ SMALLEST = 1e-4
 PANELS = {"displacement": "displacement", "strain": "strain", "von_mises": "von Mises stress"}
 
 
-def draw_held_out(path: Path, *, errors: Mapping[str, Sequence[float]], simulated: bool) -> None:
+def draw_held_out(errors: Mapping[str, Sequence[float]], simulated: bool) -> Figure:
     """Draw the mean of |du| + |dv| at every marker where it is held out, a line for each solver."""
     height = legend_height(list(errors))
-    with figure(path, HEAD + height + HEIGHT + FOOT) as drawn:
+    with figure(HEAD + height + HEIGHT + FOOT) as drawn:
         heading(
             drawn,
             "Error of each marker when it is held out",
@@ -49,13 +47,14 @@ def draw_held_out(path: Path, *, errors: Mapping[str, Sequence[float]], simulate
         axes.set_ylabel(r"$|\Delta u| + |\Delta v|$, mm")
         axes.set_xticks(range(1, len(values) + 1))
         _finish(axes)
+    return drawn
 
 
-def draw_fields(path: Path, *, scores: Mapping[str, Mapping[str, Score]], schemes: Sequence[str]) -> None:
+def draw_fields(scores: Mapping[str, Mapping[str, Score]], schemes: Sequence[str]) -> Figure:
     """Draw relative L2 distances from the truth by scheme, a chart for each field."""
     height = legend_height(list(scores))
     width = (WIDTH - LEFT - 0.1 - (len(PANELS) - 1) * GAP) / len(PANELS)
-    with figure(path, HEAD + height + HEIGHT + FOOT + 0.25) as drawn:
+    with figure(HEAD + height + HEIGHT + FOOT + 0.25) as drawn:
         heading(
             drawn,
             "Distance from the truth over the body",
@@ -72,13 +71,13 @@ def draw_fields(path: Path, *, scores: Mapping[str, Mapping[str, Score]], scheme
             _finish(axes, legend=column == 0)
             axes.set_xlabel(title)
         drawn.axes[0].set_ylabel("%")
+    return drawn
 
 
-def draw_weight_sweep(path: Path, *, sweep: Mapping[str, Sequence[float]]) -> None:
+def draw_weight_sweep(sweep: Mapping[str, Sequence[float]]) -> Figure:
     """Draw the errors of `fem-asm` at the markers and over the body against the weight of the markers.
 
     Args:
-        path: The picture.
         sweep: Columns of `compare.crossval.weight_sweep.sweep_weights`.
     """
     panels: dict[str, dict[str, str]] = {
@@ -87,7 +86,7 @@ def draw_weight_sweep(path: Path, *, sweep: Mapping[str, Sequence[float]]) -> No
     }
     between, legend = LEFT, len(PANELS) * LEGEND_LINE
     width = (WIDTH - LEFT - 0.1 - between) / 2
-    with figure(path, HEAD + legend + HEIGHT + FOOT) as drawn:
+    with figure(HEAD + legend + HEIGHT + FOOT) as drawn:
         heading(
             drawn,
             "fem-asm for other weights of the markers",
@@ -105,6 +104,7 @@ def draw_weight_sweep(path: Path, *, sweep: Mapping[str, Sequence[float]]) -> No
             axes.legend(loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0, labelspacing=0.2)
         drawn.axes[0].set_ylim(bottom=SMALLEST)
         drawn.axes[0].yaxis.set_major_formatter("{x:g}")
+    return drawn
 
 
 def _line(axes: Axes, x: Sequence[float], values: Sequence[float], number: int, label: str) -> None:

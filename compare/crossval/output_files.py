@@ -30,17 +30,15 @@ def write_results(
     pictures = []
     if ONE in result.schemes:
         errors = {label: each[ONE].per_marker for label, each in result.scores.items()}
-        draw_held_out(out / HELD_OUT, errors=errors, simulated=result.study.measurements is None)
-        pictures.append(HELD_OUT)
+        simulated = result.study.measurements is None
+        pictures.append(draw_held_out(errors=errors, simulated=simulated).save(out / HELD_OUT))
     if result.has_fields:
-        draw_fields(out / FIELDS, scores=result.scores, schemes=result.schemes)
-        pictures.append(FIELDS)
+        pictures.append(draw_fields(scores=result.scores, schemes=result.schemes).save(out / FIELDS))
     if sweep:
         rows = [dict(zip(sweep, values, strict=True)) for values in zip(*sweep.values(), strict=True)]
         write_csv(out / "l_curve.csv", rows)
-        draw_weight_sweep(out / SWEEP, sweep=sweep)
-        pictures.append(SWEEP)
-    for name in {HELD_OUT, FIELDS, SWEEP} - set(pictures):  # of an earlier study with more
+        pictures.append(draw_weight_sweep(sweep=sweep).save(out / SWEEP))
+    for name in {HELD_OUT, FIELDS, SWEEP} - {path.name for path in pictures}:  # of an earlier study with more
         (out / name).unlink(missing_ok=True)
     html = (
         template_environment()
@@ -49,7 +47,7 @@ def write_results(
             result=result,
             answers=answers(result),
             grids=grids(result),
-            pictures=[out / name for name in pictures],
+            pictures=pictures,
         )
     )
     with atomic_path(out / "report.html") as partial:

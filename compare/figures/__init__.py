@@ -1,27 +1,23 @@
-"""Every picture of a comparison.
+"""The pictures of a comparison; each function that draws one returns a `geometry.figure.Figure`.
 
-`draw_all` is the one entry; what it needs is imported when it runs, so that a run without pictures starts
-fast.
+Imports `compare.evaluation`. Matplotlib and PyVista are imported when the first picture is drawn, so that a
+run without pictures starts fast.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from compare.evaluation.evaluation import Evaluation
-from geometry.finger.parameters import Parameters
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from solvers.problem import Load
+from compare.evaluation.comparison import Comparison
 
 
 @dataclass(frozen=True)
-class Figure:
+class Picture:
     """A picture that has been written.
 
     Attributes:
         path: The PNG file.
-        title: What it shows, in a few words.
+        title: Its subject, in a few words.
         caption: What a reader must know to read it, in sentences.
     """
 
@@ -32,37 +28,26 @@ class Figure:
 
 def draw_all(
     folder: Path,
-    *,
-    design: Parameters,
-    mesh: TriangleMesh,
-    load: Load,
-    evaluations: Sequence[Evaluation],
-    observations: Observations,
-    reference: Evaluation,
+    comparison: Comparison,
     progress: Callable[[float, str], None] = lambda done, what: None,
-) -> list[Figure]:
-    """Draw every picture of a comparison, each written atomically as PNG.
+) -> list[Picture]:
+    """Write every picture of a comparison as PNG.
 
     Args:
         folder: Where to write; created if it is missing.
-        design: The finger.
-        mesh: The mesh that the solvers shared.
-        load: What moved the finger.
-        evaluations: One for each solver, in the order of panels and colours.
-        observations: What the markers did.
-        reference: One of the evaluations, which the others are compared with.
+        comparison: What to draw.
         progress: Called before every picture with the share done, from 0 to 1, and what comes next.
 
     Returns:
         The pictures in the order of a report.
     """
-    from compare.figures.gallery import Gallery
+    from compare.figures.gallery import DRAWINGS
 
-    gallery = Gallery(folder, design, mesh, load, tuple(evaluations), observations, reference)
-    tasks = gallery.tasks()
-    figures: list[Figure] = []
-    for number, (what, draw) in enumerate(tasks):
-        progress(number / len(tasks), what)
-        figures += [figure for figure in [draw()] if figure is not None]
+    pictures: list[Picture] = []
+    for number, (name, (what, draw)) in enumerate(DRAWINGS.items()):
+        progress(number / len(DRAWINGS), what)
+        if (drawing := draw(comparison)) is not None:
+            path = drawing.figure.save(folder / f"{name}.png")
+            pictures.append(Picture(path, drawing.title, drawing.caption))
     progress(1.0, "pictures drawn")
-    return figures
+    return pictures

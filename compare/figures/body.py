@@ -6,12 +6,18 @@ from matplotlib.collections import LineCollection
 
 from compare.figures.canvas import Extent, Pixels
 from compare.figures.colours import Scale
-from compare.figures.style import HALO, INK, MUTED
+from compare.figures.style import HALO
 from geometry.arrays import FloatArray, IntArray
+from geometry.figure import INK, MUTED
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 PIXELS = 1800
 """Pixels across a picture of the body; a printed panel has fewer, which smooths its edges."""
+
+
+def field_extent(mesh: TriangleMesh) -> Extent:
+    """The extent of a panel of a field: the undeformed body with a margin, mm."""
+    return Extent.around(mesh.points, margin=0.012 * float(np.ptp(mesh.points[:, 0])))
 
 
 def prepare(axes: Axes, extent: Extent) -> None:

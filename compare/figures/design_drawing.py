@@ -1,7 +1,5 @@
 """The design with the paper's nine parameters, the clamped base, the contact and the markers."""
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
@@ -11,14 +9,14 @@ from matplotlib.path import Path as Outline
 from compare.figures import body
 from compare.figures.canvas import Extent
 from compare.figures.dimensions import Draughtsman
-from compare.figures.style import BODY, INK, MEASURED, WIDTH, axes_at, figure, heading
+from compare.figures.style import axes_at, heading
 from geometry.arrays import FloatArray
+from geometry.figure import BODY, CONTACT, INK, MEASURED, WIDTH, Figure, figure
 from geometry.finger.fillets import fillet_points
 from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import Parameters
 from geometry.finger.section import Section, corner_angles, finger_section, rib_direction, rib_pitch
 
-CONTACT = "#d55e00"
 POINT = 8.5 / 72 / WIDTH
 """Height of the type as a share of the drawing's width."""
 LEFT, RIGHT, ABOVE, BELOW = 5.2, 1.6, 7.2, 3.2
@@ -26,12 +24,12 @@ LEFT, RIGHT, ABOVE, BELOW = 5.2, 1.6, 7.2, 3.2
 HEAD, FOOT = 0.28, 0.42
 
 
-def draw_design(path: Path, design: Parameters) -> None:
+def draw_design(design: Parameters) -> Figure:
     """Draw the section of a finger, to scale, with a dimension for each of the paper's nine parameters."""
     em = design.height * POINT / (1 - (LEFT + RIGHT) * POINT)
     extent = Extent(-LEFT * em, design.height + RIGHT * em, -design.base_width - BELOW * em, ABOVE * em)
     height = WIDTH * extent.height / extent.width
-    with figure(path, HEAD + height + FOOT) as drawn:
+    with figure(HEAD + height + FOOT) as drawn:
         heading(drawn, f"Design “{design.name}”")
         axes = axes_at(drawn, (0, HEAD, WIDTH, height))
         body.prepare(axes, extent)
@@ -54,6 +52,7 @@ def draw_design(path: Path, design: Parameters) -> None:
             ],
             loc="lower center", ncols=2, columnspacing=2.5, handletextpad=0.6, borderaxespad=0.3,
         )  # fmt: skip
+    return drawn
 
 
 def _body(axes: Axes, shape: Section) -> None:

@@ -9,8 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Arc
 from matplotlib.text import Text
 
-from compare.figures.style import HALO, INK
+from compare.figures.style import HALO
 from geometry.arrays import FloatArray
+from geometry.figure import INK
 
 Point = Sequence[float] | FloatArray
 LINE = 0.6

@@ -1,24 +1,16 @@
 """Energy on the way to the solution, from the record that a solver keeps."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.labels import solver_label
-from compare.figures.style import (
-    INK,
-    WIDTH,
-    axes_at,
-    figure,
-    heading,
-    legend_above,
-    legend_height,
-    solver_colour,
-)
+from compare.figures.style import axes_at, heading, legend_above, legend_height, solver_colour
 from geometry.arrays import FloatArray
+from geometry.figure import INK, WIDTH, Figure, figure
 
 LOG_RATIO = 20.0
 """An axis is logarithmic where the largest value exceeds the smallest by this factor."""
@@ -52,22 +44,22 @@ def approaches_reference(group: Group) -> bool:
     return column == ENERGY and not abscissa.startswith("load")
 
 
-def draw_energy(path: Path, *, evaluations: Sequence[Evaluation], reference: Evaluation) -> bool:
-    """Draw every solver's record, a row for each kind; beside it how far the energy is from the reference's.
+def draw_energy(comparison: Comparison) -> Figure | None:
+    """Draw every solver's record, a row for each kind; beside it the distance from the reference's energy.
 
-    Returns:
-        Whether there was a record to draw.
+    None without a record.
     """
+    evaluations, reference = comparison.evaluations, comparison.reference
     groups = recorded(evaluations)
     colours = {evaluation.solver: solver_colour(number) for number, evaluation in enumerate(evaluations)}
     if not groups:
-        return False
+        return None
     line = f"{solver_label(reference)} {reference.energy:.4g}"
     heights = [
         legend_height([*map(record_label, members), *([line] if approaches_reference(group) else [])])
         for group, members in groups.items()
     ]
-    with figure(path, HEAD + sum(heights) + len(groups) * (HEIGHT + FOOT)) as drawn:
+    with figure(HEAD + sum(heights) + len(groups) * (HEIGHT + FOOT)) as drawn:
         heading(drawn, "Energy on the way to the solution")
         for row, (group, members) in enumerate(groups.items()):
             others = [each for each in members if each is not reference and not each.in_sample]
@@ -83,7 +75,7 @@ def draw_energy(path: Path, *, evaluations: Sequence[Evaluation], reference: Eva
                 beside = axes_at(drawn, (LEFT + width + GAP, top, width, HEIGHT))
                 _distances(beside, group, compared, colours, reference)
             legend_above(axes)
-    return True
+    return drawn
 
 
 def record_label(evaluation: Evaluation) -> str:

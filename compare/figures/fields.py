@@ -1,23 +1,23 @@
 """A scalar field of every solver on one colour scale, with the differences from the reference beside it."""
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure as MplFigure
 
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.differences import field_difference
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.labels import solver_label
 from compare.evaluation.metrics import COMPONENTS
 from compare.evaluation.number_format import percent, significant
 from compare.figures import body
-from compare.figures.canvas import Canvas, Extent
+from compare.figures.canvas import Canvas
 from compare.figures.colours import PERCENT, Scale, sequential, symmetric
-from compare.figures.style import MUTED, WIDTH, axes_at, figure, heading
+from compare.figures.style import axes_at, heading
 from geometry.arrays import FloatArray
+from geometry.figure import MUTED, WIDTH, Figure, figure
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 MARGIN = 0.1
@@ -99,20 +99,17 @@ def difference_scale(
     return found._replace(low=-limit, high=limit)
 
 
-def draw_field(
-    path: Path,
-    quantity: Quantity,
-    *,
-    canvas: Canvas,
-    mesh: TriangleMesh,
-    evaluations: Sequence[Evaluation],
-    reference: Evaluation,
-) -> None:
+def draw_field(comparison: Comparison, quantity: Quantity) -> Figure:
     """Draw a quantity on the undeformed body: a row a solver, its difference from the reference beside it."""
-    ordered = [reference, *(evaluation for evaluation in evaluations if evaluation is not reference)]
+    mesh, reference = comparison.mesh, comparison.reference
+    ordered = [
+        reference,
+        *(evaluation for evaluation in comparison.evaluations if evaluation is not reference),
+    ]
     columns = 1 if len(ordered) == 1 else 2
     width = (WIDTH - MARGIN * (columns + 1)) / columns
-    height = width * canvas.extent.height / canvas.extent.width
+    extent = body.field_extent(mesh)
+    height = width * extent.height / extent.width
     scale = field_scale(quantity, mesh, reference)
     differences = difference_scale(quantity, mesh, ordered, reference)
     total = HEAD + len(ordered) * (PANEL_TITLE + height) + FOOT
@@ -123,12 +120,12 @@ def draw_field(
     def panel(row: int, column: int, colours: Scale, values: FloatArray, of: Evaluation) -> Axes:
         left, top = MARGIN + column * (width + MARGIN), HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
         axes = axes_at(drawn, (left, top, width, height))
-        body.prepare(axes, canvas.extent)
-        body.show(axes, canvas.picture(colours.paint(of.per_triangle(values))), canvas.extent)
+        body.prepare(axes, extent)
+        body.show(axes, canvas.picture(colours.paint(of.per_triangle(values))), extent)
         body.outline(axes, edges, mesh.points, width=0.35)
         return axes
 
-    with figure(path, total) as drawn:
+    with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // 2) as canvas:
         heading(drawn, f"{quantity.title}, undeformed body")
         for row, evaluation in enumerate(ordered):
             values = quantity.values(evaluation)
@@ -143,13 +140,9 @@ def draw_field(
                 _remark(axes, f"rel. $L^2$ {percent(norm)}")
             elif columns == 2:
                 _explain(drawn, (2 * MARGIN + width, HEAD + PANEL_TITLE, width, height), reference)
-        body.scale_bar(axes, canvas.extent)
+        body.scale_bar(axes, extent)
         _bars(drawn, quantity, scale, differences, columns, width, total)
-
-
-def field_extent(mesh: TriangleMesh) -> Extent:
-    """What a panel of a field shows: the undeformed body."""
-    return Extent.around(mesh.points, margin=0.012 * float(np.ptp(mesh.points[:, 0])))
+    return drawn
 
 
 def _remark(axes: Axes, text: str) -> None:
@@ -157,7 +150,7 @@ def _remark(axes: Axes, text: str) -> None:
     axes.text(0.99, 0.33, text, ha="right", size=7, color=MUTED, transform=axes.transAxes)
 
 
-def _explain(drawn: MplFigure, box: tuple[float, float, float, float], reference: Evaluation) -> None:
+def _explain(drawn: Figure, box: tuple[float, float, float, float], reference: Evaluation) -> None:
     axes = axes_at(drawn, box)
     axes.set_axis_off()
     text = (
@@ -170,7 +163,7 @@ def _explain(drawn: MplFigure, box: tuple[float, float, float, float], reference
 
 
 def _bars(
-    drawn: MplFigure,
+    drawn: Figure,
     quantity: Quantity,
     scale: Scale,
     differences: Scale,

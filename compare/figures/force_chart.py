@@ -1,35 +1,26 @@
 """Force over displacement of the indenter."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
 from compare.evaluation.force_displacement import ForceCurve, follows_load
 from compare.evaluation.labels import solver_label
-from compare.figures.style import (
-    INK,
-    WIDTH,
-    axes_at,
-    figure,
-    heading,
-    legend_above,
-    legend_height,
-    solver_colour,
-)
+from compare.figures.style import axes_at, heading, legend_above, legend_height, solver_colour
+from geometry.figure import INK, WIDTH, Figure, figure
 
 HEAD, HEIGHT, FOOT, LEFT, RIGHT = 0.3, 2.4, 0.45, 0.75, 0.65
 """Heights and the margins, inches."""
 
 
-def draw_force_displacement(path: Path, *, curves: Sequence[ForceCurve], depth: float) -> None:
+def draw_force_displacement(curves: Sequence[ForceCurve], *, depth: float) -> Figure:
     """Draw every curve: per mm of depth on the left axis, for the depth, mm, on the right one.
 
     A solver that follows the load has a mark at each of its equilibria, a linear one a dashed line.
     """
     labels = [_label(curve) for curve in curves]
     height = legend_height(labels)
-    with figure(path, HEAD + height + HEIGHT + FOOT) as drawn:
+    with figure(HEAD + height + HEIGHT + FOOT) as drawn:
         heading(drawn, "Force of the indenter along its travel")
         axes = axes_at(drawn, (LEFT, HEAD + height, WIDTH - LEFT - RIGHT, HEIGHT))
         straight = sum(not follows_load(curve.evaluation) for curve in curves)
@@ -61,6 +52,7 @@ def draw_force_displacement(path: Path, *, curves: Sequence[ForceCurve], depth: 
         whole.set_ylabel(f"force for {depth:g} mm of depth, N")
         whole.spines["right"].set(visible=True, color=INK)
         legend_above(axes)
+    return drawn
 
 
 def _label(curve: ForceCurve) -> str:

@@ -1,20 +1,10 @@
 """The losses of networks that are trained by gradients, over the epochs."""
 
-from collections.abc import Sequence
-from pathlib import Path
-
-from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.labels import solver_at_markers
 from compare.figures.energy_chart import wants_log
-from compare.figures.style import (
-    WIDTH,
-    axes_at,
-    figure,
-    heading,
-    legend_above,
-    legend_height,
-    solver_colour,
-)
+from compare.figures.style import axes_at, heading, legend_above, legend_height, solver_colour
+from geometry.figure import WIDTH, Figure, figure
 
 LOSSES = {"PDE": "MPa", "BC": "mm²", "ASM": "mm²"}
 """The terms of the paper's loss, without their weights, and their units."""
@@ -23,22 +13,21 @@ HEAD, HEIGHT, GAP, FOOT, LEFT = 0.3, 1.15, 0.15, 0.42, 0.85
 """Heights and the left margin, inches."""
 
 
-def draw_losses(path: Path, *, evaluations: Sequence[Evaluation]) -> bool:
+def draw_losses(comparison: Comparison) -> Figure | None:
     """Draw a chart for each term of the loss, with a line for every solver that has it (Fig. 7 of the paper).
 
-    Returns:
-        Whether there was a record to draw.
+    None without a record.
     """
     trained = {
         number: evaluation
-        for number, evaluation in enumerate(evaluations)
+        for number, evaluation in enumerate(comparison.evaluations)
         if {EPOCH, "PDE"} <= evaluation.history.keys()
     }
     if not trained:
-        return False
+        return None
     terms = [name for name in LOSSES if any(name in each.history for each in trained.values())]
     legend = legend_height([solver_at_markers(evaluation) for evaluation in trained.values()])
-    with figure(path, HEAD + legend + len(terms) * (HEIGHT + GAP) + FOOT) as drawn:
+    with figure(HEAD + legend + len(terms) * (HEIGHT + GAP) + FOOT) as drawn:
         heading(drawn, "Losses over the epochs, without their weights")
         for row, term in enumerate(terms):
             top = HEAD + legend + row * (HEIGHT + GAP)
@@ -59,4 +48,4 @@ def draw_losses(path: Path, *, evaluations: Sequence[Evaluation]) -> bool:
             if row < len(terms) - 1:
                 axes.tick_params(labelbottom=False)
         axes.set_xlabel(EPOCH)
-    return True
+    return drawn

@@ -1,19 +1,19 @@
 """Errors at the markers, a row a solver."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure as MplFigure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.labels import solver_at_markers
 from compare.evaluation.metrics import MarkerErrors, held_out_errors, marker_errors
-from compare.figures.style import MUTED, WIDTH, axes_at, figure, heading, solver_colour
+from compare.figures.style import axes_at, heading, solver_colour
 from geometry.arrays import BoolArray
+from geometry.figure import MUTED, WIDTH, Figure, figure
 from geometry.observations import Observations
 
 HEAD, TITLE, HEIGHT, GAP, FOOT = 0.62, 0.19, 0.42, 0.09, 0.4
@@ -22,15 +22,16 @@ LEFT, MEANS = 0.48, 0.72
 """Widths in inches beside the bars: their scale; their means."""
 
 
-def draw_marker_errors(path: Path, *, evaluations: Sequence[Evaluation], observations: Observations) -> None:
+def draw_marker_errors(comparison: Comparison) -> Figure:
     """Bars of |du| and |dv| at every marker (Fig. 6 of the paper), all on one scale.
 
     Full bars: at markers that the solver was not given. Hollow ones: at markers that it was given.
     """
+    evaluations, observations = comparison.evaluations, comparison.observations
     width = WIDTH / 2 - LEFT - MEANS
     step = TITLE + HEIGHT + GAP
     ceiling = _ceiling(evaluations, observations)
-    with figure(path, HEAD + len(evaluations) * step + FOOT) as drawn:
+    with figure(HEAD + len(evaluations) * step + FOOT) as drawn:
         heading(drawn, f"Absolute error at the markers, against {observations.label} displacements")
         _legend(drawn)
         for row, evaluation in enumerate(evaluations):
@@ -48,6 +49,7 @@ def draw_marker_errors(path: Path, *, evaluations: Sequence[Evaluation], observa
                     axes.set_xlabel("marker (1 is nearest the base)")
                 else:
                     axes.tick_params(labelbottom=False)
+    return drawn
 
 
 def _ceiling(evaluations: Sequence[Evaluation], observations: Observations) -> float:
@@ -93,7 +95,7 @@ def _scales(axes: Axes, visible: BoolArray, ceiling: float) -> None:
     axes.set_axisbelow(True)
 
 
-def _legend(drawn: MplFigure) -> None:
+def _legend(drawn: Figure) -> None:
     handles = [
         Patch(facecolor=MUTED, edgecolor=MUTED, label="at a marker that the solver was not given"),
         Patch(facecolor="white", edgecolor=MUTED, label="at one that it was given"),

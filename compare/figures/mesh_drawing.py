@@ -1,6 +1,5 @@
 """A picture of the mesh: the whole, and close-ups where it is finest and where a rib meets a wall."""
 
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -10,14 +9,14 @@ from matplotlib.patches import Rectangle
 
 from compare.figures import body
 from compare.figures.canvas import Extent
-from compare.figures.style import INK, MEASURED, WIDTH, axes_at, figure, heading
+from compare.figures.style import axes_at, heading
 from geometry.arrays import FloatArray
+from geometry.figure import CONTACT, INK, MEASURED, WIDTH, Figure, figure
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 MARGIN = 0.1
 HEAD, INSET_TITLE = 0.48, 0.24
 LINE = "#3d5a80"
-CONTACT = "#d55e00"
 
 
 class MeshNumbers(NamedTuple):
@@ -83,7 +82,7 @@ def inner_corner(mesh: TriangleMesh, near: float) -> FloatArray:
     return np.asarray(candidates[np.abs(candidates[:, 0] - near).argmin()])
 
 
-def draw_mesh(path: Path, mesh: TriangleMesh) -> None:
+def draw_mesh(mesh: TriangleMesh) -> Figure:
     """Draw the whole mesh and two close-ups: the contact, and a joint of a rib and a wall."""
     whole = Extent.around(mesh.points, margin=0.02 * float(np.ptp(mesh.points[:, 0])))
     width = WIDTH - 2 * MARGIN
@@ -103,7 +102,7 @@ def draw_mesh(path: Path, mesh: TriangleMesh) -> None:
         f"{numbers.nodes} nodes, {numbers.triangles} triangles; edges {numbers.shortest:.3g} to "
         f"{numbers.longest:.3g} mm; quality: worst {numbers.worst:.2f}, mean {numbers.mean:.2f}"
     )
-    with figure(path, HEAD + height + INSET_TITLE + inset_height + MARGIN) as drawn:
+    with figure(HEAD + height + INSET_TITLE + inset_height + MARGIN) as drawn:
         heading(drawn, "Mesh, shared by every solver", note)
         axes = axes_at(drawn, (MARGIN, HEAD, width, height))
         _draw(axes, mesh, whole, 0.12)
@@ -134,6 +133,7 @@ def draw_mesh(path: Path, mesh: TriangleMesh) -> None:
                 spine.set(visible=True, color=MEASURED, linewidth=0.9)
             inset.set_title(title, size=8, pad=3)
             body.scale_bar(inset, window)
+    return drawn
 
 
 def _window(middle: FloatArray, width: float, ratio: float) -> Extent:

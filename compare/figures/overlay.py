@@ -1,23 +1,23 @@
 """The deformed finger of every solver, with its markers and those that were seen."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure as MplFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.labels import markers_label, solver_at_markers
 from compare.evaluation.metrics import marker_errors
 from compare.figures import body
 from compare.figures.canvas import Canvas, Extent
 from compare.figures.colours import Scale
-from compare.figures.style import INK, MEASURED, MUTED, WIDTH, axes_at, figure, heading
+from compare.figures.style import axes_at, heading
 from geometry.arrays import FloatArray, IntArray
+from geometry.figure import INK, MEASURED, MUTED, WIDTH, Figure, figure
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Load
@@ -27,16 +27,10 @@ HEAD, PANEL_TITLE, FOOT = 0.55, 0.27, 0.48
 """Heights in inches: heading and legend; the name above a panel; the colour bar."""
 
 
-def draw_overlay(
-    path: Path,
-    *,
-    mesh: TriangleMesh,
-    load: Load,
-    evaluations: Sequence[Evaluation],
-    observations: Observations,
-) -> None:
+def draw_overlay(comparison: Comparison) -> Figure:
     """Draw every solver's deformed finger, one panel each, at true scale."""
-    extent = overlay_extent(mesh, evaluations, observations)
+    mesh, load, evaluations = comparison.mesh, comparison.load, comparison.evaluations
+    extent = overlay_extent(comparison)
     columns = 1 if len(evaluations) <= 3 else 2
     rows = -(-len(evaluations) // columns)
     width = (WIDTH - MARGIN * (columns + 1)) / columns
@@ -44,14 +38,14 @@ def draw_overlay(
     scale = displacement_scale(mesh, evaluations)
     edges = body.boundary_edges(mesh)
     total = HEAD + rows * (PANEL_TITLE + height) + FOOT
-    with figure(path, total) as drawn, Canvas(mesh, extent, width=body.PIXELS // columns) as canvas:
+    with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // columns) as canvas:
         heading(drawn, "Deformed finger, true scale")
         for number, evaluation in enumerate(evaluations):
             row, column = divmod(number, columns)
             left = MARGIN + column * (width + MARGIN)
             top = HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
             axes = axes_at(drawn, (left, top, width, height))
-            _panel(axes, canvas, scale, edges, mesh, evaluation, observations)
+            _panel(axes, canvas, scale, edges, mesh, evaluation, comparison.observations)
             if load.radius is None:
                 _contact_path(axes, mesh, evaluation)
             else:
@@ -62,7 +56,10 @@ def draw_overlay(
             scale,
             "displacement magnitude, mm",
         )
-        _legend(drawn, observations, "contact’s motion" if load.radius is None else "cylinder’s motion")
+        _legend(
+            drawn, comparison.observations, "contact’s motion" if load.radius is None else "cylinder’s motion"
+        )
+    return drawn
 
 
 def displacement_scale(mesh: TriangleMesh, evaluations: Sequence[Evaluation]) -> Scale:
@@ -71,15 +68,16 @@ def displacement_scale(mesh: TriangleMesh, evaluations: Sequence[Evaluation]) ->
     return Scale(0.0, high or 1.0, mpl.colormaps["viridis"])
 
 
-def overlay_extent(
-    mesh: TriangleMesh, evaluations: Sequence[Evaluation], observations: Observations
-) -> Extent:
-    """What a panel shows: the body before and after in every solution, and all markers, mm."""
+def overlay_extent(comparison: Comparison) -> Extent:
+    """The extent of a panel: the body before and after in every converged solution, and all markers, mm."""
+    mesh, observations = comparison.mesh, comparison.observations
     span = float(np.ptp(mesh.points[:, 0]))
     seen = observations.visible
     clouds = [mesh.points, observations.points[seen] + observations.displacements[seen]]
     clouds += [
-        mesh.points + evaluation.node_displacement for evaluation in evaluations if evaluation.converged
+        mesh.points + evaluation.node_displacement
+        for evaluation in comparison.evaluations
+        if evaluation.converged
     ]
     tight = Extent.around(*clouds, margin=0.03 * span)
     return tight._replace(bottom=tight.bottom - 0.02 * span)
@@ -147,7 +145,7 @@ def _arrow(axes: Axes, start: FloatArray, end: FloatArray) -> None:
     axes.annotate("", xy=tuple(end), xytext=tuple(start), arrowprops=arrow, zorder=6)
 
 
-def _legend(drawn: MplFigure, observations: Observations, motion: str) -> None:
+def _legend(drawn: Figure, observations: Observations, motion: str) -> None:
     handles = [
         Line2D(
             [],

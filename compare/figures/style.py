@@ -1,31 +1,11 @@
-"""One look for every chart: size, type, colours, and how a figure becomes a file."""
+"""The layout that all charts share: heading, axes by inches, legends, colours of solvers."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
 
-import matplotlib as mpl
 from matplotlib import patheffects
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure as MplFigure
 
-from geometry.atomic import atomic_path
-
-if TYPE_CHECKING:
-    from matplotlib.typing import RcKeyType
-
-WIDTH = 5.5
-"""Width of every figure, inches: type stays readable when a journal prints it in one column of 88 mm."""
-
-DPI = 300
-
-INK = "#1a1a1a"
-MUTED = "#767676"
-BODY = "#e4e4e4"
-MEASURED = "#d1006c"
-"""Colour of measurements: occurs in none of the colour maps and for no solver."""
+from geometry.figure import INK, MUTED, Figure
 
 HALO = [patheffects.withStroke(linewidth=2.5, foreground="white")]
 """Keeps type and lines legible on anything."""
@@ -33,40 +13,8 @@ HALO = [patheffects.withStroke(linewidth=2.5, foreground="white")]
 SOLVER_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#56b4e9", "#d55e00", "#000000", "#8c6bb1", "#999933")
 """Okabe and Ito's palette, safe for colour-blind readers, without its pink (see `MEASURED`), and two more."""
 
-_RC: "dict[RcKeyType, Any]" = {
-    "font.family": "DejaVu Sans",
-    "font.size": 8.5,
-    "axes.titlesize": 9,
-    "axes.labelsize": 8.5,
-    "axes.edgecolor": INK,
-    "axes.linewidth": 0.6,
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "legend.fontsize": 8,
-    "legend.frameon": False,
-    "figure.titlesize": 10,
-    "mathtext.fontset": "dejavusans",
-    "savefig.dpi": "figure",
-}
 
-
-@contextmanager
-def figure(path: Path, height: float) -> Iterator[MplFigure]:
-    """A figure of `WIDTH` by `height` inches, written atomically when the block ends without an error."""
-    with mpl.rc_context(_RC):
-        drawn = MplFigure(figsize=(WIDTH, height), dpi=DPI, facecolor="white")
-        FigureCanvasAgg(drawn)
-        yield drawn
-        with atomic_path(path) as partial:
-            drawn.savefig(partial, pil_kwargs={"compress_level": 3})
-
-
-def heading(drawn: MplFigure, text: str, note: str = "") -> None:
+def heading(drawn: Figure, text: str, note: str = "") -> None:
     """Title at the top left of a figure, and under it, smaller, what the reader must know."""
     height = drawn.get_figheight()
     drawn.text(0.012, 1 - 0.06 / height, text, va="top", weight="bold", size=9.5, color=INK)
@@ -74,7 +22,7 @@ def heading(drawn: MplFigure, text: str, note: str = "") -> None:
         drawn.text(0.012, 1 - 0.25 / height, note, va="top", size=7.5, color=MUTED, linespacing=1.3)
 
 
-def axes_at(drawn: MplFigure, box: Sequence[float]) -> Axes:
+def axes_at(drawn: Figure, box: Sequence[float]) -> Axes:
     """Axes at left, top, width, height in inches, measured from the figure's top left corner."""
     left, top, width, height = box
     total_width, total_height = drawn.get_size_inches()

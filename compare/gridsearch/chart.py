@@ -1,7 +1,6 @@
 """A grid search as two maps: distance from `fem`, and violation of the boundary conditions."""
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib import colormaps
@@ -9,9 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.patches import Rectangle
 
-from compare.figures.style import HALO, INK, MUTED, WIDTH, axes_at, figure, heading
+from compare.figures.style import HALO, axes_at, heading
 from compare.gridsearch.tables import best_of
 from compare.gridsearch.training_run import TrainingMetrics, TrainingRun
+from geometry.figure import INK, MUTED, WIDTH, Figure, figure
 
 HEAD, CELL, FOOT, LEFT, GAP = 0.68, 0.34, 0.5, 0.85, 0.25
 """Heights, the left margin and the gap between the maps, inches."""
@@ -20,7 +20,7 @@ SMALLEST = 1e-12
 """Stands for zero on the logarithmic scale of the colours."""
 
 
-def draw_grid(path: Path, *, runs: Sequence[TrainingRun]) -> None:
+def draw_grid(runs: Sequence[TrainingRun]) -> Figure:
     """Draw both maps over learning rate and weight; the run nearest to `fem` has a frame."""
     weights = sorted({run.point.bc_weight for run in runs})
     height = CELL * len(weights)
@@ -30,7 +30,7 @@ def draw_grid(path: Path, *, runs: Sequence[TrainingRun]) -> None:
         "Violation of base or load, % of stroke": lambda measured: measured.boundary_violation,
     }
     epochs = max((run.measured.epochs for run in runs if run.measured), default=0)
-    with figure(path, HEAD + height + FOOT) as drawn:
+    with figure(HEAD + height + FOOT) as drawn:
         heading(
             drawn,
             "Grid search of the paper's networks",
@@ -45,6 +45,7 @@ def draw_grid(path: Path, *, runs: Sequence[TrainingRun]) -> None:
                 axes.set_yticklabels([])
             else:
                 axes.set_ylabel("BC weight\nMPa/mm²")
+    return drawn
 
 
 def _map(axes: Axes, runs: Sequence[TrainingRun], value: Callable[[TrainingMetrics], float]) -> None:

@@ -104,7 +104,7 @@ def search_grid(search: GridSearch, stages: Stages | None = None) -> list[Traini
         with stages.stage("picture"):
             from compare.gridsearch.chart import draw_grid
 
-            draw_grid(search.out / "gridsearch.png", runs=runs)
+            draw_grid(runs=runs).save(search.out / "gridsearch.png")
         best = best_of(runs)
         write_json(
             search.out / "gridsearch.json",

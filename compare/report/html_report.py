@@ -5,14 +5,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from compare.evaluation.certificate import Certificate
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.differences import ReferenceDifferences
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.labels import solver_label
 from compare.evaluation.metrics import TruthDifferences, reference_differences, truth_differences
 from compare.evaluation.number_format import distance, number, percent
 from compare.evaluation.regions import NEAR
+from compare.evaluation.solver_selection import left_out_remarks
 from compare.evaluation.uncertainty import indistinct
-from compare.figures import Figure
+from compare.figures import Picture
 from compare.report import text
 from compare.report.certificate_text import certificate_sentences
 from compare.report.table_one import PRINTED, millimetres, table_one
@@ -20,44 +22,6 @@ from compare.report.tables import seconds
 from compare.report.truth_text import truth_sentences
 from compare.runtime.html import template_environment
 from geometry.atomic import atomic_path
-from geometry.finger.parameters import Parameters
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from solvers.adaptation import Adaptation
-from solvers.problem import Load, Material
-
-
-@dataclass(frozen=True, eq=False)
-class ReportContent:
-    """What a report tells.
-
-    Attributes:
-        design: The finger.
-        material: The elastic law and its constants.
-        load: What moved the finger.
-        mesh: The mesh that the solvers shared.
-        observations: What the markers did.
-        evaluations: One for each solver, in the order of the tables.
-        reference: One of the evaluations.
-        figures: Pictures in the order in which they appear.
-        provenance: What to state of the run (seed, versions, hashes, times); a mapping becomes a group.
-        adaptation: How the mesh was refined, if that was asked for.
-        left_out: Which solvers cannot do the job, and why.
-        truth: The fields of the virtual experiment; None where markers were measured.
-    """
-
-    design: Parameters
-    material: Material
-    load: Load
-    mesh: TriangleMesh
-    observations: Observations
-    evaluations: Sequence[Evaluation]
-    reference: Evaluation
-    figures: Sequence[Figure]
-    provenance: Mapping[str, object]
-    adaptation: Adaptation | None = None
-    left_out: Sequence[str] = ()
-    truth: Evaluation | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,15 +40,25 @@ class SolverEntry:
     certificate_sentences: str
 
 
-def write_report(path: Path, content: ReportContent) -> None:
-    """Write the report as one HTML file, atomically."""
-    html = render(content)
+def write_report(
+    path: Path, comparison: Comparison, pictures: Sequence[Picture], provenance: Mapping[str, object]
+) -> None:
+    """Write the report as one HTML file, atomically.
+
+    Args:
+        path: The file.
+        comparison: What was found.
+        pictures: In the order in which they appear.
+        provenance: Facts of the run (seed, versions, hashes, times); a mapping becomes a group.
+    """
+    html = render(comparison, pictures, provenance)
     with atomic_path(path) as partial:
         partial.write_text(html, encoding="utf-8")
 
 
-def render(content: ReportContent) -> str:
+def render(comparison: Comparison, pictures: Sequence[Picture], provenance: Mapping[str, object]) -> str:
     """The report as HTML text."""
+    reference, design = comparison.reference, comparison.design
     environment = template_environment()
     environment.filters |= {
         "millimetres": millimetres,
@@ -96,41 +70,45 @@ def render(content: ReportContent) -> str:
         "symbol": text.symbol,
     }
     return environment.get_template("report.html.j2").render(
-        content=content,
-        observations=content.observations,
-        reference=content.reference,
-        reference_label=solver_label(content.reference),
-        own=content.reference.uncertainty,
-        own_error=text.own_error_sentence(solver_label(content.reference), content.reference),
+        comparison=comparison,
+        observations=comparison.observations,
+        reference=reference,
+        reference_label=solver_label(reference),
+        own=reference.uncertainty,
+        own_error=text.own_error_sentence(solver_label(reference), reference),
         beside=text.beside,
-        table_one=table_one(content.evaluations, content.observations),
+        table_one=table_one(comparison),
         printed=PRINTED,
-        truth_sentences=truth_sentences(content.evaluations, content.reference, content.truth),
-        entries=[_entry(evaluation, content) for evaluation in content.evaluations],
-        design_rows=text.design_rows(content.design),
-        paper_rows=[(symbol, value) for _, symbol, value in text.design_rows(content.design) if symbol],
+        truth_sentences=truth_sentences(comparison),
+        entries=[_entry(evaluation, comparison) for evaluation in comparison.evaluations],
+        left_out=left_out_remarks(comparison.left_out),
+        design_rows=text.design_rows(design),
+        paper_rows=[(symbol, value) for _, symbol, value in text.design_rows(design) if symbol],
         material_rows=text.material_rows(
-            content.material, {solver_label(evaluation): evaluation.law for evaluation in content.evaluations}
+            comparison.material,
+            {solver_label(evaluation): evaluation.law for evaluation in comparison.evaluations},
         ),
         near=NEAR,
-        load_sentence=text.load_sentence(content.load, content.design),
-        source=text.source_sentence(content.observations),
-        provenance=text.grouped(content.provenance),
+        load_sentence=text.load_sentence(comparison.load, design),
+        source=text.source_sentence(comparison.observations),
+        pictures=pictures,
+        provenance=text.grouped(provenance),
     )
 
 
-def _entry(evaluation: Evaluation, content: ReportContent) -> SolverEntry:
-    differences = reference_differences(evaluation, content.reference)
+def _entry(evaluation: Evaluation, comparison: Comparison) -> SolverEntry:
+    reference, truth = comparison.reference, comparison.truth
+    differences = reference_differences(evaluation, reference)
     return SolverEntry(
         label=solver_label(evaluation),
-        is_reference=evaluation is content.reference,
+        is_reference=evaluation is reference,
         evaluation=evaluation,
-        to_truth=None if content.truth is None else truth_differences(evaluation, content.truth),
+        to_truth=None if truth is None else truth_differences(evaluation, truth),
         differences=differences,
         indistinct=text.indistinct_sentence(
             solver_label(evaluation),
-            solver_label(content.reference),
-            [] if evaluation is content.reference else indistinct(differences, content.reference.uncertainty),
+            solver_label(reference),
+            [] if evaluation is reference else indistinct(differences, reference.uncertainty),
         ),
         reaction=text.without_rounding(evaluation.reaction),
         seconds=seconds(evaluation),

@@ -1,9 +1,10 @@
 """`metrics.json`: the numbers of a comparison, for scripts to rely on. Units: mm, MPa, N/mm, s."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.differences import FieldDifference, ReferenceDifferences
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import (
@@ -13,52 +14,39 @@ from compare.evaluation.metrics import (
     reference_differences,
     truth_differences,
 )
-from geometry.finger.design import Design
-from geometry.observations import Observations
-from solvers.problem import Load, Material
 
 SCHEMA = 1
 """Keys may be added to a schema; a key that is renamed or removed makes a new one."""
 
 
-def metrics(
-    *,
-    design: Design,
-    material: Material,
-    load: Load,
-    observations: Observations,
-    evaluations: Sequence[Evaluation],
-    reference: Evaluation,
-    truth: Evaluation | None = None,
-) -> dict[str, Any]:
-    """Everything that `metrics.json` holds.
+def metrics(comparison: Comparison) -> dict[str, Any]:
+    """The content of `metrics.json`.
 
     `markers` compares with every marker that was seen. `held_out` compares with markers that the solver was
     not given: those same markers for a solver that was given none; each marker left out in its turn for one
     that assimilated them, null if it does not tell. Markers that were not seen are NaN.
     `to_truth` is null where the markers were measured, since nobody knows the fields of a real finger.
     """
+    observations = comparison.observations
     return {
         "schema": SCHEMA,
-        "design": design.model_dump(),
-        "material": material.model_dump(),
-        "load": load.model_dump(),
+        "design": comparison.design.model_dump(),
+        "material": comparison.material.model_dump(),
+        "load": comparison.load.model_dump(),
         "measurements": {
             "source": observations.label,
             "description": observations.source,
             "markers": int(observations.visible.sum()),
         },
-        "reference": reference.solver,
+        "reference": comparison.reference.solver,
         "solvers": {
-            evaluation.solver: _solver(evaluation, observations, reference, truth)
-            for evaluation in evaluations
+            evaluation.solver: _solver(evaluation, comparison) for evaluation in comparison.evaluations
         },
     }
 
 
-def _solver(
-    evaluation: Evaluation, observations: Observations, reference: Evaluation, truth: Evaluation | None
-) -> dict[str, Any]:
+def _solver(evaluation: Evaluation, comparison: Comparison) -> dict[str, Any]:
+    observations, reference, truth = comparison.observations, comparison.reference, comparison.truth
     errors, held_out = marker_errors(evaluation, observations), held_out_errors(evaluation, observations)
     differences = reference_differences(evaluation, reference)
     return {

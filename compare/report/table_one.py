@@ -4,15 +4,13 @@ The paper gives all nine markers to the solver that assimilates them, and judges
 a training error. What a solver says of a marker that it was not given is another column here.
 """
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.labels import solver_label
 from compare.evaluation.metrics import MarkerErrors, held_out_errors, marker_errors
 from compare.runtime.csv_files import Cell, write_csv
-from geometry.observations import Observations
 
 MEANS = ("u", "v", "sum", "rss")
 
@@ -66,8 +64,9 @@ Source: X. Wang et al., PINN-Ray, arXiv:2407.08222, Table I.
 """
 
 
-def table_one(evaluations: Sequence[Evaluation], observations: Observations) -> list[Row]:
+def table_one(comparison: Comparison) -> list[Row]:
     """A row a solver of this run."""
+    observations = comparison.observations
     return [
         Row(
             solver_label(evaluation),
@@ -75,7 +74,7 @@ def table_one(evaluations: Sequence[Evaluation], observations: Observations) -> 
             Means.of(marker_errors(evaluation, observations)) if evaluation.in_sample else None,
             Means.of(held_out_errors(evaluation, observations)),
         )
-        for evaluation in evaluations
+        for evaluation in comparison.evaluations
     ]
 
 
@@ -85,9 +84,9 @@ def millimetres(error: float, printed: bool = False) -> str:
     return text.removesuffix("0") if printed else text
 
 
-def write_table_one(path: Path, *, evaluations: Sequence[Evaluation], observations: Observations) -> None:
+def write_table_one(path: Path, comparison: Comparison) -> None:
     """Write a row a solver, then those that the paper prints; what does not exist is empty."""
-    write_csv(path, [_cells(row) for row in [*table_one(evaluations, observations), *PRINTED]])
+    write_csv(path, [_cells(row) for row in [*table_one(comparison), *PRINTED]])
 
 
 def _cells(row: Row) -> dict[str, Cell]:

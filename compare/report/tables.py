@@ -1,9 +1,9 @@
 """The numbers of a comparison as CSV files."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from compare.evaluation.certificate import Certificate
+from compare.evaluation.comparison import MEANS, Comparison
 from compare.evaluation.differences import ReferenceDifferences
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import (
@@ -14,14 +14,14 @@ from compare.evaluation.metrics import (
     truth_differences,
 )
 from compare.runtime.csv_files import Cell, write_csv
-from geometry.observations import Observations
 
 
-def write_markers(path: Path, *, evaluations: Sequence[Evaluation], observations: Observations) -> None:
+def write_markers(path: Path, comparison: Comparison) -> None:
     """Write a row a marker: where it was, how it moved, what each solver says and how far off that is.
 
     The cells of observations and errors are empty at markers that were not seen.
     """
+    observations, evaluations = comparison.observations, comparison.evaluations
     rows: list[dict[str, Cell]] = []
     errors = [marker_errors(evaluation, observations) for evaluation in evaluations]
     for marker, (x, y) in enumerate(observations.points):
@@ -44,16 +44,9 @@ def write_markers(path: Path, *, evaluations: Sequence[Evaluation], observations
     write_csv(path, rows)
 
 
-def write_summary(
-    path: Path,
-    *,
-    evaluations: Sequence[Evaluation],
-    observations: Observations,
-    reference: Evaluation,
-    truth: Evaluation | None = None,
-) -> None:
+def write_summary(path: Path, comparison: Comparison) -> None:
     """Write a row a solver: errors at the markers, distances over the body, energy, reaction, status."""
-    write_csv(path, [_summary(evaluation, observations, reference, truth) for evaluation in evaluations])
+    write_csv(path, [_summary(evaluation, comparison) for evaluation in comparison.evaluations])
 
 
 def seconds(evaluation: Evaluation) -> str:
@@ -64,9 +57,8 @@ def seconds(evaluation: Evaluation) -> str:
     return f"{value:.{2 if value < 10 else 1 if value < 100 else 0}f}"
 
 
-def _summary(
-    evaluation: Evaluation, observations: Observations, reference: Evaluation, truth: Evaluation | None
-) -> dict[str, Cell]:
+def _summary(evaluation: Evaluation, comparison: Comparison) -> dict[str, Cell]:
+    observations, reference, truth = comparison.observations, comparison.reference, comparison.truth
     errors, to = marker_errors(evaluation, observations), reference_differences(evaluation, reference)
     row: dict[str, Cell] = {"solver": evaluation.solver, "converged": int(evaluation.converged)}
     row |= {"in_sample": int(evaluation.in_sample)}
@@ -74,7 +66,7 @@ def _summary(
     row |= {"mae_u_mm": errors.mae_u, "mae_v_mm": errors.mae_v}
     row |= {"mae_sum_mm": errors.mae_sum, "mae_rss_mm": errors.mae_rss}
     held_out = held_out_errors(evaluation, observations)
-    for name in ("mae_u", "mae_v", "mae_sum", "mae_rss"):
+    for name in MEANS:
         row[f"held_out_{name}_mm"] = getattr(held_out, name) if held_out else ""
     row |= _differences("to_reference", to)
     empty = dict.fromkeys(_differences("reference_uncertainty", to), "")

@@ -1,21 +1,20 @@
 """The numbers of a comparison as tables for the terminal; both fit into 80 columns."""
 
-from collections.abc import Sequence
-
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.labels import solver_label
 from compare.evaluation.metrics import reference_differences, truth_differences
 from compare.evaluation.number_format import NONE, percent
 from compare.report.table_one import MEANS, PAPER, PRINTED, Row, millimetres, table_one
 from compare.report.tables import seconds
-from geometry.observations import Observations
 
 
-def marker_table(evaluations: Sequence[Evaluation], observations: Observations) -> Table:
+def marker_table(comparison: Comparison) -> Table:
     """Mean absolute errors at the markers, those of the paper's Table I below."""
+    observations = comparison.observations
     seen, count = int(observations.visible.sum()), len(observations.visible)
     markers = f"{count} marker{'s' * (count > 1)}" if seen == count else f"{seen} of {count} markers"
     table = _table(
@@ -28,8 +27,7 @@ def marker_table(evaluations: Sequence[Evaluation], observations: Observations) 
     )
     for heading in ("given\nu", "\nv", "\nsum", "\nrss", "held out\nu", "\nv", "\nsum", "\nrss"):
         table.add_column(heading, justify="right", no_wrap=True)
-    rows = table_one(evaluations, observations)
-    for row, evaluation in zip(rows, evaluations, strict=True):
+    for row, evaluation in zip(table_one(comparison), comparison.evaluations, strict=True):
         style = None if evaluation.converged else "yellow"
         table.add_row(_name(evaluation), *_means(row), style=style)
     table.add_section()
@@ -39,10 +37,9 @@ def marker_table(evaluations: Sequence[Evaluation], observations: Observations) 
     return table
 
 
-def body_table(
-    evaluations: Sequence[Evaluation], reference: Evaluation, truth: Evaluation | None = None
-) -> Table:
+def body_table(comparison: Comparison) -> Table:
     """Distances over the body, energy and time."""
+    evaluations, reference, truth = comparison.evaluations, comparison.reference, comparison.truth
     label = solver_label(reference)
     lines = [f"from {label}: relative L² difference of the displacement."]
     if reference.uncertainty is not None and len(evaluations) > 1:

@@ -1,21 +1,18 @@
 """Is the stress better once a solver is given the markers? In sentences, by the truth of the simulation."""
 
-from collections.abc import Sequence
-
-from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.labels import solver_label
 from compare.evaluation.metrics import TruthDifferences, truth_differences
 from compare.evaluation.number_format import percent
 
 
-def truth_sentences(
-    evaluations: Sequence[Evaluation], reference: Evaluation, truth: Evaluation | None
-) -> list[str]:
+def truth_sentences(comparison: Comparison) -> list[str]:
     """What the markers change, against the reference, for each solver that was given them; then the answer.
 
     Empty without a truth, without such a solver, or if the reference was given the markers too.
     """
-    given = [evaluation for evaluation in evaluations if evaluation.in_sample]
+    reference, truth = comparison.reference, comparison.truth
+    given = [evaluation for evaluation in comparison.evaluations if evaluation.in_sample]
     if truth is None or reference.in_sample or not given:
         return []
     plain, label = truth_differences(reference, truth), solver_label(reference)

@@ -1,20 +1,23 @@
 """A small body with a known solution, and how to make evaluations of it; units mm and MPa."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.uncertainty import evaluated
 from geometry.arrays import FloatArray
+from geometry.finger.design import Design
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Problem
 from solvers.solution import ErrorEstimate, Solution, Status
-from tests.compare.drawn_pages import Page, watching
 
 COLUMNS, ROWS = 24, 8
 
@@ -155,11 +158,14 @@ def observations(observe: Callable[..., Observations], fem: Evaluation) -> Obser
     return observe(fem.marker_displacement + np.array([0.3, -0.4]))
 
 
-@pytest.fixture(scope="module")
-def pages() -> Iterator[dict[Path, Page]]:
-    """Every matplotlib figure that the module's tests have drawn so far, by its file."""
-    with watching() as drawn:
-        yield drawn
+@pytest.fixture(scope="session")
+def compared(mesh: TriangleMesh, observations: Observations) -> Callable[..., Comparison]:
+    """`compared(fem, pinn, truth=..., ...)`: their comparison; the first is the reference."""
+
+    def make(*evaluations: Evaluation, **changes: Any) -> Comparison:
+        return replace(Comparison(Design(), mesh, observations, evaluations, evaluations[0]), **changes)
+
+    return make
 
 
 @pytest.fixture(scope="session")
@@ -176,4 +182,4 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures take most of the time of a small run, and have tests of their own."""
-    monkeypatch.setattr("compare.pipeline.draw_all", lambda folder, **_: [])
+    monkeypatch.setattr("compare.pipeline.draw_all", lambda *_: [])

@@ -1,38 +1,20 @@
-"""Watch matplotlib draw: which figure, and which words where."""
+"""The words of a matplotlib figure and their places."""
 
 import itertools
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from importlib import import_module
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import pytest
 from matplotlib.backend_bases import RendererBase
-from matplotlib.figure import Figure as MplFigure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-MODULES = (
-    "figures.overlay",
-    "figures.marker_chart",
-    "figures.fields",
-    "figures.energy_chart",
-    "figures.loss_chart",
-    "figures.force_chart",
-    "figures.excess",
-    "figures.design_drawing",
-    "figures.mesh_drawing",
-    "gridsearch.chart",
-    "camera.calibration_chart",
-    "crossval.charts",
-)
+from geometry.figure import Figure
 
 
 class Page(NamedTuple):
     """A matplotlib figure and what it wrote where, in pixels, when it was drawn."""
 
-    figure: MplFigure
+    figure: Figure
     words: list[tuple[str, Bbox]]
 
     @property
@@ -55,10 +37,8 @@ class Page(NamedTuple):
         ]
 
 
-@contextmanager
-def watching() -> Iterator[dict[Path, Page]]:
-    """Every matplotlib figure that is drawn meanwhile, by its file."""
-    seen: dict[Path, Page] = {}
+def page_of(figure: Figure) -> Page:
+    """The figure, drawn, with its words."""
     words: list[tuple[str, Bbox]] = []
     draw = Text.draw
 
@@ -69,16 +49,5 @@ def watching() -> Iterator[dict[Path, Page]]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Text, "draw", noted)
-        for module in map(import_module, (f"compare.{name}" for name in MODULES)):
-
-            @contextmanager
-            def watched(
-                path: Path, height: float, original: Callable[..., Any] = module.figure
-            ) -> Iterator[MplFigure]:
-                words.clear()
-                with original(path, height) as drawn:
-                    yield drawn
-                seen[path] = Page(drawn, list(words))
-
-            patch.setattr(module, "figure", watched)
-        yield seen
+        figure.canvas.draw()
+    return Page(figure, words)

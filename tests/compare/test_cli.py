@@ -353,7 +353,7 @@ def test_a_design_with_many_changes_still_has_a_name():
 
 def test_without_names_a_solver_that_cannot_do_the_job_is_left_out(folder, capsys, monkeypatch):
     """Two are known before anything is solved, and one once the markers are."""
-    monkeypatch.setattr("compare.pipeline.draw_all", lambda folder, **_: [])
+    monkeypatch.setattr("compare.pipeline.draw_all", lambda *_: [])
     monkeypatch.setitem(JOBS, "", JobDefaults(solvers="gp,fem-id,fem,fem-nonlinear"))
     options = ["--load", "patch", "--plane", "stress", "--mesh-size", "1", "--measurements", "good.csv"]
     assert main(["compare", *options]) == 0

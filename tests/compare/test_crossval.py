@@ -42,6 +42,7 @@ from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
 from solvers.solution import Solution
 from solvers.solver import silent
+from tests.compare.drawn_pages import page_of
 
 NOISE = 0.005
 
@@ -416,18 +417,17 @@ def test_a_solver_that_chooses_its_weights_is_there_in_three_ways():
     assert [variant.label for variant in read_variants(SolverOptions(), "fem-asm", stiff)] == ["fem-asm"]
 
 
-def test_pictures_show_every_solver(pages, tmp_path):
+def test_pictures_show_every_solver():
     values = {f"solver {number}": [0.1 * number + 0.01, 1.0, 2.0] for number in range(9)}
-    draw_held_out(tmp_path / "held.png", errors=values, simulated=True)
+    held_out = draw_held_out(errors=values, simulated=True)
     fields = {"displacement": 0.2, "strain": 0.3, "von_mises": 2.0}
     one = score([[outcome_of(ONE, (0,), [[1.0, 1.0]], fields=fields)]])
     scores = {label: {ALL: one, ONE: one} for label in values}
-    draw_fields(tmp_path / "fields.png", scores=scores, schemes=[ALL, ONE])
+    distances = draw_fields(scores=scores, schemes=[ALL, ONE])
     columns = ("factor", "in_sample_mm", "left_out_mm", *fields)
-    draw_weight_sweep(tmp_path / "curve.png", sweep={name: [1e-6, 1e-3, 1.0] for name in columns})
-    page = pages[tmp_path / "curve.png"]
+    page = page_of(draw_weight_sweep(sweep={name: [1e-6, 1e-3, 1.0] for name in columns}))
     assert (page.cut_off(), page.overlaps()) == ([], [])
-    for name in ("held.png", "fields.png"):
-        page = pages[tmp_path / name]
+    for drawn in (held_out, distances):
+        page = page_of(drawn)
         assert page.cut_off() == []
         assert all(label in page.text for label in values)

@@ -1,12 +1,10 @@
-from pathlib import Path
-
 import pytest
 
 from compare.figures.design_drawing import draw_design
 from geometry.finger.design import Design
 from geometry.finger.parameters import Parameters
 from geometry.finger.presets import load_design, preset_names
-from tests.compare.drawn_pages import Page
+from tests.compare.drawn_pages import page_of
 
 DESIGNS = {
     **{name: load_design(name) for name in preset_names()},
@@ -17,11 +15,8 @@ DESIGNS = {
 
 
 @pytest.mark.parametrize("design", DESIGNS.values(), ids=DESIGNS)
-def test_a_drawing_has_every_dimension_and_none_overlaps(
-    design: Parameters, pages: dict[Path, Page], tmp_path: Path
-) -> None:
-    draw_design(tmp_path / "drawing.png", design)
-    text = pages[tmp_path / "drawing.png"].text
+def test_a_drawing_has_every_dimension_and_none_overlaps(design: Parameters) -> None:
+    page = page_of(draw_design(design))
     expected = [
         rf"$H$ = {design.height:g} mm",
         rf"$L$ = {design.base_width:g} mm",
@@ -33,7 +28,7 @@ def test_a_drawing_has_every_dimension_and_none_overlaps(
     ]
     if design.rib_count:
         expected += [rf"$t_\mathrm{{rib}}$ = {design.rib_thickness:g} mm", r"$L_\mathrm{angle}$"]
-    assert [dimension for dimension in expected if dimension not in text] == []
+    assert [dimension for dimension in expected if dimension not in page.text] == []
     numerals = {str(number) for number in range(1, 100)}
-    assert pages[tmp_path / "drawing.png"].cut_off() == []
-    assert [pair for pair in pages[tmp_path / "drawing.png"].overlaps() if not numerals & set(pair)] == []
+    assert page.cut_off() == []
+    assert [pair for pair in page.overlaps() if not numerals & set(pair)] == []

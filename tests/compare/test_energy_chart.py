@@ -1,9 +1,9 @@
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.figures.energy_chart import approaches_reference, draw_energy, readable, recorded, wants_log
 
@@ -21,9 +21,10 @@ def test_records_are_grouped_by_their_first_column(
     }
 
 
-def test_without_a_record_there_is_no_chart_of_energy(fem: Evaluation, tmp_path: Path) -> None:
-    assert not draw_energy(tmp_path / "energy.png", evaluations=[fem], reference=fem)
-    assert not (tmp_path / "energy.png").exists()
+def test_without_a_record_there_is_no_chart_of_energy(
+    fem: Evaluation, compared: Callable[..., Comparison]
+) -> None:
+    assert draw_energy(compared(fem)) is None
 
 
 @pytest.mark.parametrize(

@@ -1,17 +1,16 @@
 """The picture of the excess energy and the certificate in words."""
 
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from compare.evaluation.certificate import Certificate, Region
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.convergence import with_certificate
 from compare.evaluation.evaluation import Evaluation
-from compare.figures.canvas import Canvas
 from compare.figures.excess import DECADES, draw_excess, excess_scale
-from compare.figures.fields import field_extent
 from compare.report.certificate_text import certificate_sentences
 from geometry.mesh.triangle_mesh import TriangleMesh
 
@@ -82,14 +81,8 @@ def test_one_scale_for_all_that_ends_at_the_larger_excess(mesh: TriangleMesh) ->
 
 
 def test_without_an_excess_there_is_no_picture(
-    mesh: TriangleMesh, fem: Evaluation, certificate: Certificate, tmp_path: Path
+    fem: Evaluation, certificate: Certificate, compared: Callable[..., Comparison]
 ) -> None:
     exact = with_certificate(fem, replace(certificate, excess=0.0))
-    path = tmp_path / "excess.png"
-    with Canvas(mesh, field_extent(mesh), width=100) as canvas:
-        assert not draw_excess(path, canvas=canvas, mesh=mesh, evaluations=[fem, exact])
-        assert not path.exists()
-        assert draw_excess(
-            path, canvas=canvas, mesh=mesh, evaluations=[fem, with_certificate(fem, certificate)]
-        )
-    assert path.exists()
+    assert draw_excess(compared(fem, exact)) is None
+    assert draw_excess(compared(fem, with_certificate(fem, certificate))) is not None

@@ -12,7 +12,7 @@ from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.force_displacement import ForceCurve, force_curves, write_force_displacement
 from compare.figures.force_chart import draw_force_displacement
 from solvers.problem import Load
-from tests.compare.drawn_pages import Page
+from tests.compare.drawn_pages import page_of
 
 STEPS = np.array([0.0, 0.5, 1.0])
 
@@ -67,13 +67,9 @@ def test_file_has_the_force_per_depth_and_for_the_depth(followed: Evaluation, tm
     assert all(name.split("_")[-1] in ("solver", "law", "converged", "1", "mm", "N") for name in rows[0])
 
 
-def test_picture_has_both_scales_and_the_end_of_every_curve(
-    followed: Evaluation, fem: Evaluation, pages: dict[Path, Page], tmp_path: Path
-) -> None:
-    path = tmp_path / "force_displacement.png"
+def test_picture_has_both_scales_and_the_end_of_every_curve(followed: Evaluation, fem: Evaluation) -> None:
     stopped = replace(followed, converged=False)
-    draw_force_displacement(path, curves=force_curves([fem, stopped], Load()), depth=20.0)
-    page = pages[path]
+    page = page_of(draw_force_displacement(force_curves([fem, stopped], Load()), depth=20.0))
     assert "fem, 0.5 N/mm at 10 mm" in page.text
     assert "fem-nonlinear (not converged), 3 N/mm at 10 mm" in page.text
     assert "force for 20 mm of depth, N" in page.text

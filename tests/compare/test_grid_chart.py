@@ -1,12 +1,10 @@
 """The picture of a grid search."""
 
-from pathlib import Path
-
 from matplotlib.patches import Rectangle
 
 from compare.gridsearch.chart import draw_grid
 from compare.gridsearch.training_run import DIVERGED, TRAINED, GridPoint, TrainingMetrics, TrainingRun
-from tests.compare.drawn_pages import Page
+from tests.compare.drawn_pages import page_of
 
 
 def run_of(rate: float, weight: float, distance: float | None) -> TrainingRun:
@@ -33,9 +31,8 @@ GRID = [
 ]
 
 
-def test_every_run_has_its_value_and_the_nearest_a_frame(pages: dict[Path, Page], tmp_path: Path) -> None:
-    draw_grid(tmp_path / "grid.png", runs=GRID)
-    page = pages[tmp_path / "grid.png"]
+def test_every_run_has_its_value_and_the_nearest_a_frame() -> None:
+    page = page_of(draw_grid(runs=GRID))
     assert (page.cut_off(), page.overlaps()) == ([], [])
     assert page.text.count("diverged") == 2  # one run, on both maps
     assert "0.011" in page.text  # per cent: rate 1e-4, weight 0.1
@@ -47,9 +44,8 @@ def test_every_run_has_its_value_and_the_nearest_a_frame(pages: dict[Path, Page]
         assert list(axes.get_images()[0].get_array().mask.ravel()).count(True) == 1
 
 
-def test_a_search_whose_runs_all_diverged_has_a_picture(pages: dict[Path, Page], tmp_path: Path) -> None:
-    draw_grid(tmp_path / "grid.png", runs=[run_of(1.0, 10.0, None)])
-    page = pages[tmp_path / "grid.png"]
+def test_a_search_whose_runs_all_diverged_has_a_picture() -> None:
+    page = page_of(draw_grid(runs=[run_of(1.0, 10.0, None)]))
     assert page.text.count("diverged") == 2
     assert (page.cut_off(), page.overlaps()) == ([], [])
     assert all(not axes.patches for axes in page.figure.axes)

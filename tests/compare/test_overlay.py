@@ -1,12 +1,13 @@
 """The picture of the deformed finger."""
 
-from pathlib import Path
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.figures.overlay import draw_overlay
 from geometry.mesh.triangle_mesh import TriangleMesh
@@ -14,11 +15,11 @@ from geometry.observations import Observations
 from solvers.problem import Load, Problem
 from solvers.solution import Solution, Status
 from tests.compare.conftest import BendingField
-from tests.compare.drawn_pages import Page
+from tests.compare.drawn_pages import page_of
 
 
 def test_crosses_are_at_the_observed_points_even_if_they_are_not_the_meshs_markers(
-    mesh: TriangleMesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    mesh: TriangleMesh, compared: Callable[..., Comparison], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     points = np.array([[2.3, -1.1], [7.7, -3.2]])
     solution = Solution(
@@ -49,9 +50,7 @@ def test_crosses_are_at_the_observed_points_even_if_they_are_not_the_meshs_marke
 
     monkeypatch.setattr(Axes, "plot", watched)
     evaluation = Evaluation.of(solution, mesh, points)
-    draw_overlay(
-        tmp_path / "a.png", mesh=mesh, load=Load(), evaluations=[evaluation], observations=observations
-    )
+    page_of(draw_overlay(compared(evaluation, observations=observations)))
     x, y = points.T
     expected = points + np.stack([0.01 * y**2, -0.02 * x**2], axis=1)
     assert len(crosses) > 0
@@ -60,14 +59,13 @@ def test_crosses_are_at_the_observed_points_even_if_they_are_not_the_meshs_marke
 
 
 def test_a_cylinder_is_drawn_where_it_ends(
-    mesh: TriangleMesh, fem: Evaluation, observations: Observations, pages: dict[Path, Page], tmp_path: Path
+    mesh: TriangleMesh, fem: Evaluation, compared: Callable[..., Comparison]
 ) -> None:
     load = Load(kind="cylinder", displacement=(1.0, -3.0), radius=2.0)
-    path = tmp_path / "a.png"
-    draw_overlay(path, mesh=mesh, load=load, evaluations=[fem], observations=observations)
-    (circle,) = [patch for patch in pages[path].figure.axes[0].patches if isinstance(patch, Circle)]
+    page = page_of(draw_overlay(compared(fem, load=load)))
+    (circle,) = [patch for patch in page.figure.axes[0].patches if isinstance(patch, Circle)]
     contact = mesh.points[mesh.boundary("contact").ravel(), 0]
     middle = (contact.min() + contact.max()) / 2
     np.testing.assert_allclose(circle.center, (middle + 1.0, -1.0), atol=1e-12)
     assert circle.radius == 2.0
-    assert "cylinder’s motion" in pages[path].text
+    assert "cylinder’s motion" in page.text

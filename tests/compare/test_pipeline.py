@@ -15,8 +15,10 @@ import pytest
 import pyvista
 from rich.console import Console
 
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.labels import solver_label
-from compare.pipeline import Job, Outcome, run
+from compare.pipeline import Job, run
+from compare.report.metrics_json import metrics
 from compare.runtime.provenance import package_versions
 from compare.runtime.stages import Stages
 from geometry.cache import finger_mesh
@@ -75,7 +77,7 @@ def job(tmp_path: Path, measured: Path, without_pictures: None) -> Callable[...,
     return make
 
 
-def compare(job: Job) -> Outcome:
+def compare(job: Job) -> Comparison:
     with Stages(Console(file=StringIO()), quiet=True) as stages:
         return run(job, stages)
 
@@ -95,8 +97,8 @@ def strictly(path: Path) -> dict[str, Any]:
     return json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
 
 
-def without_times(metrics: dict[str, Any]) -> dict[str, Any]:
-    copy = json.loads(json.dumps(metrics))
+def without_times(told: dict[str, Any]) -> dict[str, Any]:
+    copy = json.loads(json.dumps(told))
     for solver in copy["solvers"].values():
         del solver["seconds"], solver["stats"]["seconds"], solver["stats"]["estimate_seconds"]
     return copy
@@ -210,7 +212,7 @@ def test_the_report_holds_the_numbers(finished):
 def test_the_observations_of_a_run_give_the_same_metrics_again(finished, job):
     """They stay simulated."""
     again = job(FemSolver(), measurements=finished / "observations.csv")
-    before, after = strictly(finished / "metrics.json"), compare(again).metrics
+    before, after = strictly(finished / "metrics.json"), metrics(compare(again))
     assert after["measurements"] == before["measurements"]
     assert after["solvers"]["fem"]["markers"] == before["solvers"]["fem"]["markers"]
 
@@ -220,7 +222,7 @@ def test_without_the_mark_they_count_as_measured(finished, tmp_path, job):
     bare.write_text((finished / "observations.csv").read_text().split("\n", 2)[2])
     again = job(FemSolver(), measurements=bare)
     outcome = compare(again)
-    assert outcome.metrics["measurements"]["source"] == "measured"
+    assert metrics(outcome)["measurements"]["source"] == "measured"
     assert {row["observations"] for row in rows(again.out / "markers.csv")} == {"measured"}
     assert "simulated" not in (again.out / "observations.csv").read_text()
     assert "imulated" not in (again.out / "report.html").read_text(encoding="utf-8")
@@ -325,7 +327,7 @@ def test_a_resumed_run_does_not_solve_again_and_gives_the_same(job, tmp_path):
     second.end = None
     resumed = compare(job(first, second, resume=True))
     assert (first.calls, second.calls) == (1, 2)
-    assert without_times(resumed.metrics) == without_times(whole.metrics)
+    assert without_times(metrics(resumed)) == without_times(metrics(whole))
     assert sorted(files(tmp_path / "out" / "run")) == sorted(files(tmp_path / "whole"))
     for name in ("markers.csv", "observations.csv", "fields/first.vtu"):
         assert (tmp_path / "out" / "run" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
@@ -336,7 +338,7 @@ def test_a_resumed_run_adds_a_solver_to_a_finished_one(job):
     compare(job(first))
     outcome = compare(job(first, second, resume=True))
     assert (first.calls, second.calls) == (1, 1)
-    assert list(outcome.metrics["solvers"]) == ["first", "second"]
+    assert list(metrics(outcome)["solvers"]) == ["first", "second"]
 
 
 def test_a_solver_that_is_not_asked_for_again_is_gone(job):
@@ -397,9 +399,9 @@ def test_another_version_of_the_code_is_not_resumed_from(job, monkeypatch, what)
 
 def test_other_measured_displacements_need_no_new_solution(job, measured):
     first = Scripted("first")
-    before = compare(job(first)).metrics["solvers"]["first"]
+    before = metrics(compare(job(first)))["solvers"]["first"]
     measured.write_text(measured.read_text().replace("-0.5,-5", "-0.6,-5"))
-    after = compare(job(first, resume=True)).metrics["solvers"]["first"]
+    after = metrics(compare(job(first, resume=True)))["solvers"]["first"]
     assert first.calls == 1
     assert after["markers"]["mae_u"] != before["markers"]["mae_u"]
 
@@ -410,7 +412,7 @@ def test_other_measured_displacements_need_no_new_solution(job, measured):
 def test_a_solver_that_hands_its_work_on_keeps_its_own_name(job):
     """Two solvers that both return `fem` would else be one row."""
     outcome = compare(job(Scripted("first"), Scripted("second")))
-    assert list(outcome.metrics["solvers"]) == ["first", "second"]
+    assert list(metrics(outcome)["solvers"]) == ["first", "second"]
 
 
 def test_numbers_of_numpy_are_no_obstacle(job):
@@ -449,7 +451,7 @@ def test_a_result_that_its_solver_believes_in_but_finite_elements_do_not_is_mark
     """Linear elements on a coarse mesh: in JSON, both CSV files, report, fields and what pictures get."""
     drawn = []
     monkeypatch.setattr(
-        "compare.pipeline.draw_all", lambda folder, *, evaluations, **_: drawn.extend(evaluations) or []
+        "compare.pipeline.draw_all", lambda _, comparison, *rest: drawn.extend(comparison.evaluations) or []
     )
     asked = job(FemSolver(), Scripted("linear", degree=1))
     compare(asked)
@@ -473,7 +475,7 @@ def test_the_archive_keeps_the_solvers_own_word(job):
         assert json.loads(str(archive["header"]))["converged"] is True
     again = compare(replace(asked, resume=True))
     assert asked.solvers[0].calls == 1
-    assert without_times(again.metrics) == without_times(first.metrics)
+    assert without_times(metrics(again)) == without_times(metrics(first))
 
 
 # Refused before anything is computed

@@ -77,19 +77,12 @@ def assert_schema(value, expected, where="metrics"):
 
 
 @pytest.fixture
-def numbers(estimated, pinn, observations, mesh):
-    """`numbers(...)`: the metrics of both solvers, with some arguments changed."""
+def numbers(estimated, pinn, compared, mesh):
+    """`numbers(...)`: the metrics of both solvers, with some attributes of the comparison changed."""
 
     def make(**changes):
-        arguments = {
-            "design": Design(),
-            "material": Material(),
-            "load": Load(),
-            "observations": observations,
-            "evaluations": with_certificates([estimated, pinn], Problem(mesh)),
-            "reference": estimated,
-        }
-        return metrics(**{**arguments, **changes})
+        evaluations = with_certificates([estimated, pinn], Problem(mesh))
+        return metrics(compared(*evaluations, **changes))
 
     return make
 

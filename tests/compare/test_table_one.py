@@ -1,12 +1,14 @@
 """Table I of the paper, and the same of a run."""
 
 import csv
+from collections.abc import Callable
 from dataclasses import replace
 from math import hypot
 from pathlib import Path
 
 import pytest
 
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.report.table_one import PRINTED, table_one, write_table_one
 from geometry.observations import Observations
@@ -19,18 +21,22 @@ def test_disp_of_the_paper_is_the_root_of_the_sum_of_squares():
 
 
 def test_a_solver_that_does_not_tell_what_it_leaves_out_has_no_held_out_error(
-    pinn: Evaluation, observations: Observations
+    pinn: Evaluation, compared: Callable[..., Comparison]
 ):
-    (row,) = table_one([replace(pinn, in_sample=True)], observations)
+    (row,) = table_one(compared(replace(pinn, in_sample=True)))
     assert row.given is not None
     assert row.held_out is None
 
 
 def test_the_file_has_this_run_and_the_paper(
-    fem: Evaluation, pinn: Evaluation, observations: Observations, tmp_path: Path
+    fem: Evaluation,
+    pinn: Evaluation,
+    observations: Observations,
+    compared: Callable[..., Comparison],
+    tmp_path: Path,
 ):
     given = replace(pinn, in_sample=True, left_out=observations.displacements + 0.125)
-    write_table_one(tmp_path / "t.csv", evaluations=[fem, given], observations=observations)
+    write_table_one(tmp_path / "t.csv", compared(fem, given))
     with (tmp_path / "t.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [row["observations"] for row in rows] == ["simulated"] * 2 + ["paper"] * 3

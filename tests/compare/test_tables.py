@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import marker_errors, reference_differences
 from compare.report.tables import write_markers, write_summary
@@ -13,6 +14,7 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 
 Rows = list[dict[str, str]]
+Comparing = Callable[..., Comparison]
 UNITS = ("_mm", "_MPa", "_1", "_N_mm_per_mm", "_N_per_mm", "_s", "_rel_l2", "_rel")
 WITHOUT_UNIT = {"marker", "observations", "visible", "solver", "converged", "reference", "status"}
 WITHOUT_UNIT |= {"misses_energy", "in_sample"}
@@ -25,17 +27,21 @@ def read(path: Path) -> Rows:
 
 
 @pytest.fixture
-def markers(tmp_path: Path, fem: Evaluation, pinn: Evaluation, observe: Callable[..., Observations]) -> Rows:
+def markers(
+    tmp_path: Path,
+    fem: Evaluation,
+    pinn: Evaluation,
+    observe: Callable[..., Observations],
+    compared: Comparing,
+) -> Rows:
     seen = observe(fem.marker_displacement + np.array([0.3, -0.4]), hidden=(1,))
-    write_markers(tmp_path / "markers.csv", evaluations=[fem, pinn], observations=seen)
+    write_markers(tmp_path / "markers.csv", compared(fem, pinn, observations=seen))
     return read(tmp_path / "markers.csv")
 
 
 @pytest.fixture
-def summary(tmp_path: Path, fem: Evaluation, failed: Evaluation, observations: Observations) -> Rows:
-    write_summary(
-        tmp_path / "summary.csv", evaluations=[fem, failed], observations=observations, reference=fem
-    )
+def summary(tmp_path: Path, fem: Evaluation, failed: Evaluation, compared: Comparing) -> Rows:
+    write_summary(tmp_path / "summary.csv", compared(fem, failed))
     return read(tmp_path / "summary.csv")
 
 
@@ -83,15 +89,15 @@ def test_the_summary_holds_the_metrics(
 
 
 def test_a_solver_that_was_given_the_markers_is_marked_in_every_table(
-    fem: Evaluation, pinn: Evaluation, observations: Observations, tmp_path: Path
+    fem: Evaluation, pinn: Evaluation, observations: Observations, compared: Comparing, tmp_path: Path
 ) -> None:
     told = replace(pinn, in_sample=True, left_out=observations.displacements + 0.125)
-    write_summary(tmp_path / "t.csv", evaluations=[fem, told], observations=observations, reference=fem)
+    write_summary(tmp_path / "t.csv", compared(fem, told))
     row = read(tmp_path / "t.csv")[1]
     assert (float(row["held_out_mae_sum_mm"]), row["in_sample"]) == (0.25, "1")
     given = [fem, replace(pinn, in_sample=True)]
-    write_summary(tmp_path / "s.csv", evaluations=given, observations=observations, reference=fem)
-    write_markers(tmp_path / "m.csv", evaluations=given, observations=observations)
+    write_summary(tmp_path / "s.csv", compared(*given))
+    write_markers(tmp_path / "m.csv", compared(*given))
     assert [row["in_sample"] for row in read(tmp_path / "s.csv")] == ["0", "1"]
     assert {(row["fem_in_sample"], row["pinn-std_in_sample"]) for row in read(tmp_path / "m.csv")} == {
         ("0", "1")
@@ -99,12 +105,10 @@ def test_a_solver_that_was_given_the_markers_is_marked_in_every_table(
 
 
 def test_the_distance_from_the_truth_is_there_if_the_markers_are_simulated(
-    fem: Evaluation, pinn: Evaluation, summary: Rows, observations: Observations, tmp_path: Path
+    fem: Evaluation, pinn: Evaluation, summary: Rows, compared: Comparing, tmp_path: Path
 ) -> None:
     """The network's field is 1.1 times the true one."""
-    write_summary(
-        tmp_path / "s.csv", evaluations=[fem, pinn], observations=observations, reference=fem, truth=fem
-    )
+    write_summary(tmp_path / "s.csv", compared(fem, pinn, truth=fem))
     names = [f"to_truth_{name}_rel_l2" for name in ("displacement", "strain", "von_mises")]
     for row, off in zip(read(tmp_path / "s.csv"), (0.0, 0.1), strict=True):
         assert [float(row[name]) for name in names] == pytest.approx([off] * 3)
@@ -112,11 +116,9 @@ def test_the_distance_from_the_truth_is_there_if_the_markers_are_simulated(
 
 
 def test_the_own_error_of_the_reference_stands_beside_the_difference(
-    estimated: Evaluation, pinn: Evaluation, observations: Observations, tmp_path: Path
+    estimated: Evaluation, pinn: Evaluation, compared: Comparing, tmp_path: Path
 ) -> None:
-    write_summary(
-        tmp_path / "s.csv", evaluations=[estimated, pinn], observations=observations, reference=estimated
-    )
+    write_summary(tmp_path / "s.csv", compared(estimated, pinn))
     _, row = read(tmp_path / "s.csv")
     assert float(row["reference_uncertainty_displacement_rel_l2"]) == pytest.approx(0.01)
     assert float(row["reference_uncertainty_energy_rel"]) == pytest.approx(-1e-4)

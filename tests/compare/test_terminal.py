@@ -1,5 +1,6 @@
 """The tables that a run prints."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from io import StringIO
 
@@ -7,9 +8,12 @@ import pytest
 from rich.console import Console
 from rich.table import Table
 
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.report.terminal import body_table, marker_table
 from geometry.observations import Observations
+
+Comparing = Callable[..., Comparison]
 
 
 def printed(table: Table, *, width: int = 80) -> str:
@@ -23,51 +27,52 @@ def cells(text: str, solver: str) -> list[str]:
     return line.removeprefix("  " + solver).split()
 
 
-def test_errors_of_a_solver_without_markers_are_predictions(fem: Evaluation, observations: Observations):
+def test_errors_of_a_solver_without_markers_are_predictions(fem: Evaluation, compared: Comparing):
     """0.3 mm in u and 0.4 mm in v."""
-    text = printed(marker_table([fem], observations))
+    text = printed(marker_table(compared(fem)))
     assert cells(text, "fem") == ["–", "–", "–", "–", "0.300", "0.400", "0.700", "0.500"]
     assert "Mean absolute error at 3 markers, mm (simulated displacements)" in text
 
 
 def test_errors_at_markers_that_were_given_stand_apart_from_those_left_out(
-    pinn: Evaluation, observations: Observations
+    pinn: Evaluation, observations: Observations, compared: Comparing
 ):
     """What is said of a marker left out is 0.125 mm off in either component."""
     fitted = replace(pinn, in_sample=True, marker_displacement=observations.displacements)
     told = replace(fitted, left_out=observations.displacements + 0.125)
-    assert cells(printed(marker_table([fitted], observations)), "pinn-std") == ["0.000"] * 4 + ["–"] * 4
-    found = cells(printed(marker_table([told], observations)), "pinn-std")
+    assert cells(printed(marker_table(compared(fitted))), "pinn-std") == ["0.000"] * 4 + ["–"] * 4
+    found = cells(printed(marker_table(compared(told))), "pinn-std")
     assert found == ["0.000"] * 4 + ["0.125", "0.125", "0.250", "0.177"]
 
 
-def test_the_papers_own_numbers_are_there_as_it_prints_them(fem: Evaluation, observations: Observations):
-    text = printed(marker_table([fem], observations))
+def test_the_papers_own_numbers_are_there_as_it_prints_them(fem: Evaluation, compared: Comparing):
+    text = printed(marker_table(compared(fem)))
     assert cells(text, "paper: FEM") == ["–", "–", "–", "–", "1.41", "0.39", "–", "1.463"]
     assert cells(text, "paper: asm") == ["0.03", "0.00", "–", "0.03", "–", "–", "–", "–"]
     assert "of its own experiment and not of this run" in text
 
 
-def test_distances_over_the_body(estimated: Evaluation, pinn: Evaluation):
+def test_distances_over_the_body(estimated: Evaluation, pinn: Evaluation, compared: Comparing):
     """The network is 10 % off, and the reference 1 % by its own estimate."""
-    text = printed(body_table([estimated, pinn], estimated, truth=pinn))
+    text = printed(body_table(compared(estimated, pinn, truth=pinn)))
     assert cells(text, "fem") == ["–", "2", "–", "9.1", "9.1", "1.25"]
     assert cells(text, "pinn-std") == ["10±1", "2.42", "–", "0", "0", "1.25"]
     assert "±: error of fem itself" in text
 
 
-def test_measured_markers_know_no_truth(fem: Evaluation, pinn: Evaluation):
-    text = printed(body_table([fem, pinn], fem))
+def test_measured_markers_know_no_truth(fem: Evaluation, pinn: Evaluation, compared: Comparing):
+    text = printed(body_table(compared(fem, pinn)))
     assert cells(text, "pinn-std") == ["10.0", "2.42", "–", "1.25"]
     assert "truth" not in text
 
 
 @pytest.mark.parametrize("width", [80, 120])
 def test_both_tables_fit_eighty_columns(
-    estimated: Evaluation, failed: Evaluation, observations: Observations, width: int
+    estimated: Evaluation, failed: Evaluation, compared: Comparing, width: int
 ):
     slow = replace(failed, stats={"seconds": 12345.2}, in_sample=True, left_out=failed.marker_displacement)
-    tables = [marker_table([estimated, slow], observations), body_table([estimated, slow], estimated, failed)]
+    both = compared(estimated, slow, truth=failed)
+    tables = [marker_table(both), body_table(both)]
     text = "".join(printed(table, width=width) for table in tables)
     assert "12345 " in text
     assert "fem-nonlinear" in text

@@ -1,13 +1,17 @@
+from collections.abc import Callable
 from dataclasses import replace
 
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.report.truth_text import truth_sentences
 
 
-def test_what_the_markers_change_is_said_of_displacement_and_stress(fem: Evaluation, pinn: Evaluation):
+def test_what_the_markers_change_is_said_of_displacement_and_stress(
+    fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
+):
     """The truth is the reference times 1.1; the stress of the solver that was given markers is tripled."""
     given = replace(pinn, in_sample=True, von_mises=3 * pinn.von_mises)
-    plain, changed, answer = truth_sentences([fem, given], fem, pinn)
+    plain, changed, answer = truth_sentences(compared(fem, given, truth=pinn))
     assert plain == (
         "fem, which was given none: displacement 9.09\xa0%, von Mises stress 9.09\xa0% "
         "away from the simulated finger."
@@ -18,8 +22,10 @@ def test_what_the_markers_change_is_said_of_displacement_and_stress(fem: Evaluat
     assert answer == "Nearer than fem in displacement: pinn-std. Nearer in von Mises stress: none."
 
 
-def test_there_is_nothing_to_say_without_a_truth_or_a_solver_with_markers(fem: Evaluation, pinn: Evaluation):
+def test_there_is_nothing_to_say_without_a_truth_or_a_solver_with_markers(
+    fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
+):
     given = replace(pinn, in_sample=True)
-    assert truth_sentences([fem, given], fem, None) == []
-    assert truth_sentences([fem, pinn], fem, pinn) == []
-    assert truth_sentences([fem, given], given, pinn) == []
+    assert truth_sentences(compared(fem, given)) == []
+    assert truth_sentences(compared(fem, pinn, truth=pinn)) == []
+    assert truth_sentences(compared(given, fem, truth=pinn)) == []

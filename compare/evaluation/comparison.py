@@ -1,0 +1,105 @@
+"""A finished comparison: one finger, one mesh, many solvers, one set of marker displacements."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.metrics import (
+    held_out_errors,
+    marker_errors,
+    reference_differences,
+    truth_differences,
+)
+from compare.evaluation.solver_selection import left_out_remarks
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.observations import Observations
+from solvers.adaptation import Adaptation
+from solvers.problem import Load, Material
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MEANS = ("mae_u", "mae_v", "mae_sum", "mae_rss")
+"""Mean absolute errors at the markers, see `compare.evaluation.metrics.MarkerErrors`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """The results of several solvers for one finger under one load; `comparison["fem"]` is one of them.
+
+    Attributes:
+        design: The finger.
+        mesh: The mesh that the solvers shared.
+        observations: Marker displacements, measured or simulated.
+        evaluations: One for each solver, in the order of tables and pictures.
+        reference: The evaluation that the others are compared with.
+        material: The elastic constants; each evaluation knows its own law.
+        load: What moved the finger.
+        truth: The fields of the virtual experiment; None where the markers were measured.
+        adaptation: Rounds of mesh refinement, if it was asked for.
+        settings: Settings of each solver, by its name.
+        left_out: Reasons why solvers were left out, by their names.
+        warnings: Remarks of the marker tracking.
+    """
+
+    design: Design
+    mesh: TriangleMesh
+    observations: Observations
+    evaluations: Sequence[Evaluation]
+    reference: Evaluation
+    material: Material = field(default_factory=Material)
+    load: Load = field(default_factory=Load)
+    truth: Evaluation | None = None
+    adaptation: Adaptation | None = None
+    settings: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    warnings: Sequence[str] = ()
+
+    def __getitem__(self, solver: str) -> Evaluation:
+        named = {evaluation.solver: evaluation for evaluation in self.evaluations}
+        if solver not in named:
+            raise UserError(f"no solver of this comparison is called {solver!r}; it has {', '.join(named)}")
+        return named[solver]
+
+    @property
+    def remarks(self) -> list[str]:
+        """Solvers that were left out, with the reason, and remarks of the marker tracking."""
+        return [*left_out_remarks(self.left_out), *self.warnings]
+
+    @property
+    def unconverged(self) -> list[Evaluation]:
+        """Results that do not count as converged."""
+        return [evaluation for evaluation in self.evaluations if not evaluation.converged]
+
+    def table(self) -> "pd.DataFrame":
+        """The main numbers, a row a solver; units are in the names of the columns, as in `summary.csv`.
+
+        `in_sample` are errors at markers that the solver was given, `held_out` at markers that it was not;
+        `to_reference` and `to_truth` are relative L2 distances over the body. NaN where there is no number.
+        """
+        import pandas as pd
+
+        rows = {evaluation.solver: self._row(evaluation) for evaluation in self.evaluations}
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("solver")
+
+    def _row(self, evaluation: Evaluation) -> dict[str, object]:
+        held_out = held_out_errors(evaluation, self.observations)
+        given = marker_errors(evaluation, self.observations) if evaluation.in_sample else None
+        row: dict[str, object] = {"converged": evaluation.converged}
+        for kind, errors in (
+            ("in_sample", given),
+            ("held_out", held_out),
+        ):
+            row |= {f"{kind}_{name}_mm": getattr(errors, name, float("nan")) for name in MEANS}
+        to = reference_differences(evaluation, self.reference)
+        true = None if self.truth is None else truth_differences(evaluation, self.truth)
+        for kind, differences in (("to_reference", to), ("to_truth", true)):
+            for name in ("displacement", "von_mises"):
+                difference = getattr(differences, name, None)
+                row[f"{kind}_{name}_rel_l2"] = getattr(difference, "rel_l2", float("nan"))
+        row |= {"energy_N_mm_per_mm": evaluation.energy}
+        row |= {f"reaction_{axis}_N_per_mm": float(evaluation.reaction[n]) for n, axis in enumerate("uv")}
+        return row | {"seconds_s": evaluation.stats.get("seconds", float("nan"))}
