@@ -1,7 +1,7 @@
-"""A pytest plug-in: meshes are read from a cache that an environment with CadQuery and Gmsh has filled.
+"""A pytest plug-in that reads meshes from a cache, filled in an environment with CadQuery and Gmsh.
 
-`MAKERS` holds the versions of that environment's packages, which the cache keys are made of. A mesh that is
-missing there cannot be made, and the test that asks for it fails.
+`MAKERS` holds the versions of that environment's packages, which are part of the cache keys. A test whose
+mesh is not in the cache fails.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""How hard must the finger be pressed? Force against stroke, at finite strain.
+"""Force over stroke of the default finger, at finite strain and linear.
 
 The indenter is a 2 mm patch that slides without friction. Forces are for the whole depth of the finger.
 """

@@ -1,7 +1,7 @@
-"""Does the tip bend toward the indenter? The Fin Ray effect against the number of ribs.
+"""The Fin Ray effect over the number of ribs.
 
-The front face is pressed by 10 mm along -y. A finger that wraps around the object has a tip that moves the
-other way, along +y.
+The front face is pressed by 10 mm along -y. If the finger wraps around the object, its tip moves the other
+way, along +y.
 """
 
 from geometry import MeshSettings, finger_mesh, load_design
@@ -10,7 +10,7 @@ from solvers.registry import make_solver
 
 
 def main() -> None:
-    """Solve fingers with more and more ribs and print how the apex moves."""
+    """Solve fingers with two, four and six ribs and print the displacement of the apex."""
     print("ribs  apex u mm  apex v mm  force N")
     apex_v = {}
     for rib_count in (2, 4, 6):
