@@ -1,4 +1,4 @@
-"""The documentation against the program: examples, code blocks, command lines, tables and links."""
+"""The documentation against the program: examples, code blocks, command lines, tables, links, names."""
 
 import csv
 import json
@@ -214,7 +214,7 @@ def test_files_and_modules_that_a_page_names_exist(page):
 
 
 def anchors(page: Path) -> set[str]:
-    """What GitHub makes of a page's headings."""
+    """The anchors that GitHub gives a page's headings."""
     text = without_blocks(page.read_text(encoding="utf-8"))
     headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in headings}
