@@ -3,8 +3,7 @@
 The names below are imported on first use: `import geometry` is quick and needs neither CadQuery nor Gmsh.
 """
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from geometry.cache import cad_files as cad_files
@@ -28,35 +27,7 @@ if TYPE_CHECKING:
     from geometry.mesh.triangle_mesh import TriangleMesh as TriangleMesh
     from geometry.mesh.walls import elements_through_thickness as elements_through_thickness
     from geometry.observations import Observations as Observations
+else:
+    from geometry.lazy_exports import lazy_exports
 
-_HOME = {
-    "Design": "finger.design",
-    "LocatedPoints": "mesh.point_location",
-    "MeshSettings": "mesh.settings",
-    "Observations": "observations",
-    "OutsideBodyError": "errors",
-    "Quadrature": "mesh.quadrature",
-    "Section": "finger.section",
-    "ShapeError": "errors",
-    "TriangleMesh": "mesh.triangle_mesh",
-    "UserError": "errors",
-    "allowed_range": "finger.validation",
-    "body_quadrature": "mesh.quadrature",
-    "cad_files": "cache",
-    "edge_quadrature": "mesh.quadrature",
-    "elements_through_thickness": "mesh.walls",
-    "finger_mesh": "cache",
-    "finger_section": "finger.section",
-    "load_design": "finger.presets",
-    "marker_positions": "finger.markers",
-    "parse_overrides": "finger.presets",
-    "preset_names": "finger.presets",
-}
-
-__all__ = sorted(_HOME)
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"geometry.{_HOME[name]}"), name)
+    __getattr__, __all__ = lazy_exports(__name__, __file__)

@@ -6,14 +6,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
+from threading import get_native_id
 from typing import Any
 
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
-    """A path beside `path`, with the same suffix, taking its place when the block ends without an error."""
+    """A path beside `path`, with its suffix, that takes its place if the block ends without an error."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
+    partial = path.with_name(f".{path.stem}.{get_native_id()}.partial{path.suffix}")  # unique to a thread
     try:
         yield partial
         os.replace(partial, path)

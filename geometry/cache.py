@@ -2,13 +2,13 @@
 
 import importlib.metadata
 import os
-import tempfile
 import warnings
 import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
+from geometry.atomic import atomic_path
 from geometry.content_hash import content_hash
 from geometry.errors import UserError
 from geometry.finger.design import Design
@@ -87,8 +87,10 @@ def cad_files(
         "formats": sorted(set(formats)),
     }
     contents = _cached(design, task, ".zip", _unpack, cache_dir, timeout_s)
-    folder.mkdir(parents=True, exist_ok=True)
-    return [_replace(folder / name, content) for name, content in contents.items()]
+    for name, content in contents.items():
+        with atomic_path(folder / name) as partial:
+            partial.write_bytes(content)
+    return [folder / name for name in contents]
 
 
 def cache_folder() -> Path:
@@ -132,33 +134,20 @@ def _cached(
                 stacklevel=3,
             )
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        scratch = tempfile.TemporaryDirectory(dir=folder, prefix=".making-", ignore_cleanup_errors=True)
+        with atomic_path(entry) as partial:
+            partial.touch()
+            run_task({**task, "design": design.model_dump(), "output": str(partial)}, timeout_s)
+            return load(partial)
     except OSError as error:
         raise UserError(
             f"cannot write to the cache folder {folder} ({error.strerror}); "
             "set PINNRAY_CACHE to a folder that can be written"
         ) from None
-    with scratch as made_in:
-        made = Path(made_in) / entry.name
-        run_task({**task, "design": design.model_dump(), "output": str(made)}, timeout_s)
-        result = load(made)
-        os.replace(made, entry)
-    return result
 
 
 def _unpack(path: Path) -> dict[str, bytes]:
     with zipfile.ZipFile(path) as archive:
         return {name: archive.read(name) for name in archive.namelist()}
-
-
-def _replace(path: Path, content: bytes) -> Path:
-    """Write a file so that it is never seen half written."""
-    with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}-", delete=False) as file:
-        file.write(content)
-    os.chmod(file.name, 0o644)
-    os.replace(file.name, path)
-    return path
 
 
 def _version(package: str) -> str:

@@ -44,17 +44,6 @@ class Section:
         return inside
 
     @property
-    def boundary_lengths(self) -> dict[str, float]:
-        """Length of the named boundaries `base`, `front`, `back` and `contact`, mm."""
-        base, back, front = polygon_sides(self.outer)
-        return {
-            "base": float(base),
-            "front": float(front),
-            "back": float(back),
-            "contact": float(np.ptp(self.contact[:, 0])),
-        }
-
-    @property
     def perimeter(self) -> float:
         """Length of the whole boundary, the cavities' included, mm."""
         total = float(polygon_sides(self.outer).sum())

@@ -55,14 +55,6 @@ def refined(mesh: TriangleMesh, marked: BoolArray, section: Section | None = Non
     )
 
 
-def smallest_angle(mesh: TriangleMesh) -> float:
-    """The smallest angle of all triangles, degrees."""
-    corners = mesh.points[mesh.triangles]
-    ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
-    cosine = (ahead * behind).sum(axis=2) / np.linalg.norm(ahead, axis=2) / np.linalg.norm(behind, axis=2)
-    return float(np.degrees(np.arccos(cosine.max())))
-
-
 def _cut_triangles(corners: IntArray, middle: IntArray) -> IntArray:
     """Triangles (a, b, c), longest side ab first, cut at the middles of ab, bc and ca; -1 where not cut."""
     a, b, c = corners.T

@@ -1,7 +1,7 @@
 """The triangle mesh that every solver shares."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -40,24 +40,22 @@ class TriangleMesh:
     boundaries: Mapping[str, IntArray]
     marker_nodes: IntArray
     contact_node: int
-    _cache: dict[str, Locator] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        def freeze(name: str, values: object) -> None:
-            object.__setattr__(self, name, values)
-
-        freeze("points", frozen_array(self.points, dtype=np.float64, shape=(None, 2), name="points"))
-        freeze("triangles", frozen_array(self.triangles, dtype=np.int64, shape=(None, 3), name="triangles"))
-        freeze(
-            "marker_nodes",
-            frozen_array(self.marker_nodes, dtype=np.int64, shape=(None,), name="marker_nodes"),
-        )
         edges = {
             name: frozen_array(nodes, dtype=np.int64, shape=(None, 2), name=f"boundary {name!r}")
             for name, nodes in self.boundaries.items()
         }
-        freeze("boundaries", MappingProxyType(edges))
-        freeze("contact_node", int(self.contact_node))
+        for name, values in {
+            "points": frozen_array(self.points, dtype=np.float64, shape=(None, 2), name="points"),
+            "triangles": frozen_array(self.triangles, dtype=np.int64, shape=(None, 3), name="triangles"),
+            "marker_nodes": frozen_array(
+                self.marker_nodes, dtype=np.int64, shape=(None,), name="marker_nodes"
+            ),
+            "boundaries": MappingProxyType(edges),
+            "contact_node": int(self.contact_node),
+        }.items():
+            object.__setattr__(self, name, values)
         numbers = [self.triangles, self.marker_nodes, np.array([self.contact_node]), *edges.values()]
         if any(nodes.size and (nodes.min() < 0 or nodes.max() >= len(self.points)) for nodes in numbers):
             raise UserError(f"the mesh names a node outside 0..{len(self.points) - 1}")
@@ -121,9 +119,11 @@ class TriangleMesh:
         Raises:
             OutsideBodyError: If a point lies outside the body.
         """
-        if "locator" not in self._cache:
-            self._cache["locator"] = Locator(self.points, self.triangles)
-        return self._cache["locator"].locate(points)
+        return self._locator.locate(points)
+
+    @cached_property
+    def _locator(self) -> Locator:
+        return Locator(self.points, self.triangles)
 
     def at_centroids(self) -> LocatedPoints:
         """The location of every triangle's centroid, in the order of the triangles."""
@@ -155,21 +155,8 @@ class TriangleMesh:
             corners[self.triangles[:, corner]] = corner
         return LocatedPoints(points=self.points, cells=cells, barycentric=np.eye(3)[corners])
 
-    def permuted(self, seed: int) -> "TriangleMesh":
-        """The same mesh with nodes and triangles numbered in another order."""
-        rng = np.random.default_rng(seed)
-        order, cells = rng.permutation(len(self.points)), rng.permutation(len(self.triangles))
-        new = np.argsort(order)
-        return TriangleMesh(
-            points=self.points[order],
-            triangles=new[np.roll(self.triangles[cells], int(rng.integers(3)), axis=1)],
-            boundaries={name: new[nodes] for name, nodes in self.boundaries.items()},
-            marker_nodes=new[self.marker_nodes],
-            contact_node=int(new[self.contact_node]),
-        )
-
     def __reduce__(self) -> tuple[object, ...]:
-        """How to send the mesh to another process: its arrays; what follows from them is not sent."""
+        """Pickle the arrays only, not the derived values."""
         arrays = (self.points, self.triangles, dict(self.boundaries), self.marker_nodes, self.contact_node)
         return TriangleMesh, arrays
 

@@ -9,6 +9,7 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
+from tests.meshes import permuted
 
 
 def test_it_samples_the_nodes_the_markers_and_three_points_a_triangle(
@@ -70,7 +71,7 @@ def test_a_solution_found_on_another_mesh_is_sampled_at_the_same_places(mesh: Tr
             status=Status(True, "a closed form"),
             stats={},
         )
-        for shared in (mesh, mesh.permuted(3))
+        for shared in (mesh, permuted(mesh, 3))
     )
     expected, sampled = (Evaluation.of(solution, mesh) for solution in (own, other))
     for name in ("marker_displacement", "node_displacement", "displacement", "stress"):

@@ -10,6 +10,7 @@ from geometry import marker_positions as positions_of
 from geometry.finger.section import corner_angles, corner_area
 from geometry.mesh.boundary import boundary_edges, boundary_loops
 from geometry.mesh.mesher import build_mesh
+from tests.meshes import boundary_lengths
 
 
 def polygon_of_loop(mesh: TriangleMesh, loop: np.ndarray) -> float:
@@ -27,7 +28,7 @@ def test_area_is_that_of_the_section(design: Design, mesh: TriangleMesh) -> None
 
 def test_named_boundaries_have_their_lengths(design: Design, mesh: TriangleMesh) -> None:
     assert {name: mesh.boundary_length(name) for name in mesh.boundaries} == pytest.approx(
-        finger_section(design).boundary_lengths, rel=1e-12
+        boundary_lengths(finger_section(design)), rel=1e-12
     )
 
 

@@ -7,7 +7,8 @@ import pytest
 
 from geometry import Design, TriangleMesh, finger_section
 from geometry.mesh.boundary import boundary_edges
-from geometry.mesh.refinement import refined, smallest_angle
+from geometry.mesh.refinement import refined
+from tests.meshes import smallest_angle
 
 
 def some(mesh: TriangleMesh, share: float, seed: int = 0) -> np.ndarray:

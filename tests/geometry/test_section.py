@@ -8,6 +8,7 @@ from shapely.geometry import LineString, Point, Polygon
 
 from geometry import Design, finger_section, marker_positions
 from geometry.finger.section import corner_area, polygon_area, rib_axes
+from tests.meshes import boundary_lengths
 
 
 def as_shapely(design: Design) -> Polygon:
@@ -79,7 +80,7 @@ def test_ribs_are_evenly_spaced_along_the_front_wall() -> None:
 
 
 def test_boundary_lengths_of_the_papers_finger() -> None:
-    lengths = finger_section(Design()).boundary_lengths
+    lengths = boundary_lengths(finger_section(Design()))
     assert lengths == pytest.approx({"base": 30, "front": 90, "back": np.hypot(90, 30), "contact": 2})
 
 
