@@ -3,28 +3,19 @@
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import ValidationError, model_validator
+from pydantic import model_validator
 
 from geometry.errors import UserError
-from geometry.finger.error_messages import validation_message
+from geometry.finger.error_messages import CheckedModel
 from geometry.finger.parameters import SYMBOLS, Parameters, title
 from geometry.finger.validation import check
 
 
-class Design(Parameters):
+class Design(CheckedModel, Parameters):
     """A finger that can be made; a combination that cannot be is refused on construction.
 
     Every parameter goes by its name or by the paper's symbol: `Design(rib_count=6)` equals `Design(N=6)`.
-
-    Raises:
-        UserError: One line with the parameter, the value, the reason and what would be right.
     """
-
-    def __init__(self, **values: Any) -> None:
-        try:
-            super().__init__(**values)
-        except ValidationError as error:
-            raise UserError(validation_message(error, Design)) from None
 
     def replaced(self, **changes: Any) -> "Design":
         """A checked copy with some parameters changed, by name or symbol."""

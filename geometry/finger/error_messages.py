@@ -1,11 +1,29 @@
-"""What a wrong value is told: one line with the parameter, the value, and what would be right."""
+"""Error messages for invalid parameters: one line with the parameter, the value, and what would be right."""
 
 import difflib
+from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
+from geometry.errors import UserError
 from geometry.finger.parameters import parameter_info, title, with_unit
+
+
+class CheckedModel(BaseModel):
+    """A frozen model that refuses invalid values in one line.
+
+    Raises:
+        UserError: With the parameter, the value and what would be right.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            raise UserError(validation_message(error, type(self))) from None
 
 
 def validation_message(error: ValidationError, model: type[BaseModel]) -> str:
@@ -14,7 +32,7 @@ def validation_message(error: ValidationError, model: type[BaseModel]) -> str:
 
 
 def unknown_parameter(key: str, model: type[BaseModel]) -> str:
-    """What to say about a parameter that `model` does not have: near matches, or the whole list."""
+    """The message for a parameter that `model` does not have: near matches, or the whole list."""
     known = list(model.model_fields)
     near = difflib.get_close_matches(key.lower(), known, n=3, cutoff=0.6)
     near = near or [name for name in known if key.lower() in name or key.lower()[:3] == name[:3]]
@@ -30,16 +48,17 @@ def _sentence(problem: ErrorDetails, model: type[BaseModel]) -> str:
     name = str(problem["loc"][0])
     if kind == "extra_forbidden":
         return unknown_parameter(name, model)
-    what = title(name, model)
+    titled = title(name, model)
     if kind in ("greater_than_equal", "less_than_equal"):
-        return f"{what} = {with_unit(float(value), name, model)} is outside its range, {_bounds(name, model)}"
+        given = with_unit(float(value), name, model)
+        return f"{titled} = {given} is outside its range, {_bounds(name, model)}"
     if kind in ("int_from_float", "int_parsing", "int_type"):
-        return f"{what} = {value!r} is not a whole number; give one from {_bounds(name, model)}"
+        return f"{titled} = {value!r} is not a whole number; give one from {_bounds(name, model)}"
     if kind in ("float_parsing", "float_type", "finite_number"):
-        return f"{what} = {value!r} is not a finite number; give one from {_bounds(name, model)}"
+        return f"{titled} = {value!r} is not a finite number; give one from {_bounds(name, model)}"
     if kind == "string_pattern_mismatch":
-        return f"{what} = {value!r} must be a letter or digit, then only letters, digits, '.', '_', '-'"
-    return f"{what} = {value!r}: {problem['msg'].lower()}"
+        return f"{titled} = {value!r} must be a letter or digit, then only letters, digits, '.', '_', '-'"
+    return f"{titled} = {value!r}: {problem['msg'].lower()}"
 
 
 def _bounds(name: str, model: type[BaseModel]) -> str:

@@ -1,4 +1,4 @@
-"""Parameters from observations: weighted least squares with a prior, and what the observations say of each.
+"""Parameters from observations: weighted least squares with a prior, covariance and resolution.
 
 With predictions y(θ), observations d of standard deviations σ, and a Gaussian prior with the mean θ0 and the
 standard deviations s, of θ or of its logarithm, the estimate minimises
@@ -6,8 +6,8 @@ standard deviations s, of θ or of its logarithm, the estimate minimises
     Σ ((y(θ) - d) / φ σ)^2 + Σ z^2        z = (θ - θ0) / s   or   log(θ / θ0) / s
 
 φ is one where noise of the size σ explains the misfit. Where it does not, at a level of 95 % of χ^2, it is
-the root of the misfit over its degrees of freedom, found together with θ: a model that is wrong by φ σ must
-not be believed to σ. With A = (dy/dz) / φ σ the covariance of z is (A^T A + 1)^-1.
+the root of the misfit over its degrees of freedom, found together with θ, so that model error widens the
+confidence intervals. With A = (dy/dz) / φ σ the covariance of z is (A^T A + 1)^-1.
 
 Sources: A. Tarantola, Inverse Problem Theory, SIAM 2005, chapter 3 (estimate, covariance,
 resolution); R. T. Birge, The calculation of errors by the method of least squares, Phys. Rev. 40 (1932)
@@ -16,7 +16,7 @@ resolution); R. T. Birge, The calculation of errors by the method of least squar
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -27,12 +27,11 @@ from geometry.arrays import BoolArray, FloatArray, IntArray
 LEVEL = 0.95
 """Of confidence intervals, and of the test whether noise explains the misfit."""
 
-RESOLVED = 0.5
-"""Least share of what is known of a parameter that must come from the observations."""
+MIN_RESOLUTION = 0.5
+"""Minimum resolution for a parameter to count as determined by the data."""
 
-ROUNDS = 20
-"""Estimates at most until φ settles, which it has done when it changes by less than `SETTLED`."""
-SETTLED = 0.01
+MAX_ROUNDS, INFLATION_CHANGE = 20, 0.01
+"""Least-squares fits at most, and the relative change of φ below which it has converged."""
 
 Prediction = tuple[FloatArray, FloatArray]
 """Predictions, shape (n,), and their derivatives by the parameters, shape (n, p)."""
@@ -40,16 +39,16 @@ Prediction = tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter that is to be found.
+    """A parameter to be estimated.
 
     Attributes:
-        name: What it is called.
-        unit: Of its value; empty for a pure number.
-        start: Middle of its prior: what it is taken for before anything is observed.
+        name: Name.
+        unit: Unit of the value; empty for a pure number.
+        start: Middle of the prior.
         scale: Standard deviation of the prior, of the value or, if `logarithmic`, of its logarithm.
-        low: Least value that it can have.
-        high: Largest value.
-        logarithmic: Whether the prior is of the logarithm: for what is positive and known to a factor.
+        low: Lower bound of the value.
+        high: Upper bound.
+        logarithmic: Whether the prior is normal in the logarithm, for positive values known to a factor.
     """
 
     name: str
@@ -61,17 +60,17 @@ class Parameter:
     logarithmic: bool = False
 
     def value(self, z: float | FloatArray) -> FloatArray:
-        """The value, z standard deviations from the middle."""
+        """The value z standard deviations from the middle of the prior."""
         z = np.asarray(z)
         return self.start * np.exp(self.scale * z) if self.logarithmic else self.start + self.scale * z
 
-    def slope(self, z: float) -> float:
+    def derivative(self, z: float) -> float:
         """Derivative of the value by z."""
         return float(self.scale * (self.value(z) if self.logarithmic else 1.0))
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Least and largest z."""
+        """Bounds of z."""
         if self.logarithmic:
             return -np.inf, np.inf
         return (self.low - self.start) / self.scale, (self.high - self.start) / self.scale
@@ -79,15 +78,15 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Values of p parameters and how well n observations determine them.
+    """Estimates of p parameters from n observations, with covariance and resolution.
 
     Attributes:
         parameters: The parameters.
-        z: Where they are in their priors, shape (p,).
+        z: Standardised values, shape (p,).
         sensitivities: A, shape (n, p).
         residuals: Predicted minus observed over φ σ, shape (n,).
         inflation: φ.
-        evaluations: Of the model.
+        evaluations: Evaluations of the model.
         converged: Whether the minimum was found.
     """
 
@@ -101,28 +100,20 @@ class Estimate:
 
     @cached_property
     def covariance(self) -> FloatArray:
-        """Of z, shape (p, p)."""
+        """Covariance of z, shape (p, p)."""
         a = self.sensitivities
         return np.linalg.inv(a.T @ a + np.eye(a.shape[1]))
 
     @cached_property
     def singular_values(self) -> FloatArray:
-        """Of A, shape (p,), largest first.
-
-        Where one is below one, the prior says more of that combination of parameters than the observations.
-        """
+        """Singular values of A, shape (p,), descending; below one, the prior dominates."""
         found = np.linalg.svd(self.sensitivities, compute_uv=False)
         return np.append(found, np.zeros(len(self.z) - len(found)))
 
     @property
-    def least_known(self) -> FloatArray:
-        """The combination of z, of unit length, that the observations say least of, shape (p,)."""
+    def least_determined(self) -> FloatArray:
+        """The combination of z, of unit length, that the observations determine least, shape (p,)."""
         return np.asarray(np.linalg.svd(self.sensitivities)[2][-1])
-
-    @property
-    def freedom(self) -> float:
-        """Degrees of freedom of the residuals."""
-        return freedom_of(self.sensitivities)
 
     @property
     def condition(self) -> float:
@@ -138,14 +129,16 @@ class Estimate:
     @property
     def deviations(self) -> FloatArray:
         """Standard deviations of the values, shape (p,); to first order where the prior is logarithmic."""
-        slopes = [u.slope(z) for u, z in zip(self.parameters, self.z, strict=True)]
+        slopes = [u.derivative(z) for u, z in zip(self.parameters, self.z, strict=True)]
         return np.sqrt(np.diagonal(self.covariance)) * slopes
 
     @property
     def intervals(self) -> FloatArray:
         """Confidence intervals at `LEVEL`, shape (p, 2); by Student's t where φ was estimated."""
         upper = (1 + LEVEL) / 2
-        times = norm.ppf(upper) if self.inflation == 1 else t.ppf(upper, self.freedom)
+        times = (
+            norm.ppf(upper) if self.inflation == 1 else t.ppf(upper, degrees_of_freedom(self.sensitivities))
+        )
         ends = self.z[:, None] + times * np.sqrt(np.diagonal(self.covariance))[:, None] * [-1, 1]
         return np.array(
             [np.clip(u.value(e), u.low, u.high) for u, e in zip(self.parameters, ends, strict=True)]
@@ -153,22 +146,22 @@ class Estimate:
 
     @property
     def resolution(self) -> FloatArray:
-        """Share of what is known of each parameter that the observations say, shape (p,): 0 to 1."""
+        """Resolution of each parameter, shape (p,): 0 where only the prior determines it, up to 1."""
         return np.asarray(1 - np.diagonal(self.covariance))
 
     @property
     def resolved(self) -> BoolArray:
         """Which parameters the observations determine, shape (p,)."""
-        return np.asarray(self.resolution >= RESOLVED)
+        return np.asarray(self.resolution >= MIN_RESOLUTION)
 
     def left_out(self, rows: IntArray) -> FloatArray:
-        """Residuals, over φ σ, of observations if they had not been used, to first order: (I - H)^-1 r.
+        """Leave-one-out residuals over φ σ, to first order: (I - H)^-1 r.
 
         H = A (A^T A + 1)^-1 A^T; exact for a linear model and the same φ (D. M. Allen, Technometrics 16
         (1974) 125-127).
 
         Args:
-            rows: The observations that are left out together, shape (k,).
+            rows: Observations left out together, shape (k,).
         """
         own = self.sensitivities[rows]
         return np.linalg.solve(np.eye(len(rows)) - own @ self.covariance @ own.T, self.residuals[rows])
@@ -183,17 +176,28 @@ def estimate(
     """Find the parameters by Gauss-Newton steps in a trust region.
 
     Args:
-        model: Predictions and derivatives at parameters of shape (p,).
+        model: Predictions and derivatives from parameter values, shape (p,).
         observed: Shape (n,).
         deviations: Their standard deviations σ, shape (n,), all positive.
         parameters: The p parameters.
     """
-    whitened = _Whitened(model, observed, deviations, parameters)
+
+    @lru_cache(maxsize=1)  # least_squares asks for residuals and derivatives separately
+    def evaluated(z: tuple[float, ...]) -> Prediction:
+        pairs = list(zip(parameters, z, strict=True))
+        predicted, derivatives = model(np.array([float(u.value(place)) for u, place in pairs]))
+        derivatives = derivatives * [u.derivative(place) for u, place in pairs] / deviations[:, None]
+        return (predicted - observed) / deviations, derivatives
+
+    def whitened(z: FloatArray) -> Prediction:
+        """Residuals over σ, shape (n,), and their derivatives by z, shape (n, p)."""
+        return evaluated(tuple(z.tolist()))
+
     count, one = len(parameters), np.eye(len(parameters))
     bounds = np.array([parameter.bounds for parameter in parameters]).T
     z = np.clip(np.zeros(count), *bounds)
     inflation = _inflation(whitened(z)[0], len(observed))
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         weight = 1 / inflation
         fit = least_squares(
             lambda z, weight=weight: np.concatenate([weight * whitened(z)[0], z]),
@@ -205,51 +209,25 @@ def estimate(
             gtol=1e-8,
         )
         z = fit.x
-        residuals, slopes = whitened(z)
-        used, inflation = inflation, _inflation(residuals, freedom_of(weight * slopes))
-        if settled := abs(inflation / used - 1) < SETTLED:
+        residuals, derivatives = whitened(z)
+        used, inflation = inflation, _inflation(residuals, degrees_of_freedom(weight * derivatives))
+        if settled := abs(inflation / used - 1) < INFLATION_CHANGE:
             break
     return Estimate(
         parameters=parameters,
         z=z,
-        sensitivities=weight * slopes,
+        sensitivities=weight * derivatives,
         residuals=weight * residuals,
         inflation=used,
-        evaluations=whitened.evaluations,
+        evaluations=evaluated.cache_info().misses,
         converged=bool(fit.success and settled),
     )
 
 
-def freedom_of(sensitivities: FloatArray) -> float:
-    """Observations less what the parameters take up of them, tr(A (A^T A + 1)^-1 A^T); at least one."""
+def degrees_of_freedom(sensitivities: FloatArray) -> float:
+    """Number of observations minus tr(A (A^T A + 1)^-1 A^T); at least one."""
     squares = np.linalg.svd(sensitivities, compute_uv=False) ** 2
     return max(len(sensitivities) - float((squares / (1 + squares)).sum()), 1.0)
-
-
-class _Whitened:
-    """Residuals over σ, shape (n,), and their derivatives by z, shape (n, p); the last ones are kept."""
-
-    def __init__(
-        self,
-        model: Callable[[FloatArray], Prediction],
-        observed: FloatArray,
-        deviations: FloatArray,
-        parameters: Sequence[Parameter],
-    ) -> None:
-        self._model, self._observed, self._deviations = model, observed, deviations
-        self._parameters = parameters
-        self._last: tuple[bytes, Prediction] | None = None
-        self.evaluations = 0
-
-    def __call__(self, z: FloatArray) -> Prediction:
-        key = z.tobytes()
-        if self._last is None or self._last[0] != key:
-            pairs = list(zip(self._parameters, z, strict=True))
-            predicted, slopes = self._model(np.array([float(u.value(place)) for u, place in pairs]))
-            slopes = slopes * [u.slope(place) for u, place in pairs] / self._deviations[:, None]
-            self._last = key, ((predicted - self._observed) / self._deviations, slopes)
-            self.evaluations += 1
-        return self._last[1]
 
 
 def _inflation(residuals: FloatArray, freedom: float) -> float:

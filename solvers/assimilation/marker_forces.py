@@ -1,4 +1,4 @@
-"""Least energy plus misfit in the few unknowns that matter: the forces by which the markers are pulled.
+"""Minimisers of energy plus misfit, by the forces that act at the markers.
 
 Let G_j be the displacement under a unit force at component j of the markers while all conditions hold at
 zero, and C = B G their compliance. The minimiser of E(u) + 1/2 (B u - d)^T W (B u - d) is u = u_0 + G p:
@@ -7,7 +7,7 @@ without the markers' forces p it is u_0, and
     (W^-1 + C) p = d - B u_0        E(u) = E(u_0) + 1/2 p^T C p
 
 (Sherman, Morrison, Woodbury). One eigen-decomposition of W^1/2 C W^1/2 gives it for all factors of W; with
-M = (W^-1 + C)^-1, what marker i would be missed by without it is M_ii^-1 p_i, a block of 2 by 2.
+M = (W^-1 + C)^-1, the leave-one-out residual of marker i is M_ii^-1 p_i, a block of 2 by 2.
 
 Sources: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006, section
 5.4.2, for leaving one out, and equation 2.30 for the evidence: with the prior exp(-E / T) the compliance
@@ -28,8 +28,8 @@ class MarkerFit(NamedTuple):
 
     Attributes:
         forces: p, shape (m, 2), N/mm.
-        residual: What the markers are missed by, d - B u, shape (m, 2), mm.
-        left_out: What each marker would be missed by without it, the other weights as they are, (m, 2), mm.
+        residual: d - B u, shape (m, 2), mm.
+        left_out: Leave-one-out residuals, the other weights as they are, shape (m, 2), mm.
         energy: E(u) - E(u_0), N mm / mm.
     """
 
@@ -40,7 +40,7 @@ class MarkerFit(NamedTuple):
 
     @property
     def phrase(self) -> str:
-        """How far the markers are missed, in words."""
+        """The root mean square residuals in words."""
         return residual_phrase(self.residual, self.left_out)
 
 
@@ -51,12 +51,12 @@ class MarkerForces:
     Attributes:
         compliance: C, shape (2 m, 2 m), mm per N/mm, the two components of a marker one after the other.
         weights: The diagonal of W, positive, shape (m, 2), MPa.
-        missed: d - B u_0, shape (m, 2), mm.
+        prior_residual: d - B u_0, shape (m, 2), mm.
     """
 
     compliance: FloatArray
     weights: FloatArray
-    missed: FloatArray
+    prior_residual: FloatArray
 
     @cached_property
     def _modes(self) -> tuple[FloatArray, FloatArray]:
@@ -67,7 +67,7 @@ class MarkerForces:
     @cached_property
     def _in_modes(self) -> FloatArray:
         """W^1/2 (d - B u_0) in the eigenvectors, shape (2 m,)."""
-        return np.asarray(self._modes[1].T @ (np.sqrt(self.weights) * self.missed).ravel())
+        return np.asarray(self._modes[1].T @ (np.sqrt(self.weights) * self.prior_residual).ravel())
 
     def fit(self, factor: float = 1.0) -> MarkerFit:
         """The minimiser for weights times a factor, which is positive."""
@@ -85,13 +85,11 @@ class MarkerForces:
         )
 
     def log_evidence(self, scale: float, factor: float = 1.0) -> float:
-        """Logarithm of the density of d, but for a constant, where W = scale / σ².
-
-        The errors' standard deviations σ are what they are; the prior is exp(-E / (factor scale)).
+        """Log evidence of d up to a constant, for W = scale / σ² and the prior exp(-E / (factor scale)).
 
         Args:
-            scale: Of the weights, N mm / mm.
-            factor: Of the scale.
+            scale: Scale of the weights, N mm / mm.
+            factor: Factor of the scale.
         """
         values, _ = self._modes
         spread = 1 + factor * values
@@ -99,14 +97,14 @@ class MarkerForces:
 
 
 def residual_phrase(residual: FloatArray, left_out: FloatArray) -> str:
-    """How far markers are missed in a fit, and where they are left out of it, mm, in words."""
+    """Root mean square residuals in words, mm, in the fit and with each marker left out."""
     return (
-        "root mean square of what the markers are missed by: "
+        "root mean square residual at the markers: "
         f"{root_mean_square(residual):.2g} mm in the fit, "
         f"{root_mean_square(left_out):.2g} mm when they are left out"
     )
 
 
 def root_mean_square(values: FloatArray) -> float:
-    """Over all entries."""
+    """Root mean square over all entries."""
     return float(np.sqrt((values**2).mean()))

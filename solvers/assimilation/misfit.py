@@ -1,13 +1,13 @@
 """The misfit of a displacement to the markers: one definition for every solver that assimilates them.
 
-What is minimised is, per depth, elastic energy plus misfit:
+Solvers minimise, per depth, elastic energy plus misfit:
 
     J(u) = E(u) + 1/2 (B u - d)^T W (B u - d)
 
 with the displacements B u of the markers, d observed there, and a diagonal of weights W. B takes the mean
-over a marker's disc, which is what a camera sees. At a radius of zero it takes the centre's displacement, as
-the paper does; that has no limit under refinement, since a force at a point of a plane body moves it by
-infinitely much.
+over a marker's disc, which a camera measures. At a radius of zero it takes the centre's displacement, as the
+paper does; that has no limit under refinement, since a point force displaces its point of a plane body
+without bound.
 
 Sources: X. Wang et al., PINN-Ray, arXiv:2407.08222, section "Loss function", whose loss times the body's area
 this is; A. M. Stuart, Inverse problems: a Bayesian perspective, Acta Numerica 19 (2010) 451-559, section 2,
@@ -31,13 +31,13 @@ from solvers.solver import Solver
 Weighting = Literal["paper", "precision"]
 
 MIN_STANDARD_DEVIATION = 0.005
-"""Standard deviation that an observation has at least, mm.
+"""Minimum standard deviation of an observation, mm: about that of a well-calibrated camera.
 
-Simulated displacements have none at all; a camera that is calibrated well knows a marker to about this.
+Simulated displacements have none.
 """
 
 RINGS, ANGLES = 4, 12
-"""Points of the rule for the mean over a disc: Gauss's in the squared radius, even ones around."""
+"""Quadrature of a disc: Gauss points in the squared radius, equidistant angles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class Misfit:
         points: Positions of the markers at rest, shape (m, 2), mm.
         observed: Displacements d, shape (m, 2), mm.
         weights: The diagonal of W, shape (m, 2), MPa: N/mm of force per depth for 1 mm of misfit.
-        radius: Of the discs over which the displacement is averaged, mm; zero for the points alone.
+        radius: Radius of the discs over which the displacement is averaged, mm; zero: the centres alone.
     """
 
     points: FloatArray
@@ -69,7 +69,7 @@ class Misfit:
         return self.weights * (self.observed - displacement)
 
     def without(self, marker: int) -> "Misfit":
-        """The misfit of the other markers, whose weights stay what they are."""
+        """The misfit of the other markers, with unchanged weights."""
         arrays = (self.points, self.observed, self.weights)
         points, observed, weights = (np.delete(values, marker, axis=0) for values in arrays)
         return Misfit(points, observed, weights, self.radius)
@@ -90,15 +90,14 @@ def misfit_of(
     """The misfit to a problem's observations; None where it has none.
 
     Args:
-        problem: With the observations; markers that were not seen are left out.
+        problem: The problem with its observations; markers that were not seen are left out.
         weights: "paper": the loss λ_ASM 1/m Σ |u - d|² beside the mean energy density, times the body's area
-            A, is W = 2 A λ_ASM / m. "precision": W = scale / σ², by the observations' standard deviations,
-            of which none counts as less than `MIN_STANDARD_DEVIATION`. The minimiser of J is then the mode of
-            the posterior for the prior exp(-E / scale) and independent normal errors of the observations.
+            A, is W = 2 A λ_ASM / m. "precision": W = scale / σ², with standard deviations σ of at least
+            `MIN_STANDARD_DEVIATION`. The minimiser of J is then the mode of the posterior for the prior
+            exp(-E / scale) and independent normal errors of the observations.
         asm_weight: λ_ASM, MPa/mm², for "paper".
-        scale: For "precision", the model's own error as an energy per depth, N mm / mm: a typical deviation
-            from the model's solution has half of it in every degree of freedom. The less, the more the model
-            is believed.
+        scale: Model error for "precision", as an energy per depth, N mm / mm: a typical deviation from the
+            model's solution has half of it in every degree of freedom.
         marker_radius: Radius of the discs over which the displacement is averaged, mm; None for the
             observations' own; less where a marker is nearer to the boundary of the body.
     """
@@ -131,21 +130,22 @@ def disc_quadrature(centres: FloatArray, radius: float) -> tuple[FloatArray, Flo
 
 
 def standard_deviations(observations: Observations) -> FloatArray:
-    """Those of the markers seen, shape (m, 2), mm, none of them less than `MIN_STANDARD_DEVIATION`."""
+    """Standard deviations at the markers seen, at least `MIN_STANDARD_DEVIATION`, shape (m, 2), mm."""
     return np.maximum(observations.standard_deviations[observations.visible], MIN_STANDARD_DEVIATION)
 
 
-def leave_one_out_displacements(problem: Problem, missed: FloatArray) -> FloatArray:
-    """What a solver that was not given marker i says of it, from what it misses it by, (m, 2), mm.
+def leave_one_out_displacements(problem: Problem, residuals: FloatArray) -> FloatArray:
+    """Displacement of each marker as predicted without it, (m, 2), mm; NaN where it was not seen.
 
-    Returns:
-        The displacement of every marker of the observations; NaN where it was not seen.
+    Args:
+        problem: The problem with its observations.
+        residuals: Observed minus predicted, shape (number of markers seen, 2), mm.
     """
     observations = problem.observations
     if observations is None:
         raise UserError("there are no markers to leave out")
     predicted = np.full(observations.displacements.shape, np.nan)
-    predicted[observations.visible] = observations.displacements[observations.visible] - missed
+    predicted[observations.visible] = observations.displacements[observations.visible] - residuals
     return predicted
 
 
@@ -158,5 +158,5 @@ def radius_within(mesh: TriangleMesh, points: FloatArray, radius: float) -> floa
 
 
 def assimilates(solver: Solver) -> bool:
-    """Whether a solver uses the observations of a problem: those only that say so are given any."""
+    """Whether a solver declares that it uses the observations of a problem."""
     return bool(getattr(solver, "assimilates", False))

@@ -1,4 +1,4 @@
-"""A solver that assimilates, for other observations and other loads of the same finger."""
+"""Reuse of an assimilating solver's work for other observations or loads of the same finger."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,21 +15,21 @@ class Refittable(Protocol):
     """A solver that shares work between fits to different observations of the same markers."""
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
-        """What gives the solution of `solve` for the problem with observations, but for `left_out`."""
+        """A function that solves the problem with other observations, like `solve` but without `left_out`."""
         ...
 
 
 @runtime_checkable
 class Transferable(Protocol):
-    """A solver that says what it learnt at one load in terms that hold at another."""
+    """A solver whose estimates at one load hold at another."""
 
     def transferred(self, solution: Solution, problem: Problem, other: Problem) -> Solution:
-        """The solution of another problem with what a solution of the first one found."""
+        """The solution of another problem with the parameters estimated in a solution of the first."""
         ...
 
 
 def refitter(solver: Solver, problem: Problem) -> Callable[[Observations], Solution]:
-    """What solves a problem for any observations, sharing what the solver can share."""
+    """A function that solves a problem for any observations, sharing work where the solver can."""
     if isinstance(solver, Refittable):
         return solver.refitter(problem)
     return lambda observations: solver.solve(replace(problem, observations=observations))

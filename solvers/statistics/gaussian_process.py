@@ -1,6 +1,6 @@
-"""`gp`: a Gaussian process through the markers, which knows nothing of mechanics: the null model.
+"""`gp`: a Gaussian process through the markers, without mechanics: the null model.
 
-What a solver that knows the mechanics has to beat at markers that it was not given.
+A solver with mechanics has to predict held-out markers better than this.
 
 Source: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006, equations
 2.23 to 2.26 and chapter 5, as scikit-learn has them.
@@ -26,12 +26,12 @@ from solvers.solution import Solution, Status
 from solvers.solver import Progress, UnsupportedProblemError, check_problem, silent
 from solvers.statistics.kernel_field import SMOOTHNESS, Kernel, KernelField
 
-FEWEST = 3
-"""Markers below which two constants of a kernel cannot be found."""
-CLAMPED = 5
-"""Points of the base that are known to be at rest, with `clamp`."""
+MIN_MARKERS = 3
+"""Minimum number of markers that determines the two hyperparameters of a kernel."""
+BASE_POINTS = 5
+"""Number of points at rest on the base, with `clamp`."""
 LENGTHS, VARIANCES = (1.0, 1000.0), (1e-4, 1e6)
-"""Between what a kernel's length, mm, and variance, mm², are looked for."""
+"""Search ranges of a kernel's length, mm, and variance, mm²."""
 START_LENGTH, START_VARIANCE = 30.0, 10.0
 
 
@@ -39,13 +39,12 @@ START_LENGTH, START_VARIANCE = 30.0, 10.0
 class GaussianProcessSolver:
     """u and v as independent processes of mean zero with one of Matérn's kernels.
 
-    Length and variance of each kernel have the largest marginal likelihood. A marker that is left out is left
-    out of that choice too.
+    Length and variance of each kernel maximise the marginal likelihood, also of the markers that remain when
+    one is left out.
 
     Attributes:
-        clamp: Whether the process is told that the base is at rest, which makes it a stronger null model. By
-            default it is told the markers only.
-        kernel: How smooth the processes are: "matern32", "matern52" or "gaussian" (squared exponential).
+        clamp: Whether the process is conditioned on a base at rest, a stronger null model.
+        kernel: Covariance function: "matern32", "matern52" or "gaussian" (squared exponential).
     """
 
     clamp: bool = False
@@ -56,18 +55,18 @@ class GaussianProcessSolver:
     assimilates: ClassVar[bool] = True
 
     def settings(self) -> dict[str, object]:
-        """Whether the base is known to be at rest, and the kernel."""
+        """Whether the base is at rest, and the kernel."""
         return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Fit the processes to the problem's observations; see `Solver`.
 
         Raises:
-            UnsupportedProblemError: If there are fewer markers than `FEWEST` and one that can be left out.
+            UnsupportedProblemError: If fewer than `MIN_MARKERS` markers and one to leave out were seen.
         """
         check_problem(self, problem)
         started = time.perf_counter()
-        solution, misfit, deviations = self._through(problem, FEWEST + 1)
+        solution, misfit, deviations = self._fitted(problem, MIN_MARKERS + 1)
         base, count = self._base(problem), len(misfit.points)
         missed, spread = np.zeros((2, count, 2))
         for marker in range(count):
@@ -82,11 +81,11 @@ class GaussianProcessSolver:
         return replace(solution, stats=stats, left_out=leave_one_out_displacements(problem, missed))
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
-        """What fits other observations, without leaving any out; see `Refittable`."""
-        return lambda observations: self._through(replace(problem, observations=observations), FEWEST)[0]
+        """A function that fits other observations, without leaving any out; see `Refittable`."""
+        return lambda observations: self._fitted(replace(problem, observations=observations), MIN_MARKERS)[0]
 
-    def _through(self, problem: Problem, least: int) -> tuple[Solution, Misfit, FloatArray]:
-        """The processes through the markers that were seen; these; standard deviations (m, 2), mm."""
+    def _fitted(self, problem: Problem, least: int) -> tuple[Solution, Misfit, FloatArray]:
+        """The solution, the misfit of the markers seen, and their standard deviations (m, 2), mm."""
         started = time.perf_counter()
         misfit = misfit_of(problem, marker_radius=0.0)
         count = 0 if misfit is None else len(misfit.points)
@@ -123,12 +122,12 @@ class GaussianProcessSolver:
         return solution, misfit, deviations
 
     def _base(self, problem: Problem) -> FloatArray:
-        """Points that are known to be at rest, shape (b, 2), mm."""
+        """Points at rest, shape (b, 2), mm."""
         if not self.clamp:
             return np.zeros((0, 2))
         points = problem.mesh.points[problem.mesh.boundary("base").ravel()]
         low, high = points[points[:, 1].argmin()], points[points[:, 1].argmax()]
-        return np.asarray(np.linspace(low, high, CLAMPED))
+        return np.asarray(np.linspace(low, high, BASE_POINTS))
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,8 +135,8 @@ class GaussianProcessField:
     """The posterior of two processes.
 
     Attributes:
-        mean: Its mean.
-        processes: Those of scikit-learn, for u and v.
+        mean: The posterior mean.
+        processes: The processes of scikit-learn for u and v.
     """
 
     mean: KernelField
@@ -152,7 +151,7 @@ class GaussianProcessField:
         return self.mean.gradient(location)
 
     def standard_deviation(self, location: LocatedPoints) -> FloatArray:
-        """Of the displacement, shape (n, 2), mm."""
+        """Standard deviation of the displacement, shape (n, 2), mm."""
         return np.stack(
             [process.predict(location.points, return_std=True)[1] for process in self.processes], 1
         )
@@ -172,7 +171,7 @@ def _fit(misfit: Misfit, deviations: FloatArray, base: FloatArray, kernel: Kerne
     for axis in (0, 1):
         process = GaussianProcessRegressor(covariance, alpha=deviations[:, axis] ** 2)
         with warnings.catch_warnings():
-            # An end of the range is a fair answer: constant over the finger, or nothing but the markers.
+            # An end of the search range is a valid result: constant over the finger, or the markers alone.
             warnings.simplefilter("ignore", ConvergenceWarning)
             processes.append(process.fit(points, observed[:, axis]))
     variances, lengths = np.exp([process.kernel_.theta for process in processes]).T

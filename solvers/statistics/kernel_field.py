@@ -1,4 +1,4 @@
-"""Displacement fields of Matérn's kernels, as Gaussian processes make them.
+"""Displacement fields as sums of Matérn kernels: posterior means of Gaussian processes.
 
 Source: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006, equations
 4.9, 4.16 and 4.17.
@@ -14,18 +14,18 @@ from geometry.mesh.point_location import LocatedPoints
 
 Kernel = Literal["matern32", "matern52", "gaussian"]
 SMOOTHNESS: dict[Kernel, float] = {"matern32": 1.5, "matern52": 2.5, "gaussian": np.inf}
-"""ν: a process has as many derivatives as there are whole numbers below it."""
+"""Smoothness ν: a process has as many derivatives as there are whole numbers below it."""
 
 
 @dataclass(frozen=True, eq=False)
 class KernelField:
-    """Σ_i c_i k(|x - x_i|), each component with coefficients and a length of its own.
+    """Σ_i c_i k(|x - x_i|), with coefficients and a length for each component.
 
     Attributes:
         centres: x_i, shape (m, 2), mm.
         coefficients: c_i, shape (m, 2), mm.
-        lengths: Of k for u and v, shape (2,), mm.
-        kernel: k.
+        lengths: Lengths of k for u and v, shape (2,), mm.
+        kernel: Covariance function k.
     """
 
     centres: FloatArray
@@ -40,8 +40,10 @@ class KernelField:
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
-        slopes = [_slope(location.points, self.centres, length, self.kernel) for length in self.lengths]
-        weighted = np.stack(slopes, axis=-1) * self.coefficients
+        derivatives = [
+            _derivative_factor(location.points, self.centres, length, self.kernel) for length in self.lengths
+        ]
+        weighted = np.stack(derivatives, axis=-1) * self.coefficients
         offset = self.centres - location.points[:, None]
         return np.asarray(np.einsum("nmc,nmx->ncx", weighted, offset))
 
@@ -55,8 +57,8 @@ def correlation(points: FloatArray, others: FloatArray, length: float, kernel: K
     return np.asarray(series * np.exp(-distance))
 
 
-def _slope(points: FloatArray, others: FloatArray, length: float, kernel: Kernel) -> FloatArray:
-    """What others minus points have to be multiplied by for the gradient of k at the points, 1/mm²."""
+def _derivative_factor(points: FloatArray, others: FloatArray, length: float, kernel: Kernel) -> FloatArray:
+    """Factor f in the gradient of k at the points, ∇k = f (others - points), shape (n, m), 1/mm²."""
     distance = _distance(points, others, length, kernel)
     if kernel == "gaussian":
         return np.asarray(np.exp(-(distance**2) / 2) / length**2)

@@ -1,15 +1,15 @@
-"""`statfem`: finite elements whose load is uncertain, plus a Gaussian process for what the model lacks.
+"""`statfem`: finite elements with an uncertain load, plus a Gaussian process for the model discrepancy.
 
-What is observed is d = ρ B u + δ + e: the displacement u of finite elements at the markers, times a factor, a
-discrepancy δ and the error e of the observations. Random are, and normal a priori:
+The observations are d = ρ B u + δ + e: the displacement u of finite elements at the markers, times a
+factor ρ, a discrepancy δ and the error e of the observations. Random, and normal a priori, are:
 
 - the prescribed displacement of the contact, about its nominal value, each component with the standard
   deviation `stroke_deviation`; as the problem is linear, u is a sum of one field for each component;
 - δ, a process of mean zero with one of Matérn's kernels, one length, an amplitude each for u and v;
 - e, with the observations' standard deviations.
 
-ρ, the amplitudes and the length have the largest marginal likelihood. The displacement that is returned is
-the posterior mean of ρ u + δ.
+ρ, the amplitudes and the length maximise the marginal likelihood. The displacement returned is the posterior
+mean of ρ u + δ.
 
 Source: M. Girolami, E. Febrianto, G. Yin, F. Cirak, The statistical finite element method (statFEM) for
 coherent synthesis of observation data and model predictions, Comput. Methods Appl. Mech. Engrg. 375 (2021)
@@ -36,7 +36,7 @@ from solvers.section_force import section_force
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, check_problem, silent
 from solvers.statistics.kernel_field import Kernel
-from solvers.statistics.statistical_posterior import Data, Posterior, StatFemField
+from solvers.statistics.statistical_posterior import Posterior, StatFemData, StatFemField
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class StatFemSolver:
     Attributes:
         degree: Degree of the elements, 1 or 2.
         stroke_deviation: Standard deviation of each component of the prescribed displacement, mm.
-        kernel: How smooth the discrepancy is: "matern32", "matern52" or "gaussian" (squared exponential).
+        kernel: Covariance function of the discrepancy, as of `gp`.
     """
 
     degree: int = 2
@@ -86,7 +86,7 @@ class StatFemSolver:
         return replace(solution, stats=stats, left_out=leave_one_out_displacements(problem, missed))
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
-        """What solves for other observations, by the same finite elements; see `Refittable`."""
+        """A function that solves for other observations with the same finite elements; see `Refittable`."""
         shapes = self._shapes(problem, silent)
 
         def refit(observations: Observations) -> Solution:
@@ -95,9 +95,9 @@ class StatFemSolver:
 
         return refit
 
-    def _data(self, problem: Problem, observations: Observations, shapes: Sequence[Solution]) -> Data:
+    def _data(self, problem: Problem, observations: Observations, shapes: Sequence[Solution]) -> StatFemData:
         points = observations.points[observations.visible]
-        return Data(
+        return StatFemData(
             points=points,
             observed=observations.displacements[observations.visible],
             deviations=standard_deviations(observations),
@@ -118,7 +118,7 @@ class StatFemSolver:
             shapes.append(fem.solve(replace(problem, load=load, observations=None), progress))
         return shapes
 
-    def _conditioned(self, problem: Problem, data: Data, shapes: Sequence[Solution]) -> Solution:
+    def _conditioned(self, problem: Problem, data: StatFemData, shapes: Sequence[Solution]) -> Solution:
         started = time.perf_counter()
         posterior = Posterior.of(data, np.arange(len(data.points)))
         field = StatFemField(posterior, tuple(shape.field for shape in shapes))
@@ -126,7 +126,7 @@ class StatFemSolver:
         gradient = field.gradient(rule.location)
         density = linear_energy_density(gradient, problem.material.lame)
         constants = posterior.constants
-        discrepancy = constants.spreads
+        discrepancy = constants.amplitudes
         _, variances = posterior.at(data.points, data.shapes)
         return Solution(
             solver=self.name,
@@ -157,7 +157,7 @@ class StatFemSolver:
         )
 
 
-def _without_each(data: Data, progress: Progress) -> tuple[FloatArray, FloatArray]:
+def _without_each(data: StatFemData, progress: Progress) -> tuple[FloatArray, FloatArray]:
     """What each marker is missed by without it, and the standard deviation of that, each (m, 2), mm."""
     every = np.arange(len(data.points))
     missed, spread = np.zeros((2, len(every), 2))

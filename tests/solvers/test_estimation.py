@@ -71,8 +71,8 @@ def test_what_is_not_observed_is_held_by_its_prior(slopes):
     found = fitted(tied, tied @ [0.4, 0.2, 5.0], 1e-4, parameters)
     np.testing.assert_allclose(found.values, [0.3, 0.3, 5.0], atol=1e-5)
     np.testing.assert_allclose(found.resolution, [0.5, 0.5, 1.0], atol=1e-5)
-    np.testing.assert_allclose(np.abs(found.least_known), [np.sqrt(0.5), np.sqrt(0.5), 0], atol=1e-6)
-    assert found.least_known[0] * found.least_known[1] < 0
+    np.testing.assert_allclose(np.abs(found.least_determined), [np.sqrt(0.5), np.sqrt(0.5), 0], atol=1e-6)
+    assert found.least_determined[0] * found.least_determined[1] < 0
     assert found.singular_values[-1] < 1e-6
     nothing = fitted(0 * slopes, np.zeros(COUNT), 1.0, parameters)
     assert not nothing.resolved.any()

@@ -83,7 +83,7 @@ def test_load_and_material_are_those_of_a_problem_that_has_them(problem, space, 
 def test_derivatives_pass_the_taylor_test(problem, finger, place, name):
     """What the first-order expansion leaves falls by four when the step is halved, or is rounding."""
     which = NAMES.index(name)
-    scale = parameters_of(problem, NAMES)[which].slope(0.0)
+    scale = parameters_of(problem, NAMES)[which].derivative(0.0)
     here = finger.response(place)
     left = []
     for step in (0.04 * scale, 0.02 * scale):

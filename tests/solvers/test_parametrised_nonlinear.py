@@ -56,7 +56,7 @@ def test_it_is_fem_nonlinear_from_rest_and_from_elsewhere(finger, direct):
 def test_derivatives_pass_the_taylor_test(problem, finger, name):
     """What the first-order expansion leaves falls by four when the step is halved, or is rounding."""
     which = PARAMETERS.index(name)
-    scale = parameters_of(problem, [name])[0].slope(0.0)
+    scale = parameters_of(problem, [name])[0].derivative(0.0)
     here = finger.response(place())
     left = []
     for step in (0.04 * scale, 0.02 * scale):

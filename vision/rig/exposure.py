@@ -1,18 +1,15 @@
-"""What light, lens and sensor make of a scene.
+"""Exposure of a picture: light, lens and sensor.
 
 Noise of the sensor: the electrons that a pixel counts have a variance equal to their number (EMVA Standard
 1288, release 4.0, section 2), here as normal numbers, which above some ten electrons they are; the read noise
 has the same variance everywhere. Units: pixels, grey levels of 0 to 255.
 """
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
-from geometry.errors import UserError
-from geometry.finger.error_messages import validation_message
+from geometry.finger.error_messages import CheckedModel
 from geometry.finger.parameters import bounded
 from vision.frames.frame import Image
 
@@ -23,14 +20,8 @@ Light = NDArray[np.float32]
 """Shares of the light that reach the pixels, shape (height, width, 3)."""
 
 
-class Exposure(BaseModel):
-    """How a picture is taken.
-
-    Raises:
-        UserError: One line with the setting, the value and what would be right.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+class Exposure(CheckedModel):
+    """Light, lens and sensor of the camera."""
 
     blur: float = bounded(0.8, 0, 20, "px", "", "Standard deviation of the blur of the lens")
     noise: float = bounded(
@@ -47,12 +38,6 @@ class Exposure(BaseModel):
         30.0, -360, 360, "deg", "", "Where the light grows to, from right to down"
     )
     monochrome: bool = Field(default=False, description="A camera without colours")
-
-    def __init__(self, **values: Any) -> None:
-        try:
-            super().__init__(**values)
-        except ValidationError as error:
-            raise UserError(validation_message(error, Exposure)) from None
 
     def develop(self, light: Light, rng: np.random.Generator) -> Image:
         """The picture that light makes, shape (height, width, 3), or (height, width) if monochrome."""

@@ -1,40 +1,25 @@
 """How the finger is moved while it is filmed: it rests, it is pressed, it is held."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, ValidationError
 
 from geometry.arrays import FloatArray
-from geometry.errors import UserError
-from geometry.finger.error_messages import validation_message
+from geometry.finger.error_messages import CheckedModel
 from geometry.finger.parameters import bounded
 
 
-class Motion(BaseModel):
+class Motion(CheckedModel):
     """The frames of a recording, and how much of the load acts while the shutter is open.
 
     Between two frames the shutter opens with the frame; the load grows at constant speed from when it has
     closed after the last frame at rest until it opens for the first frame that is held.
-
-    Raises:
-        UserError: One line with the setting, the value and what would be right.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     rest: int = bounded(30, 1, 100_000, "frames", "", "Before the finger is pressed")
     moving: int = bounded(30, 0, 100_000, "frames", "", "While it is pressed; 0 is a jump between two frames")
     held: int = bounded(30, 1, 100_000, "frames", "", "While it is held")
     rate: float = bounded(30.0, 0.1, 1000, "1/s", "", "Frames a second")
     shutter: float = bounded(0.3, 0, 0.9, "", "", "Share of the time for which the shutter is open")
-
-    def __init__(self, **values: Any) -> None:
-        try:
-            super().__init__(**values)
-        except ValidationError as error:
-            raise UserError(validation_message(error, Motion)) from None
 
     def __len__(self) -> int:
         """Number of frames."""

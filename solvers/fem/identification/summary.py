@@ -45,7 +45,8 @@ def sentence(found: Estimate, missed: FloatArray) -> str:
 
 def combination(found: Estimate) -> str:
     """The least determined combination of parameters, in standard deviations of their priors."""
-    direction = found.least_known * np.sign(found.least_known[np.abs(found.least_known).argmax()])
+    least = found.least_determined
+    direction = least * np.sign(least[np.abs(least).argmax()])
     order = np.argsort(-np.abs(direction))
     text = " ".join(
         f"{direction[i]:+.2f} {found.parameters[i].name}" for i in order if abs(direction[i]) >= MENTIONED
