@@ -1,4 +1,4 @@
-"""Checked, read-only arrays for the objects that cross package borders."""
+"""Checked, read-only arrays."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,13 +16,13 @@ BoolArray = NDArray[np.bool_]
 def frozen_array(
     values: ArrayLike, *, dtype: type[Any], shape: Sequence[int | None], name: str
 ) -> NDArray[Any]:
-    """A read-only copy of `values` whose shape has been checked.
+    """A read-only copy of `values` with a checked shape.
 
     Args:
-        values: What the caller gave.
-        dtype: Wanted type of the entries.
-        shape: Wanted shape; None stands for any length.
-        name: How an error message calls the array.
+        values: The values.
+        dtype: Type of the entries.
+        shape: Expected shape; None stands for any length.
+        name: Name of the array in an error message.
 
     Returns:
         Read-only array of that type and shape.

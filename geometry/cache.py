@@ -1,4 +1,4 @@
-"""Meshes and CAD files, made once for each design and kept by the hash of all that they depend on."""
+"""Cache of meshes and CAD files, keyed by a hash of everything they depend on."""
 
 import importlib.metadata
 import os
@@ -17,13 +17,13 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.worker import run_task
 
 FORMAT = 1
-"""Raise it when the files of the cache change their meaning."""
+"""Increase it when the content of the cached files changes its meaning."""
 
 TIMEOUT_S = 300.0
 CAD_FORMATS = ("step", "stl", "dxf", "svg")
 
 MAKERS = ("cadquery", "cadquery-ocp", "gmsh", "numpy")
-"""Packages whose version the results depend on."""
+"""Packages on whose versions the results depend."""
 
 _Result = TypeVar("_Result")
 
@@ -40,8 +40,8 @@ def finger_mesh(
     Args:
         design: The finger.
         settings: Element sizes; the default ones if None.
-        cache_dir: Where results are kept; by default `cache_folder()`.
-        timeout_s: Time after which meshing is given up, s.
+        cache_dir: Folder of the cache; by default `cache_folder()`.
+        timeout_s: Time limit, s.
 
     Raises:
         UserError: If meshing fails or takes too long.
@@ -67,10 +67,10 @@ def cad_files(
 
     Args:
         design: The finger.
-        folder: Where the files go; made if it does not exist.
+        folder: Output folder; made if it does not exist.
         formats: Some of `CAD_FORMATS`.
-        cache_dir: Where results are kept; by default `cache_folder()`.
-        timeout_s: Time after which CAD is given up, s.
+        cache_dir: Folder of the cache; by default `cache_folder()`.
+        timeout_s: Time limit, s.
 
     Returns:
         The files written.
@@ -127,7 +127,7 @@ def _cached(
     if entry.exists():
         try:
             return load(entry)
-        except Exception as error:  # whatever a damaged file makes the reader raise
+        except Exception as error:  # a damaged file can make the reader raise anything
             warnings.warn(
                 f"rebuilding {entry.name}: the cached file is damaged ({type(error).__name__})",
                 RuntimeWarning,

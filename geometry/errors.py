@@ -1,13 +1,13 @@
-"""Errors that a person can act on; the command line prints them as one line and exits with code 2."""
+"""Errors of the user's input; the command line prints them as one line and exits with code 2."""
 
 
 class UserError(ValueError):
-    """Bad input: the message says what was wrong, where, and what would be right."""
+    """Invalid input: the message names the place, the fault and the remedy."""
 
 
 class ShapeError(UserError):
-    """An array has another shape than the interface asks for."""
+    """An array has the wrong shape."""
 
 
 class OutsideBodyError(UserError):
-    """A field was asked for at a point outside the finger."""
+    """A point lies outside the finger, where fields are undefined."""

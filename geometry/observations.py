@@ -1,4 +1,4 @@
-"""Displacements measured, or simulated, at the markers."""
+"""Measured or simulated displacements of the markers."""
 
 from dataclasses import dataclass
 from math import inf
@@ -15,10 +15,10 @@ class Observations:
 
     Attributes:
         points: Initial positions, shape (m, 2), mm.
-        displacements: Shape (m, 2), mm; the values at markers that are not visible mean nothing.
-        standard_deviations: Of the displacements, shape (m, 2), mm.
+        displacements: Shape (m, 2), mm; meaningless at markers that are not visible.
+        standard_deviations: Standard deviations of the displacements, shape (m, 2), mm.
         visible: Which markers were seen, shape (m,).
-        source: One sentence on where the numbers come from; shown wherever they appear.
+        source: One sentence on the origin of the numbers, shown with them.
         simulated: True if no camera was involved.
         marker_radius: Radius of the markers' discs, over which their displacements are means, mm.
 

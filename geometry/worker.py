@@ -1,4 +1,4 @@
-"""The process that runs CAD and meshing, so that a hang or a crash there can be ended and reported.
+"""The child process for CAD and meshing, so that a hang or a crash can be ended and reported.
 
 `python -m geometry.worker` reads one task as JSON from standard input and answers with one line of JSON.
 """
@@ -22,11 +22,11 @@ EXTRA_SECONDS = 5
 
 
 def run_task(task: Mapping[str, Any], timeout_s: float) -> None:
-    """Do a task in another process and wait for it.
+    """Run a task in a child process and wait for it.
 
     Args:
-        task: What `perform` takes.
-        timeout_s: Time after which the process is ended, s.
+        task: Argument of `perform`, with `what` as its description in messages.
+        timeout_s: Time limit, s.
 
     Raises:
         UserError: One line, if the task fails or takes too long.
@@ -39,22 +39,21 @@ def run_task(task: Mapping[str, Any], timeout_s: float) -> None:
         text=True,
         env=child_environment(os.environ),
     )
-    what = task["what"]
     try:
-        answer, noise = process.communicate(json.dumps({**task, "timeout_s": timeout_s}), timeout=timeout_s)
+        answer, errors = process.communicate(json.dumps({**task, "timeout_s": timeout_s}), timeout=timeout_s)
     except BaseException as error:  # a time-out, or Ctrl-C: leave no process behind
         process.kill()
         process.communicate()
         if isinstance(error, subprocess.TimeoutExpired):
             raise UserError(
-                f"{what} was ended after {timeout_s:g} s; use larger elements, or allow more time"
+                f"{task['what']} was ended after {timeout_s:g} s; use larger elements, or allow more time"
             ) from None
         raise
     if process.returncode == EXIT_REFUSED:
         raise UserError(json.loads(answer)["error"])
     if process.returncode != 0:
-        last = noise.strip().splitlines()[-1:] or ["it left no message"]
-        raise UserError(f"{what} failed (exit code {process.returncode}): {last[0]}")
+        last = errors.strip().splitlines()[-1:] or ["it left no message"]
+        raise UserError(f"{task['what']} failed (exit code {process.returncode}): {last[0]}")
 
 
 def child_environment(environment: Mapping[str, str]) -> dict[str, str]:
@@ -66,7 +65,7 @@ def child_environment(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def perform(task: Mapping[str, Any]) -> None:
-    """Do a task in this process.
+    """Run a task in this process.
 
     Args:
         task: `kind` ("mesh" or "cad"), `design` as a dictionary and `output` as a path; for a mesh also
@@ -90,9 +89,9 @@ def perform(task: Mapping[str, Any]) -> None:
 
 
 def main() -> int:
-    """Read a task, do it, and answer."""
+    """Read a task, run it, and answer."""
     task = json.load(sys.stdin)
-    if hasattr(signal, "alarm"):  # ends this process even if the parent was killed and Gmsh hangs
+    if hasattr(signal, "alarm"):  # ends this process if the parent was killed and Gmsh hangs
         signal.alarm(int(task["timeout_s"]) + EXTRA_SECONDS)
     try:
         perform(task)

@@ -1,4 +1,4 @@
-"""How a mesh was refined until the displacements of the markers are known."""
+"""The record of an adaptive refinement, by the estimated error of the markers' displacements."""
 
 from dataclasses import dataclass
 from math import inf
@@ -10,11 +10,11 @@ from solvers.problem import Load
 
 
 class RefinementRound(NamedTuple):
-    """One solution on the way.
+    """One mesh of the sequence.
 
     Attributes:
-        triangles: Of its mesh.
-        nodes: Of its mesh.
+        triangles: Number of triangles.
+        nodes: Number of nodes.
         at_markers: Largest estimated error of u or v at a marker, mm.
         energy_norm: Estimated relative error in the energy norm.
     """
@@ -27,11 +27,11 @@ class RefinementRound(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Adaptation:
-    """A refined mesh and how it came about.
+    """A refined mesh and the rounds that led to it.
 
     Attributes:
-        tolerance: What was asked for, mm.
-        rounds: The first mesh's first, the refined one's last.
+        tolerance: Tolerance of u and v at the markers, mm.
+        rounds: From the first mesh to the refined one.
         mesh: The refined mesh.
     """
 
@@ -46,7 +46,7 @@ class Adaptation:
 
     @property
     def message(self) -> str:
-        """How it ended, in a sentence without its full stop."""
+        """The outcome, in a sentence without its full stop."""
         first, last = self.rounds[0], self.rounds[-1]
         if not self.reached:
             return (
@@ -60,7 +60,7 @@ class Adaptation:
 
 
 def check_adaptable(tolerance: float, load: Load) -> None:
-    """Raise a `UserError` if the tolerance is not a length, mm, or the load has no limit to be near to."""
+    """Raise a `UserError` if the tolerance is no length, mm, or refinement cannot adapt to the load."""
     if not 0 < tolerance < inf:
         raise UserError(f"a tolerance of {tolerance:g} mm at the markers: give a length above 0 mm")
     if load.kind == "point":

@@ -1,7 +1,7 @@
-"""The constitutive laws, once, for NumPy arrays, torch tensors and UFL expressions alike.
+"""Constitutive laws for NumPy arrays, torch tensors and UFL expressions alike.
 
-Every function takes the displacement gradient `H[..., i, j] = du_i/dx_j` and uses nothing but arithmetic and
-indexing on it, so that any of the three libraries can be passed. Linear elasticity is Hooke's law for the
+Every function takes the displacement gradient `H[..., i, j] = du_i/dx_j` and uses only arithmetic and
+indexing on it, so that it works with all three libraries. Linear elasticity is Hooke's law for the
 plane states (Timoshenko and Goodier, Theory of Elasticity, 3rd ed., chapter 2). The finite-strain laws are
 those of Bonet and Wood (Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed.), in plane strain:
 the compressible neo-Hookean (section 6.4.3) and the St Venant-Kirchhoff law (chapter 6).
@@ -22,7 +22,7 @@ class Lame(NamedTuple):
     Attributes:
         λ: First constant as it stands in the plane law; in plane stress the reduced one, 2 λ μ / (λ + 2 μ).
         μ: Shear modulus.
-        λ_out: What multiplies the in-plane trace to give sigma_zz: λ in plane strain, 0 in plane stress.
+        λ_out: sigma_zz over the trace of the in-plane strain: λ in plane strain, 0 in plane stress.
     """
 
     λ: float
@@ -69,10 +69,7 @@ def small_strain(gradient: Field, lame: Lame) -> PlaneTensor:
 
 def linear_energy_density(gradient: Field, lame: Lame) -> Field:
     """Strain energy density 1/2 sigma : eps, MPa (= N mm / mm^3)."""
-    strain = small_strain(gradient, lame)
-    trace = strain.xx + strain.yy
-    shear = strain.xx * strain.xx + strain.yy * strain.yy + 2 * strain.xy * strain.xy
-    return 0.5 * lame.λ * trace * trace + lame.μ * shear
+    return _quadratic_energy_density(small_strain(gradient, lame), lame)
 
 
 def linear_stress(gradient: Field, lame: Lame) -> PlaneTensor:
@@ -88,7 +85,7 @@ def linear_stress(gradient: Field, lame: Lame) -> PlaneTensor:
 
 
 def deformation_jacobian(gradient: Field) -> Field:
-    """J = det(I + H); positive where the deformation is possible."""
+    """J = det(I + H); positive unless the material is turned inside out."""
     return (1 + gradient[..., 0, 0]) * (1 + gradient[..., 1, 1]) - gradient[..., 0, 1] * gradient[..., 1, 0]
 
 
@@ -104,7 +101,7 @@ def green_lagrange_strain(gradient: Field) -> PlaneTensor:
 
 
 def neo_hookean_energy_density(gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> Field:
-    """ψ = μ/2 (tr C - 3) - μ ln J + λ/2 (ln J)^2 per reference volume, MPa; `log` is the library's own."""
+    """ψ = μ/2 (tr C - 3) - μ ln J + λ/2 (ln J)^2 per reference volume, MPa; `log` is that of the library."""
     strain = green_lagrange_strain(gradient)
     log_j = log(deformation_jacobian(gradient))
     return lame.μ * (strain.xx + strain.yy) - lame.μ * log_j + 0.5 * lame.λ * log_j * log_j
@@ -126,12 +123,16 @@ def neo_hookean_stress(gradient: Field, lame: Lame, log: Callable[[Field], Field
 def st_venant_kirchhoff_energy_density(gradient: Field, lame: Lame) -> Field:
     """ψ = λ/2 (tr E)^2 + μ E : E per reference volume, MPa, with the Green-Lagrange strain E.
 
-    Not for strong compression: the energy stays finite as J tends to zero.
+    Unsuitable for strong compression: the energy stays finite as J tends to zero.
     """
-    strain = green_lagrange_strain(gradient)
+    return _quadratic_energy_density(green_lagrange_strain(gradient), lame)
+
+
+def _quadratic_energy_density(strain: PlaneTensor, lame: Lame) -> Field:
+    """λ/2 (tr ε)^2 + μ ε : ε of an in-plane strain ε, MPa."""
     trace = strain.xx + strain.yy
-    shear = strain.xx * strain.xx + strain.yy * strain.yy + 2 * strain.xy * strain.xy
-    return 0.5 * lame.λ * trace * trace + lame.μ * shear
+    squares = strain.xx * strain.xx + strain.yy * strain.yy + 2 * strain.xy * strain.xy
+    return 0.5 * lame.λ * trace * trace + lame.μ * squares
 
 
 def st_venant_kirchhoff_stress(gradient: Field, lame: Lame) -> PlaneTensor:
@@ -154,7 +155,7 @@ def strain_of(law: LawName, gradient: Field, lame: Lame) -> PlaneTensor:
 
 
 def energy_density_of(law: LawName, gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> Field:
-    """Strain energy of a law per reference volume, MPa; `log` is the library's own."""
+    """Strain energy of a law per reference volume, MPa; `log` is that of the library."""
     if law == "linear":
         return linear_energy_density(gradient, lame)
     if law == "st-venant-kirchhoff":
@@ -163,7 +164,7 @@ def energy_density_of(law: LawName, gradient: Field, lame: Lame, log: Callable[[
 
 
 def stress_of(law: LawName, gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> PlaneTensor:
-    """Cauchy stress of a law, MPa; `log` is the library's own."""
+    """Cauchy stress of a law, MPa; `log` is that of the library."""
     if law == "linear":
         return linear_stress(gradient, lame)
     if law == "st-venant-kirchhoff":

@@ -1,4 +1,4 @@
-"""The boundary-value problem: the argument of every solver, and nothing else."""
+"""The boundary-value problem: the argument of every solver."""
 
 from dataclasses import dataclass
 from typing import Literal, Self
@@ -49,19 +49,18 @@ class Material(BaseModel):
 
 
 class Load(BaseModel):
-    """What the indenter does to the boundary `contact`; a component that is None is free of force.
+    """Displacement that the indenter prescribes at the boundary `contact`; a component None is free of force.
 
     Attributes:
         kind: `mean`: the weighted mean displacement over the contact is prescribed (`contact_functional`);
             well posed, the default. `point`: the displacement of the contact's middle node is prescribed, as
             in the paper; its limit under mesh refinement does not exist. `patch`: every point of the contact
             has the displacement. `cylinder`: a rigid cylinder without friction, which touches the front face
-            at the contact's middle from outside, moves by the displacement; which part of the face it
-            presses on is found.
+            at the contact's middle from outside, moves by the displacement; the contact zone is found.
         displacement: Prescribed (u, v), mm.
         position: Abscissa of the contact's middle on the front face, mm; None means where the mesh has its
             boundary `contact`, whose width the contact has in any case. A `patch` cannot be elsewhere.
-        radius: Of the cylinder, mm; None for the other kinds.
+        radius: Radius of the cylinder, mm; None for the other kinds.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -105,7 +104,7 @@ class Problem:
     Attributes:
         mesh: The mesh that every solver shares.
         material: The elastic law.
-        load: What moves the finger.
+        load: The indenter's action.
         observations: Marker displacements, for the solvers that assimilate them.
 
     Raises:
@@ -150,7 +149,7 @@ class Problem:
 
 
 POINTS_ON_EDGE = 12
-"""Quadrature points on an edge of the contact: enough where one edge holds the whole contact."""
+"""Quadrature points on an edge of the contact, enough if one edge holds the whole contact."""
 
 
 def contact_ends(problem: Problem) -> tuple[float, float]:

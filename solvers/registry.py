@@ -25,7 +25,7 @@ PRESETS = {
         "paper": "solvers.pinn.assimilating:PaperPinnAsmSolver",
     },
 }
-"""Presets of our solvers, the usual one first. Each is a class with settings of its own."""
+"""Presets of our solvers, the default first. Each is a class with its own settings."""
 
 RENAMED = {"ridges": "neurons", "slope": "steepness"}
 """Former names of settings, and their present names."""
@@ -45,7 +45,7 @@ BUILT_IN = {
 
 
 def solver_names() -> list[str]:
-    """Names of every solver that can be asked for, ours first."""
+    """Names of all solvers, ours first."""
     return [*BUILT_IN, *sorted({entry.name for entry in entry_points(group=GROUP)} - set(BUILT_IN))]
 
 
@@ -78,7 +78,7 @@ def make_solver(name: str, **settings: Any) -> Solver:
         solver = factory(**typed)
     except UserError:
         raise
-    except Exception as error:  # whatever the constructor of another package raises
+    except Exception as error:  # the constructor of another package may raise anything
         raise UserError(f"solver {name!r} cannot be made with {typed}: {error}") from error
     if not isinstance(solver, Solver):
         raise UserError(
@@ -89,7 +89,7 @@ def make_solver(name: str, **settings: Any) -> Solver:
 
 
 def usable_solvers() -> dict[str, Solver]:
-    """Every solver with its defaults; one that cannot be loaded is left out with a warning."""
+    """Every solver with its default settings; one that cannot be loaded is left out with a warning."""
     solvers = {}
     for name in solver_names():
         try:
@@ -100,7 +100,7 @@ def usable_solvers() -> dict[str, Solver]:
 
 
 def _preset(name: str, preset: str) -> str:
-    """Where the class of a solver's preset is."""
+    """Import path of a preset's class."""
     if preset not in PRESETS[name]:
         raise UserError(f"{name} has no preset {preset!r}; it has {', '.join(PRESETS[name])}")
     return PRESETS[name][preset]

@@ -1,4 +1,4 @@
-"""The indenter's force by the stress of a displacement field."""
+"""The indenter's force from the stress in sections of the finger."""
 
 import numpy as np
 
@@ -9,13 +9,13 @@ from solvers.problem import Problem, contact_ends
 
 
 def section_force(problem: Problem, rule: Quadrature, gradient: FloatArray) -> FloatArray:
-    """Force on the sections between base and contact, on average, for the prescribed components.
+    """Mean force on the sections between base and contact, for the prescribed components.
 
-    In equilibrium each of these sections transmits the indenter's force. This is the work of the stress on a
-    displacement that grows linearly from the base to the contact, where it is a unit translation.
+    In equilibrium each of these sections transmits the indenter's force. The mean is the work of the stress
+    on a displacement that grows linearly from the base to a unit translation at the contact.
 
     Args:
-        problem: Of the linear law.
+        problem: A problem of the linear law.
         rule: A quadrature over the body.
         gradient: Displacement gradient at its points, shape (q, 2, 2).
 

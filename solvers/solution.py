@@ -1,4 +1,4 @@
-"""What every solver returns, and everything that follows from the displacement gradient, derived once."""
+"""The solution that every solver returns, with strain and stress derived from the displacement gradient."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from solvers.problem import Problem
 
 
 class DisplacementField(Protocol):
-    """The displacement as a function of position: what a solver has to provide."""
+    """The displacement as a function of position, which a solver has to provide."""
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement at `location.points`, shape (n, 2), mm."""
@@ -27,11 +27,11 @@ class DisplacementField(Protocol):
 
 @dataclasses.dataclass(frozen=True)
 class Status:
-    """How the solve ended.
+    """Outcome of a solve.
 
     Attributes:
         converged: Whether the solver's own criterion was met.
-        message: A sentence that says so and, where it was not, what to try.
+        message: A sentence on the outcome, with advice if it has not converged.
     """
 
     converged: bool
@@ -40,14 +40,14 @@ class Status:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ErrorEstimate:
-    """How far a solution is from the exact one of its problem, as its solver estimates it.
+    """A solver's estimate of the error of its solution.
 
     Attributes:
         energy_norm: Error in the energy norm over the norm of the solution.
         displacement: Relative L2 error of the displacement over the body.
         von_mises: Relative L2 error of the von Mises stress over the body.
         markers: Exact minus computed displacement at the mesh's markers, shape (m, 2), mm.
-        field: A field that is nearer to the exact one: its distance from the solution's is the error.
+        field: A more accurate field: its distance from the solution's is the estimated error.
     """
 
     energy_norm: float
@@ -63,27 +63,27 @@ class ErrorEstimate:
 
     @property
     def phrase(self) -> str:
-        """Its size in words."""
+        """The estimated error in words."""
         size = f"{self.at_markers:.2g} mm at the markers and {self.energy_norm:.2%} in the energy norm"
         return f"an estimated {size}"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Solution:
-    """A displacement field with its problem and how it was found.
+    """A displacement field with its problem and a record of the solve.
 
     Attributes:
         solver: Name of the solver.
-        problem: What was solved, with the material that the solver used.
+        problem: The problem solved, with the material that the solver used.
         field: The displacement field.
         energy: Elastic energy per unit depth, N mm / mm.
         reaction: Force of the indenter on the finger per unit depth, shape (2,), N/mm.
-        status: How the solve ended.
+        status: Outcome of the solve.
         stats: Numbers that describe the solve: `seconds`, `unknowns`, ...
         history: Columns of the training or load-stepping record, all of one length; empty for a direct solve.
         error: The discretisation error, where the solver estimates it.
-        left_out: Of a solver that assimilates: the displacement of each observed marker as it would be
-            without that one, shape (m, 2), mm; NaN where it was not seen.
+        left_out: From a solver that assimilates: the displacement of each observed marker as predicted
+            without it, shape (m, 2), mm; NaN where it was not seen.
     """
 
     solver: str
@@ -114,7 +114,7 @@ class Solution:
         return self.field.gradient(self._locate(points))
 
     def state(self, points: ArrayLike | LocatedPoints) -> "State":
-        """Strain, stress and what follows from them at points of shape (n, 2), mm."""
+        """Strain, stress and energy density at points of shape (n, 2), mm."""
         return State.from_gradient(self.gradient(points), self.problem)
 
     def _locate(self, points: ArrayLike | LocatedPoints) -> LocatedPoints:

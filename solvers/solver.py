@@ -10,44 +10,44 @@ from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution
 
 Progress = Callable[[float, str], None]
-"""Called with the fraction done (0 to 1) and a short text; may be ignored by a solver that is quick."""
+"""Called with the fraction done (0 to 1) and a short text; a fast solver may ignore it."""
 
 
 def silent(fraction: float, text: str) -> None:
-    """A progress report that nobody reads."""
+    """Discard the progress."""
 
 
 class UnsupportedProblemError(UserError):
-    """A problem is not one that a solver is made for."""
+    """The solver does not support the problem."""
 
 
 @runtime_checkable
 class Solver(Protocol):
-    """Something that solves a `Problem`.
+    """A method that solves a `Problem`.
 
     A solver is made without arguments for its defaults; the three properties may be plain class attributes.
     """
 
     @property
     def name(self) -> str:
-        """What it is called by on the command line."""
+        """Its name on the command line."""
         ...
 
     @property
     def laws(self) -> tuple[str, ...]:
-        """Material laws that it has (`Material.law`), the usual one first."""
+        """Supported material laws (`Material.law`), the default first."""
         ...
 
     @property
     def loads(self) -> tuple[str, ...]:
-        """Kinds of load that it takes (`Load.kind`)."""
+        """Supported kinds of load (`Load.kind`)."""
         ...
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve `problem`.
 
         Raises:
-            UnsupportedProblemError: If the problem is of a kind that the solver does not have.
+            UnsupportedProblemError: If the solver does not support the problem.
         """
         ...
 
@@ -57,7 +57,7 @@ class Solver(Protocol):
 
 
 def check_problem(solver: Solver, problem: Problem) -> None:
-    """Raise an `UnsupportedProblemError` for a law or kind of load that the solver lacks."""
+    """Raise an `UnsupportedProblemError` if the solver does not support the law or the kind of load."""
     if problem.material.law not in solver.laws:
         raise UnsupportedProblemError(
             f"{solver.name} has the law {' or '.join(solver.laws)}, not {problem.material.law}"
@@ -66,7 +66,7 @@ def check_problem(solver: Solver, problem: Problem) -> None:
 
 
 def check_load(solver: Solver, load: Load) -> None:
-    """Raise an `UnsupportedProblemError` if the kind of load is not one that the solver takes."""
+    """Raise an `UnsupportedProblemError` if the solver does not support the kind of load."""
     if load.kind not in solver.loads:
         raise UnsupportedProblemError(
             f"{solver.name} takes the loads {', '.join(solver.loads)}, not {load.kind!r}; "
@@ -75,7 +75,7 @@ def check_load(solver: Solver, load: Load) -> None:
 
 
 def with_law(material: Material, solver: Solver) -> Material:
-    """The material with a law that the solver has: its own if it can, else the solver's usual one.
+    """The material with a law that the solver supports: its own if possible, else the solver's default.
 
     Raises:
         UnsupportedProblemError: If that law does not exist for the material's plane state.

@@ -1,4 +1,4 @@
-"""What a solver that trains for long is told about its run: where to save, and what is known."""
+"""Runtime context of trained solvers: checkpoint folder, resume flag, reference energy."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,16 +9,16 @@ from solvers.solver import Solver
 
 
 class TrainingDiverged(UserError):
-    """The training went astray: the message says when and by what, and what to try."""
+    """The training diverged; the message says when, by which quantity, and what to try."""
 
 
 @dataclass(frozen=True)
 class TrainingContext:
-    """Where a training run saves its state, and what it may tell meanwhile. It does not change the result.
+    """Runtime context of a training, which does not change its result.
 
     Attributes:
         folder: Folder for checkpoints and the history; None to write nothing.
-        resume: Whether to go on from the checkpoint in `folder` if there is one.
+        resume: Whether to continue from the checkpoint in `folder` if there is one.
         reference_energy: Energy of a reference solution per depth, N mm/mm, for the progress text.
     """
 
@@ -32,5 +32,5 @@ class TrainedSolver(Solver, Protocol):
     """A solver whose training can be saved and resumed."""
 
     def in_context(self, context: TrainingContext) -> Solver:
-        """The same solver for a run with this context, which is no part of its settings."""
+        """The same solver with this context, which is no setting."""
         ...

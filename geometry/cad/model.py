@@ -25,9 +25,9 @@ STL_TOLERANCE = 0.01
 
 
 def section_face(parameters: Parameters) -> cq.Face:
-    """The section as one planar face at z = 0 with the cells as holes."""
-    outer, cells = _wires(parameters)
-    return cq.Face.makeFromWires(outer, cells)
+    """The section as one planar face at z = 0 with the cavities as holes."""
+    outer, cavities = _wires(parameters)
+    return cq.Face.makeFromWires(outer, cavities)
 
 
 def section_brep(parameters: Parameters, path: Path) -> Path:
@@ -42,14 +42,14 @@ def solids(parameters: Parameters) -> tuple[cq.Shape, tuple[cq.Solid, ...]]:
     The section lies in z = 0 to `depth`; markers are inlaid `marker_height` deep into the face z = `depth`.
     """
     p = parameters
-    outer, cells = _wires(p)
+    outer, cavities = _wires(p)
     markers = tuple(
         cq.Solid.makeCylinder(
             p.marker_radius, p.marker_height, pnt=cq.Vector(x, y, p.depth - p.marker_height)
         )
         for x, y in marker_positions(p)
     )
-    body = cq.Solid.extrudeLinear(outer, cells, cq.Vector(0, 0, p.depth)).cut(*markers)
+    body = cq.Solid.extrudeLinear(outer, cavities, cq.Vector(0, 0, p.depth)).cut(*markers)
     return body, markers
 
 
@@ -82,7 +82,7 @@ def write_stl(parameters: Parameters, folder: Path) -> list[Path]:
 def write_dxf(parameters: Parameters, folder: Path) -> list[Path]:
     """The section as DXF, mm, with the layers `outline` and `markers`."""
     path = folder / "section.dxf"
-    outer, cells = _wires(parameters)
+    outer, cavities = _wires(parameters)
     circles = [
         cq.Wire.makeCircle(parameters.marker_radius, cq.Vector(x, y, 0), cq.Vector(0, 0, 1))
         for x, y in marker_positions(parameters)
@@ -90,7 +90,7 @@ def write_dxf(parameters: Parameters, folder: Path) -> list[Path]:
     document = DxfDocument(approx=None)
     document.add_layer("outline", color=7)
     document.add_layer("markers", color=1)
-    document.add_shape(cq.Workplane("XY").newObject([outer, *cells]), "outline")
+    document.add_shape(cq.Workplane("XY").newObject([outer, *cavities]), "outline")
     document.add_shape(cq.Workplane("XY").newObject(circles), "markers")
     document.document.saveas(str(path))
     return [path]
@@ -109,7 +109,7 @@ WRITERS: Mapping[str, Callable[[Parameters, Path], list[Path]]] = {
     "dxf": write_dxf,
     "svg": write_svg,
 }
-"""What writes each format into a folder."""
+"""The writer of each format, into a folder."""
 
 
 def write_archive(parameters: Parameters, formats: Sequence[str], path: Path) -> None:
@@ -123,11 +123,11 @@ def write_archive(parameters: Parameters, formats: Sequence[str], path: Path) ->
 def _wires(parameters: Parameters) -> tuple[cq.Wire, list[cq.Wire]]:
     shape = finger_section(parameters)
     outer = cq.Wire.makePolygon([_vector(corner) for corner in shape.outer], close=True)
-    return outer, [_cell_wire(cell, shape.fillet_radius) for cell in shape.cavities]
+    return outer, [_cavity_wire(cavity, shape.fillet_radius) for cavity in shape.cavities]
 
 
-def _cell_wire(corners: FloatArray, radius: float) -> cq.Wire:
-    """A cell's outline; with a radius, every corner is an arc between its two points of tangency."""
+def _cavity_wire(corners: FloatArray, radius: float) -> cq.Wire:
+    """A cavity's outline; with a radius, every corner is an arc between its two points of tangency."""
     if radius == 0:
         return cq.Wire.makePolygon([_vector(corner) for corner in corners], close=True)
     arcs = [fillet_points(corners, which, radius) for which in range(len(corners))]

@@ -14,7 +14,7 @@ def section_svg(parameters: Parameters) -> str:
     """The section in SVG, with the groups `outline` and `markers`; one user unit is 1 mm, y points up."""
     p = parameters
     shape = finger_section(p)
-    paths = [_polygon(shape.outer), *(_cell(cell, shape.fillet_radius) for cell in shape.cavities)]
+    paths = [_polygon(shape.outer), *(_cavity(cavity, shape.fillet_radius) for cavity in shape.cavities)]
     circles = "\n".join(
         f'    <circle cx="{x:.6f}" cy="{y:.6f}" r="{p.marker_radius:.6g}"/>' for x, y in marker_positions(p)
     )
@@ -43,7 +43,7 @@ def _polygon(corners: FloatArray) -> str:
     return "M " + " L ".join(_point(corner) for corner in corners) + " Z"
 
 
-def _cell(corners: FloatArray, radius: float) -> str:
+def _cavity(corners: FloatArray, radius: float) -> str:
     if radius == 0:
         return _polygon(corners)
     pieces = []

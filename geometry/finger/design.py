@@ -12,7 +12,7 @@ from geometry.finger.validation import check
 
 
 class Design(CheckedModel, Parameters):
-    """A finger that can be made; a combination that cannot be is refused on construction.
+    """A valid finger; invalid combinations of parameters are refused on construction.
 
     Every parameter goes by its name or by the paper's symbol: `Design(rib_count=6)` equals `Design(N=6)`.
     """
@@ -33,7 +33,7 @@ class Design(CheckedModel, Parameters):
 
 
 def by_parameter_name(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The values with the paper's symbols turned into names.
+    """The values with the paper's symbols replaced by names.
 
     Raises:
         UserError: If a parameter is given by name and by symbol.

@@ -1,4 +1,4 @@
-"""Rounded corners as points, for CAD, for drawings and for meshes."""
+"""Fillets: points of tangency, middle and centre, for CAD, drawings and meshes."""
 
 import numpy as np
 

@@ -1,6 +1,6 @@
-"""Where the markers sit.
+"""Positions of the markers.
 
-Both layouts are inferred: the paper shows nine markers, printed with the finger, and gives no positions.
+Both layouts are assumptions: the paper shows nine markers, printed with the finger, without positions.
 """
 
 import numpy as np

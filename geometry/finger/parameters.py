@@ -8,7 +8,7 @@ from geometry.content_hash import content_hash
 
 
 def bounded(default: Any, low: float, high: float, unit: str, symbol: str, meaning: str) -> Any:
-    """A bounded number of a model, described once for validation, messages and help texts."""
+    """A bounded number of a model, with its description for messages and help texts."""
     return Field(
         default=default,
         ge=low,
@@ -117,4 +117,4 @@ def title(name: str, model: type[BaseModel] = Parameters) -> str:
 
 
 SYMBOLS = {symbol: name for name in Parameters.model_fields if (symbol := parameter_info(name, "symbol"))}
-"""From the paper's symbol to the parameter's name."""
+"""Parameter names by the paper's symbols."""

@@ -1,4 +1,4 @@
-"""Designs by name, from TOML files, and with single parameters changed."""
+"""Designs from presets and TOML files, with single parameters changed."""
 
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ from geometry.finger.error_messages import unknown_parameter
 from geometry.finger.parameters import SYMBOLS, Parameters, title
 
 FOLDER = Path(__file__).parent.parent / "designs"
-"""Where the presets lie, one TOML file each."""
+"""Folder of the presets, one TOML file each."""
 
 
 def preset_names() -> list[str]:
@@ -46,9 +46,9 @@ def load_design(name_or_path: str | Path = "default", overrides: Mapping[str, An
 
 
 def parse_overrides(settings: Sequence[str]) -> dict[str, Any]:
-    """Turn texts such as `rib_count=6` or `N=6` into overrides for `load_design`.
+    """Parse texts such as `rib_count=6` or `N=6` into overrides for `load_design`.
 
-    `contact_position=none` goes back to the middle of the ribbed part.
+    `contact_position=none` restores the middle of the ribbed part.
 
     Raises:
         UserError: If a text is no assignment, or names an unknown parameter or one twice.

@@ -1,4 +1,4 @@
-"""What makes a finger possible: each rule gives a margin, a sentence, and the parameters that can mend it."""
+"""Rules that a finger has to obey: each gives a margin, a message, and the parameters that can remedy it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,34 +6,40 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.distance import pdist
 
-from geometry.arrays import FloatArray
 from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import Parameters
-from geometry.finger.section import back_offset_line, corner_angles, finger_section, polygon_sides, rib_pitch
+from geometry.finger.section import (
+    back_offset_line,
+    corner_angles,
+    finger_section,
+    inside_distance,
+    polygon_sides,
+    rib_pitch,
+)
 
 MIN_CAVITY = 0.5
-"""Least clear width of a cavity, mm: what a printer can leave open and a mesh can resolve."""
+"""Minimum clear width of a cavity, mm, for printing and meshing."""
 
 MIN_CONTACT_MARGIN = 0.5
-"""Least distance of the contact from the clamped base and from the apex, mm."""
+"""Minimum distance of the contact from the clamped base and from the apex, mm."""
 
 MIN_MARKER_WALL = 0.1
-"""Least material around a marker, mm."""
+"""Minimum material around a marker, mm."""
 
 MIN_DEPTH_LEFT = 0.2
-"""Least material below a marker's pocket, mm."""
+"""Minimum material below a marker's pocket, mm."""
 
 MIN_STRAIGHT = 1e-3
-"""Least straight length between two fillets, mm."""
+"""Minimum straight length between two fillets, mm."""
 
 
 @dataclass(frozen=True)
 class RuleResult:
-    """What a rule found.
+    """Outcome of a rule.
 
     Attributes:
         margin: Zero or more if the rule is obeyed, mm.
-        sentence: What is wrong if it is not, with the numbers.
+        sentence: The fault if it is not, with the numbers.
     """
 
     margin: float
@@ -45,8 +51,8 @@ class Rule:
     """One condition on a finger.
 
     Attributes:
-        check: Gives the finding.
-        remedies: Parameters whose change can repair it, the likeliest first.
+        check: Evaluates the rule.
+        remedies: Parameters whose change can satisfy it, the likeliest first.
     """
 
     check: Callable[[Parameters], RuleResult]
@@ -87,12 +93,12 @@ def ribs_apart(p: Parameters) -> RuleResult:
 
 def ribs_clear_of_base(p: Parameters) -> RuleResult:
     """The first rib stays clear of the base wall at both its ends."""
-    return _cell_width(p, 0, "first rib runs into the base wall")
+    return _cavity_width(p, 0, "first rib runs into the base wall")
 
 
 def ribs_clear_of_tip(p: Parameters) -> RuleResult:
     """The last rib stays clear of the tip block at both its ends."""
-    return _cell_width(p, -1, "last rib runs into the tip block")
+    return _cavity_width(p, -1, "last rib runs into the tip block")
 
 
 def contact_on_front(p: Parameters) -> RuleResult:
@@ -108,9 +114,9 @@ def contact_on_front(p: Parameters) -> RuleResult:
 def fillets_fit(p: Parameters) -> RuleResult:
     """Two fillets fit on every side of every cell."""
     room = np.inf
-    for cell in finger_section(p).cavities if p.fillet_radius > 0 else ():
-        tangents = p.fillet_radius / np.tan(corner_angles(cell) / 2)
-        room = min(room, float((polygon_sides(cell) - tangents - np.roll(tangents, -1)).min()))
+    for cavity in finger_section(p).cavities if p.fillet_radius > 0 else ():
+        tangents = p.fillet_radius / np.tan(corner_angles(cavity) / 2)
+        room = min(room, float((polygon_sides(cavity) - tangents - np.roll(tangents, -1)).min()))
     return RuleResult(
         room - MIN_STRAIGHT,
         f"fillets too large: two of fillet_radius {p.fillet_radius:g} mm need {-room:.3g} mm more than the "
@@ -124,7 +130,7 @@ def markers_fit(p: Parameters) -> RuleResult:
     Markers sit in the middle of a wall or on the tip's bisector, so no cavity is nearer than the outline.
     """
     centres = marker_positions(p)
-    margins = _inside_distance(finger_section(p).outer, centres)
+    margins = inside_distance(finger_section(p).outer, centres)
     worst = int(margins.argmin())
     x, y = centres[worst]
     room = 2 * (margins[worst] - MIN_MARKER_WALL)
@@ -170,29 +176,16 @@ RULES: tuple[Rule, ...] = (
     Rule(markers_apart, ("marker_count", "marker_diameter", "rib_count")),
     Rule(markers_not_through, ("marker_height", "depth")),
 )
-"""Checked in this order: the later ones mean something only where the earlier ones are obeyed."""
+"""In the order of checking: the later ones presuppose the earlier ones."""
 
 
-def _cell_width(p: Parameters, which: int, what: str) -> RuleResult:
-    """RuleResult on the narrower end of the first or last cell."""
-    base_front, base_back, tip_back, tip_front = finger_section(p).cavities[which]
+def _cavity_width(p: Parameters, number: int, fault: str) -> RuleResult:
+    """Result for the narrower end of the first or last cavity."""
+    base_front, base_back, tip_back, tip_front = finger_section(p).cavities[number]
     front, back = tip_front[0] - base_front[0], tip_back[0] - base_back[0]
     wall, width = ("front", front) if front < back else ("back", back)
     return RuleResult(
         float(width) - MIN_CAVITY if p.rib_count else np.inf,
-        f"{what}: with {p.rib_count} ribs of {p.rib_thickness:g} mm at {p.rib_angle:g} deg the cavity between"
-        f" them is {width:.3g} mm wide at the {wall} wall, at least {MIN_CAVITY} mm is needed",
-    )
-
-
-def _inside_distance(corners: FloatArray, points: FloatArray) -> FloatArray:
-    """How far points (n, 2) lie inside a convex counter-clockwise polygon, shape (n,), mm; negative outside.
-
-    Outside, the distance is to the nearest side's line: never more than the true distance.
-    """
-    ahead = np.roll(corners, -1, axis=0) - corners
-    ahead = ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
-    apart = points[:, None] - corners
-    return np.asarray(
-        (ahead[:, 0] * apart[..., 1] - ahead[:, 1] * apart[..., 0]).min(axis=1), dtype=np.float64
+        f"{fault}: with {p.rib_count} ribs of {p.rib_thickness:g} mm at {p.rib_angle:g} deg the cavity "
+        f"between them is {width:.3g} mm wide at the {wall} wall, at least {MIN_CAVITY} mm is needed",
     )

@@ -32,30 +32,31 @@ class Section:
     def area(self) -> float:
         """Area of the body, mm^2, fillets included."""
         return polygon_area(self.outer) - sum(
-            polygon_area(cell) - sum(corner_area(angle, self.fillet_radius) for angle in corner_angles(cell))
-            for cell in self.cavities
+            polygon_area(cavity)
+            - sum(corner_area(angle, self.fillet_radius) for angle in corner_angles(cavity))
+            for cavity in self.cavities
         )
 
     def contains(self, points: FloatArray) -> BoolArray:
-        """Which points, shape (n, 2), mm, lie in the body or on its boundary; fillets do not count."""
-        inside = _within(self.outer, points)
-        for cell in self.cavities:
-            inside &= ~_within(cell, points, strictly=True)
+        """Mask of the points, shape (n, 2), mm, in the body or on its boundary; fillets are ignored."""
+        inside = inside_distance(self.outer, points) >= 0
+        for cavity in self.cavities:
+            inside &= inside_distance(cavity, points) <= 0
         return inside
 
     @property
     def perimeter(self) -> float:
         """Length of the whole boundary, the cavities' included, mm."""
         total = float(polygon_sides(self.outer).sum())
-        for cell in self.cavities:
-            turns = np.pi - corner_angles(cell)
+        for cavity in self.cavities:
+            turns = np.pi - corner_angles(cavity)
             shortened = 2 * np.tan(turns / 2) - turns
-            total += float(polygon_sides(cell).sum() - self.fillet_radius * shortened.sum())
+            total += float(polygon_sides(cavity).sum() - self.fillet_radius * shortened.sum())
         return total
 
 
 def finger_section(parameters: Parameters) -> Section:
-    """The section of a finger; meaningful for parameters that obey the rules."""
+    """The section of a finger whose parameters obey the rules."""
     p = parameters
     half = p.rib_thickness / (2 * np.cos(np.radians(p.rib_angle)))
     sides = [_wall_side(p, p.base_thickness)]
@@ -73,14 +74,12 @@ def finger_section(parameters: Parameters) -> Section:
 
 
 def rib_feet(parameters: Parameters) -> FloatArray:
-    """Where the rib axes meet the front wall's inner face: x, shape (rib_count,), mm.
+    """Abscissae of the rib axes on the front wall's inner face, shape (rib_count,), mm.
 
-    Equal pitch over the cavity's length there. The paper gives no spacing; this and `rib_direction` are the
-    one place that decides it.
+    Equal pitch over the cavity's length there, which is an assumption: the paper gives no spacing.
     """
     p = parameters
-    pitch = rib_pitch(p)
-    return p.base_thickness + pitch * np.arange(1, p.rib_count + 1)
+    return p.base_thickness + rib_pitch(p) * np.arange(1, p.rib_count + 1)
 
 
 def rib_pitch(parameters: Parameters) -> float:
@@ -99,7 +98,7 @@ def rib_direction(parameters: Parameters) -> FloatArray:
 
 
 def rib_axes(parameters: Parameters) -> FloatArray:
-    """Where each rib's axis meets the front and the back wall's centre line, shape (rib_count, 2, 2), mm."""
+    """Ends of the rib axes on the front and the back wall's centre line, shape (rib_count, 2, 2), mm."""
     p = parameters
     direction = rib_direction(p)
     axes = np.empty((p.rib_count, 2, 2))
@@ -140,6 +139,17 @@ def corner_area(angle: float, radius: float) -> float:
     return float(radius**2 * (1 / np.tan(angle / 2) - (np.pi - angle) / 2))
 
 
+def inside_distance(corners: FloatArray, points: FloatArray) -> FloatArray:
+    """Distance of points (n, 2) inside a convex counter-clockwise polygon, (n,), mm; negative outside.
+
+    Outside, it is the distance to the nearest side's line: never more than the true distance.
+    """
+    ahead = np.roll(corners, -1, axis=0) - corners
+    ahead = ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
+    apart = points[:, None] - corners
+    return np.asarray((ahead[:, 0] * apart[..., 1] - ahead[:, 1] * apart[..., 0]).min(axis=1))
+
+
 def _wall_side(p: Parameters, x: float) -> tuple[FloatArray, FloatArray]:
     """Front and back end of the vertical side of the cavity at `x`."""
     slope, intercept = back_offset_line(p, p.back_thickness)
@@ -159,11 +169,3 @@ def _to_back(p: Parameters, start: FloatArray, direction: FloatArray, distance: 
     return np.asarray(
         start + direction * (start[1] - slope * start[0] - intercept) / closing, dtype=np.float64
     )
-
-
-def _within(corners: FloatArray, points: FloatArray, *, strictly: bool = False) -> BoolArray:
-    """Which points lie in a convex polygon whose corners run counter-clockwise."""
-    sides = np.roll(corners, -1, axis=0) - corners
-    away = points[:, None] - corners
-    left = sides[:, 0] * away[..., 1] - sides[:, 1] * away[..., 0]
-    return np.asarray((left > 0 if strictly else left >= 0).all(axis=1))

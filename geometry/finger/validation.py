@@ -1,4 +1,4 @@
-"""Check a finger against every rule, and find the range in which a parameter would obey them."""
+"""Validation of a finger against all rules, and the range of a parameter that obeys them."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -11,21 +11,17 @@ from geometry.finger.parameters import Parameters, parameter_info
 from geometry.finger.rules import RULES, Rule
 
 ROUNDING = -1e-9
-"""Margins down to this count as zero, mm."""
+"""Tolerance of the margins, mm."""
 
 STEP = 0.01
-"""Printed ranges are rounded inward to multiples of this, mm or degrees."""
+"""Step to which ranges are rounded inward, mm or degrees."""
 
 SCAN = 240
-"""Values tried over a parameter's bounds before bisection."""
+"""Number of values tried within a parameter's bounds before bisection."""
 
 
 def check(parameters: Parameters) -> None:
-    """Raise if a rule is broken.
-
-    Raises:
-        UserError: One line with the reason and the allowed ranges.
-    """
+    """Raise a `UserError` with the reason and the allowed ranges if a rule is broken."""
     for rule in RULES:
         finding = rule.check(parameters)
         if finding.margin < ROUNDING:
@@ -33,7 +29,7 @@ def check(parameters: Parameters) -> None:
 
 
 def advice(parameters: Parameters, broken: Rule) -> str:
-    """The ranges of the parameters that can mend a broken rule, each with the others unchanged."""
+    """Ranges of the parameters that can remedy a broken rule, each with the others unchanged."""
     ranges = _ranges(parameters, broken.remedies, RULES)
     if ranges:
         return f"allowed with the rest unchanged: {', or '.join(ranges[:3])}"

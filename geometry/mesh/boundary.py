@@ -9,9 +9,9 @@ from geometry.arrays import FloatArray, IntArray
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 CORNER_ANGLE = np.radians(10.0)
-"""Turn of the boundary from which on it counts as a corner."""
+"""Minimum turn of the boundary at a corner."""
 FACING = -0.9
-"""Cosine of the angle between the normals of two edges below which they face each other."""
+"""Maximum cosine of the angle between the normals of two edges that face each other."""
 
 
 def boundary_edges(triangles: IntArray) -> IntArray:
@@ -22,7 +22,7 @@ def boundary_edges(triangles: IntArray) -> IntArray:
 
 
 def boundary_loops(mesh: TriangleMesh) -> list[IntArray]:
-    """The nodes of every closed boundary: the outline first, then the cells from base to tip."""
+    """The nodes of every closed boundary: the outline first, then the cavities from base to tip."""
     edges = boundary_edges(mesh.triangles)
     nodes, local = np.unique(edges, return_inverse=True)
     local = local.reshape(-1, 2)
@@ -42,7 +42,7 @@ def mean_thickness(mesh: TriangleMesh) -> float:
 def boundary_widths(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
     """Boundary points (b, 2), mm, and the width there, (b,), mm.
 
-    That is the distance from the nearest other closed boundary, which is across the wall, or the width of the
+    The width is the distance to the nearest other closed boundary, across the wall, or the width of the
     cavity beside it if that is less; infinite where there is neither.
     """
     loops = boundary_loops(mesh)

@@ -14,10 +14,10 @@ from geometry.finger.section import back_offset_line
 from geometry.mesh.settings import MeshSettings
 
 SAMPLES = 400
-"""Points on each curve between which Gmsh measures the distance to it."""
+"""Sampling points on each curve for Gmsh's distance to it."""
 
 ON_LINE = 1e-6
-"""A curve whose middle is this near a line lies on it, mm."""
+"""Maximum distance of a curve's middle from a line that it lies on, mm."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,9 @@ def refinements(
 
     Args:
         design: The finger.
-        settings: Sizes to keep to.
+        settings: Element sizes.
         elements_through_thickness: A wall's thickness over its largest element.
-        corners: Gmsh points at the cells' corners and at the ends of the base.
+        corners: Gmsh points at the cavities' corners and at the ends of the base.
         contact: Gmsh points at the contact's ends and middle.
     """
     size = settings.size
@@ -53,7 +53,7 @@ def refinements(
         "base": design.base_thickness,
         "rib": design.rib_thickness,
     }
-    by_kind = _cell_curves(design)
+    by_kind = _cavity_curves(design)
     found = [
         Refinement(min(size, across / elements_through_thickness), across, curves=by_kind[kind])
         for kind, across in thickness.items()
@@ -67,7 +67,7 @@ def refinements(
 
 
 def set_sizes(entries: Iterable[Refinement], settings: MeshSettings) -> None:
-    """Make the smallest of all refinements, each growing with the distance, Gmsh's size field."""
+    """Set Gmsh's size field: the minimum over all refinements, each growing with the distance."""
     field = gmsh.model.mesh.field
     largest = settings.size * settings.coarsening
     thresholds = []
@@ -89,8 +89,8 @@ def set_sizes(entries: Iterable[Refinement], settings: MeshSettings) -> None:
         gmsh.option.setNumber(f"Mesh.{option}", 0)
 
 
-def _cell_curves(design: Design) -> dict[str, tuple[int, ...]]:
-    """The cells' curves in the current model by what lies behind them."""
+def _cavity_curves(design: Design) -> dict[str, tuple[int, ...]]:
+    """The cavities' curves in the current model by the part of the finger behind them."""
     slope, intercept = back_offset_line(design, design.back_thickness)
     kinds: dict[str, list[int]] = {
         kind: [] for kind in ("front", "back", "base", "tip", "rib", "arc", "outer")

@@ -25,7 +25,7 @@ TRIES = (3.6, 4.8, 6.4)
 """Thickness over element size: the first that gives `MIN_ELEMENTS` is taken."""
 
 TOLERANCE = 1e-7
-"""Nodes this near a line or a wanted position are on it, mm."""
+"""Maximum distance of a node from a line or a position that it lies on, mm."""
 
 
 def build_mesh(design: Design, settings: MeshSettings) -> TriangleMesh:
@@ -125,7 +125,7 @@ def _named(design: Design, points: FloatArray, triangles: IntArray) -> TriangleM
 
 
 def _nodes_at(points: FloatArray, wanted: FloatArray, what: str) -> IntArray:
-    """The nodes at wanted positions (m, 2), which are then moved there to the last digit."""
+    """The nodes at positions (m, 2), mm, moved there to the last digit."""
     nodes = np.array([((points - position) ** 2).sum(axis=1).argmin() for position in wanted], dtype=np.int64)
     if np.abs(points[nodes] - wanted).max() > TOLERANCE:
         raise UserError(f"the mesh has no node at a {what}; this is a fault of the mesher, please report it")
@@ -143,7 +143,7 @@ def _add_point(x: float, y: float) -> int:
 
 
 def _points_at(wanted: FloatArray) -> list[int]:
-    """Gmsh points of the current model at wanted positions (m, 2); those that are not there are left out."""
+    """Tags of the current Gmsh model's points at positions (m, 2), mm, as far as they exist."""
     found = []
     for _, tag in gmsh.model.getEntities(0):
         x, y, _ = gmsh.model.getValue(0, tag, [])

@@ -1,4 +1,4 @@
-"""Find the triangle that holds a point."""
+"""Point location: the triangle and the barycentric coordinates of points."""
 
 from dataclasses import dataclass
 
@@ -10,16 +10,16 @@ from geometry.arrays import FloatArray, IntArray, frozen_array
 from geometry.errors import OutsideBodyError
 
 INSIDE_TOLERANCE = 1e-9
-"""How far below zero a barycentric coordinate may fall: rounding on the boundary, far below any mesh size."""
+"""Rounding of barycentric coordinates on the boundary, far below any mesh size."""
 
 
 @dataclass(frozen=True, eq=False)
 class LocatedPoints:
-    """Points in the body with the triangle that holds each.
+    """Points in the body with the triangle of each.
 
     Attributes:
         points: Shape (n, 2), mm.
-        cells: Number of the triangle, shape (n,).
+        cells: Numbers of the triangles, shape (n,).
         barycentric: Barycentric coordinates in it, shape (n, 3).
     """
 
@@ -32,7 +32,7 @@ class LocatedPoints:
 
 
 class Locator:
-    """Point location by the nearest centroids, looking at ever more of them until the triangle is found."""
+    """Point location among the nearest centroids, with more of them until the triangle is found."""
 
     def __init__(self, points: FloatArray, triangles: IntArray) -> None:
         corners = points[triangles]

@@ -16,7 +16,7 @@ class Quadrature:
     """Points and weights: the integral of f over the body is `(weights * f(points)).sum()`.
 
     Attributes:
-        location: The points, of shape (q, 2) mm, and the triangles that hold them.
+        location: The points, of shape (q, 2) mm, and their triangles.
         weights: Shape (q,), mm^2.
     """
 
@@ -31,7 +31,7 @@ def triangle_rule(degree: int) -> tuple[FloatArray, FloatArray]:
         Barycentric points (q, 3) and weights (q,) that sum to one.
 
     Raises:
-        UserError: If no rule of that degree is held here.
+        UserError: If no rule of that degree is implemented.
 
     Source: D. A. Dunavant, High degree efficient symmetrical Gaussian quadrature rules for the triangle,
     Int. J. Numer. Meth. Engng 21 (1985) 1129-1148, appendix II, p = 1, 2, 4.

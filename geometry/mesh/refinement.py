@@ -20,19 +20,18 @@ from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 ON_ARC = 1e-6
-"""A node is on a fillet if its distance from the centre differs from the radius by less, mm."""
+"""Maximum distance of a node from a fillet that it lies on, mm."""
 
 
 def refined(mesh: TriangleMesh, marked: BoolArray, section: Section | None = None) -> TriangleMesh:
-    """The mesh with the marked triangles cut in four, and as many others as conformity asks for.
+    """The mesh with the marked triangles cut in four, and others as conformity requires.
 
     Nodes keep their numbers, new ones follow; markers, contact node and named boundaries stay where they are.
 
     Args:
-        mesh: What to refine.
+        mesh: The mesh.
         marked: Mask of shape (t,).
-        section: The body: new nodes between two of a fillet are moved onto its arc. None leaves them on the
-            chord.
+        section: The section onto whose fillets new boundary nodes are moved; None leaves them on the chord.
     """
     count, lengths = len(mesh.points), np.linalg.norm(np.diff(mesh.points[mesh.edges], axis=1)[:, 0], axis=1)
     rank = np.empty(len(lengths), dtype=np.int64)
@@ -91,8 +90,8 @@ def _middles(mesh: TriangleMesh, cut: BoolArray, section: Section | None) -> Flo
         return middles
     radius, outside = section.fillet_radius, np.zeros(len(mesh.edges), dtype=bool)
     outside[mesh.edge_numbers(boundary_edges(mesh.triangles))] = True
-    for cell, which in product(section.cavities, range(4)):
-        centre = fillet_centre(cell, which, radius)
+    for cavity, corner in product(section.cavities, range(4)):
+        centre = fillet_centre(cavity, corner, radius)
         off = np.abs(np.linalg.norm(ends - centre, axis=2) - radius)
         chord = outside[cut] & (off < ON_ARC).all(axis=1)
         ray = middles[chord] - centre
