@@ -1,8 +1,9 @@
-"""Properties and copies of meshes that only tests need."""
+"""Closed forms of the section, and properties and copies of meshes, that only tests need."""
 
 import numpy as np
 
-from geometry.finger.section import Section, polygon_sides
+from geometry.arrays import FloatArray
+from geometry.finger.section import Section, corner_angles, polygon_sides
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 
@@ -33,3 +34,33 @@ def boundary_lengths(section: Section) -> dict[str, float]:
     base, back, front = polygon_sides(section.outer)
     contact = np.ptp(section.contact[:, 0])
     return {"base": float(base), "front": float(front), "back": float(back), "contact": float(contact)}
+
+
+def body_area(section: Section) -> float:
+    """Area of the body, mm^2, fillets included."""
+    return polygon_area(section.outer) - sum(
+        polygon_area(cavity)
+        - sum(corner_area(angle, section.fillet_radius) for angle in corner_angles(cavity))
+        for cavity in section.cavities
+    )
+
+
+def body_perimeter(section: Section) -> float:
+    """Length of the whole boundary, the cavities' included, mm."""
+    total = float(polygon_sides(section.outer).sum())
+    for cavity in section.cavities:
+        turns = np.pi - corner_angles(cavity)
+        shortened = 2 * np.tan(turns / 2) - turns
+        total += float(polygon_sides(cavity).sum() - section.fillet_radius * shortened.sum())
+    return total
+
+
+def polygon_area(corners: FloatArray) -> float:
+    """Signed area of a polygon of shape (n, 2), mm^2; positive if counter-clockwise."""
+    following = np.roll(corners, -1, axis=0)
+    return float(0.5 * (corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0]).sum())
+
+
+def corner_area(angle: float, radius: float) -> float:
+    """Area that a fillet of `radius` mm cuts off a corner of `angle` radians, mm^2."""
+    return float(radius**2 * (1 / np.tan(angle / 2) - (np.pi - angle) / 2))

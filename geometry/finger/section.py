@@ -1,4 +1,4 @@
-"""The finger's section in closed form: outline, cavities, ribs, area and lengths; no CAD."""
+"""The finger's section in closed form: outline, cavities and ribs; no CAD."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -28,31 +28,12 @@ class Section:
     fillet_radius: float
     contact: FloatArray
 
-    @property
-    def area(self) -> float:
-        """Area of the body, mm^2, fillets included."""
-        return polygon_area(self.outer) - sum(
-            polygon_area(cavity)
-            - sum(corner_area(angle, self.fillet_radius) for angle in corner_angles(cavity))
-            for cavity in self.cavities
-        )
-
     def contains(self, points: FloatArray) -> BoolArray:
         """Mask of the points, shape (n, 2), mm, in the body or on its boundary; fillets are ignored."""
         inside = inside_distance(self.outer, points) >= 0
         for cavity in self.cavities:
             inside &= inside_distance(cavity, points) <= 0
         return inside
-
-    @property
-    def perimeter(self) -> float:
-        """Length of the whole boundary, the cavities' included, mm."""
-        total = float(polygon_sides(self.outer).sum())
-        for cavity in self.cavities:
-            turns = np.pi - corner_angles(cavity)
-            shortened = 2 * np.tan(turns / 2) - turns
-            total += float(polygon_sides(cavity).sum() - self.fillet_radius * shortened.sum())
-        return total
 
 
 def finger_section(parameters: Parameters) -> Section:
@@ -116,12 +97,6 @@ def back_offset_line(parameters: Parameters, distance: float) -> tuple[float, fl
     return slope, -p.base_width + distance * float(np.hypot(1, slope))
 
 
-def polygon_area(corners: FloatArray) -> float:
-    """Signed area of a polygon of shape (n, 2), mm^2; positive if counter-clockwise."""
-    following = np.roll(corners, -1, axis=0)
-    return float(0.5 * (corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0]).sum())
-
-
 def polygon_sides(corners: FloatArray) -> FloatArray:
     """Length of every side of a polygon of shape (n, 2), from each corner to the next, shape (n,), mm."""
     return np.asarray(np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1), dtype=np.float64)
@@ -132,11 +107,6 @@ def corner_angles(corners: FloatArray) -> FloatArray:
     ahead, behind = np.roll(corners, -1, axis=0) - corners, np.roll(corners, 1, axis=0) - corners
     cross = ahead[:, 0] * behind[:, 1] - ahead[:, 1] * behind[:, 0]
     return np.asarray(np.arctan2(cross, (ahead * behind).sum(axis=1)), dtype=np.float64)
-
-
-def corner_area(angle: float, radius: float) -> float:
-    """Area that a fillet of `radius` mm cuts off a corner of `angle` radians, mm^2."""
-    return float(radius**2 * (1 / np.tan(angle / 2) - (np.pi - angle) / 2))
 
 
 def inside_distance(corners: FloatArray, points: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ from geometry.finger.section import finger_section
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.element_size import refinements, set_sizes
 from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
 from geometry.mesh.walls import elements_through_thickness
 
 MIN_ELEMENTS = 3
@@ -72,8 +72,8 @@ def _triangulate(
         ):
             gmsh.option.setNumber(option, value)
         faces = gmsh.model.occ.importShapes(str(brep))
-        contact = [_add_point(x, 0.0) for x in _contact_abscissae(design)]
-        markers = [_add_point(x, y) for x, y in marker_positions(design)]
+        contact = [gmsh.model.occ.addPoint(x, 0, 0) for x in _contact_abscissae(design)]
+        markers = [gmsh.model.occ.addPoint(x, y, 0) for x, y in marker_positions(design)]
         gmsh.model.occ.fragment(faces, [(0, tag) for tag in contact + markers])
         gmsh.model.occ.synchronize()
         shape = finger_section(design)
@@ -138,10 +138,6 @@ def _contact_abscissae(design: Design) -> tuple[float, float, float]:
     return low, design.contact_abscissa, high
 
 
-def _add_point(x: float, y: float) -> int:
-    return int(gmsh.model.occ.addPoint(x, y, 0.0))
-
-
 def _points_at(wanted: FloatArray) -> list[int]:
     """Tags of the current Gmsh model's points at positions (m, 2), mm, as far as they exist."""
     found = []
@@ -153,7 +149,6 @@ def _points_at(wanted: FloatArray) -> list[int]:
 
 
 def _counter_clockwise(points: FloatArray, triangles: IntArray) -> IntArray:
-    a, b, c = (points[triangles[:, corner]] for corner in range(3))
-    clockwise = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
+    clockwise = signed_areas(points, triangles) < 0
     triangles[clockwise] = triangles[clockwise][:, [0, 2, 1]]
     return triangles

@@ -67,10 +67,7 @@ class TriangleMesh:
     @cached_property
     def areas(self) -> FloatArray:
         """Area of every triangle, shape (t,), mm^2."""
-        a, b, c = (self.points[self.triangles[:, corner]] for corner in range(3))
-        return np.asarray(
-            0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]), dtype=np.float64
-        )
+        return signed_areas(self.points, self.triangles)
 
     @property
     def markers(self) -> FloatArray:
@@ -187,3 +184,9 @@ class TriangleMesh:
             "marker_nodes": self.marker_nodes,
             "contact_node": np.asarray(self.contact_node),
         } | {BOUNDARY_PREFIX + name: nodes for name, nodes in sorted(self.boundaries.items())}
+
+
+def signed_areas(points: FloatArray, triangles: IntArray) -> FloatArray:
+    """Areas of triangles, shape (t,), mm^2; negative for a clockwise one."""
+    a, b, c = (points[triangles[:, corner]] for corner in range(3))
+    return np.asarray(0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]))

@@ -10,15 +10,16 @@ import pytest
 from geometry import Design, UserError, cad_files, finger_section, marker_positions
 from geometry.cad import model as cad
 from geometry.cad.svg import section_svg
+from tests.meshes import body_area, body_perimeter
 
 
 def test_face_has_the_area_and_the_holes_of_the_closed_form(design: Design) -> None:
     face, section = cad.section_face(design), finger_section(design)
     assert face.isValid()
-    assert face.Area() == pytest.approx(section.area, rel=1e-9)
+    assert face.Area() == pytest.approx(body_area(section), rel=1e-9)
     assert len(face.innerWires()) == design.rib_count + 1
     perimeter = sum(wire.Length() for wire in [face.outerWire(), *face.innerWires()])
-    assert perimeter == pytest.approx(section.perimeter, rel=1e-9)
+    assert perimeter == pytest.approx(body_perimeter(section), rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -34,7 +35,7 @@ def test_body_and_markers_together_are_the_extruded_section(design: Design) -> N
     volumes = np.array([part.Volume() for part in parts])
     heights = np.array([part.Center().z for part in parts])
     assert all(part.isValid() for part in parts)
-    assert volumes.sum() == pytest.approx(finger_section(design).area * design.depth, rel=1e-9)
+    assert volumes.sum() == pytest.approx(body_area(finger_section(design)) * design.depth, rel=1e-9)
     assert (volumes * heights).sum() / volumes.sum() == pytest.approx(design.depth / 2, rel=1e-9)
     disc = np.pi / 4 * design.marker_diameter**2 * design.marker_height
     np.testing.assert_allclose(volumes[1:], disc, rtol=1e-9)
@@ -70,7 +71,7 @@ def test_step_holds_body_and_markers_as_named_parts(written: dict[str, Path]) ->
     solids = cq.importers.importStep(str(written["finger.step"])).solids().vals()
     assert len(solids) == 10
     assert sum(solid.Volume() for solid in solids) == pytest.approx(
-        finger_section(Design()).area * 20, rel=1e-9
+        body_area(finger_section(Design())) * 20, rel=1e-9
     )
     text = written["finger.step"].read_text()
     assert all(f"'{name}'" in text for name in ("body", "marker-1", "marker-9"))
@@ -92,7 +93,7 @@ def test_stl_files_enclose_the_volumes(written: dict[str, Path]) -> None:
     discs = 9 * np.pi / 4 * 1.6**2 * 0.6
     assert stl_volume(written["finger-markers.stl"]) == pytest.approx(discs, rel=0.01)  # facets of circles
     assert stl_volume(written["finger-body.stl"]) == pytest.approx(
-        finger_section(Design()).area * 20 - discs, rel=1e-4
+        body_area(finger_section(Design())) * 20 - discs, rel=1e-4
     )
 
 
@@ -102,7 +103,7 @@ def test_dxf_has_a_layer_for_the_outline_and_one_for_the_markers(written: dict[s
     circles = [entity for entity in entities if entity.dxf.layer == "markers"]
     assert len(lines) == 3 + 4 * 5
     length = sum((entity.dxf.end - entity.dxf.start).magnitude for entity in lines)
-    assert length == pytest.approx(finger_section(Design()).perimeter, rel=1e-9)
+    assert length == pytest.approx(body_perimeter(finger_section(Design())), rel=1e-9)
     centres = sorted((circle.dxf.center.x, circle.dxf.center.y) for circle in circles)
     np.testing.assert_allclose(centres, marker_positions(Design()), atol=1e-9)
     assert {circle.dxf.radius for circle in circles} == {0.8}
@@ -131,7 +132,7 @@ def test_svg_arcs_cut_the_corners_of_the_cells() -> None:
             segment = half - np.sin(2 * half) / 2  # between a unit circle's arc and its chord
             ring_area += segment if sweep == "1" else -segment
         area = area - ring_area if area else ring_area
-    assert area == pytest.approx(finger_section(design).area, rel=1e-6)
+    assert area == pytest.approx(body_area(finger_section(design)), rel=1e-6)
 
 
 def test_unknown_format_is_refused(tmp_path: Path) -> None:
