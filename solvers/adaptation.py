@@ -41,7 +41,7 @@ class Adaptation:
 
     @property
     def reached(self) -> bool:
-        """Whether the estimate is within the tolerance."""
+        """True if the estimate is within the tolerance."""
         return self.rounds[-1].at_markers <= self.tolerance
 
     @property

@@ -1,6 +1,6 @@
 """The finger as CAD: the section's face, the solid with its markers as separate bodies, and their files.
 
-The only module that knows CadQuery; import it where it is used.
+The only module that imports CadQuery; import it where it is used.
 """
 
 import tempfile

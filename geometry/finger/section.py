@@ -72,7 +72,7 @@ def rib_pitch(parameters: Parameters) -> float:
 def rib_direction(parameters: Parameters) -> FloatArray:
     """Unit vector along the ribs from front to back, shape (2,).
 
-    A positive angle leans toward the tip: x grows on the way from the front wall to the back wall.
+    A positive angle leans toward the tip: x grows from the front wall to the back wall.
     """
     angle = np.radians(parameters.rib_angle)
     return np.array([np.sin(angle), -np.cos(angle)])

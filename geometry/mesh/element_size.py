@@ -1,6 +1,6 @@
 """Element sizes: fine in walls and ribs, finer at corners and contact if asked, growing into solid parts.
 
-The only module besides `mesher` that knows Gmsh's fields.
+The only module besides `mesher` that imports Gmsh.
 """
 
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""What assimilating solvers share: misfit to the markers, marker forces, marker weight, parameter estimation.
+"""Shared parts of assimilating solvers: misfit to the markers, marker forces, weights, parameter estimation.
 
 Imports the problem, the solution and the solver interface; no finite elements, no networks.
 """

@@ -151,7 +151,7 @@ class Estimate:
 
     @property
     def resolved(self) -> BoolArray:
-        """Which parameters the observations determine, shape (p,)."""
+        """Mask of the parameters that the observations determine, shape (p,)."""
         return np.asarray(self.resolution >= MIN_RESOLUTION)
 
     def left_out(self, rows: IntArray) -> FloatArray:

@@ -158,5 +158,5 @@ def radius_within(mesh: TriangleMesh, points: FloatArray, radius: float) -> floa
 
 
 def assimilates(solver: Solver) -> bool:
-    """Whether a solver declares that it uses the observations of a problem."""
+    """True if a solver declares that it uses the observations of a problem."""
     return bool(getattr(solver, "assimilates", False))

@@ -55,7 +55,7 @@ class GaussianProcessSolver:
     assimilates: ClassVar[bool] = True
 
     def settings(self) -> dict[str, object]:
-        """Whether the base is at rest, and the kernel."""
+        """The condition at the base, and the kernel."""
         return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
@@ -68,17 +68,17 @@ class GaussianProcessSolver:
         started = time.perf_counter()
         solution, misfit, deviations = self._fitted(problem, MIN_MARKERS + 1)
         base, count = self._base(problem), len(misfit.points)
-        missed, spread = np.zeros((2, count, 2))
+        residuals, spread = np.zeros((2, count, 2))
         for marker in range(count):
             progress(marker / count, "leaving each marker out")
             others = _fit(misfit.without(marker), np.delete(deviations, marker, axis=0), base, self.kernel)
             there = problem.mesh.locate(misfit.points[[marker]])
-            missed[marker] = misfit.observed[marker] - others.displacement(there)[0]
+            residuals[marker] = misfit.observed[marker] - others.displacement(there)[0]
             spread[marker] = np.hypot(others.standard_deviation(there)[0], deviations[marker])
-        within = float((np.abs(missed) < 2 * spread).mean())
+        within = float((np.abs(residuals) < 2 * spread).mean())
         seconds = time.perf_counter() - started
         stats = {**solution.stats, "seconds": seconds, "left_out_within_2sd": within}
-        return replace(solution, stats=stats, left_out=leave_one_out_displacements(problem, missed))
+        return replace(solution, stats=stats, left_out=leave_one_out_displacements(problem, residuals))
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
         """A function that fits other observations, without leaving any out; see `Refittable`."""

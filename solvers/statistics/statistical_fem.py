@@ -79,11 +79,11 @@ class StatFemSolver:
         shapes = self._shapes(problem, progress)
         data = self._data(problem, problem.observations, shapes)
         solution = self._conditioned(problem, data, shapes)
-        missed, spread = _without_each(data, progress)
-        within = float((np.abs(missed) < 2 * spread).mean())
+        residuals, spread = _leave_one_out(data, progress)
+        within = float((np.abs(residuals) < 2 * spread).mean())
         seconds = time.perf_counter() - started
         stats = {**solution.stats, "seconds": seconds, "left_out_within_2sd": within}
-        return replace(solution, stats=stats, left_out=leave_one_out_displacements(problem, missed))
+        return replace(solution, stats=stats, left_out=leave_one_out_displacements(problem, residuals))
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
         """A function that solves for other observations with the same finite elements; see `Refittable`."""
@@ -157,14 +157,14 @@ class StatFemSolver:
         )
 
 
-def _without_each(data: StatFemData, progress: Progress) -> tuple[FloatArray, FloatArray]:
-    """What each marker is missed by without it, and the standard deviation of that, each (m, 2), mm."""
+def _leave_one_out(data: StatFemData, progress: Progress) -> tuple[FloatArray, FloatArray]:
+    """Leave-one-out residuals of the markers and their standard deviations, each (m, 2), mm."""
     every = np.arange(len(data.points))
-    missed, spread = np.zeros((2, len(every), 2))
+    residuals, spread = np.zeros((2, len(every), 2))
     for marker in every:
         progress(0.5 + marker / len(every) / 2, "leaving each marker out")
         others = Posterior.of(data, np.delete(every, marker))
         mean, covariance = others.at(data.points[[marker]], data.shapes[:, [marker]])
-        missed[marker] = data.observed[marker] - mean[0]
+        residuals[marker] = data.observed[marker] - mean[0]
         spread[marker] = np.sqrt(covariance[0] + data.deviations[marker] ** 2)
-    return missed, spread
+    return residuals, spread
