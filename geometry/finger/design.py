@@ -6,7 +6,7 @@ from typing import Any
 from pydantic import model_validator
 
 from geometry.errors import UserError
-from geometry.finger.error_messages import CheckedModel
+from geometry.finger.checked_model import CheckedModel
 from geometry.finger.parameters import SYMBOLS, Parameters, title
 from geometry.finger.validation import check
 

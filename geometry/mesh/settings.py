@@ -1,6 +1,6 @@
 """Settings of the mesh: element sizes."""
 
-from geometry.finger.error_messages import CheckedModel
+from geometry.finger.checked_model import CheckedModel
 from geometry.finger.parameters import bounded
 
 

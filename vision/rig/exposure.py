@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from geometry.finger.error_messages import CheckedModel
+from geometry.finger.checked_model import CheckedModel
 from geometry.finger.parameters import bounded
 from vision.frames.frame import Image
 

@@ -1,4 +1,4 @@
-"""Error messages for invalid parameters: one line with the parameter, the value, and what would be right."""
+"""Models whose invalid values are refused in one line: the parameter, the value, and the allowed ones."""
 
 import difflib
 from typing import Any
