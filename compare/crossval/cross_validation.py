@@ -11,7 +11,7 @@ from compare.crossval.output_files import write_results
 from compare.crossval.result import CrossvalResult
 from compare.crossval.solver_folds import FailedSolver, SolverTask, run_folds
 from compare.crossval.study import Study, visible_markers
-from compare.crossval.true_fields import TrueFields, TruthTask, find_truth
+from compare.crossval.true_fields import SampledField, TruthTask, simulate_truth
 from compare.crossval.weight_sweep import SWEPT, sweep_weights
 from compare.evaluation.shared_mesh import check_inside
 from compare.evaluation.virtual_experiment import experiment_source
@@ -102,7 +102,7 @@ def _truths(study: Study, load_cases: Sequence[LoadCase], shared: Path, stages: 
     }
     found: dict[str, Path] = {}
     for name, answer in in_stages(
-        find_truth,
+        simulate_truth,
         tasks,
         processes=study.processes,
         stages=stages,
@@ -119,7 +119,7 @@ def _truths(study: Study, load_cases: Sequence[LoadCase], shared: Path, stages: 
 
 def _noisy(study: Study, mesh: TriangleMesh, truths: Sequence[Path], source: str) -> list[list[Observations]]:
     """The true marker displacements with noise, for each seed at each load."""
-    displacements = [TrueFields.load(path).markers for path in truths]
+    displacements = [SampledField.load(path).markers for path in truths]
     return [
         [
             Observations(

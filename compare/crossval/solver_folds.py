@@ -12,7 +12,7 @@ from pydantic_core import to_jsonable_python
 from compare.crossval.fold_result import FoldResult
 from compare.crossval.folds import Fold, LoadCase, hide_markers
 from compare.crossval.study import SolverVariant
-from compare.crossval.true_fields import FieldSampler, SampledField, TrueFields
+from compare.crossval.true_fields import FieldSampler, SampledField
 from geometry.atomic import atomic_path
 from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
@@ -85,7 +85,7 @@ def run_folds(task: SolverTask, progress: Progress = silent) -> list[list[FoldRe
         for seed in range(seeds):
             solver = task.variant.make(seed)
             if runner is None or "seed" in solver.settings():
-                runner = _FoldRunner(task, solver)
+                runner = FoldRunner(task, solver)
             results.append(
                 runner.run(seed, lambda share, text: progress((len(results) + share) / seeds, text))
             )
@@ -94,18 +94,23 @@ def run_folds(task: SolverTask, progress: Progress = silent) -> list[list[FoldRe
     return results
 
 
-class _FoldRunner:
-    """One solver on one mesh, with the work that folds share."""
+class FoldRunner:
+    """One solver on one mesh, with the work that folds share.
+
+    Attributes:
+        problem: Without markers, at the full load, with the solver's law.
+        sampler: Of the shared mesh.
+    """
 
     def __init__(self, task: SolverTask, solver: Solver) -> None:
         self._task, self._solver = task, solver
         mesh = TriangleMesh.load(task.mesh)
-        self._problem = Problem(mesh, with_law(task.material, solver), task.load_cases[0].load)
+        self.problem = Problem(mesh, with_law(task.material, solver), task.load_cases[0].load)
         finite = task.material.model_copy(update={"law": "neo-hookean", "plane": "strain"})
-        self._finite = replace(self._problem, material=finite)
+        self._finite = replace(self.problem, material=finite)
         markers = task.observations[0][0]
-        self._sampler = FieldSampler.of(mesh, markers.points, markers.marker_radius)
-        self._truths = [TrueFields.load(path) for path in task.truths]
+        self.sampler = FieldSampler.of(mesh, markers.points, markers.marker_radius)
+        self._truths = [SampledField.load(path) for path in task.truths]
         self._unassimilated: dict[int, tuple[SampledField, bool]] = {}
         self._refit: Callable[[Observations], Solution] | None = None
         self._fit: tuple[tuple[int, ...], Solution] | None = None
@@ -135,18 +140,21 @@ class _FoldRunner:
             stated = getattr(solution.field, "standard_deviation", None)
             if stated is not None and fold.load_case == 0:
                 noise = observations[0].standard_deviations
-                deviations = np.hypot(stated(self._sampler.centres), noise).tolist()
-        fields = {}
-        if self._truths:
-            truth = self._truths[fold.load_case]
-            fields = truth.distance(sampled, self._problem, self._finite, self._sampler.weights)
+                deviations = np.hypot(stated(self.sampler.centres), noise).tolist()
+        fields = self.distances(sampled, fold.load_case)
         errors = (sampled.markers - observations[fold.load_case].displacements).tolist()
         return FoldResult(fold, errors, deviations, fields, converged, given)
+
+    def distances(self, sampled: SampledField, case: int) -> dict[str, float]:
+        """Relative L2 distances from the truth at a load case; none without a truth."""
+        if not self._truths:
+            return {}
+        return sampled.distances(self._truths[case], self.problem, self._finite, self.sampler.weights)
 
     def _fitted(self, observations: Observations, held: tuple[int, ...]) -> Solution:
         """The solution with the markers that are not held out; folds that hold out the same share it."""
         if self._fit is None or self._fit[0] != held:
-            self._refit = self._refit or refitter(self._solver, self._problem)
+            self._refit = self._refit or refitter(self._solver, self.problem)
             self._fit = held, self._refit(hide_markers(observations, held))
         return self._fit[1]
 
@@ -157,10 +165,10 @@ class _FoldRunner:
         the markers made at the full load, times the share of the stroke, is added. If it has no solution
         without markers, its whole field counts as that change.
         """
-        mesh, share = self._problem.mesh, self._task.load_cases[case].share
+        mesh, share = self.problem.mesh, self._task.load_cases[case].share
         if case and isinstance(self._solver, Transferable):
-            solution = self._solver.transferred(solution, self._problem, self._at(case))
-        sampled = self._sampler.of_solution(solution, mesh)
+            solution = self._solver.transferred(solution, self.problem, self._at(case))
+        sampled = self.sampler.of_solution(solution, mesh)
         if case == 0 or isinstance(self._solver, Transferable):
             return sampled
         try:
@@ -170,13 +178,13 @@ class _FoldRunner:
         return there + (sampled + here * -1.0) * share
 
     def _at(self, case: int) -> Problem:
-        return replace(self._problem, load=self._task.load_cases[case].load)
+        return replace(self.problem, load=self._task.load_cases[case].load)
 
     def _without_markers(self, case: int) -> tuple[SampledField, bool]:
         """The solver's field without markers at a load case, and whether it converged; solved once."""
         if case not in self._unassimilated:
             solution = self._solver.solve(self._at(case))
-            sampled = self._sampler.of_solution(solution, self._problem.mesh)
+            sampled = self.sampler.of_solution(solution, self.problem.mesh)
             self._unassimilated[case] = sampled, bool(solution.status.converged)
         return self._unassimilated[case]
 

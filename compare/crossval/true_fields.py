@@ -1,6 +1,6 @@
-"""The truth that solvers are judged by: the virtual experiment on a mesh of half the size, everywhere."""
+"""The true fields of a cross-validation: the virtual experiment on a finer mesh, sampled over the body."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -23,12 +23,12 @@ from solvers.solution import Solution, State
 from solvers.solver import Progress, silent
 
 FINER = 0.5
-"""Size of the truth's elements over that of the shared mesh."""
+"""Element size of the truth over that of the shared mesh."""
 
 
 @dataclass(frozen=True, eq=False)
 class SampledField:
-    """A displacement field at m markers and q points of the body; a linear space.
+    """A displacement field at m markers and q quadrature points of the body; fields can be added and scaled.
 
     Attributes:
         markers: Means over the markers' discs, shape (m, 2), mm.
@@ -50,17 +50,51 @@ class SampledField:
     def __mul__(self, factor: float) -> "SampledField":
         return SampledField(factor * self.markers, factor * self.displacement, factor * self.gradient)
 
+    @classmethod
+    def load(cls, path: Path) -> "SampledField":
+        """Read the file that `save` wrote."""
+        with np.load(path) as archive:
+            return cls(**archive)
+
+    def save(self, path: Path) -> None:
+        """Write atomically."""
+        with atomic_path(path) as partial:
+            np.savez(partial, **vars(self))
+
+    def distances(
+        self, truth: "SampledField", own: Problem, finite: Problem, weights: FloatArray
+    ) -> dict[str, float]:
+        """Relative L2 distances of displacement, strain and von Mises stress from the truth over the body.
+
+        Args:
+            truth: The true displacement.
+            own: Problem with the law that gives strain and stress of this displacement.
+            finite: Problem with the truth's law; it also gives this displacement's `von_mises_finite`.
+            weights: Quadrature weights, shape (q,), mm².
+        """
+        state, true = State.from_gradient(self.gradient, own), State.from_gradient(truth.gradient, finite)
+        with np.errstate(invalid="ignore"):  # an inverted element has no such stress
+            with_true_law = State.from_gradient(self.gradient, finite)
+        flat = (len(weights), -1)
+        pairs = {
+            "displacement": (self.displacement, truth.displacement),
+            "strain": (state.strain.reshape(flat), true.strain.reshape(flat)),
+            "von_mises": (state.von_mises, true.von_mises),
+            "von_mises_finite": (with_true_law.von_mises, true.von_mises),
+        }
+        return {name: field_difference(*pair, weights).rel_l2 for name, pair in pairs.items()}
+
 
 @dataclass(frozen=True, eq=False)
 class FieldSampler:
-    """Where fields are looked at.
+    """The points of the shared mesh at which fields are sampled.
 
     Attributes:
-        inside: Quadrature points of the shared mesh.
-        weights: Their areas, shape (q,), mm².
-        centres: Of the markers.
+        inside: Quadrature points of the body.
+        weights: Their weights, shape (q,), mm².
+        centres: Centres of the markers.
         discs: Points of the markers' discs.
-        means: From values at these points to the markers', shape (m, d).
+        means: Weights that average the discs' points to the markers, shape (m, d).
     """
 
     inside: LocatedPoints
@@ -77,7 +111,7 @@ class FieldSampler:
         return cls(rule.location, rule.weights, mesh.locate(markers), mesh.locate(points), means)
 
     def of_solution(self, solution: Solution, mesh: TriangleMesh) -> SampledField:
-        """Sample a solution, which may have been found on another mesh than the shared one."""
+        """Sample a solution, which may have another mesh than the shared one."""
         inside, discs = self.inside, self.discs
         if solution.problem.mesh is not mesh:  # a location belongs to its mesh
             inside, discs = (solution.problem.mesh.locate(place.points) for place in (inside, discs))
@@ -88,64 +122,13 @@ class FieldSampler:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class TrueFields:
-    """The true fields at one load.
-
-    Attributes:
-        markers: Displacements, means over the discs, shape (m, 2), mm.
-        displacement: Shape (q, 2), mm.
-        strain: Green-Lagrange, shape (q, 2, 2).
-        von_mises: Of the Cauchy stress, shape (q,), MPa.
-    """
-
-    markers: FloatArray
-    displacement: FloatArray
-    strain: FloatArray
-    von_mises: FloatArray
-
-    @classmethod
-    def load(cls, path: Path) -> "TrueFields":
-        """Read what `save` wrote."""
-        with np.load(path) as archive:
-            return cls(**{entry.name: archive[entry.name] for entry in fields(cls)})
-
-    def save(self, path: Path) -> None:
-        """Write atomically."""
-        with atomic_path(path) as partial:
-            np.savez(partial, **{entry.name: getattr(self, entry.name) for entry in fields(self)})
-
-    def distance(
-        self, sampled: SampledField, own: Problem, finite: Problem, weights: FloatArray
-    ) -> dict[str, float]:
-        """Relative L2 distances of a solver's fields over the body.
-
-        Args:
-            sampled: The solver's displacement.
-            own: With the solver's law, which makes strain and stress of it.
-            finite: With the truth's law, which makes the stress `von_mises_finite` of it.
-            weights: Areas of the points, shape (q,), mm².
-        """
-        state = State.from_gradient(sampled.gradient, own)
-        with np.errstate(invalid="ignore"):  # a body that is turned inside out has no such stress
-            turned = State.from_gradient(sampled.gradient, finite)
-        flat = (len(weights), -1)
-        pairs = {
-            "displacement": (sampled.displacement, self.displacement),
-            "strain": (state.strain.reshape(flat), self.strain.reshape(flat)),
-            "von_mises": (state.von_mises, self.von_mises),
-            "von_mises_finite": (turned.von_mises, self.von_mises),
-        }
-        return {name: field_difference(*pair, weights).rel_l2 for name, pair in pairs.items()}
-
-
 @dataclass(frozen=True)
 class TruthTask:
-    """All that a process needs to find a truth.
+    """All that a process needs to simulate a truth.
 
     Attributes:
-        design: The finger, with the contact where it is pressed.
-        settings: Of the shared mesh.
+        design: The finger, with the contact at its place.
+        settings: Element sizes of the shared mesh.
         shared: File of the shared mesh.
         material: Elastic constants.
         stroke: -v of the indenter, mm.
@@ -157,42 +140,31 @@ class TruthTask:
     material: Material
     stroke: float
 
-    @property
-    def entry(self) -> Path:
-        """Where it is kept: a file of the cache."""
-        parts = [
-            self.design.digest,
-            self.settings.model_dump(),
-            TriangleMesh.load(self.shared).digest,
-            self.material.model_dump(),
-            self.stroke,
-            FINER,
-            package_versions(),
-            sources_digest(
-                [*SOURCES, "compare.crossval.true_fields", "compare.evaluation.virtual_experiment"]
-            ),
-        ]
-        digest = content_hash(parts)
-        return cache_folder() / f"truth-{digest}.npz"
 
-
-def find_truth(task: TruthTask, progress: Progress = silent) -> Path:
-    """Simulate, or find in the cache, and give the file.
+def simulate_truth(task: TruthTask, progress: Progress = silent) -> Path:
+    """Simulate the true field, unless the cache has it, and return its file in the cache.
 
     Raises:
         UserError: If the simulation cannot be run or does not reach the full load.
     """
-    entry = task.entry
-    if entry.exists():
-        progress(1.0, "from the cache")
-        return entry
     shared = TriangleMesh.load(task.shared)
+    parts = [
+        task.design.digest,
+        task.settings.model_dump(),
+        shared.digest,
+        task.material.model_dump(),
+        task.stroke,
+        FINER,
+        package_versions(),
+        sources_digest([*SOURCES, __name__, "compare.evaluation.virtual_experiment"]),
+    ]
+    file = cache_folder() / f"truth-{content_hash(parts)}.npz"
+    if file.exists():
+        progress(1.0, "from the cache")
+        return file
     finer = task.settings.model_copy(update={"size": FINER * task.settings.size})
     mesh = finger_mesh(task.design, settings=finer)
     problem = Problem(mesh, task.material, Load(displacement=(0.0, -task.stroke)))
-    solution = simulate(problem, progress)
     sampler = FieldSampler.of(shared, shared.markers, task.design.marker_radius)
-    sampled = sampler.of_solution(solution, shared)
-    state = State.from_gradient(sampled.gradient, solution.problem)
-    TrueFields(sampled.markers, sampled.displacement, state.strain, state.von_mises).save(entry)
-    return entry
+    sampler.of_solution(simulate(problem, progress), shared).save(file)
+    return file

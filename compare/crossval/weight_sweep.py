@@ -1,20 +1,17 @@
-"""What more weight of the markers does to `fem-asm`: the L-curve, with distances from the truth."""
+"""The L-curve of `fem-asm`: its errors for other weights of the markers."""
 
 from dataclasses import replace
 
 from compare.crossval.scores import FIELDS
-from compare.crossval.solver_folds import SolverTask
-from compare.crossval.true_fields import FieldSampler, TrueFields
-from geometry.mesh.triangle_mesh import TriangleMesh
+from compare.crossval.solver_folds import FoldRunner, SolverTask
 from solvers.assimilation.marker_forces import root_mean_square
 from solvers.assimilation.marker_weighting import FACTORS
 from solvers.fem.assimilating import FemAsmSolver
 from solvers.lagrange import LagrangeField
-from solvers.problem import Problem
-from solvers.solver import Progress, silent, with_law
+from solvers.solver import Progress, silent
 
 SWEPT = "fem-asm"
-"""The solver whose minimisers for all weights are known at once."""
+"""The solver whose minimisers for all weights come from one factorisation."""
 
 
 def sweep_weights(task: SolverTask, progress: Progress = silent) -> dict[str, list[float]]:
@@ -27,26 +24,19 @@ def sweep_weights(task: SolverTask, progress: Progress = silent) -> dict[str, li
     solver = task.variant.make(0)
     if not isinstance(solver, FemAsmSolver):
         raise TypeError(f"{solver.name} has no minimisers for all weights")
-    mesh, observations = TriangleMesh.load(task.mesh), task.observations[0][0]
-    material = with_law(task.material, solver)
-    problem = Problem(mesh, material, task.load_cases[0].load, observations)
-    law = task.material.model_copy(update={"law": "neo-hookean", "plane": "strain"})
-    finite = replace(problem, material=law)
-    sampler = FieldSampler.of(mesh, observations.points, observations.marker_radius)
-    truth = TrueFields.load(task.truths[0])
+    runner = FoldRunner(task, solver)
+    problem = replace(runner.problem, observations=task.observations[0][0])
     solution = solver.solve(problem)
     finger, misfit = solver.prepare(problem)
     forces, space = finger.forces(misfit), finger.equilibrium.elasticity.distributed.space
-    columns: dict[str, list[float]] = {
-        name: [] for name in ("factor", "in_sample_mm", "left_out_mm", *FIELDS)
-    }
+    rows = []
     for number, factor in enumerate(FACTORS.tolist()):
         progress(number / len(FACTORS), f"{factor:.3g} times the weight")
         fit = forces.fit(factor)
-        weighed = replace(solution, field=LagrangeField(space, finger.under(fit.forces)))
-        distances = truth.distance(sampler.of_solution(weighed, mesh), problem, finite, sampler.weights)
-        row = (factor, root_mean_square(fit.residual), root_mean_square(fit.left_out), *distances.values())
-        for column, value in zip(columns.values(), row, strict=True):
-            column.append(value)
+        weighted = replace(solution, field=LagrangeField(space, finger.under(fit.forces)))
+        distances = runner.distances(runner.sampler.of_solution(weighted, problem.mesh), 0)
+        errors = [root_mean_square(fit.residual), root_mean_square(fit.left_out)]
+        rows.append([factor, *errors, *(distances[name] for name in FIELDS)])
     finger.equilibrium.factors.destroy()
-    return columns
+    names = ("factor", "in_sample_mm", "left_out_mm", *FIELDS)
+    return {name: list(column) for name, column in zip(names, zip(*rows, strict=True), strict=True)}
