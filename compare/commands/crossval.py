@@ -1,6 +1,7 @@
 """Score solvers on held-out markers, loads and fields."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
@@ -9,9 +10,15 @@ from compare.commands.options import (
     OptionalOutputPath,
     PhysicsOptions,
     SolverOptions,
+    comma_list,
     existing,
+    read_processes,
 )
 from compare.runtime.exits import NOT_CONVERGED, say
+from solvers.problem import Material
+
+if TYPE_CHECKING:  # SciPy's statistics come with it, and `--help` has to be quick
+    from compare.crossval.study import SolverVariant
 
 
 def crossval(
@@ -43,16 +50,16 @@ def crossval(
         processes: Solvers run at a time; default: one per core.
         out: Output folder; default out/crossval-DESIGN.
     """
-    from compare.commands.crossval_options import read_finger, read_schemes, read_variants
-    from compare.commands.gridsearch_options import read_processes
     from compare.crossval.cross_validation import cross_validate
     from compare.crossval.folds import LOAD
-    from compare.crossval.study import Study
+    from compare.crossval.study import ELEMENT_SIZE, Study
     from compare.crossval.tables import tables
     from compare.runtime.stages import Stages
     from vision.measurements import read_measurements
 
-    design, mesh = read_finger(finger, options.preset)
+    design, mesh = finger.read(options.preset)
+    if finger.mesh_size is None and options.preset is None:
+        mesh = mesh.model_copy(update={"size": ELEMENT_SIZE})
     material, load = physics.read(options.preset)
     file = existing(measurements)
     study = Study(
@@ -61,7 +68,7 @@ def crossval(
         material=material,
         load=load,
         variants=read_variants(options, solvers, material),
-        schemes=read_schemes(schemes),
+        schemes=comma_list(schemes),
         seeds=seeds,
         noise=noise,
         measurements=read_measurements(file, marker_radius=design.marker_radius) if file else None,
@@ -86,3 +93,12 @@ def crossval(
         say(f"error: {name} failed, and is tried again by the same command: {message}")
     converged = all(score.converged == 1 for each in result.scores.values() for score in each.values())
     return 0 if converged and not result.failed else NOT_CONVERGED
+
+
+def read_variants(options: SolverOptions, names: str, material: Material) -> "list[SolverVariant]":
+    """The solvers and their variants; a single one where --solver-set chooses the weight of the markers."""
+    from compare.crossval.study import solver_variants
+
+    keys = [text.partition("=")[0].split(".") for text in options.solver_set]
+    fixed = [key[0] for key in keys if key[1:] in (["choose"], ["weights"])]
+    return solver_variants(options.read(names), material, fixed=fixed)

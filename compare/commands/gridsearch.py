@@ -1,11 +1,26 @@
 """Repeat the paper's grid search."""
 
+from dataclasses import replace
+from math import isfinite
 from pathlib import Path
 
 from rich.console import Console
 
-from compare.commands.options import FingerOptions, OptionalOutputPath, PhysicsOptions, SolverOptions
+from compare.commands.options import (
+    FingerOptions,
+    OptionalOutputPath,
+    PhysicsOptions,
+    SolverOptions,
+    read_processes,
+)
 from compare.runtime.exits import NOT_CONVERGED, say
+from geometry.errors import UserError
+
+SOLVER = "pinn-std"
+SHORT = 2_000
+"""Default epochs of a run: minutes on a CPU with the usual mesh."""
+
+SEARCHED = {"learning_rate": "--learning-rates", "bc_weight": "--bc-weights"}
 
 
 def gridsearch(
@@ -31,7 +46,6 @@ def gridsearch(
         processes: Runs trained at a time; default: one per core.
         out: Output folder; default out/gridsearch-DESIGN.
     """
-    from compare.commands.gridsearch_options import read_processes, read_settings, read_values
     from compare.gridsearch.search import GridSearch, search_grid
     from compare.gridsearch.tables import best_of, runs_table
     from compare.gridsearch.training_run import FAILED
@@ -63,3 +77,34 @@ def gridsearch(
     for run in failed:
         say(f"error: {run.point.name} failed, and is tried again by the same command: {run.message}")
     return 0 if best_of(runs) and not failed else NOT_CONVERGED
+
+
+def read_settings(options: SolverOptions, epochs: int | None) -> dict[str, object]:
+    """The settings of the paper's network that all runs share."""
+    if options.preset not in (None, "paper"):
+        raise UserError(f"--preset {options.preset}: the search is for the settings of the preset paper")
+    keys = [text.partition("=")[0].removeprefix(f"{SOLVER}.") for text in options.solver_set]
+    if searched := next((key for key in keys if key in SEARCHED), None):
+        raise UserError(
+            f"{SOLVER}.{searched} is what is searched for; give its values with {SEARCHED[searched]}"
+        )
+    texts = options.solver_set
+    if epochs is None and options.preset is None and "epochs" not in keys:
+        epochs = SHORT
+    if epochs is not None:
+        texts = (*texts, f"{SOLVER}.epochs={epochs}")
+    (solver,) = replace(options, preset="paper", solver_set=texts).read(SOLVER)
+    return {key: value for key, value in solver.settings().items() if key not in SEARCHED}
+
+
+def read_values(option: str, text: str) -> tuple[float, ...]:
+    """Different positive numbers from a text with commas between them."""
+    try:
+        values = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        raise UserError(
+            f"--{option} {text}: give numbers with commas between them, such as 1e-4,1e-3"
+        ) from None
+    if not all(value > 0 and isfinite(value) for value in values) or len(set(values)) < len(values):
+        raise UserError(f"--{option} {text}: give different numbers above 0")
+    return values

@@ -11,6 +11,7 @@ from cyclopts import Group, Parameter
 from pydantic import ValidationError
 
 from compare.commands.preset_jobs import job_defaults
+from compare.runtime.provenance import cores
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.finger.presets import load_design, parse_overrides
@@ -214,6 +215,14 @@ def _made(name: str, given: Mapping[str, object], shared: Mapping[str, object]) 
 def comma_list(text: str) -> list[str]:
     """The words of a text with commas between them."""
     return [word for part in text.split(",") if (word := part.strip())]
+
+
+def read_processes(processes: int | None) -> int:
+    """Processes at a time: as many as there are cores if None."""
+    count = cores() if processes is None else processes
+    if count < 1:
+        raise UserError(f"--processes {count}: give a whole number from 1")
+    return count
 
 
 def existing(path: Path | None) -> Path | None:

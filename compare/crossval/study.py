@@ -121,6 +121,11 @@ class Study:
             raise UserError("no solver was asked for; name at least one")
         if len(set(labels)) < len(labels):
             raise UserError(f"a solver is named twice: {', '.join(labels)}")
+        known = [scheme for scheme in SCHEMES if scheme != ALL]
+        if unknown := next((scheme for scheme in self.schemes if scheme not in known), None):
+            raise UserError(f"--schemes: there is no scheme {unknown!r}; there are {', '.join(known)}")
+        if not self.schemes or len(set(self.schemes)) < len(self.schemes):
+            raise UserError(f"--schemes: name at least one of {', '.join(known)}, none twice")
         if self.seeds < 1:
             raise UserError(f"--seeds {self.seeds}: give a whole number from 1")
         if not 0 <= self.noise < inf:

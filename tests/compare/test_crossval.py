@@ -394,7 +394,7 @@ def test_bad_input_is_one_line(tmp_path, capsys, line, said):
 
 
 def test_a_solver_that_chooses_its_weights_is_there_in_three_ways():
-    from compare.commands.crossval_options import read_variants
+    from compare.commands.crossval import read_variants
     from compare.commands.options import SolverOptions
 
     variants = read_variants(SolverOptions(), "fem,fem-asm", Material())

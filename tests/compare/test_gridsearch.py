@@ -14,7 +14,7 @@ import pytest
 from rich.console import Console
 
 from compare.cli import main
-from compare.commands.gridsearch_options import read_settings
+from compare.commands.gridsearch import read_settings
 from compare.commands.options import SolverOptions
 from compare.gridsearch.search import GridSearch, search_grid
 from compare.gridsearch.tables import best_of
