@@ -1,4 +1,5 @@
-"""Cross-validation: solvers judged by markers, loads and fields that they were not given.
+"""Cross-validation: solvers scored at markers, loads and fields that they were not given.
 
-Imports `compare.evaluation`, `compare.figures`, `compare.report`, `compare.runtime`.
+`cross_validation.cross_validate` is the entry. Imports `compare.evaluation`, `compare.figures`,
+`compare.runtime`.
 """

@@ -13,7 +13,7 @@ from compare.crossval.tables import grids, write_tables
 from compare.runtime.csv_files import write_csv
 from compare.runtime.html import template_environment
 from compare.runtime.provenance import file_digest
-from geometry.atomic import atomic_path, write_json
+from geometry.atomic import write_json, write_text
 
 HELD_OUT, FIELDS, SWEEP = "held_out.png", "fields.png", "l_curve.png"
 
@@ -40,18 +40,9 @@ def write_results(
         pictures.append(draw_weight_sweep(sweep=sweep).save(out / SWEEP))
     for name in {HELD_OUT, FIELDS, SWEEP} - {path.name for path in pictures}:  # of an earlier study with more
         (out / name).unlink(missing_ok=True)
-    html = (
-        template_environment()
-        .get_template("crossval.html.j2")
-        .render(
-            result=result,
-            answers=answers(result),
-            grids=grids(result),
-            pictures=pictures,
-        )
-    )
-    with atomic_path(out / "report.html") as partial:
-        partial.write_text(html, encoding="utf-8")
+    template = template_environment().get_template("crossval.html.j2")
+    html = template.render(result=result, answers=answers(result), grids=grids(result), pictures=pictures)
+    write_text(out / "report.html", html)
     written = [path for path in sorted(out.glob("*.*")) if path.suffix in (".csv", ".png", ".html")]
     write_json(
         out / "crossval.json",

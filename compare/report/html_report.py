@@ -21,7 +21,7 @@ from compare.report.table_one import PRINTED, millimetres, table_one
 from compare.report.tables import seconds
 from compare.report.truth_text import truth_sentences
 from compare.runtime.html import template_environment
-from geometry.atomic import atomic_path
+from geometry.atomic import write_text
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,9 +51,7 @@ def write_report(
         pictures: In the order in which they appear.
         provenance: Facts of the run (seed, versions, hashes, times); a mapping becomes a group.
     """
-    html = render(comparison, pictures, provenance)
-    with atomic_path(path) as partial:
-        partial.write_text(html, encoding="utf-8")
+    write_text(path, render(comparison, pictures, provenance))
 
 
 def render(comparison: Comparison, pictures: Sequence[Picture], provenance: Mapping[str, object]) -> str:

@@ -1,4 +1,4 @@
-"""How a command runs: processes, stages and progress, output folders, provenance, exit codes.
+"""Runs of commands: processes, progress, output folders, provenance, HTML and terminal tables, exit codes.
 
 Imports nothing else of `compare`.
 """

@@ -1,8 +1,7 @@
-"""The output folder: the last complete result or the new one, never half of one.
+"""The output folder: always one complete result, the last or the new one.
 
-A run works in `NAME.partial` beside the output folder `NAME` and takes its place at the end. A killed run
-leaves there the solutions that it had finished and the checkpoints of the one in training, from which a
-resumed run goes on.
+A run writes into `NAME.partial`, which replaces the output folder `NAME` at the end. A killed run leaves
+there its finished solutions and the checkpoints of the solver in training, from which a resumed run goes on.
 """
 
 import fcntl
@@ -24,7 +23,7 @@ TRAINING = "training"
 
 
 def check_output(out: Path) -> None:
-    """Refuse, before anything is computed, a folder that must not be replaced."""
+    """Raise a `UserError` if the folder must not be replaced."""
     if out.exists() and not out.is_dir():
         raise UserError(f"{out} is a file; name a folder with --out")
     if Path.cwd().is_relative_to(out.resolve()):
@@ -47,8 +46,7 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
 
     Args:
         out: The output folder.
-        keep: Names of the solvers whose solutions and checkpoints are left in place if there are any of an
-            earlier, killed run.
+        keep: Names of the solvers whose solutions and checkpoints of a killed run are kept.
 
     Raises:
         UserError: If the folder cannot be written, or another run is writing it.
@@ -68,14 +66,14 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
             if not any([*partial.glob(f"{SOLUTIONS}/*.npz"), *partial.glob(f"{TRAINING}/*/*")]):
                 shutil.rmtree(partial, ignore_errors=True)
                 for folder in missing:
-                    with suppress(OSError):  # somebody else uses it by now
+                    with suppress(OSError):  # in use by another program
                         folder.rmdir()
             raise
         _take_place(partial, out)
 
 
 def write_run(folder: Path, provenance: Mapping[str, Any]) -> None:
-    """Write `run.json`: what the results depend on, and the SHA-256 of every file beside it."""
+    """Write `run.json`: the provenance, and the SHA-256 of every other file."""
     files = {
         path.relative_to(folder).as_posix(): file_digest(path)
         for path in sorted(folder.rglob("*"))
@@ -85,7 +83,7 @@ def write_run(folder: Path, provenance: Mapping[str, Any]) -> None:
 
 
 def take_training(name: str, source: Path, target: Path) -> None:
-    """Copy what a solver's training left from one output folder to another, in place of what is there."""
+    """Copy a solver's checkpoints from one output folder to another, replacing those there."""
     left, place = source / TRAINING / name, target / TRAINING / name
     if left != place:
         shutil.rmtree(place, ignore_errors=True)
@@ -108,7 +106,7 @@ def _take_place(partial: Path, out: Path) -> None:
 
 
 def _written(out: Path) -> set[str]:
-    """The files that the run which made `out` says it wrote."""
+    """The files that `run.json` lists."""
     try:
         return {RUN_FILE, *json.loads((out / RUN_FILE).read_text(encoding="utf-8"))["files_sha256"]}
     except (OSError, ValueError, LookupError, TypeError):
@@ -116,7 +114,7 @@ def _written(out: Path) -> set[str]:
 
 
 def _clear(partial: Path, keep: Collection[str]) -> None:
-    """Remove what an earlier run left, except solutions and checkpoints that can be taken over."""
+    """Remove the files of an earlier run, except solutions and checkpoints that can be reused."""
     for path in partial.iterdir():
         if path.name not in (SOLUTIONS, TRAINING):
             _remove(path)
@@ -137,7 +135,7 @@ def _remove(path: Path) -> None:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Keep a second run out of the folder; the lock ends with the process, however that ends."""
+    """Lock the folder against a second run; the lock ends with the process."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         with suppress(OSError):  # some network file systems have no locks

@@ -27,7 +27,7 @@ PACKAGES = (
 
 
 def package_versions() -> dict[str, str]:
-    """Version of every package that has a part in the numbers or pictures."""
+    """Versions of all packages that affect the numbers or pictures."""
     versions = {"python": platform.python_version()}
     for package in PACKAGES:
         try:
@@ -39,7 +39,7 @@ def package_versions() -> dict[str, str]:
 
 
 def machine() -> dict[str, str | int]:
-    """Where the run took place."""
+    """The operating system, the processor and its cores."""
     return {
         "system": platform.platform(),
         "processor": platform.machine(),
@@ -55,7 +55,7 @@ def cores() -> int:
 def sources_digest(modules: Iterable[str]) -> str:
     """SHA-256 over the Python sources of loaded packages or single modules, in hexadecimal.
 
-    What was typed into a notebook has no source file, and no part in the digest.
+    Code of a notebook has no source file and is left out.
     """
     sha = hashlib.sha256()
     for name in sorted(set(modules)):

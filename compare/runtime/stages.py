@@ -24,9 +24,9 @@ from solvers.solver import UnsupportedProblemError
 
 
 class Stages:
-    """Shows a line for every stage, with time left where the stage tells how far it is.
+    """Shows a line with progress and time left for every stage.
 
-    Where there is no terminal, each stage is a plain line when it is done.
+    Without a terminal, each finished stage is a plain line.
 
     Attributes:
         started: Time when the run began.
@@ -76,7 +76,7 @@ class Stages:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[Report]:
-        """Run a stage; what it yields takes the fraction done and a short note."""
+        """Run a stage; it yields a function that takes the fraction done and a short note."""
         started = time.perf_counter()
         task = self._progress.add_task(name, total=1.0, note="")
         last = ""
