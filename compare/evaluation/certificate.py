@@ -135,7 +135,7 @@ class Certificate:
                 f"its energy is {percent(self.rel_excess, 2)} above that of fem "
                 f"(limit {percent(INTERPOLANT_LIMIT, 1)})"
             )
-        return found
+        return [fault.replace("\N{NO-BREAK SPACE}", " ") for fault in found]  # for files and terminals
 
     def numbers(self) -> dict[str, Any]:
         """What `metrics.json` holds of it."""
