@@ -7,10 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as MplFigure
 
+from geometry.arrays import FloatArray
 from geometry.atomic import atomic_path
 
 if TYPE_CHECKING:
@@ -21,6 +24,8 @@ WIDTH = 5.5
 
 DPI = 300
 NOTEBOOK_DPI = 150
+LEFT, RIGHT, TITLE, BELOW = 0.55, 0.12, 0.3, 0.45
+"""Margins of the axes of `body_figure`, inches."""
 
 INK = "#1a1a1a"
 MUTED = "#767676"
@@ -86,3 +91,24 @@ def figure(height: float) -> Iterator[Figure]:
     """A new figure of a height in inches, to be filled in the block with the project's settings."""
     with mpl.rc_context(_RC):
         yield Figure(height)
+
+
+@contextmanager
+def body_figure(points: FloatArray, title: str, *, foot: float = 0.0) -> Iterator[tuple[Figure, Axes]]:
+    """A figure with axes in mm, of equal scale, around points of shape (n, 2), mm.
+
+    Args:
+        points: What must be visible.
+        title: Of the figure.
+        foot: Room below the axes, inches.
+    """
+    margin = 0.03 * float(np.ptp(points[:, 0]))
+    (left, bottom), (right, top) = points.min(axis=0) - margin, points.max(axis=0) + margin
+    width = WIDTH - LEFT - RIGHT
+    height = width * (top - bottom) / (right - left)
+    total = TITLE + height + BELOW + foot
+    with figure(total) as drawn:
+        axes = drawn.add_axes((LEFT / WIDTH, (BELOW + foot) / total, width / WIDTH, height / total))
+        axes.set(xlim=(left, right), ylim=(bottom, top), xlabel="x, mm", ylabel="y, mm", aspect="equal")
+        axes.set_title(title, weight="bold")
+        yield drawn, axes

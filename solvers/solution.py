@@ -2,15 +2,20 @@
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.arrays import FloatArray
+from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints
+from geometry.notebook import fact_table
 from solvers.elasticity import PlaneTensor, energy_density_of, strain_of, stress_of, von_mises
 from solvers.problem import Problem
+
+if TYPE_CHECKING:
+    from geometry.figure import Figure
 
 
 class DisplacementField(Protocol):
@@ -116,6 +121,47 @@ class Solution:
     def state(self, points: ArrayLike | LocatedPoints) -> "State":
         """Strain, stress and energy density at points of shape (n, 2), mm."""
         return State.from_gradient(self.gradient(points), self.problem)
+
+    def plot(
+        self, quantity: Literal["displacement", "von_mises"] = "displacement", *, scale: float = 1.0
+    ) -> "Figure":
+        """A field on the deformed mesh, as a matplotlib figure.
+
+        Args:
+            quantity: `displacement`: its magnitude, mm; `von_mises`: the stress, MPa.
+            scale: Factor of the displacement that is drawn.
+
+        Raises:
+            UserError: If the quantity is another one.
+        """
+        from geometry.mesh.picture import plot_field
+
+        mesh = self.problem.mesh
+        moved = self.displacement(mesh.points)
+        if quantity == "displacement":
+            name, unit = "displacement magnitude", "mm"
+            values = np.linalg.norm(moved, axis=1)[mesh.triangles].mean(axis=1)
+        elif quantity == "von_mises":
+            name, unit, values = "von Mises stress", "MPa", self.state(mesh.at_centroids()).von_mises
+        else:
+            raise UserError(f"there is no field {quantity!r} to plot; there are displacement, von_mises")
+        remark = "" if self.status.converged else " (not converged)"
+        times = "true scale" if scale == 1 else f"displacement times {scale:g}"
+        title = f"{self.solver}{remark}: {name}, {times}"
+        return plot_field(mesh, scale * moved, values, title=title, label=f"{name}, {unit}")
+
+    def _repr_html_(self) -> str:
+        """Status, energy, reaction, unknowns and time, in a notebook."""
+        u, v = self.reaction
+        facts = {
+            "status": ("converged" if self.status.converged else "not converged")
+            + f": {self.status.message}",
+            "energy": f"{self.energy:.5g} N mm per mm of depth",
+            "reaction": f"({u:.4g}, {v:.4g}) N per mm of depth",
+            "unknowns": self.stats.get("unknowns", "–"),
+            "time": f"{float(self.stats.get('seconds', np.nan)):.3g} s",
+        }
+        return fact_table(f"Solution of {self.solver}", facts)
 
     def _locate(self, points: ArrayLike | LocatedPoints) -> LocatedPoints:
         return points if isinstance(points, LocatedPoints) else self.problem.mesh.locate(points)

@@ -33,13 +33,6 @@ def show(axes: Axes, pixels: Pixels, extent: Extent) -> None:
     axes.imshow(pixels, extent=extent, interpolation="hanning", zorder=1, aspect="equal")
 
 
-def boundary_edges(mesh: TriangleMesh) -> IntArray:
-    """The edges that belong to one triangle only, shape (b, 2)."""
-    pairs = np.sort(mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    unique, count = np.unique(pairs, axis=0, return_counts=True)
-    return np.asarray(unique[count == 1], dtype=np.int64)
-
-
 def outline(
     axes: Axes,
     edges: IntArray,

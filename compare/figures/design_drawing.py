@@ -1,21 +1,18 @@
 """The design with the paper's nine parameters, the clamped base, the contact and the markers."""
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, PathPatch, Polygon
-from matplotlib.path import Path as Outline
+from matplotlib.patches import Circle
 
 from compare.figures import body
 from compare.figures.canvas import Extent
 from compare.figures.dimensions import Draughtsman
 from compare.figures.style import axes_at, heading
-from geometry.arrays import FloatArray
-from geometry.figure import BODY, CONTACT, INK, MEASURED, WIDTH, Figure, figure
-from geometry.finger.fillets import fillet_points
+from geometry.figure import CONTACT, MEASURED, WIDTH, Figure, figure
 from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import Parameters
-from geometry.finger.section import Section, corner_angles, finger_section, rib_direction, rib_pitch
+from geometry.finger.picture import draw_section
+from geometry.finger.section import Section, finger_section, rib_direction, rib_pitch
 
 POINT = 8.5 / 72 / WIDTH
 """Height of the type as a share of the drawing's width."""
@@ -34,7 +31,7 @@ def draw_design(design: Parameters) -> Figure:
         axes = axes_at(drawn, (0, HEAD, WIDTH, height))
         body.prepare(axes, extent)
         shape = finger_section(design)
-        _body(axes, shape)
+        draw_section(axes, shape)
         body.clamp(axes, shape.outer[:2], size=0.8 * em)
         pen = Draughtsman(axes, em)
         pen.text((-1.7 * em, -design.base_width / 2), "clamped", va="center", rotation=90)
@@ -53,33 +50,6 @@ def draw_design(design: Parameters) -> Figure:
             loc="lower center", ncols=2, columnspacing=2.5, handletextpad=0.6, borderaxespad=0.3,
         )  # fmt: skip
     return drawn
-
-
-def _body(axes: Axes, shape: Section) -> None:
-    axes.add_patch(Polygon(shape.outer, fc=BODY, ec=INK, lw=0.9, zorder=1))
-    for cell in shape.cavities:
-        axes.add_patch(PathPatch(_rounded(cell, shape.fillet_radius), fc="white", ec=INK, lw=0.9, zorder=2))
-
-
-def _rounded(corners: FloatArray, radius: float) -> Outline:
-    """A convex polygon with its corners rounded: cubic curves, within 0.03 % of the radius of the arcs."""
-    if radius == 0:
-        return Outline(np.concatenate([corners, corners[:1]]), closed=True)
-    angles = corner_angles(corners)
-    pull = 4 / 3 * np.tan((np.pi - angles) / 4) * np.tan(angles / 2)
-    vertices = []
-    for which, corner in enumerate(corners):
-        enter, _, leave = fillet_points(corners, which, radius)
-        vertices += [
-            enter,
-            enter + (corner - enter) * pull[which],
-            leave + (corner - leave) * pull[which],
-            leave,
-        ]
-    codes = [Outline.LINETO, Outline.CURVE4, Outline.CURVE4, Outline.CURVE4] * len(corners)
-    return Outline(
-        np.array([*vertices, vertices[0]]), np.array([Outline.MOVETO, *codes[1:], Outline.CLOSEPOLY])
-    )
 
 
 def _lengths(pen: Draughtsman, design: Parameters) -> None:

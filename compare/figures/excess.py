@@ -17,6 +17,7 @@ from compare.figures.colours import PERCENT, Scale
 from compare.figures.style import axes_at, heading
 from geometry.arrays import FloatArray
 from geometry.figure import MUTED, WIDTH, Figure, figure
+from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 MARGIN = 0.1
@@ -53,7 +54,7 @@ def draw_excess(comparison: Comparison) -> Figure | None:
     extent = body.field_extent(mesh)
     height = width * extent.height / extent.width
     scale = excess_scale(mesh, [certificate.density for _, certificate in entries])
-    edges = body.boundary_edges(mesh)
+    edges = boundary_edges(mesh.triangles)
     total = HEAD + rows * (PANEL_TITLE + height) + FOOT
     with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // 2) as canvas:
         heading(drawn, "Excess energy over finite elements, undeformed body")

@@ -18,6 +18,7 @@ from compare.figures.colours import PERCENT, Scale, sequential, symmetric
 from compare.figures.style import axes_at, heading
 from geometry.arrays import FloatArray
 from geometry.figure import MUTED, WIDTH, Figure, figure
+from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 MARGIN = 0.1
@@ -113,7 +114,7 @@ def draw_field(comparison: Comparison, quantity: Quantity) -> Figure:
     scale = field_scale(quantity, mesh, reference)
     differences = difference_scale(quantity, mesh, ordered, reference)
     total = HEAD + len(ordered) * (PANEL_TITLE + height) + FOOT
-    edges = body.boundary_edges(mesh)
+    edges = boundary_edges(mesh.triangles)
     base = quantity.values(reference)
     size = f"$|{quantity.symbol}|$" if quantity.signed else f"${quantity.symbol}$"
 

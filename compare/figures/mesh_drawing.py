@@ -12,6 +12,7 @@ from compare.figures.canvas import Extent
 from compare.figures.style import axes_at, heading
 from geometry.arrays import FloatArray
 from geometry.figure import CONTACT, INK, MEASURED, WIDTH, Figure, figure
+from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 MARGIN = 0.1
@@ -76,7 +77,7 @@ def inner_corner(mesh: TriangleMesh, near: float) -> FloatArray:
         ahead, behind = corners[:, (i + 1) % 3] - corners[:, i], corners[:, (i + 2) % 3] - corners[:, i]
         cross = ahead[:, 0] * behind[:, 1] - ahead[:, 1] * behind[:, 0]
         np.add.at(angle, mesh.triangles[:, i], np.arctan2(cross, (ahead * behind).sum(axis=1)))
-    boundary = np.unique(body.boundary_edges(mesh))
+    boundary = np.unique(boundary_edges(mesh.triangles))
     sharp = boundary[angle[boundary] > np.radians(200)]
     candidates = mesh.points[sharp if len(sharp) else boundary]
     return np.asarray(candidates[np.abs(candidates[:, 0] - near).argmin()])
@@ -151,6 +152,8 @@ def _draw(axes: Axes, mesh: TriangleMesh, window: Extent, width: float) -> None:
     )
     inside = ~beyond.any(axis=1)
     axes.add_collection(LineCollection(list(ends[inside]), colors=LINE, linewidths=width), autolim=False)
-    body.outline(axes, body.boundary_edges(mesh), mesh.points, colour=INK, width=0.5 if width < 0.3 else 1.0)
+    body.outline(
+        axes, boundary_edges(mesh.triangles), mesh.points, colour=INK, width=0.5 if width < 0.3 else 1.0
+    )
     body.outline(axes, mesh.boundary("contact"), mesh.points, colour=CONTACT, width=2.2, zorder=4)
     axes.plot(*mesh.markers.T, "o", ms=2.5, mfc=MEASURED, mec="white", mew=0.5, zorder=4)

@@ -18,6 +18,7 @@ from compare.figures.colours import Scale
 from compare.figures.style import axes_at, heading
 from geometry.arrays import FloatArray, IntArray
 from geometry.figure import INK, MEASURED, MUTED, WIDTH, Figure, figure
+from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Load
@@ -36,7 +37,7 @@ def draw_overlay(comparison: Comparison) -> Figure:
     width = (WIDTH - MARGIN * (columns + 1)) / columns
     height = width * extent.height / extent.width
     scale = displacement_scale(mesh, evaluations)
-    edges = body.boundary_edges(mesh)
+    edges = boundary_edges(mesh.triangles)
     total = HEAD + rows * (PANEL_TITLE + height) + FOOT
     with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // columns) as canvas:
         heading(drawn, "Deformed finger, true scale")

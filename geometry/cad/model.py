@@ -12,11 +12,11 @@ import cadquery as cq
 from cadquery.occ_impl.exporters.dxf import DxfDocument
 
 from geometry.arrays import FloatArray
-from geometry.cad.svg import section_svg
 from geometry.finger.fillets import fillet_points
 from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import Parameters
 from geometry.finger.section import finger_section
+from geometry.finger.svg import section_svg
 
 BODY_COLOUR = (0.15, 0.15, 0.17)
 MARKER_COLOUR = (0.95, 0.25, 0.1)

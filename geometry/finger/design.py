@@ -1,14 +1,18 @@
 """The design of a finger: parameters that obey every rule."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import model_validator
 
 from geometry.errors import UserError
 from geometry.finger.checked_model import CheckedModel
-from geometry.finger.parameters import SYMBOLS, Parameters, title
+from geometry.finger.parameters import SYMBOLS, Parameters, title, with_unit
 from geometry.finger.validation import check
+from geometry.notebook import fact_table
+
+if TYPE_CHECKING:
+    from geometry.figure import Figure
 
 
 class Design(CheckedModel, Parameters):
@@ -20,6 +24,21 @@ class Design(CheckedModel, Parameters):
     def replaced(self, **changes: Any) -> "Design":
         """A checked copy with some parameters changed, by name or symbol."""
         return Design(**{**self.model_dump(), **by_parameter_name(changes)})
+
+    def plot(self) -> "Figure":
+        """The section to scale, with its markers and the contact, as a matplotlib figure."""
+        from geometry.finger.picture import plot_design
+
+        return plot_design(self)
+
+    def _repr_html_(self) -> str:
+        """The section and the paper's nine parameters, in a notebook."""
+        from geometry.finger.svg import section_svg
+
+        facts = {
+            f"{name} ({symbol})": with_unit(getattr(self, name), name) for symbol, name in SYMBOLS.items()
+        }
+        return fact_table(f"Design “{self.name}”", facts, section_svg(self).partition("?>")[2])
 
     @model_validator(mode="before")
     @classmethod

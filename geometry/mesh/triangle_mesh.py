@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +14,10 @@ from geometry.arrays import FloatArray, IntArray, frozen_array
 from geometry.content_hash import content_hash
 from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints, Locator
+from geometry.notebook import fact_table, png_image
+
+if TYPE_CHECKING:
+    from geometry.figure import Figure
 
 BOUNDARY_PREFIX = "boundary_"
 
@@ -156,6 +161,24 @@ class TriangleMesh:
         """Pickle the arrays only, not the derived values."""
         arrays = (self.points, self.triangles, dict(self.boundaries), self.marker_nodes, self.contact_node)
         return TriangleMesh, arrays
+
+    def plot(self) -> "Figure":
+        """Every triangle, the contact and the markers, as a matplotlib figure."""
+        from geometry.mesh.picture import plot_mesh
+
+        return plot_mesh(self)
+
+    def _repr_html_(self) -> str:
+        """Counts, sizes and the picture, in a notebook."""
+        lengths = np.linalg.norm(np.diff(self.points[self.edges], axis=1)[:, 0], axis=1)
+        facts = {
+            "nodes": len(self.points),
+            "triangles": len(self.triangles),
+            "markers": len(self.marker_nodes),
+            "edges": f"{lengths.min():.3g} to {lengths.max():.3g} mm",
+            "area": f"{self.areas.sum():.5g} mm²",
+        }
+        return fact_table("Triangle mesh", facts, png_image(self.plot()._repr_png_()))
 
     def save(self, path: Path) -> None:
         """Write the mesh as a NumPy archive."""

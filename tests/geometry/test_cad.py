@@ -9,7 +9,7 @@ import pytest
 
 from geometry import Design, UserError, cad_files, finger_section, marker_positions
 from geometry.cad import model as cad
-from geometry.cad.svg import section_svg
+from geometry.finger.svg import section_svg
 from tests.meshes import body_area, body_perimeter
 
 

@@ -1,0 +1,82 @@
+"""A comparison that draws, reports and shows itself."""
+
+from dataclasses import fields
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Self
+
+from compare.evaluation import comparison
+from geometry.notebook import fact_table
+
+if TYPE_CHECKING:
+    from geometry.figure import Figure
+
+SHOWN = {
+    "converged": "converged",
+    "in_sample_mae_rss_mm": "error at markers given, mm",
+    "held_out_mae_rss_mm": "error at markers held out, mm",
+    "to_reference_displacement_rel_l2": "displacement to reference, rel. L²",
+    "to_truth_displacement_rel_l2": "displacement to truth, rel. L²",
+    "energy_N_mm_per_mm": "energy, N mm/mm",
+    "seconds_s": "time, s",
+}
+"""Columns of `table` that a notebook shows, with their headings."""
+
+
+class Comparison(comparison.Comparison):
+    """The results of several solvers for one finger, with `table`, `plot` and `report`.
+
+    `comparison["fem"]` is the result of one solver.
+    """
+
+    @classmethod
+    def of(cls, finished: comparison.Comparison) -> Self:
+        """The same comparison, with its pictures and report."""
+        return cls(**{each.name: getattr(finished, each.name) for each in fields(finished)})
+
+    def plot(self, picture: str = "overlay") -> "Figure":
+        """A picture of the report, as a figure that a notebook shows; `figure.save(path)` keeps it.
+
+        Args:
+            picture: `overlay`, `marker_errors`, `von_mises`, `strain_principal`, `strain_xx`, `strain_yy`,
+                `strain_xy`, `force_displacement`, `excess`, `energy`, `losses`, `design` or `mesh`.
+
+        Raises:
+            UserError: If there is no such picture, or nothing to draw in it.
+        """
+        from compare.figures.gallery import draw
+
+        return draw(self, picture).figure
+
+    def report(self, path: str | Path) -> Path:
+        """Write the report as one HTML file that holds its pictures, and return its path."""
+        from compare.figures import draw_all
+        from compare.report.html_report import write_report
+        from compare.runtime.provenance import machine, package_versions
+
+        provenance = {
+            "design_sha256": self.design.digest,
+            "mesh_sha256": self.mesh.digest,
+            "solvers": self.settings,
+            "versions": package_versions(),
+            "machine": machine(),
+        }
+        with TemporaryDirectory() as folder:
+            write_report(Path(path), self, draw_all(Path(folder), self), provenance)
+        return Path(path)
+
+    def _repr_html_(self) -> str:
+        """Design, load, markers, remarks and the main columns of `table`, in a notebook."""
+        seen = int(self.observations.visible.sum())
+        facts = {
+            "load": f"{self.load.kind}, (u, v) = {self.load.displacement} mm",
+            "markers": f"{seen} of {len(self.observations.visible)}, {self.observations.label}: "
+            f"{self.observations.source}",
+            "reference": self.reference.solver,
+        }
+        for evaluation in self.unconverged:
+            facts[f"{evaluation.solver} is not converged"] = evaluation.message
+        facts |= {f"remark {number}": remark for number, remark in enumerate(self.remarks, start=1)}
+        shown = self.table()[list(SHOWN)].rename(columns=SHOWN).dropna(axis="columns", how="all")
+        table: str = shown.to_html(float_format="{:.4g}".format, na_rep="–")
+        return fact_table(f"Comparison of finger “{self.design.name}”", facts) + table

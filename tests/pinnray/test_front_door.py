@@ -1,0 +1,127 @@
+"""The front door: names, quick import, forgiving inputs, objects that show themselves."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import pinnray as pr
+from geometry.mesh.settings import MeshSettings
+from solvers.fem.linear import FemSolver
+
+HEAVY = ("torch", "dolfinx", "cadquery", "gmsh", "cv2", "pyvista", "pandas", "matplotlib", "scipy")
+COARSE = {"size": 1.0}
+
+
+@pytest.fixture(scope="module")
+def comparison() -> pr.Comparison:
+    return pr.compare("default", ["fem", "fem-asm"], size=1.0)
+
+
+def test_the_import_loads_no_heavy_library():
+    code = f"import pinnray, sys; print([name for name in {HEAVY} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("name", pr.__all__)
+def test_every_name_leads_somewhere(name: str):
+    assert getattr(pr, name).__name__ == name
+
+
+def test_an_unknown_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="'pinnray' has no attribute 'sovle'"):
+        _ = pr.sovle
+
+
+def test_the_table_has_a_row_a_solver_and_units_in_its_columns(comparison: pr.Comparison):
+    table = comparison.table()
+    assert list(table.index) == ["fem", "fem-asm"]
+    assert table.loc["fem", "held_out_mae_u_mm"] == pytest.approx(1.52, abs=0.05)
+    assert np.isnan(table.loc["fem", "in_sample_mae_u_mm"])
+    assert table.loc["fem-asm", "in_sample_mae_u_mm"] < 0.1
+    assert table.loc["fem", "to_reference_displacement_rel_l2"] == 0
+    assert table["energy_N_mm_per_mm"].dtype == float
+
+
+@pytest.mark.parametrize("picture", ["overlay", "marker_errors", "von_mises", "design"])
+def test_a_picture_of_the_comparison_is_a_png_in_a_notebook(comparison: pr.Comparison, picture: str):
+    assert comparison.plot(picture)._repr_png_()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def test_an_unknown_picture_lists_the_choices(comparison: pr.Comparison):
+    with pytest.raises(pr.UserError, match="no picture 'stress'; there are overlay, marker_errors"):
+        comparison.plot("stress")
+
+
+def test_a_solver_of_the_comparison_by_its_name(comparison: pr.Comparison):
+    assert comparison["fem-asm"].in_sample
+    with pytest.raises(pr.UserError, match="is called 'gp'; it has fem, fem-asm"):
+        comparison["gp"]
+
+
+def test_a_comparison_shows_that_its_markers_are_simulated(comparison: pr.Comparison):
+    shown = comparison._repr_html_()
+    assert "9 of 9, simulated: simulated by fem-nonlinear" in shown
+    assert "error at markers held out, mm" in shown
+
+
+def test_the_report_is_one_file(comparison: pr.Comparison, tmp_path: Path):
+    text = comparison.report(tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "data:image/png;base64," in text
+    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_measurements_can_be_a_data_frame_and_a_solver_an_object():
+    frame = pd.DataFrame({"x_mm": [20, 85], "y_mm": [-1, -1], "u_mm": [-0.5, np.nan], "v_mm": [-5, np.nan]})
+    frame["visible"] = [True, False]
+    compared = pr.compare(pr.Design(), [FemSolver(degree=1)], measurements=frame, size=1.5)
+    assert compared.observations.visible.tolist() == [True, False]
+    assert not compared.observations.simulated
+    assert "1 of 2, measured: measurements from a data frame" in compared._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: pr.compare("defualt"), "there is no design 'defualt'; the presets are default"),
+        (lambda: pr.compare(solvers="fme"), "no solver is called 'fme'; did you mean 'fem'"),
+        (lambda: pr.compare(solvers=[]), "no solver was asked for"),
+        (lambda: pr.solver("fem", degre=1), "fem has no setting 'degre'"),
+        (lambda: pr.mesh(size=-1), "size"),
+        (lambda: pr.compare(measurements=pd.DataFrame({"x_mm": [1]})), "the data frame has no column y_mm"),
+    ],
+)
+def test_a_wrong_input_is_refused_in_one_line(call: Callable[[], object], message: str):
+    with pytest.raises(pr.UserError) as caught:
+        call()
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_design_or_a_problem_is_solved_and_shows_itself():
+    mesh = pr.mesh("default", **COARSE)
+    solution = pr.solve(pr.Problem(mesh), pr.solver("fem"))
+    again = pr.solve("default", size=1.0)
+    assert again.energy == solution.energy
+    assert "converged: " in solution._repr_html_()
+    assert solution.plot("von_mises")._repr_png_().startswith(b"\x89PNG")
+    assert solution.plot(scale=0.0).axes[0].get_title().endswith("displacement times 0")
+    with pytest.raises(pr.UserError, match="no field 'strain' to plot; there are displacement, von_mises"):
+        solution.plot("strain")
+    with pytest.raises(pr.UserError, match="a Problem has its own mesh"):
+        pr.solve(pr.Problem(mesh), size=2.0)
+
+
+def test_a_design_and_a_mesh_show_themselves():
+    shown = pr.load_design("slender")._repr_html_()
+    assert "<svg" in shown
+    assert "<?xml" not in shown
+    assert shown.count("<tr>") == 9
+    mesh = pr.mesh("default", **MeshSettings(**COARSE).model_dump())
+    assert f'<td style="text-align:left">{len(mesh.points)}</td>' in mesh._repr_html_()
+    assert pr.Design().plot()._repr_png_().startswith(b"\x89PNG")
