@@ -38,8 +38,7 @@ class Film:
         from vision.calibration.camera_file import load_camera
         from vision.discs.colour import read_colour
         from vision.tracking.scene import FilmedScene
-        from vision.tracking.workspace import default_workspace
-        from vision.tracking.workspace_file import load_workspace
+        from vision.tracking.workspace import default_workspace, load_workspace
 
         return FilmedScene(
             design=design,

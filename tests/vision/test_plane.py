@@ -13,7 +13,7 @@ from vision.calibration.camera import Camera
 from vision.discs.disc_detector import DiscDetections
 from vision.rig.shapes import centroid, circle, closed
 from vision.tracking.plane_fit import camera_plane, homography_plane, similarity_plane
-from vision.tracking.scene import FilmedScene, FoundFiducials
+from vision.tracking.scene import FilmedScene
 from vision.tracking.workspace import default_workspace
 
 CAMERA = Camera(1280, 720, 1200.0, 1195.0, 652.0, 349.0, distortion=(-0.12, 0.05, 1e-3, -5e-4, 0.0))
@@ -171,7 +171,7 @@ def test_a_lens_moves_the_middles_of_discs_which_is_undone():
 def test_the_plane_of_fiducials_is_that_of_their_discs():
     scene = FilmedScene(Parameters(), default_workspace(Parameters()), CAMERA)
     discs = DiscDetections(pictured(FIDUCIALS, 2.0, CAMERA), noise(7), np.full(7, 16.0), np.full(7, 180.0))
-    plane = scene.plane(FoundFiducials(np.arange(7), discs))
+    plane = scene.plane(discs)
     assert plane.residual < 1e-4
     np.testing.assert_allclose(
         plane.points(seen(AFTER)) - plane.points(seen(BEFORE)), AFTER - BEFORE, atol=1e-4

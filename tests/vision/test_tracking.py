@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vision.discs.disc_detector import FLOOR, DiscDetections
-from vision.tracking.trajectories import mean_detections
+from vision.tracking.frame_means import mean_detections
 
 DISCS, REPEATS = 9, 200
 DEVIATION = 0.01

@@ -44,8 +44,8 @@ class DiscDetections(NamedTuple):
         """No disc."""
         return DiscDetections(np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0), np.empty(0))
 
-    def where(self, kept: BoolArray | IntArray) -> "DiscDetections":
-        """Subset selected by a mask or by numbers."""
+    def where(self, kept: BoolArray | IntArray | slice) -> "DiscDetections":
+        """Subset selected by a mask, numbers or a slice."""
         return DiscDetections(*(part[kept] for part in self))
 
     def numbered(self, discs: IntArray) -> "DiscDetections":

@@ -1,4 +1,4 @@
-"""Pictures to check by eye: which disc is which marker, how it moved, and what was not seen."""
+"""Annotated images of tracked markers, to check by eye."""
 
 from collections.abc import Sequence
 
@@ -10,16 +10,16 @@ from geometry.arrays import FloatArray
 from vision.frames.frame import Image
 from vision.tracking.frame_tracker import FrameDetections
 
-SEEN, LOST, FIXED, WAY = (40, 150, 0), (0, 60, 230), (200, 110, 0), (190, 0, 190)
-"""Blue, green, red of markers, of markers not seen, of fiducials, and of displacements."""
+SEEN, LOST, FIXED, TRAJECTORY = (40, 150, 0), (0, 60, 230), (200, 110, 0), (190, 0, 190)
+"""Colours, in blue, green, red, of markers, undetected markers, fiducials and trajectories."""
 SHIFT = 4
-"""Binary digits of a pixel's fractions in what is drawn."""
+"""Binary digits after the point in the coordinates that OpenCV draws."""
 
 
 def annotated(
     image: Image, detections: FrameDetections, text: Sequence[str], *, trajectories: Sequence[FloatArray] = ()
 ) -> Image:
-    """A copy of an image with what was seen in it.
+    """A copy of an image with the detections drawn into it.
 
     Args:
         image: Grey or coloured.
@@ -36,12 +36,12 @@ def annotated(
     width = max(1, round(size))
     for trajectory in trajectories:
         known = trajectory[np.isfinite(trajectory).all(axis=1)]
-        cv2.polylines(canvas, [_fixed(known)], False, WAY, width, cv2.LINE_AA, SHIFT)
+        cv2.polylines(canvas, [_fixed(known)], False, TRAJECTORY, width, cv2.LINE_AA, SHIFT)
     for discs, colour in ((detections.fiducials, FIXED), (detections.markers, SEEN)):
         for centre, radius in zip(discs.centres, discs.radii, strict=True):
             if np.isfinite(radius):
                 whole = round(float(radius) * 2**SHIFT)
-                cv2.circle(canvas, _point(centre), whole, colour, width, cv2.LINE_AA, SHIFT)
+                cv2.circle(canvas, _fixed(centre).tolist(), whole, colour, width, cv2.LINE_AA, SHIFT)
     for number, (seen, guess) in enumerate(
         zip(detections.markers.radii, detections.guesses, strict=True), start=1
     ):
@@ -62,11 +62,6 @@ def _write(canvas: Image, text: str, place: FloatArray, scale: float, colour: tu
     where = (round(float(place[0])), round(float(place[1])))
     for width, paint in ((4, (255, 255, 255)), (1, colour)):
         cv2.putText(canvas, text, where, cv2.FONT_HERSHEY_SIMPLEX, scale, paint, width, cv2.LINE_AA)
-
-
-def _point(pixels: FloatArray) -> tuple[int, int]:
-    x, y = _fixed(pixels[None])[0]
-    return int(x), int(y)
 
 
 def _fixed(pixels: FloatArray) -> NDArray[np.int32]:

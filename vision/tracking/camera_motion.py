@@ -1,4 +1,4 @@
-"""A camera that was moved between start and end: the fiducials, which stay where they are, undo it."""
+"""Motion of the camera between start and end, from the fiducials, and its correction."""
 
 from typing import NamedTuple
 
@@ -7,23 +7,23 @@ import numpy as np
 from geometry.errors import UserError
 from vision.discs.disc_detector import DiscDetections
 from vision.tracking.marker_plane import MarkerPlane
-from vision.tracking.scene import FilmedScene, FoundFiducials
+from vision.tracking.scene import FilmedScene
 
 FEWEST = 4
-"""Fiducials from which a camera's place is known."""
+"""Number of fiducials that determines the pose of a camera."""
 STEADY = 2.0
-"""Way of the fiducials that counts as none, in standard deviations of a coordinate's way."""
+"""Fiducial shift, in standard deviations, below which the camera counts as static."""
 UNKNOWNS = 6
-"""Of a camera's place, which the fiducials' coordinates have to tell."""
+"""Parameters of a pose."""
 
 
 class CameraMotion(NamedTuple):
-    """What the fiducials did between start and end.
+    """Motion of the camera between start and end.
 
     Attributes:
-        way: Median over the fiducials, pixels; nan if none was seen at both ends.
-        planes: Of the markers at start and end; None if the camera stood still or too few fiducials tell.
-        deviation: Standard deviation of a coordinate that the planes undo, pixels.
+        shift: Median over the fiducials, pixels.
+        planes: Of the markers at start and end; None if the camera is static or there are too few fiducials.
+        deviation: Standard deviation of a coordinate that is corrected by the planes, pixels.
     """
 
     shift: float
@@ -31,7 +31,7 @@ class CameraMotion(NamedTuple):
     deviation: float = 0.0
 
     def undone(self, final: DiscDetections) -> DiscDetections:
-        """Discs at the end where the camera would have seen them had it stayed where it was."""
+        """Discs at the end, mapped to where a static camera would have seen them."""
         if self.planes is None:
             return final
         start, end = self.planes
@@ -41,10 +41,10 @@ class CameraMotion(NamedTuple):
 
 
 def find_camera_motion(scene: FilmedScene, before: DiscDetections, after: DiscDetections) -> CameraMotion:
-    """How the camera moved, from the fiducials at rest at start and end, nan where one was not seen.
+    """Estimate the motion from the fiducials at rest, shape (f, ...), at start and end; nan for hidden ones.
 
     Raises:
-        UserError: If no fiducial is where it was.
+        UserError: If no fiducial was detected at both ends.
     """
     common = np.isfinite(before.radii + after.radii)
     if not common.any():
@@ -57,10 +57,8 @@ def find_camera_motion(scene: FilmedScene, before: DiscDetections, after: DiscDe
     noise, count = float(np.sqrt(np.median(variances))), int(common.sum())
     if shift < STEADY * noise or count < FEWEST:
         return CameraMotion(shift, None)
-    numbers = np.nonzero(common)[0]
-    # Equal weights let what the lens does to the fiducials cancel, also where it is not known.
+    numbers = np.where(common, np.arange(len(common)), -1)
+    # Equal weights make the distortion of the lens cancel, also where it is not known.
     alike = after._replace(covariances=before.covariances)
-    start, end = (
-        scene.plane(FoundFiducials(numbers, detections.where(common))) for detections in (before, alike)
-    )
+    start, end = (scene.plane(fiducials.numbered(numbers)) for fiducials in (before, alike))
     return CameraMotion(shift, (start, end), noise * np.sqrt(UNKNOWNS / (2 * count)))

@@ -1,39 +1,39 @@
-"""Which detection is which marker, by the joint explanation that a smooth deformation makes likeliest.
+"""Data association: assigns detections to markers, as the likeliest joint hypothesis of a smooth deformation.
 
-The displacement from where the markers are expected is a Gaussian field that the base ties down. Markers are
-taken from base to tip; each is one of the detections or missing, and what is known of it narrows the field at
-the others. The likeliest joint explanations are kept (D. B. Reid, "An algorithm for tracking multiple
-targets", IEEE TAC 24, 1979), and a marker is named only if almost all of their weight agrees. Units: mm.
+The prior of the displacement is a Gaussian field that is fixed at the base. Markers are taken from base to
+tip; each is one of the detections or missing, and its detection conditions the field at the others. The
+likeliest joint hypotheses are kept (D. B. Reid, "An algorithm for tracking multiple targets", IEEE TAC 24,
+1979), and a detection is assigned only if almost all of their weight agrees. Units: mm.
 """
 
 import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
 
-EXPLANATIONS = 256
-"""How many joint explanations are kept."""
+HYPOTHESES = 256
+"""Number of joint hypotheses that are kept."""
 SURE = 0.999
-"""Posterior probability from which a marker is named; below it counts as missing."""
+"""Posterior probability from which a marker is assigned; below, it counts as missing."""
 SEEN = 0.9
-"""Prior probability that a marker is among the detections."""
+"""Prior probability that a marker is detected."""
 FALSE_DENSITY = 1e-4
-"""Of detections that are no marker, 1/mm²."""
+"""Density of detections that are no marker, 1/mm²."""
 GATE = 5.0
-"""Standard deviations beyond which a detection is not a marker."""
+"""Largest distance of a detection from its marker, in standard deviations."""
 NOISE = 0.15
-"""Standard deviation of what the field leaves out: detection, and a wall that bulges between two ribs."""
+"""Standard deviation of errors outside the field: detection, and a wall that bulges between two ribs."""
 JUMPS = (1 / 16, 1.0)
-"""Steps between frames that are thought possible, as multiples of the finger's usual whole stroke."""
+"""Possible steps between frames, as multiples of the finger's usual whole stroke."""
 
 
 def associate_markers(found: FloatArray, expected: FloatArray, fields: FloatArray) -> IntArray:
-    """Name the markers among detections.
+    """Assign detections to markers.
 
     Args:
         found: Detections in the finger's frame, shape (n, 2).
-        expected: Where the markers are expected, shape (m, 2).
-        fields: Covariances of the displacement from there along x and y, one for each size of step that is
-            thought possible, shape (k, 2, m, m), mm²; see `moved` and `placed`.
+        expected: Predicted positions of the markers, shape (m, 2).
+        fields: Covariances of the displacement from there along x and y, one for each possible size of step,
+            shape (k, 2, m, m), mm²; see `moved` and `placed`.
 
     Returns:
         The number of its detection for every marker, shape (m,); -1 where it is missing or not certain.
@@ -52,7 +52,7 @@ def associate_markers(found: FloatArray, expected: FloatArray, fields: FloatArra
         allowed = free & (square < GATE**2)
         density = np.where(allowed, density + np.log(SEEN / FALSE_DENSITY), -np.inf)
         choices = weight[:, None] + np.column_stack([density, np.full(len(weight), np.log(1 - SEEN))])
-        best = np.argsort(-choices, axis=None)[:EXPLANATIONS]
+        best = np.argsort(-choices, axis=None)[:HYPOTHESES]
         best = best[np.isfinite(choices.ravel()[best])]
         parent, chosen = np.unravel_index(best, choices.shape)
         weight, seen = choices[parent, chosen], chosen < len(found)
@@ -71,9 +71,9 @@ def associate_markers(found: FloatArray, expected: FloatArray, fields: FloatArra
 def step_covariances(points: FloatArray, jumps: tuple[float, ...] = JUMPS) -> FloatArray:
     """Covariances of a deformation between two frames, shape (len(jumps), 2, m, m), mm².
 
-    The slope of v along the finger is a random walk that starts at a hinge in the base. So is that of u, but
-    much smaller, and u follows the turning of the section. The sizes are those of fingers that are pressed
-    in by an eighth of their length, by `fem-nonlinear`, with room to spare.
+    The slope of v along the finger is a random walk that starts at a hinge in the base; that of u too, but
+    much smaller, and u follows the rotation of the section. The sizes exceed those of fingers that are
+    pressed in by an eighth of their length, by `fem-nonlinear`.
     """
     length = points[:, 0].max()
     x, y = points[:, :1] / length, (points[:, 1:] - points[:, 1].mean()) / length
@@ -85,13 +85,13 @@ def step_covariances(points: FloatArray, jumps: tuple[float, ...] = JUMPS) -> Fl
 
 
 def rest_covariances(points: FloatArray) -> FloatArray:
-    """Covariances at rest, shape (1, 2, m, m), mm²: the finger may be 1 mm and 1 degree off its place."""
+    """Covariances at rest, shape (1, 2, m, m), mm²: a misalignment of the finger by 1 mm and 1 degree."""
     arms = (points[:, 1:], points[:, :1])
     return np.array([[1 + np.radians(1) ** 2 * arm @ arm.T for arm in arms]])
 
 
 def with_predictions(points: FloatArray, displacements: FloatArray) -> FloatArray:
-    """Displacements with the likeliest values in place of those that are nan, shape (m, 2), mm."""
+    """Displacements with predictions of the field in place of nan, shape (m, 2), mm."""
     known = np.isfinite(displacements).all(axis=1)
     whole = displacements.copy()
     for axis, field in enumerate(step_covariances(points, (1.0,))[0]):

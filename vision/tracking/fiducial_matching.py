@@ -1,8 +1,8 @@
-"""Which of the discs in an image are the fiducials of a workspace, and which is which.
+"""Identification of the fiducials of a workspace among the discs in an image.
 
-Four discs of one size and four fiducials that turn the same way round suggest a homography. All suggestions
-are drawn up at once, and the one under which most fiducials meet a disc of the right size is taken: some may
-be hidden, and there may be other discs. Units: pixels, mm.
+Four discs of one size and four fiducials with the same orientation define a homography. The one that maps
+most fiducials to a disc of the right size is taken: some may be hidden, and there may be other discs. Units:
+pixels, mm.
 """
 
 from itertools import combinations, permutations
@@ -15,15 +15,15 @@ from geometry.errors import UserError
 from vision.tracking.workspace import Workspace
 
 GATE = 2.0
-"""How far from a fiducial its disc may be found under a suggestion, mm: the lens is not always undone yet."""
+"""Largest distance of a fiducial from its disc, mm, which includes an unknown lens distortion."""
 SAME_SIZE = 1.3
-"""Ratio of the radii of two discs that may both be fiducials."""
+"""Largest ratio of the radii of two fiducials."""
 OBLIQUE = 1.6
-"""Ratio of the scales in two directions: the plane may be tilted by 50 degrees."""
+"""Largest ratio of the scales in two directions, for a tilt of 50 degrees."""
 MOST_DISCS = 16
-"""Of one size; more are no fiducials of one workspace."""
+"""Largest number of discs of one size that is searched."""
 FLATTEST = 0.1
-"""Least area of the triangles of four fiducials, as a share of the largest triangle's."""
+"""Smallest area of the triangles of four fiducials, as a share of the largest triangle's."""
 LINE = 1e-3
 """Area of a triangle of three discs, over the square of the extent of all, below which they lie on a line."""
 
@@ -33,24 +33,24 @@ class UnseenError(UserError):
 
 
 class FiducialMatch(NamedTuple):
-    """Discs of the fiducials, shape (f,), -1 for those not found, and how far off all others are, mm."""
+    """Discs of the fiducials, shape (f,), -1 for those not found, and the sum of the residuals, mm."""
 
     discs: IntArray
-    missed: float
+    residual: float
 
     @property
     def found(self) -> int:
-        """How many fiducials have a disc."""
+        """Number of fiducials that have a disc."""
         return int((self.discs >= 0).sum())
 
 
 def identify_fiducials(pixels: FloatArray, radii: FloatArray, workspace: Workspace) -> IntArray:
-    """The number of its disc for every fiducial, shape (f,); -1 where none was found.
+    """Find the number of its disc for every fiducial, shape (f,); -1 where none was found.
 
     Args:
         pixels: Centres of discs, shape (n, 2); undistorted, if the camera is known.
         radii: Of the discs, shape (n,).
-        workspace: Whose fiducials are looked for.
+        workspace: The layout of the fiducials.
 
     Raises:
         UnseenError: If the discs show too few of the fiducials.
@@ -76,13 +76,13 @@ def _best(pixels: FloatArray, radii: FloatArray, workspace: Workspace, *, mirror
     for group in _groups(radii):
         discs = np.nonzero(group)[0]
         for match in _matches(pixels[discs], radii[discs], workspace, mirrored=mirrored):
-            if (match.found, -match.missed) > (best.found, -best.missed):
+            if (match.found, -match.residual) > (best.found, -best.residual):
                 best = match._replace(discs=np.where(match.discs >= 0, discs[match.discs], -1))
     return best
 
 
 def _groups(radii: FloatArray) -> list[BoolArray]:
-    """Sets of discs of about one size, of which some may be fiducials."""
+    """Sets of discs of about one size that may contain the fiducials."""
     groups = {tuple((radii <= SAME_SIZE * radius) & (SAME_SIZE * radii >= radius)) for radius in radii}
     return [np.array(group) for group in sorted(groups) if 4 <= sum(group) <= MOST_DISCS]
 
@@ -111,17 +111,17 @@ def _matches(
 def _match(
     pixels: FloatArray, radii: FloatArray, workspace: Workspace, corners: FloatArray, chosen: IntArray
 ) -> FiducialMatch:
-    """The best of the suggestions that put `corners`, shape (4, 2), mm, at `chosen` discs, (s, 4)."""
+    """The best of the homographies that map `corners`, shape (4, 2), mm, to `chosen` discs, (s, 4)."""
     world = workspace.points
     homographies = _homographies(corners, pixels[chosen])
     mapped = np.einsum("sij,fj->sfi", homographies, np.column_stack([world, np.ones(len(world))]))
     in_front = (mapped[..., 2] > 0).all(axis=1)
     homographies, mapped = homographies[in_front], mapped[in_front]
     seen = mapped[..., :2] / mapped[..., 2:]
-    slopes = homographies[:, None, :2, :2] - seen[..., None] * homographies[:, None, 2:, :2]
-    slopes /= mapped[..., 2, None, None]
-    area = np.abs(np.linalg.det(slopes))
-    upright = ((slopes**2).sum(axis=(2, 3)) <= (OBLIQUE + 1 / OBLIQUE) * area).all(axis=1)
+    jacobians = homographies[:, None, :2, :2] - seen[..., None] * homographies[:, None, 2:, :2]
+    jacobians /= mapped[..., 2, None, None]
+    area = np.abs(np.linalg.det(jacobians))
+    upright = ((jacobians**2).sum(axis=(2, 3)) <= (OBLIQUE + 1 / OBLIQUE) * area).all(axis=1)
     if not upright.any():
         return FiducialMatch(np.full(len(world), -1), np.inf)
     scale = np.sqrt(area[upright, :, None])
@@ -130,16 +130,16 @@ def _match(
     allowed = (distance < GATE) & (size < SAME_SIZE) & (size > 1 / SAME_SIZE)
     distance = np.where(allowed, distance, np.inf)
     nearest = distance.argmin(axis=2)
-    missed = distance.min(axis=2)
-    count = np.isfinite(missed).sum(axis=1)
-    error = np.where(np.isfinite(missed), missed, 0.0).sum(axis=1)
+    residuals = distance.min(axis=2)
+    count = np.isfinite(residuals).sum(axis=1)
+    error = np.where(np.isfinite(residuals), residuals, 0.0).sum(axis=1)
     best = int(np.lexsort([error, -count])[0])
-    found = np.isfinite(missed[best])
+    found = np.isfinite(residuals[best])
     return FiducialMatch(np.where(found, nearest[best], -1), float(error[best]))
 
 
 def _homographies(corners: FloatArray, images: FloatArray) -> FloatArray:
-    """What takes four points, shape (4, 2), to their images, (s, 4, 2); shape (s, 3, 3)."""
+    """Homographies from four points, shape (4, 2), to their images, (s, 4, 2); shape (s, 3, 3)."""
     x, y = corners.T
     one, zero = np.ones(4), np.zeros(4)
     matrix = np.zeros((len(images), 8, 8))
@@ -153,7 +153,7 @@ def _homographies(corners: FloatArray, images: FloatArray) -> FloatArray:
 
 
 def _triangles(quads: FloatArray) -> FloatArray:
-    """Twice the signed areas of the four triangles of quadrangles, shape (q, 4, 2); shape (q, 4)."""
+    """Twice the signed areas, shape (q, 4), of the four triangles of quadrangles, shape (q, 4, 2)."""
     a, b, c = (quads[:, corner] for corner in ([0, 0, 0, 1], [1, 1, 2, 2], [2, 3, 3, 3]))
     (p, q), (r, s) = np.moveaxis(b - a, -1, 0), np.moveaxis(c - a, -1, 0)
     return np.asarray(p * s - q * r)

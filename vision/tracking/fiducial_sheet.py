@@ -1,4 +1,4 @@
-"""The fiducials as a drawing in true scale, to print and to lay under a finger."""
+"""Drawing of the fiducials in true scale, to print and put under a finger."""
 
 from geometry.finger.parameters import Parameters
 from geometry.finger.section import finger_section

@@ -1,4 +1,4 @@
-"""The markers from frame to frame: sought where they are expected, and around the finger if one is lost."""
+"""Tracking from frame to frame, by prediction, with a search around the finger for lost markers."""
 
 from typing import NamedTuple
 
@@ -16,31 +16,28 @@ from vision.tracking.data_association import (
     step_covariances,
     with_predictions,
 )
-from vision.tracking.fiducial_matching import UnseenError
-from vision.tracking.marker_plane import MarkerPlane
-from vision.tracking.scene import FilmedScene, FoundFiducials
+from vision.tracking.scene import FilmedScene
 
 FEWEST = 3
-"""Markers without which a finger is not known."""
+"""Number of markers that must be identified in the first frame."""
 AROUND = 15.0
-"""How far around the markers a lost one is looked for, mm."""
+"""Search distance around the markers for a lost one, mm."""
 LIVE_PERIOD = 5
-"""Frames between two searches for markers that stay lost, and between two looks at the fiducials, which do
-not move, where there is no time for more."""
+"""Period, in frames of a live film, of searches for markers that stay lost and of detecting the fiducials."""
 SAME_SIZE = 1.3
 """Ratio of the radii of a disc and of a marker beyond which the disc is no marker."""
 SAME_CONTRAST = 5.0
-"""Ratio of the contrasts, which uneven light explains; a disc of the other sign is no marker either."""
+"""Largest ratio of the contrasts, for uneven light; a disc of the other sign is no marker either."""
 
 
 class FrameDetections(NamedTuple):
-    """What a frame shows.
+    """Markers and fiducials in a frame.
 
     Attributes:
-        markers: Every marker, shape (m, ...); nan where it was not seen.
-        fiducials: Every fiducial of the workspace, shape (f, ...); nan where it was not seen.
-        places: Where the markers are, or probably are if they were not seen, shape (m, 2), mm, by the plane
-            of the first frame.
+        markers: Every marker, shape (m, ...); nan where it was not detected.
+        fiducials: Every fiducial of the workspace, shape (f, ...); nan where it was not detected.
+        places: Positions of the markers, predicted ones if not detected, shape (m, 2), mm, by the plane of
+            the first frame.
         guesses: The same in the image, pixels.
     """
 
@@ -50,31 +47,18 @@ class FrameDetections(NamedTuple):
     guesses: FloatArray
 
 
-def _plane_of(scene: FilmedScene, image: Image) -> tuple[MarkerPlane, FoundFiducials]:
-    """The markers' plane in the first frame, and the fiducials that gave it; none if the markers did."""
-    try:
-        fiducials = scene.find_fiducials(image)
-        return scene.plane(fiducials), fiducials
-    except UnseenError:
-        if not scene.markers_only:
-            raise
-        return scene.find_plane_from_markers(image), FoundFiducials(
-            np.empty(0, dtype=np.int64), DiscDetections.none()
-        )
-
-
 class FrameTracker:
-    """Knows the markers in one frame after another.
+    """Tracks the markers in one frame after another.
 
     Args:
-        scene: What the frames show.
-        image: The first of them.
-        live: Whether time matters: the fiducials, and markers that stay lost, are then looked for in every
+        scene: The filmed scene.
+        image: The first frame.
+        live: Whether to save time: detect the fiducials, and search for markers that stay lost, in every
             fifth frame only.
 
     Attributes:
-        plane: Of the markers, as the first frame shows it.
-        first: What that frame shows.
+        plane: Of the markers, from the first frame.
+        first: Detections in that frame.
 
     Raises:
         UserError: If the first frame shows too few fiducials or markers.
@@ -82,18 +66,18 @@ class FrameTracker:
 
     def __init__(self, scene: FilmedScene, image: Image, *, live: bool = False) -> None:
         self._scene, self._period, self._number = scene, LIVE_PERIOD if live else 1, 0
-        self.plane, self._fiducials = _plane_of(scene, image)
+        self.plane, self._fiducials = scene.first_plane(image)
         self._rest = self._places = marker_positions(scene.design)
         self._step = np.zeros_like(self._rest)
         self._steps = step_covariances(self._rest)
         self._size, self._contrast = 1.0, np.nan
         detections = self._search(image, sized=False)
         fields = rest_covariances(self._rest)
-        names = self._named(detections, fields)
+        names = self._associated(detections, fields)
         if (seen := names >= 0).any():
             self._contrast = float(np.median(detections.contrasts[names[seen]]))
             self._size = float(np.median(detections.radii[names[seen]] / self._radii(self._rest)[seen]))
-            detections, names = self._sought(detections, names, fields, image)
+            detections, names = self._searched(detections, names, fields, image)
         count, least = int((names >= 0).sum()), min(FEWEST, len(names))
         if count < least:
             raise UserError(
@@ -101,49 +85,49 @@ class FrameTracker:
                 "show the finger before it is pressed, and give its design, workspace and markers' colour"
             )
         self._lost = 0
-        self.first = self._sighting(detections, names, image)
+        self.first = self._accepted(detections, names, image)
         self._step = np.zeros_like(self._rest)
 
     def see(self, image: Image) -> FrameDetections:
-        """What the next frame shows."""
-        detections = self._follow(image, self._places + self._step)
-        names = self._named(detections, self._steps)
+        """Track the markers into the next frame."""
+        detections = self._detected_near(image, self._places + self._step)
+        names = self._associated(detections, self._steps)
         missing = int((names < 0).sum())
         if missing > self._missing or (missing and self._lost >= self._period):
             self._lost = 0
-            detections, names = self._sought(detections, names, self._steps, image)
+            detections, names = self._searched(detections, names, self._steps, image)
         self._lost += 1
-        return self._sighting(detections, names, image)
+        return self._accepted(detections, names, image)
 
-    def _follow(self, image: Image, places: FloatArray) -> DiscDetections:
-        """Discs near places, shape (m, 2), mm."""
+    def _detected_near(self, image: Image, places: FloatArray) -> DiscDetections:
+        """Detect discs near places, shape (m, 2), mm."""
         scene = self._scene
         return detect_discs_near(
             image, scene.colour, self.plane.pixels(places), self._radii(places), scene.method
         )
 
-    def _sought(
+    def _searched(
         self, detections: DiscDetections, names: IntArray, fields: FloatArray, image: Image
     ) -> tuple[DiscDetections, IntArray]:
-        """Discs and names with those that a search finds, and those that are where the others say."""
+        """Add the discs of a search, then those near the places that the identified ones predict."""
         detections = detections.together(self._search(image))
-        names = self._named(detections, fields)
+        names = self._associated(detections, fields)
         if 0 < (names < 0).sum() < len(names):
             detections = detections.together(
-                self._follow(image, self._places + self._moved(detections.numbered(names)))
+                self._detected_near(image, self._places + self._steps_of(detections.numbered(names)))
             )
-            names = self._named(detections, fields)
+            names = self._associated(detections, fields)
         return detections, names
 
-    def _moved(self, markers: DiscDetections) -> FloatArray:
-        """Steps of the markers from their places, likely ones for those not seen, shape (m, 2), mm."""
+    def _steps_of(self, markers: DiscDetections) -> FloatArray:
+        """Steps of the markers from their places, predicted for undetected ones, shape (m, 2), mm."""
         known = np.isfinite(markers.radii)
         step = np.full_like(self._places, np.nan)
         step[known] = self.plane.points(markers.centres[known]) - self._places[known]
         return with_predictions(self._rest, step)
 
     def _search(self, image: Image, *, sized: bool = True) -> DiscDetections:
-        """Discs of the markers' size, perhaps known, in the part of the image that the finger can reach."""
+        """Detect discs of the markers' size in the part of the image that the finger can reach."""
         (x0, y0), (x1, y1) = self._places.min(axis=0) - AROUND, self._places.max(axis=0) + AROUND
         corners = self.plane.pixels(np.array([(x0, y0), (x0, y1), (x1, y0), (x1, y1)]))
         low, high = np.floor(corners.min(axis=0)).astype(int), np.ceil(corners.max(axis=0)).astype(int) + 1
@@ -153,7 +137,7 @@ class FrameTracker:
         known = (lambda pixels: self._radii(self.plane.points(pixels))) if sized else None
         return detect_discs(image, self._scene.colour, limits, self._scene.method, window, known)
 
-    def _named(self, detections: DiscDetections, fields: FloatArray) -> IntArray:
+    def _associated(self, detections: DiscDetections, fields: FloatArray) -> IntArray:
         """The number of its disc for every marker, shape (m,); -1 if it has none."""
         ratio = detections.contrasts / self._contrast
         alike = np.nonzero(~((ratio < 1 / SAME_CONTRAST) | (ratio > SAME_CONTRAST)))[0]  # nan is not known
@@ -161,27 +145,28 @@ class FrameTracker:
         return np.where(names >= 0, np.append(alike, -1)[names], -1)
 
     def _radii(self, places: FloatArray) -> FloatArray:
-        """Of the pictures of markers, shape (m,), pixels."""
+        """Radii of markers in the image, shape (m,), pixels."""
         return self._size * self._scene.design.marker_radius * self.plane.scales(places)
 
-    def _sighting(self, detections: DiscDetections, names: IntArray, image: Image) -> FrameDetections:
-        """Put in order what was found, and remember it."""
+    def _accepted(self, detections: DiscDetections, names: IntArray, image: Image) -> FrameDetections:
+        """Order the discs by marker and keep the state for the next frame."""
         markers = detections.numbered(names)
         self._missing = int((names < 0).sum())
-        self._step = self._moved(markers)
+        self._step = self._steps_of(markers)
         self._places = self._places + self._step
         places = self._places
-        return FrameDetections(markers, self._fixed(image), places, self.plane.pixels(places))
+        return FrameDetections(markers, self._detected_fiducials(image), places, self.plane.pixels(places))
 
-    def _fixed(self, image: Image) -> DiscDetections:
-        """The fiducials, if it is their turn."""
+    def _detected_fiducials(self, image: Image) -> DiscDetections:
+        """The fiducials, shape (f, ...), nan where one was not detected or not searched for."""
         self._number += 1
-        numbers, old = self._fiducials
-        discs = np.full(len(self._scene.workspace.fiducials), -1)
+        old, known = self._fiducials, np.isfinite(self._fiducials.radii)
+        discs = np.full(len(known), -1)
         if (self._number - 1) % self._period:
             return old.numbered(discs)
+        old = old.where(known)
         found = detect_discs_near(image, DARK, old.centres, old.radii, self._scene.method)
         if len(found.radii):
             away = np.linalg.norm(old.centres[:, None] - found.centres, axis=2)
-            discs[numbers] = np.where(away.min(axis=1) < old.radii, away.argmin(axis=1), -1)
+            discs[known] = np.where(away.min(axis=1) < old.radii, away.argmin(axis=1), -1)
         return found.numbered(discs)

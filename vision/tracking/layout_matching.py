@@ -1,8 +1,8 @@
-"""The plane without fiducials: the scale, turn and shift that put the design's markers on discs in the image.
+"""Identification of the markers in an image without fiducials, by the design's marker layout.
 
-Two discs that are taken for two markers suggest a similarity; the one under which most markers meet a disc of
-their size is taken. A row of markers looks the same from both ends, and then the one is taken in which x
-runs to the right in the image; how the finger moves then tells. Units: pixels, mm.
+Two discs and two markers define a similarity (scale, rotation, shift); the one that maps most markers to a
+disc of their size is taken. For a row of markers, which looks the same from both ends, x runs to the right
+in the image until the motion of the finger shows its direction. Units: pixels, mm.
 """
 
 from itertools import combinations
@@ -13,20 +13,20 @@ from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
 
 GATE = 0.15
-"""How far from its marker a disc may be, over the least distance of two markers."""
+"""Largest distance of a disc from its marker, over the smallest distance of two markers."""
 SAME_SIZE = 1.4
-"""Ratio of the radii of a disc and of a marker."""
+"""Largest ratio of the radii of a disc and of a marker."""
 BETTER = 1.5
-"""Markers, above those that a similarity in which x runs to the right explains."""
+"""Bonus, in markers, of a similarity in which x runs to the right."""
 
 
 def match_layout(pixels: FloatArray, radii: FloatArray, markers: FloatArray, diameter: float) -> IntArray:
-    """The number of its disc for every marker, shape (m,); -1 where none was found.
+    """Find the number of its disc for every marker, shape (m,); -1 where none was found.
 
     Args:
         pixels: Centres of discs, shape (n, 2).
         radii: Of the discs, shape (n,).
-        markers: Where the design has them, shape (m, 2), mm.
+        markers: Their positions in the design, shape (m, 2), mm.
         diameter: Of a marker, mm.
 
     Raises:
@@ -59,6 +59,6 @@ def match_layout(pixels: FloatArray, radii: FloatArray, markers: FloatArray, dia
 
 
 def has_half_turn_symmetry(markers: FloatArray) -> bool:
-    """Whether the markers, shape (m, 2), look the same from both ends."""
+    """Whether a half turn maps the markers, shape (m, 2), to themselves."""
     middle = markers.mean(axis=0)
     return bool(np.allclose(2 * middle - markers[::-1], markers))

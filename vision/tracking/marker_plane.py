@@ -1,9 +1,9 @@
-"""From pixels to the markers' plane and back, with what is known about the errors.
+"""Maps from pixels to the markers' plane and back, with covariances.
 
-A plane is seen through a few parameters: pose and intrinsics of a calibrated camera, the eight of a
-homography, or the four of a similarity. The measured fiducials determine them, and their errors move all
-markers alike: in a displacement most of that cancels, because both of its ends go through the same
-parameters. All is linear propagation of covariances by the implicit function theorem (R. Hartley,
+A plane's projection has a few parameters: pose and intrinsics of a calibrated camera, the eight of a
+homography, or the four of a similarity. They are fitted to the fiducials, and their errors shift all markers
+alike: in a displacement most of that cancels, because both of its ends go through the same parameters.
+Covariances come from linear propagation of covariances by the implicit function theorem (R. Hartley,
 A. Zisserman, "Multiple View Geometry", 2nd ed., 2003, chapter 5). Units: pixels, mm.
 """
 
@@ -17,7 +17,7 @@ from geometry.arrays import FloatArray
 from vision.calibration.camera import Camera, Pose
 
 CORNERS = 24
-"""Of the polygon that stands for a circle."""
+"""Of the polygon that approximates a circle."""
 
 
 class Jacobians(NamedTuple):
@@ -28,10 +28,10 @@ class Jacobians(NamedTuple):
 
 
 class PlaneProjection(Protocol):
-    """How a plane is seen; `parameters` has shape (k,)."""
+    """Projection of a plane to pixels; `parameters` has shape (k,)."""
 
     def pixels(self, points: FloatArray, parameters: FloatArray) -> FloatArray:
-        """Where points of the plane, shape (n, 2), mm, are seen; shape (n, 2), pixels."""
+        """Project points of the plane, shape (n, 2), mm, to pixels, shape (n, 2)."""
         ...
 
     def points(self, pixels: FloatArray, parameters: FloatArray) -> FloatArray:
@@ -45,13 +45,13 @@ class PlaneProjection(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class MarkerPlane:
-    """A plane in space whose image is known.
+    """The markers' plane and its projection to pixels.
 
     Attributes:
         view: How it is seen.
         parameters: Shape (k,).
         covariance: Of the parameters, shape (k, k).
-        residual: Root mean square distance of the fiducials from where they should be, mm.
+        residual: Root mean square residual of the fiducials, mm.
     """
 
     projection: PlaneProjection
@@ -60,22 +60,26 @@ class MarkerPlane:
     residual: float
 
     def points(self, pixels: FloatArray) -> FloatArray:
-        """Where in the plane pixels lie; shapes (n, 2), mm."""
+        """Points of the plane at pixels; shapes (n, 2), mm."""
         return self.projection.points(pixels, self.parameters)
 
     def pixels(self, points: FloatArray) -> FloatArray:
-        """Where points of the plane are seen; shapes (n, 2), pixels."""
+        """Project points of the plane; shapes (n, 2), pixels."""
         return self.projection.pixels(points, self.parameters)
 
     def circles(self, pixels: FloatArray, radius: float) -> FloatArray:
-        """Centres of circles in the plane from the middles of their pictures, shapes (n, 2), mm."""
-        return self.points(pixels - self.beside(self.points(pixels), radius))
+        """Centres of circles in the plane, shape (..., 2), mm, from those of their images; nan stays nan."""
+        flat = pixels.reshape(-1, 2)
+        known = np.isfinite(flat).all(axis=1)
+        seen, centres = flat[known], np.full_like(flat, np.nan)
+        centres[known] = self.points(seen - self.beside(self.points(seen), radius))
+        return centres.reshape(pixels.shape)
 
     def beside(self, centres: FloatArray, radius: float) -> FloatArray:
-        """From the pictures of circles' centres to the middles of their pictures, shape (n, 2), pixels.
+        """Offsets of the images of circles from the images of their centres, shape (n, 2), pixels.
 
-        Perspective and lens bend the map from the plane, so that they are not the same. The middle is the
-        centroid of the area, as it is the centre of an ellipse.
+        They differ by perspective and lens. The place of an image is the centroid of its area, as for an
+        ellipse its centre.
         """
         angles = 2 * np.pi * np.arange(CORNERS) / CORNERS
         reach = radius * np.sqrt(angles[1] / np.sin(angles[1]))  # the polygon has the circle's area

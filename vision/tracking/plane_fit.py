@@ -1,4 +1,4 @@
-"""The markers' plane from fiducials: weighted least squares of what it is seen through."""
+"""Weighted least-squares fits of the markers' plane to fiducials."""
 
 from contextlib import suppress
 
@@ -30,12 +30,12 @@ def camera_plane(
     *,
     height: float = 0.0,
 ) -> MarkerPlane:
-    """The plane z = `height` from fiducials in the plane z = 0, seen by a calibrated camera.
+    """Fit the plane z = `height` to fiducials in the plane z = 0, with a calibrated camera.
 
     Args:
-        camera: With covariance, if its errors are to count.
+        camera: With a covariance to propagate, or none.
         points: Fiducials, shape (n, 2), mm.
-        pixels: Where they are seen, shape (n, 2), pixels.
+        pixels: The same in the image, shape (n, 2), pixels.
         covariances: Of the pixels, shape (n, 2, 2), pixels².
         height: Of the plane, mm.
     """
@@ -51,11 +51,11 @@ def camera_plane(
             fits.append(_refined(projection, np.ravel(start), points, pixels, covariances))
     if not fits:
         raise UserError(f"{UNDETERMINED}; give the design or workspace, and the camera, of the video")
-    # A plane that is seen obliquely looks almost like another one; the better of both is kept.
+    # An oblique plane has two similar poses; keep the better one.
     pose, squares = min(fits, key=lambda fit: fit[1])
     jacobians = projection.jacobians(points, pose).parameters.reshape(2 * len(points), -1)
     gain, inverse = _gain(jacobians[:, :6], covariances)
-    # A wrong lens is partly made up for by the pose that is fitted through it.
+    # The fitted pose compensates errors of the intrinsics in part.
     follow = np.concatenate([-gain @ jacobians[:, 6:], np.eye(jacobians.shape[1] - 6)])
     covariance = follow @ (camera.covariance or np.zeros((len(camera.intrinsic_names),) * 2)) @ follow.T
     covariance[:6, :6] += inverse * max(1.0, squares / (2 * len(points) - 6))
@@ -66,41 +66,37 @@ def camera_plane(
 
 
 def homography_plane(points: FloatArray, pixels: FloatArray, covariances: FloatArray) -> MarkerPlane:
-    """The plane of the fiducials without a camera; arguments as of `camera_plane`."""
+    """Fit a homography, without a camera; arguments as of `camera_plane`."""
     start = cv2.findHomography(points, pixels, 0)[0]
-    return _flat_plane(HomographyProjection(), (start / start[2, 2]).ravel()[:8], points, pixels, covariances)
+    start = (start / start[2, 2]).ravel()[:8]
+    return _plane_without_lens(HomographyProjection(), start, points, pixels, covariances)
 
 
 def similarity_plane(points: FloatArray, pixels: FloatArray, covariances: FloatArray) -> MarkerPlane:
-    """The plane whose scale, turn and shift put points at pixels; arguments as of `camera_plane`."""
-    return _flat_plane(SimilarityProjection(), np.array([1.0, 0.0, 0.0, 0.0]), points, pixels, covariances)
+    """Fit a scale, rotation and shift; arguments as of `camera_plane`."""
+    start = np.array([1.0, 0.0, 0.0, 0.0])
+    return _plane_without_lens(SimilarityProjection(), start, points, pixels, covariances)
 
 
-def _flat_plane(
-    projection: PlaneProjection,
-    start: FloatArray,
-    points: FloatArray,
-    pixels: FloatArray,
-    covariances: FloatArray,
+def _plane_without_lens(
+    projection: PlaneProjection, start: FloatArray, points: FloatArray, *measured: FloatArray
 ) -> MarkerPlane:
-    """The fit of a view that knows no lens; what that leaves is no noise, so it does not shrink in a mean."""
-    parameters, squares = _refined(projection, start, points, pixels, covariances)
+    """Fit a projection without a lens; the misfit is no noise, which a mean over fiducials would reduce."""
+    parameters, squares = _refined(projection, start, points, *measured)
     jacobians = projection.jacobians(points, parameters).parameters.reshape(2 * len(points), -1)
     excess = max(0.0, squares / max(2 * len(points) - len(parameters), 1) - 1)
-    residual = _rms(projection.points(pixels, parameters) - points)
+    pixels, covariances = measured
+    covariance = _gain(jacobians, covariances)[1] * (1 + len(points) * excess)
     return MarkerPlane(
-        projection, parameters, _gain(jacobians, covariances)[1] * (1 + len(points) * excess), residual
+        projection, parameters, covariance, _rms(projection.points(pixels, parameters) - points)
     )
 
 
 def _refined(
-    projection: PlaneProjection,
-    parameters: FloatArray,
-    points: FloatArray,
-    pixels: FloatArray,
-    covariances: FloatArray,
+    projection: PlaneProjection, parameters: FloatArray, points: FloatArray, *measured: FloatArray
 ) -> tuple[FloatArray, float]:
-    """Least squares by Gauss and Newton: the parameters and the sum of weighted squares."""
+    """Gauss-Newton least squares: the parameters and the sum of weighted squares."""
+    pixels, covariances = measured
     known = np.linalg.inv(np.linalg.cholesky(covariances))
     count = len(parameters)
     for _ in range(STEPS):
@@ -117,7 +113,7 @@ def _refined(
 
 
 def _gain(jacobians: FloatArray, covariances: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """How parameters follow measurements in weighted least squares, and the parameters' covariance."""
+    """Derivatives of the fitted parameters by the measurements, and the parameters' covariance."""
     blocks = jacobians.reshape(-1, 2, jacobians.shape[1])
     weighted = np.linalg.solve(covariances, blocks).reshape(jacobians.shape)
     inverse = np.linalg.inv(jacobians.T @ weighted)

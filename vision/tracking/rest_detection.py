@@ -1,4 +1,4 @@
-"""When the finger rests: the frames before it is pressed and those after it has come to rest again."""
+"""Detection of the frames at rest: before the finger is pressed, and while it is held."""
 
 from typing import NamedTuple
 
@@ -8,11 +8,11 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 
 STILL = 0.02
-"""Root mean square distance from the first frames that is no motion yet, mm, ..."""
+"""Root mean square distance from the first frames, mm, that counts as rest, ..."""
 NOISE_FACTOR = 3.5
-"""... or so many standard deviations of the noise, whichever is more."""
+"""... or this multiple of the noise's standard deviation, whichever is more."""
 FEWEST = 3
-"""Frames that are a rest; fewer if there are only a few pictures."""
+"""Smallest number of frames at rest; fewer if there are only a few pictures."""
 
 
 class RestIntervals(NamedTuple):
@@ -23,10 +23,10 @@ class RestIntervals(NamedTuple):
 
 
 def find_rest_intervals(positions: FloatArray, noise: float = 0.0) -> RestIntervals:
-    """Find when the finger rests.
+    """Find the frames at rest.
 
     Args:
-        positions: Of markers in every frame, shape (f, m, 2), mm; nan where one was not seen.
+        positions: Of markers in every frame, shape (f, m, 2), mm; nan where one was not detected.
         noise: Standard deviation of a coordinate that is known beforehand, mm.
 
     Raises:
@@ -56,7 +56,7 @@ def find_rest_intervals(positions: FloatArray, noise: float = 0.0) -> RestInterv
 
 
 def _resting(positions: FloatArray, fewest: int, limit: float) -> int:
-    """Number of frames from the first that stay near where the first few are; a single stray one may not."""
+    """Number of first frames that stay near the first few; a single outlier is tolerated."""
     reference = _centre(positions[:fewest])
     away = np.array([not _distance(frame, reference) <= limit for frame in positions])
     left = away[:-1] & away[1:]
@@ -73,7 +73,7 @@ def _noise(positions: FloatArray) -> float:
 
 
 def _centre(positions: FloatArray) -> FloatArray:
-    """The median of the frames in which a marker was seen, shape (m, 2), mm; nan if it never was."""
+    """Median of the frames in which a marker was detected, shape (m, 2), mm; nan if there is none."""
     seen = np.isfinite(positions).any(axis=0)
     centre = np.full(positions.shape[1:], np.nan)
     centre[seen] = np.nanmedian(positions[:, seen], axis=0)
@@ -81,7 +81,7 @@ def _centre(positions: FloatArray) -> FloatArray:
 
 
 def _distance(positions: FloatArray, reference: FloatArray) -> float:
-    """Root mean square over the coordinates of what is known in both, mm; nan if nothing is."""
+    """Root mean square over the coordinates that are known in both, mm; nan if there are none."""
     missed = positions - reference
     known = missed[np.isfinite(missed)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan

@@ -1,11 +1,10 @@
-"""What is filmed, and how: the finger, the fiducials around it, the camera, the colour of the markers."""
+"""The filmed scene: the finger, the fiducials around it, the camera, the colour of the markers."""
 
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray, IntArray
+from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import Parameters
@@ -13,46 +12,35 @@ from vision.calibration.camera import Camera
 from vision.discs.colour import DARK, Colour
 from vision.discs.disc_detector import DetectionMethod, DiscDetections, detect_discs
 from vision.frames.frame import Image
-from vision.tracking.fiducial_matching import identify_fiducials
+from vision.tracking.fiducial_matching import UnseenError, identify_fiducials
 from vision.tracking.layout_matching import match_layout
-from vision.tracking.marker_plane import CameraProjection, MarkerPlane
+from vision.tracking.marker_plane import MarkerPlane
 from vision.tracking.plane_fit import camera_plane, homography_plane, similarity_plane
 from vision.tracking.workspace import Workspace
 
 SMALLEST_VIEW = 0.25
-"""Least share of the image's diagonal that the fiducials span."""
+"""Smallest share of the image's diagonal that the fiducials span."""
 ASTRAY = 0.5
-"""Distance from its place beyond which a fiducial is left out while enough others remain, mm."""
+"""Residual beyond which a fiducial is left out while enough others remain, mm."""
 FEWEST = 5
-"""Fiducials that are enough."""
+"""Number of fiducials that is enough."""
 LARGEST_RESIDUAL = 0.5
-"""Root mean square distance of the fiducials from their places that is accepted with a camera, mm, ..."""
+"""Largest root mean square residual of the fiducials that is accepted with a camera, mm, ..."""
 LARGEST_WITHOUT_CAMERA = 3.0
 """... and without one, where the lens shows in it."""
 
 
-class FoundFiducials(NamedTuple):
-    """The fiducials that were found: their numbers, shape (k,), and their discs."""
-
-    numbers: IntArray
-    detections: DiscDetections
-
-    def where(self, kept: BoolArray) -> "FoundFiducials":
-        """Some of them."""
-        return FoundFiducials(self.numbers[kept], self.detections.where(kept))
-
-
 @dataclass(frozen=True)
 class FilmedScene:
-    """What is filmed and how it is measured.
+    """The finger, the fiducials and the camera, and how the markers are measured.
 
     Attributes:
         design: The finger.
         workspace: The fiducials around it.
         camera: The calibrated camera; None if it is not known.
         colour: Of the markers; the fiducials are dark.
-        alone: Whether the markers alone may give the plane if the fiducials cannot be made out.
         method: "precise", or "hough" for the paper's pipeline, whose map from pixels to mm is linear.
+        markers_only: Whether the markers alone may give the plane if the fiducials cannot be identified.
     """
 
     design: Parameters
@@ -62,81 +50,84 @@ class FilmedScene:
     method: DetectionMethod = "precise"
     markers_only: bool = False
 
-    def plane(self, fiducials: FoundFiducials) -> MarkerPlane:
-        """The markers' plane from fiducials, as exact as the method and what is known allow."""
-        points = self.workspace.points[fiducials.numbers]
-        centres, covariances = fiducials.detections[:2]
+    def plane(self, fiducials: DiscDetections) -> MarkerPlane:
+        """The markers' plane from the fiducials, shape (f, ...), nan where one was not detected."""
+        seen = np.isfinite(fiducials.radii)
+        points, centres, covariances = self.workspace.points[seen], *fiducials.where(seen)[:2]
         if self.method == "hough":
             return similarity_plane(points, centres, covariances)
         radius = self.workspace.fiducial_diameter / 2
-        plane = self._plane(points, centres, covariances)
-        plane = self._plane(points, centres - plane.beside(points, radius), covariances)
-        if not isinstance(plane.projection, CameraProjection):
-            return plane
-        return replace(plane, projection=replace(plane.projection, height=self.workspace.marker_plane))
+        plane = self._fiducial_plane(points, centres, covariances)
+        centres = centres - plane.beside(points, radius)
+        return self._fiducial_plane(points, centres, covariances, height=self.workspace.marker_plane)
 
-    def plane_from_markers(self, centres: FloatArray, covariances: FloatArray) -> MarkerPlane:
-        """The plane without fiducials, from the markers at rest, (m, 2), pixels; nan for hidden ones."""
-        seen = np.isfinite(centres).all(axis=1)
-        return similarity_plane(marker_positions(self.design)[seen], centres[seen], covariances[seen])
+    def plane_from_markers(self, markers: DiscDetections) -> MarkerPlane:
+        """The plane without fiducials, from the markers at rest, shape (m, ...), nan for hidden ones."""
+        seen = np.isfinite(markers.radii)
+        return similarity_plane(marker_positions(self.design)[seen], *markers.where(seen)[:2])
 
-    def find_plane_from_markers(self, image: Image) -> MarkerPlane:
-        """The plane without fiducials, from the markers in the first frame.
+    def first_plane(self, image: Image) -> tuple[MarkerPlane, DiscDetections]:
+        """The markers' plane in the first frame, and the fiducials, all nan if the markers gave it.
 
         Raises:
-            UserError: If they cannot be made out.
+            UserError: If it cannot be determined.
         """
-        markers, diameter = marker_positions(self.design), self.design.marker_diameter
-        largest = float(np.linalg.norm(image.shape[:2])) / self.design.height * diameter / 2
-        detections = detect_discs(
-            image, self.colour, (max(SMALLEST_VIEW * largest, 3.0), largest), self.method
+        try:
+            fiducials = self.find_fiducials(image)
+            return self.plane(fiducials), fiducials
+        except UnseenError:
+            if not self.markers_only:
+                raise
+        design = self.design
+        detections = self._discs(image, self.colour, design.height, design.marker_diameter)
+        numbers = match_layout(
+            detections.centres, detections.radii, marker_positions(design), design.marker_diameter
         )
-        discs = detections.numbered(match_layout(detections.centres, detections.radii, markers, diameter))
-        return self.plane_from_markers(discs.centres, discs.covariances)
+        absent = np.full(len(self.workspace.fiducials), -1)
+        return self.plane_from_markers(detections.numbered(numbers)), detections.numbered(absent)
 
-    def find_fiducials(self, image: Image) -> FoundFiducials:
-        """Find the fiducials in an image.
+    def find_fiducials(self, image: Image) -> DiscDetections:
+        """Detect the fiducials in an image, shape (f, ...); nan for those that are not found.
 
         Raises:
             UserError: If they are not there, or mirrored, or not where the workspace has them.
         """
-        extent = np.linalg.norm(np.ptp(self.workspace.points, axis=0)) + self.workspace.fiducial_diameter
-        largest = float(np.linalg.norm(image.shape[:2]) / extent * self.workspace.fiducial_diameter / 2)
-        detections = detect_discs(image, DARK, (max(SMALLEST_VIEW * largest, 3.0), largest), self.method)
+        diameter = self.workspace.fiducial_diameter
+        extent = float(np.linalg.norm(np.ptp(self.workspace.points, axis=0))) + diameter
+        detections = self._discs(image, DARK, extent, diameter)
         straight = detections.centres if self.camera is None else self.camera.undistort(detections.centres)
-        discs = identify_fiducials(straight, detections.radii, self.workspace)
-        numbers = np.nonzero(discs >= 0)[0]
-        found = FoundFiducials(numbers, DiscDetections(*(part[discs[numbers]] for part in detections)))
-        while len(found.numbers) > FEWEST:
-            missed = self._missed(found)
-            if missed.max() <= max(ASTRAY, 3 * float(np.median(missed))):
+        numbers = identify_fiducials(straight, detections.radii, self.workspace)
+        while True:
+            found = detections.numbered(numbers)
+            residuals = self._residuals(found)
+            astray = np.nanmax(residuals) > max(ASTRAY, 3 * float(np.nanmedian(residuals)))
+            if not astray or (numbers >= 0).sum() <= FEWEST:
                 break
-            found = found.where(np.arange(len(missed)) != missed.argmax())
+            numbers[np.nanargmax(residuals)] = -1
         limit = LARGEST_WITHOUT_CAMERA if self.camera is None else LARGEST_RESIDUAL
-        if (residual := float(np.sqrt(np.mean(self._missed(found) ** 2)))) > limit:
+        if (residual := float(np.sqrt(np.nanmean(residuals**2)))) > limit:
             raise UserError(
                 f"the fiducials lie {residual:.2f} mm from where the workspace has them, more than {limit:g} "
                 "mm; give the workspace and the camera of the video"
             )
         return found
 
-    def _missed(self, fiducials: FoundFiducials) -> FloatArray:
-        """How far fiducials are from their places, shape (k,), mm."""
-        points = self.workspace.points[fiducials.numbers]
-        plane = self._plane(points, *fiducials.detections[:2])
-        return np.asarray(np.linalg.norm(plane.points(fiducials.detections.centres) - points, axis=1))
+    def _discs(self, image: Image, colour: Colour, extent: float, diameter: float) -> DiscDetections:
+        """Discs of a diameter, of which some span an extent that fills most of the image; both in mm."""
+        largest = float(np.linalg.norm(image.shape[:2])) / extent * diameter / 2
+        return detect_discs(image, colour, (max(SMALLEST_VIEW * largest, 3.0), largest), self.method)
 
-    def _plane(self, points: FloatArray, centres: FloatArray, covariances: FloatArray) -> MarkerPlane:
-        """The plane of the fiducials themselves."""
+    def _residuals(self, fiducials: DiscDetections) -> FloatArray:
+        """Distances of the fiducials from their places, shape (f,), mm; nan where one was not detected."""
+        seen, points = np.isfinite(fiducials.radii), self.workspace.points
+        centres, covariances = fiducials.where(seen)[:2]
+        plane = self._fiducial_plane(points[seen], centres, covariances)
+        residuals = np.full(len(points), np.nan)
+        residuals[seen] = np.linalg.norm(plane.points(centres) - points[seen], axis=1)
+        return residuals
+
+    def _fiducial_plane(self, *fiducials: FloatArray, height: float = 0.0) -> MarkerPlane:
+        """The plane at a height, mm, above that of fiducials: their points, pixels and covariances."""
         if self.camera is None:
-            return homography_plane(points, centres, covariances)
-        return camera_plane(self.camera, points, centres, covariances)
-
-
-def check_size(camera: Camera | None, size: tuple[int, int], name: str) -> None:
-    """Refuse frames of another size than the camera's."""
-    if camera is not None and (camera.width, camera.height) != size:
-        raise UserError(
-            f"{name} has {size[0]}x{size[1]} pixels, but the camera was calibrated with "
-            f"{camera.width}x{camera.height}; calibrate it at the size of the video"
-        )
+            return homography_plane(*fiducials)
+        return camera_plane(self.camera, *fiducials, height=height)

@@ -1,10 +1,12 @@
-"""The plane that is photographed: fiducials around the finger, whose places in its frame are known.
+"""Workspaces: layouts of fiducials around the finger, at known places in its frame, and their JSON files.
 
-The fiducials are dark discs, printed or drilled, that do not move with the finger. Their layout looks like no
-turned or mirrored copy of itself, so that each is known by its place even where some are hidden. Units: mm.
+The fiducials are dark discs, printed or drilled, that do not move with the finger. Their layout must have no
+symmetry of rotation or reflection, so that their places identify them even if some are hidden. Units: mm.
 """
 
+import json
 from itertools import product
+from pathlib import Path
 from typing import Self
 
 import numpy as np
@@ -15,17 +17,17 @@ from geometry.errors import UserError
 from geometry.finger.parameters import Parameters
 
 MARGIN = 12.0
-"""Between the finger's bounding box, before loading, and the lines of the fiducials."""
+"""Distance of the fiducials from the finger's bounding box before loading."""
 
 Point = tuple[float, float]
 
 
 class Workspace(BaseModel):
-    """What surrounds the finger in the image, in the finger's frame: x to the tip, y out of the front face.
+    """Fiducials around the finger, in the finger's frame: x to the tip, y out of the front face.
 
     Attributes:
         fiducials: Centres of the fiducials, in the plane z = 0.
-        fiducial_diameter: Of every fiducial.
+        fiducial_diameter: Diameter of every fiducial.
         marker_plane: z of the markers' plane, positive toward the camera; 0 if the fiducials lie in it.
 
     Raises:
@@ -63,9 +65,28 @@ class Workspace(BaseModel):
 
 
 def default_workspace(parameters: Parameters) -> Workspace:
-    """Seven fiducials around a finger: four in front of it, which leave the indenter room, three behind."""
+    """Seven fiducials around a finger: four in front of it, with room for the indenter, three behind."""
     p = parameters
     left, right = -MARGIN, p.height + MARGIN
     front = product((left, 0.15 * p.height, 0.7 * p.height, right), (MARGIN,))
     back = product((left, 0.45 * p.height, right), (-p.base_width - MARGIN,))
     return Workspace(fiducials=(*front, *back))
+
+
+def load_workspace(path: Path) -> Workspace:
+    """Read a workspace from a JSON file with the fields of `Workspace`.
+
+    Raises:
+        UserError: If the file cannot be read or is no workspace.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not JSON"
+        raise UserError(f"cannot read the workspace {path}: {reason}") from None
+    if not isinstance(content, dict):
+        raise UserError(f"{path}: a workspace has fiducials, fiducial_diameter and marker_plane")
+    try:
+        return Workspace(**content)
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
