@@ -1,1 +1,4 @@
-"""The virtual rig: what a camera would have seen of a finger, with known truth. Units: mm, pixels."""
+"""The virtual rig: rendered films of a finger, with known truth. Units: mm, pixels.
+
+Imports `vision.frames`, `vision.calibration`, `vision.tracking` (the workspace).
+"""

@@ -21,7 +21,7 @@ PAINTS: dict[str, Paint] = {
     "green": (0.16, 0.48, 0.12),
     "blue": (0.60, 0.25, 0.08),
 }
-"""What markers can be painted with."""
+"""Paints of the markers."""
 
 BENCH: Paint = (0.60, 0.62, 0.61)
 FINGER: Paint = (0.80, 0.86, 0.88)
@@ -29,16 +29,16 @@ CLAMP: Paint = (0.40, 0.37, 0.35)
 INDENTER: Paint = (0.20, 0.42, 0.72)
 
 CLAMP_SIZE = (7.0, 3.0)
-"""Of the clamp: how far it reaches behind the base, and beyond its ends, mm."""
+"""Extent of the clamp behind the base, and beyond its ends, mm."""
 BLADE = ((0.0, 0.0), (0.033, 0.1), (0.033, 0.67))
-"""Half of the indenter: from the contact's end, and above it, as shares of the finger's height."""
+"""Corners of the right half of the indenter, from the end of the contact, over the finger's height."""
 OVERLAP = 0.3
-"""How far the indenter's foot goes on below the finger that hides it, so that no gap is seen, mm."""
+"""Overlap of the indenter with the finger, which hides it, so that no gap is visible, mm."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """What the camera looks at; the finger moves with the displacements that it is given.
+    """The finger, its fiducials, clamp and indenter; nodal displacements deform the finger.
 
     Attributes:
         mesh: Of the finger, whose nodes are moved.
@@ -53,12 +53,12 @@ class Bench:
     paint: str = "dark"
 
     def markers(self, displacement: FloatArray) -> FloatArray:
-        """Where the markers' centres are, shape (m, 3), mm, with the nodes displaced by shape (n, 2), mm."""
+        """Centres of the markers, shape (m, 3), mm, for nodal displacements, shape (n, 2), mm."""
         points = self.mesh.markers + _checked(displacement, self.mesh)[self.mesh.marker_nodes]
         return np.column_stack([points, np.full(len(points), self.workspace.marker_plane)])
 
     def discs(self, displacement: FloatArray) -> list[Shape]:
-        """The markers with the nodes displaced by shape (n, 2), mm; they are deformed with the finger."""
+        """The markers, deformed with the finger, for nodal displacements, shape (n, 2), mm."""
         where = self._marker_borders
         corners = _checked(displacement, self.mesh)[self.mesh.triangles[where.cells]]
         moved = where.points + np.einsum("nc,ncx->nx", where.barycentric, corners)
@@ -66,7 +66,7 @@ class Bench:
         return [Shape(closed(border), PAINTS[self.paint], self.workspace.marker_plane) for border in borders]
 
     def scene(self, displacement: FloatArray, occluders: Sequence[Shape] = ()) -> Scene:
-        """The scene with the nodes displaced by shape (n, 2), mm, and what else is before the camera."""
+        """The scene for nodal displacements, shape (n, 2), mm, with occluders in front."""
         moved = self.mesh.points + _checked(displacement, self.mesh)
         plane = self.workspace.marker_plane
         fiducials = [circle(point, self.workspace.fiducial_diameter / 2) for point in self.workspace.points]
@@ -85,7 +85,7 @@ class Bench:
         )
 
     def _indenter(self, moved: FloatArray) -> FloatArray:
-        """A blade that stands on the contact, shape (n, 2, 2)."""
+        """Edges of a blade on the contact, shape (n, 2, 2)."""
         foot = moved[np.unique(self.mesh.boundary("contact"))]
         middle, width = foot.mean(axis=0), np.ptp(foot[:, 0])
         blade = np.array(BLADE) * self.parameters.height

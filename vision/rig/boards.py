@@ -1,4 +1,4 @@
-"""Photographs of a calibration board in many poses."""
+"""Scenes and poses for photographs of a calibration board."""
 
 from collections.abc import Iterator
 
@@ -33,15 +33,15 @@ def board_scene(board: Board) -> Scene:
     black = places[places.sum(axis=1) % 2 == 0]
     squares = [rectangle(place * board.square, (place + 1) * board.square) for place in black]
     cells = _cells(board) if isinstance(board, CharucoBoard) else []
-    # All in one shape, in which cells that touch leave no seam.
+    # One shape, so that cells that touch leave no seam.
     ink = Shape(np.concatenate([*squares, *cells]), INK)
     return Scene(WALL, [Shape(rectangle(low, high), PAPER), ink])
 
 
 def board_poses(board: Board, camera: Camera, count: int, *, seed: int = 0) -> list[Pose]:
-    """Poses in which all of a board is seen, tilted in all directions; together they cover the image.
+    """Random poses that show the whole board, tilted in all directions; together they cover the image.
 
-    Each is the one of some drawn at random that shows most of what no pose before it has shown.
+    Each is the one of several candidates that covers most of the part of the image that is not covered yet.
 
     Raises:
         UserError: If the board never fits into the image.
@@ -65,7 +65,7 @@ def board_poses(board: Board, camera: Camera, count: int, *, seed: int = 0) -> l
 
 
 def _drawn(board: Board, camera: Camera, rng: np.random.Generator) -> Pose | None:
-    """A pose at random; None if part of the board would not be seen."""
+    """A random pose; None if part of the board is outside the image."""
     axis, tilt, turn = rng.uniform(0, 2 * np.pi), np.deg2rad(rng.uniform(*TILT)), rng.uniform(-0.3, 0.3)
     rotation = Rotation.from_rotvec([tilt * np.cos(axis), tilt * np.sin(axis), 0.0]) * Rotation.from_rotvec(
         [0.0, 0.0, turn]
@@ -82,14 +82,14 @@ def _drawn(board: Board, camera: Camera, rng: np.random.Generator) -> Pose | Non
 
 
 def _rim(board: Board, margin: float) -> FloatArray:
-    """The corners of the squares' rectangle, or of one that is larger by some squares, shape (4, 3), mm."""
+    """Corners of the squares' rectangle, enlarged by a margin in squares, shape (4, 3), mm."""
     low, high = -(1 + margin), np.array([board.columns, board.rows]) + margin
     x, y = np.array([low, high[0], high[0], low]), np.array([low, low, high[1], high[1]])
     return np.asarray(board.square * np.stack([x, y, np.zeros(4)], axis=1))
 
 
 def _inside(corners: FloatArray, points: FloatArray) -> BoolArray:
-    """Which points, shape (n, 2), lie in a convex polygon."""
+    """Mask of the points, shape (n, 2), in a convex polygon."""
     side = np.roll(corners, -1, axis=0) - corners
     to = points[:, None] - corners
     turn = side[:, 0] * to[:, :, 1] - side[:, 1] * to[:, :, 0]

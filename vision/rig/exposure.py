@@ -1,8 +1,8 @@
 """Exposure of a picture: light, lens and sensor.
 
-Noise of the sensor: the electrons that a pixel counts have a variance equal to their number (EMVA Standard
-1288, release 4.0, section 2), here as normal numbers, which above some ten electrons they are; the read noise
-has the same variance everywhere. Units: pixels, grey levels of 0 to 255.
+Noise of the sensor: the number of electrons of a pixel has a variance equal to its mean (EMVA Standard 1288,
+release 4.0, section 2), here normally distributed, as it is above some ten electrons; the read noise has the
+same variance everywhere. Units: pixels, grey levels of 0 to 255.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ LUMA = (0.114, 0.587, 0.299)
 """Weights of blue, green and red (ITU-R BT.601)."""
 
 Light = NDArray[np.float32]
-"""Shares of the light that reach the pixels, shape (height, width, 3)."""
+"""Light on the pixels, as shares of white, shape (height, width, 3)."""
 
 
 class Exposure(CheckedModel):
@@ -40,7 +40,7 @@ class Exposure(CheckedModel):
     monochrome: bool = Field(default=False, description="A camera without colours")
 
     def develop(self, light: Light, rng: np.random.Generator) -> Image:
-        """The picture that light makes, shape (height, width, 3), or (height, width) if monochrome."""
+        """The image from light on the pixels, shape (height, width, 3), or (height, width) if monochrome."""
         grey = self.white * self._lamp(light.shape[1::-1])[:, :, None] * light
         if self.monochrome:
             grey = grey @ np.array(LUMA, dtype=np.float32)
@@ -50,7 +50,7 @@ class Exposure(CheckedModel):
         return np.asarray(np.clip(np.rint(grey), 0, 255), dtype=np.uint8)
 
     def _lamp(self, size: tuple[int, ...]) -> Light:
-        """The light on a picture of this width and height, relative to its middle, shape (height, width)."""
+        """Illumination relative to that in the middle of the image, shape (height, width)."""
         width, height = size
         angle = np.deg2rad(self.gradient_direction)
         x = (np.arange(width) - (width - 1) / 2) * np.cos(angle)

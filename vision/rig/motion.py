@@ -1,4 +1,4 @@
-"""How the finger is moved while it is filmed: it rests, it is pressed, it is held."""
+"""Motion of the finger in a film: at rest, pressed, held."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -42,10 +42,10 @@ class Motion(CheckedModel):
         return np.asarray(np.clip((np.asarray(time) - start) / (self.rest + self.moving - start), 0.0, 1.0))
 
     def exposed(self, frame: int, steps: int) -> FloatArray:
-        """Shares of the load in the middles of so many parts of a frame's exposure; one if they are equal."""
+        """Shares of the load at `steps` times within a frame's exposure; one share if they are equal."""
         parts = (np.arange(steps) + 0.5) / steps
         return np.unique(self.load(frame + self.shutter * parts))
 
     def travel(self, frame: int) -> float:
-        """By how much the share of the load grows during a frame's exposure."""
+        """Growth of the share of the load during a frame's exposure."""
         return float(np.ptp(self.load(frame + np.array([0.0, self.shutter]))))

@@ -1,4 +1,4 @@
-"""Things that come between the camera and the finger."""
+"""Cables between the camera and the finger."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
@@ -17,7 +17,7 @@ from vision.rig.shapes import Paint, Shape, area, closed, seen_edges
 CABLES: dict[str, Paint] = {"dark": (0.10, 0.10, 0.11), "light": (0.52, 0.50, 0.50)}
 """Paints of cables: one like dark markers, and one unlike."""
 REACH = 75.0
-"""Half of the length of a cable, mm."""
+"""Half the length of a cable, mm."""
 
 
 def cable(
@@ -35,7 +35,7 @@ def cable(
     Args:
         point: Centre of the disc, shape (2,), mm.
         radius: Of the disc, mm.
-        share: 0 if the cable touches it, 1 if it hides it all; the wider part of the cable lies beyond.
+        share: 0 if the cable touches the disc, 1 if it hides it.
         angle: Of the cable with the x axis, degrees.
         width: Of the cable, mm.
         z: Of the cable's plane, mm.
@@ -58,7 +58,7 @@ def cables(
     *,
     paint: str = "dark",
 ) -> Callable[[int], Sequence[Shape]]:
-    """Cables that hide the same shares of some markers' diameters in every frame of a part of a recording.
+    """Cables that follow markers and hide shares of their diameters during a part of a recording.
 
     Args:
         bench: With the markers, from 1 on.
@@ -69,7 +69,7 @@ def cables(
         paint: One of `CABLES`.
 
     Returns:
-        What is before the finger in a frame.
+        The occluders in a frame.
 
     Raises:
         UserError: If there is no such marker, or a share is not between 0 and 1.
@@ -97,7 +97,7 @@ def cables(
 
 
 def share_seen(shape: Shape, occluders: Sequence[Shape], camera: Camera, pose: Pose) -> float:
-    """Share of a shape's picture that lies in the image and that the occluders leave, to a hundredth."""
+    """Share of a shape's image that is visible: inside the frame and not occluded, to a hundredth."""
     size = (camera.width, camera.height)
     edges = seen_edges(shape, camera, pose) + 0.5
     whole = abs(area(edges))

@@ -1,8 +1,8 @@
-"""How much of every pixel a polygon covers, exactly.
+"""Exact share of every pixel that a polygon covers.
 
-An edge that rises by dy within a pixel adds dy to the coverage of all that lies right of it in that row, and
-to its own pixel the part of dy that lies right of it; summing along the rows gives the area. Rasterisers of
-fonts work so: R. Levien, "Inside the fastest font renderer in the world", 2016. Nothing is sampled.
+An edge that rises by dy within a pixel adds dy to the coverage of the pixels to its right in that row, and to
+its own pixel the part of dy to its right; cumulative sums along the rows give the area, without sampling.
+Source: R. Levien, "Inside the fastest font renderer in the world", 2016.
 """
 
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""A recording of the finger: its frames, one after another, each with the truth about it."""
+"""A recording of the finger: its frames, each with its truth."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -20,21 +20,20 @@ from vision.rig.render import mean_light, noise_of
 from vision.rig.shapes import Shape, centroid
 
 STEP = 1.0
-"""How far the finger moves at most between two pictures whose mean is one with motion blur, pixels: a pixel's
-own width hides such steps."""
+"""Longest step between the instants whose mean is an image with motion blur, pixels."""
 MOST_STEPS = 32
 
 
 class FrameTruth(NamedTuple):
-    """What is known of a frame.
+    """Truth about a frame.
 
     Attributes:
-        load: Share of the load, the mean while the shutter is open.
-        world: The markers' centres, the mean while the shutter is open, shape (m, 3), mm.
-        pixels: Their pictures, shape (m, 2).
-        discs: The middles of the deformed discs, shape (m, 2), mm: in a finger that bends they are not where
-            the centres are, and it is discs that a camera sees.
-        seen: Share of every marker's picture that nothing hides, shape (m,).
+        load: Mean share of the load while the shutter is open.
+        world: Mean of the markers' centres while the shutter is open, shape (m, 3), mm.
+        pixels: The same in the image, shape (m, 2).
+        discs: Centroids of the deformed discs, shape (m, 2), mm, which a camera sees; they differ from the
+            centres in a finger that bends.
+        seen: Visible share of every marker's image, shape (m,).
     """
 
     load: float
@@ -51,13 +50,13 @@ def nothing(frame: int) -> Sequence[Shape]:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """How a finger is filmed; `frames` gives the film.
+    """Settings of a film; `frames` renders it.
 
     Attributes:
         bench: The finger and what is around it.
         displacement: Of the mesh's nodes under the whole load, shape (n, 2), mm.
-        camera, pose, exposure, motion: How it is filmed, and how the load grows; displacements grow with it.
-        occluders: What is before the finger in a frame.
+        camera, pose, exposure, motion: Of the film; displacements are proportional to the load.
+        occluders: Shapes in front of the finger in a frame.
         seed: Of the noise.
     """
 
@@ -87,7 +86,7 @@ class Recording:
 
         Args:
             source: One sentence on where they come from.
-            discs: Whether of the middles of their discs, which are what a camera sees, or of their centres.
+            discs: Whether of the centroids of their discs, which a camera sees, or of their centres.
         """
         mesh = self.bench.mesh
         moved = self.displacement[mesh.marker_nodes]
@@ -104,25 +103,25 @@ class Recording:
         )
 
     def _middles(self, displacement: FloatArray) -> FloatArray:
-        """Middles of the markers' discs, shape (m, 2), mm."""
+        """Centroids of the markers' discs, shape (m, 2), mm."""
         return np.array([centroid(disc.edges) for disc in self.bench.discs(displacement)])
 
     def _state(self, number: int) -> tuple[tuple[float, ...], tuple[Shape, ...]]:
-        """The shares of the load in a frame's exposure, and what is before the finger."""
+        """Shares of the load in a frame's exposure, and the occluders."""
         pictures = np.ceil(self.motion.travel(number) * self._path / STEP)
         loads = self.motion.exposed(number, int(np.clip(pictures, 1, MOST_STEPS)))
         return tuple(loads.tolist()), tuple(self.occluders(number))
 
     @cached_property
     def _path(self) -> float:
-        """The longest way of a marker in the picture, pixels."""
+        """The longest displacement of a marker in the image, pixels."""
         start, end = (
             self.camera.project(self.bench.markers(load * self.displacement), self.pose) for load in (0, 1)
         )
         return float(np.linalg.norm(end - start, axis=1).max())
 
     def _seen(self, loads: Sequence[float], occluders: Sequence[Shape]) -> tuple[Light, FrameTruth]:
-        """The mean light of the states with these shares of the load, and their truth."""
+        """Mean light of the states with these shares of the load, and their truth."""
         states = [load * self.displacement for load in loads]
         scenes = [self.bench.scene(state, occluders) for state in states]
         light = mean_light(scenes, self.camera, self.pose, self.exposure.blur)

@@ -1,4 +1,4 @@
-"""A recording as files: the video, and everything that is needed to score who tracks it."""
+"""Files of a recording: the video, the truth, and the inputs of a tracker."""
 
 import csv
 from collections.abc import Callable, Iterator, Sequence
@@ -22,7 +22,7 @@ from vision.tracking.fiducial_sheet import workspace_svg
 
 PICTURES = "png"
 FILES = {codec.lower(): f"video{suffix}" for suffix, codec in CODECS.items()} | {PICTURES: "frames"}
-"""Where the frames are by the codec: a video, or a folder of pictures."""
+"""File or folder of the frames by codec."""
 TRUTH_COLUMNS = (
     *("frame", "time_s", "load", "marker"),
     *("x_mm", "y_mm", "z_mm", "x_px", "y_px", "x_disc_mm", "y_disc_mm", "seen"),
@@ -44,11 +44,11 @@ def record(
     `camera.json`, `workspace.json`, `fiducials.svg` to print, and `truth.json` with the rest of the settings.
 
     Args:
-        recording: What is filmed, and how.
+        recording: The film.
         folder: Where the files go.
-        source: One sentence on where the displacements come from.
+        source: Origin of the displacements, one sentence.
         codec: ffv1 and png lose nothing; mjpg and mp4v do.
-        progress: Told the share that is done.
+        progress: Called with the share that is done and a text.
 
     Raises:
         UserError: If the codec is unknown or a file cannot be written.
@@ -91,7 +91,7 @@ def photograph(
 ) -> None:
     """Photograph a scene in some poses with the camera of a recording, as PNG pictures in a new folder.
 
-    The noise is that of frames which the recording does not have.
+    Their frame numbers, and so their noise, follow those of the recording.
     """
     folder.mkdir()
     for number, pose in enumerate(poses):
@@ -108,7 +108,7 @@ def photograph(
 
 
 def _writer(recording: Recording, place: Path, stack: ExitStack) -> Callable[[Image], None]:
-    """What appends a frame to the video or to the folder of pictures."""
+    """A function that appends a frame to the video or to the folder of pictures."""
     if place.suffix:
         size = (recording.camera.width, recording.camera.height)
         return stack.enter_context(VideoWriter(place, size, recording.motion.rate)).write
@@ -124,7 +124,7 @@ def _rows(number: int, time: float, truth: FrameTruth) -> Iterator[tuple[float, 
 
 
 def _settings(recording: Recording) -> dict[str, object]:
-    """All that the frames depend on and that is in no other file."""
+    """Settings of the frames that are in no other file."""
     return {
         "design": recording.bench.parameters.model_dump(),
         "mesh_sha256": recording.bench.mesh.digest,

@@ -1,4 +1,4 @@
-"""A scene as a camera sees it."""
+"""Rendering of a scene through a camera."""
 
 from collections.abc import Sequence
 
@@ -15,15 +15,15 @@ from vision.rig.shapes import Scene, seen_edges
 def render(
     scene: Scene, camera: Camera, pose: Pose, exposure: Exposure, *, seed: int = 0, frame: int = 0
 ) -> Image:
-    """A picture of a scene; the same arguments give the same picture to the bit.
+    """Render a scene; the same arguments give the same image to the bit.
 
     Args:
-        scene: What is seen.
-        camera: What sees it.
+        scene: The shapes.
+        camera: The camera.
         pose: Of the scene's frame in the camera's.
         exposure: Light, lens and sensor.
         seed: Of the noise of a recording.
-        frame: Number in it; the noise of a frame does not depend on other frames.
+        frame: Its number in the recording; noise is independent between frames.
 
     Returns:
         Shape (height, width, 3), BGR, or (height, width) if the exposure is monochrome.
@@ -33,7 +33,7 @@ def render(
 
 
 def noise_of(seed: int, frame: int) -> np.random.Generator:
-    """The random numbers of one frame of a recording."""
+    """Random generator of one frame of a recording."""
     return np.random.default_rng([seed, frame])
 
 
@@ -54,7 +54,7 @@ def mean_light(scenes: Sequence[Scene], camera: Camera, pose: Pose, blur: float)
 
 
 def fineness(blur: float) -> int:
-    """How many cells a pixel is divided into along either side, so that they resolve the blur."""
+    """Cells along a side of a pixel, enough to resolve the blur."""
     return int(np.clip(np.ceil(2 / blur), 2, 4)) if blur else 1
 
 
@@ -69,7 +69,7 @@ def _painted(scene: Scene, camera: Camera, pose: Pose, cells: int, size: tuple[i
 
 
 def _on_pixels(canvas: Light, blur: float, cells: int) -> Light:
-    """The light on pixels from that on cells, of which so many squared make a pixel."""
+    """Blurred light on pixels from that on their cells, `cells`² for each pixel."""
     if not blur:
         return canvas
     reach = 2 * int(np.ceil(4 * blur * cells)) + 1

@@ -1,4 +1,4 @@
-"""Painted shapes in planes of constant z: what scenes are made of."""
+"""Painted shapes in planes of constant z, which make up a scene."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,12 +10,12 @@ from geometry.arrays import FloatArray
 from vision.calibration.camera import Camera, Pose
 
 CORNERS = 512
-"""Of the polygon that stands for a circle: 0.0004 pixels from it at a radius of 20 pixels."""
+"""Of the polygon that approximates a circle: 0.0004 pixels from it at a radius of 20 pixels."""
 CHORD = 1e-3
-"""How far the picture of a straight edge may be from the curve that the lens makes of it, pixels."""
+"""Largest distance of an edge's image, a polyline, from the curve that the lens makes of it, pixels."""
 
 Paint = tuple[float, float, float]
-"""Shares of blue, green and red light that a surface sends back."""
+"""Reflectance in blue, green and red."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ def area(edges: FloatArray) -> float:
 
 
 def centroid(edges: FloatArray) -> FloatArray:
-    """The middle of what edges of shape (n, 2, 2) enclose, shape (2,)."""
+    """Centroid of the area within edges of shape (n, 2, 2), shape (2,)."""
     return np.asarray((edges.sum(axis=1) * _turns(edges)[:, None]).sum(axis=0) / (6 * area(edges)))
 
 
@@ -76,7 +76,7 @@ def _turns(edges: FloatArray) -> FloatArray:
 
 
 def seen_edges(shape: Shape, camera: Camera, pose: Pose) -> FloatArray:
-    """The edges of the shape's picture, shape (m, 2, 2), pixels; those that the lens bends are cut."""
+    """Edges of the shape in the image, shape (m, 2, 2), pixels; those that the lens bends are divided."""
     start, end = shape.edges[:, 0], shape.edges[:, 1]
 
     def seen(points: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Where the virtual camera stands."""
+"""The virtual camera and its pose."""
 
 import cv2
 import numpy as np
@@ -8,11 +8,11 @@ from vision.calibration.camera import Camera, Pose
 from vision.tracking.workspace import Workspace
 
 RIM = 0.06
-"""Free share of the image on either side of the fiducials."""
+"""Margin around the fiducials, as a share of the image."""
 
 
 def default_camera(width: int = 1280, height: int = 720) -> Camera:
-    """A camera with a usual lens, whose picture is a little narrower at its rim; without deviations."""
+    """A camera with slight barrel distortion; without a covariance."""
     focus = 1.02 * width
     return Camera(
         width=width,
@@ -28,11 +28,11 @@ def default_camera(width: int = 1280, height: int = 720) -> Camera:
 def viewing_pose(
     camera: Camera, workspace: Workspace, *, tilt: float = 0.0, direction: float = 60.0, turn: float = 0.0
 ) -> Pose:
-    """Where the workspace is in the frame of a camera that looks at its middle and sees all fiducials.
+    """Pose of the workspace in front of a camera that is aimed at its middle and sees all fiducials.
 
     Args:
-        camera: What looks.
-        workspace: What is looked at, with its z axis towards the camera.
+        camera: The camera.
+        workspace: Its z axis points towards the camera.
         tilt: Angle between the optical axis and the workspace's z axis, degrees.
         direction: Of the axis about which it is tilted, in the image, degrees from right to down.
         turn: About the optical axis, degrees.

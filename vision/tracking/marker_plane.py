@@ -129,18 +129,18 @@ class CameraProjection:
     height: float = 0.0
 
     def pixels(self, points: FloatArray, parameters: FloatArray) -> FloatArray:
-        """See `View`."""
+        """See `PlaneProjection`."""
         return self.camera.project(self._raised(points), _pose(parameters))
 
     def points(self, pixels: FloatArray, parameters: FloatArray) -> FloatArray:
-        """See `View`: the ray of every pixel meets the plane."""
+        """See `PlaneProjection`: the ray of every pixel meets the plane."""
         pose = _pose(parameters)
         rotation = cv2.Rodrigues(pose.rotation)[0]
         plane = np.column_stack([rotation[:, :2], pose.translation + self.height * rotation[:, 2]])
         return _divided(self.camera.undistort(pixels), np.linalg.inv(self.camera.matrix @ plane))
 
     def jacobians(self, points: FloatArray, parameters: FloatArray) -> Jacobians:
-        """See `View`."""
+        """See `PlaneProjection`."""
         pose = _pose(parameters)
         matrix, by_rotation = cv2.Rodrigues(pose.rotation)
         raised = self._raised(points)
@@ -153,21 +153,27 @@ class CameraProjection:
         return np.column_stack([points, np.full(len(points), self.height)])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HomographyProjection:
-    """A plane without a camera: the homography's entries but the last, which is 1, row by row."""
+    """A plane without a camera: the homography's entries but the last, which is 1, row by row.
+
+    Attributes:
+        entries: Linear map from the parameters to these entries, shape (8, k); the identity if k = 8.
+    """
+
+    entries: FloatArray
 
     def pixels(self, points: FloatArray, parameters: FloatArray) -> FloatArray:
-        """See `View`."""
-        return _divided(points, np.append(parameters, 1.0).reshape(3, 3))
+        """See `PlaneProjection`."""
+        return _divided(points, self._matrix(parameters))
 
     def points(self, pixels: FloatArray, parameters: FloatArray) -> FloatArray:
-        """See `View`."""
-        return _divided(pixels, np.linalg.inv(np.append(parameters, 1.0).reshape(3, 3)))
+        """See `PlaneProjection`."""
+        return _divided(pixels, np.linalg.inv(self._matrix(parameters)))
 
     def jacobians(self, points: FloatArray, parameters: FloatArray) -> Jacobians:
-        """See `View`."""
-        homography = np.append(parameters, 1.0).reshape(3, 3)
+        """See `PlaneProjection`."""
+        homography = self._matrix(parameters)
         pixels = _divided(points, homography)
         whole = np.column_stack([points, np.ones(len(points))])
         depth = (whole @ homography[2])[:, None, None]
@@ -175,32 +181,15 @@ class HomographyProjection:
         by_entries = np.zeros((len(points), 2, 8))
         by_entries[:, 0, :3] = by_entries[:, 1, 3:6] = whole
         by_entries[:, :, 6:] = -pixels[:, :, None] * points[:, None, :]
-        return Jacobians(by_point, by_entries / depth)
+        return Jacobians(by_point, by_entries / depth @ self.entries)
+
+    def _matrix(self, parameters: FloatArray) -> FloatArray:
+        return np.append(self.entries @ parameters, 1.0).reshape(3, 3)
 
 
-@dataclass(frozen=True)
-class SimilarityProjection:
-    """The linear transform of the paper: pixel = (a x + b y + c, b x - a y + d), for y is up in the plane."""
-
-    def pixels(self, points: FloatArray, parameters: FloatArray) -> FloatArray:
-        """See `View`."""
-        return points @ self._linear(parameters).T + parameters[2:]
-
-    def points(self, pixels: FloatArray, parameters: FloatArray) -> FloatArray:
-        """See `View`."""
-        return np.asarray((pixels - parameters[2:]) @ np.linalg.inv(self._linear(parameters)).T)
-
-    def jacobians(self, points: FloatArray, parameters: FloatArray) -> Jacobians:
-        """See `View`."""
-        by_point = np.repeat(self._linear(parameters)[None], len(points), axis=0)
-        (x, y), one, zero = points.T, np.ones(len(points)), np.zeros(len(points))
-        rows = np.stack([[x, y, one, zero], [-y, x, zero, one]])
-        return Jacobians(by_point, rows.transpose(2, 0, 1))
-
-    @staticmethod
-    def _linear(parameters: FloatArray) -> FloatArray:
-        a, b = parameters[:2]
-        return np.array([[a, b], [b, -a]])
+HOMOGRAPHY = HomographyProjection(np.eye(8))
+SIMILARITY = HomographyProjection(np.eye(4)[[0, 1, 2, 1, 0, 3, 0, 0]] * np.c_[[1, 1, 1, 1, -1, 1, 0, 0]])
+"""The linear transform of the paper: pixel = (a x + b y + c, b x - a y + d), because y is up in the plane."""
 
 
 def _pose(parameters: FloatArray) -> Pose:

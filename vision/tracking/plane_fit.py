@@ -9,11 +9,11 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from vision.calibration.camera import Camera
 from vision.tracking.marker_plane import (
+    HOMOGRAPHY,
+    SIMILARITY,
     CameraProjection,
-    HomographyProjection,
     MarkerPlane,
     PlaneProjection,
-    SimilarityProjection,
 )
 
 STEPS = 50
@@ -60,22 +60,21 @@ def camera_plane(
     covariance = follow @ (camera.covariance or np.zeros((len(camera.intrinsic_names),) * 2)) @ follow.T
     covariance[:6, :6] += inverse * max(1.0, squares / (2 * len(points) - 6))
     residual = _rms(projection.points(pixels, pose) - points)
-    return MarkerPlane(
-        CameraProjection(camera, height), np.append(pose, camera.intrinsics), covariance, residual
-    )
+    parameters = np.append(pose, camera.intrinsics)
+    return MarkerPlane(CameraProjection(camera, height), parameters, covariance, residual)
 
 
 def homography_plane(points: FloatArray, pixels: FloatArray, covariances: FloatArray) -> MarkerPlane:
     """Fit a homography, without a camera; arguments as of `camera_plane`."""
     start = cv2.findHomography(points, pixels, 0)[0]
     start = (start / start[2, 2]).ravel()[:8]
-    return _plane_without_lens(HomographyProjection(), start, points, pixels, covariances)
+    return _plane_without_lens(HOMOGRAPHY, start, points, pixels, covariances)
 
 
 def similarity_plane(points: FloatArray, pixels: FloatArray, covariances: FloatArray) -> MarkerPlane:
     """Fit a scale, rotation and shift; arguments as of `camera_plane`."""
     start = np.array([1.0, 0.0, 0.0, 0.0])
-    return _plane_without_lens(SimilarityProjection(), start, points, pixels, covariances)
+    return _plane_without_lens(SIMILARITY, start, points, pixels, covariances)
 
 
 def _plane_without_lens(
@@ -87,9 +86,8 @@ def _plane_without_lens(
     excess = max(0.0, squares / max(2 * len(points) - len(parameters), 1) - 1)
     pixels, covariances = measured
     covariance = _gain(jacobians, covariances)[1] * (1 + len(points) * excess)
-    return MarkerPlane(
-        projection, parameters, covariance, _rms(projection.points(pixels, parameters) - points)
-    )
+    residual = _rms(projection.points(pixels, parameters) - points)
+    return MarkerPlane(projection, parameters, covariance, residual)
 
 
 def _refined(
@@ -101,9 +99,8 @@ def _refined(
     count = len(parameters)
     for _ in range(STEPS):
         missed = (known @ (pixels - projection.pixels(points, parameters))[:, :, None]).ravel()
-        jacobians = (known @ projection.jacobians(points, parameters).parameters[:, :, :count]).reshape(
-            -1, count
-        )
+        by_parameters = projection.jacobians(points, parameters).parameters[:, :, :count]
+        jacobians = (known @ by_parameters).reshape(-1, count)
         scale = np.linalg.norm(jacobians, axis=0)
         step = np.linalg.lstsq(jacobians / scale, missed, rcond=None)[0] / scale
         parameters = parameters + step
