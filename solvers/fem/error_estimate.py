@@ -40,25 +40,17 @@ STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class ImprovedField:
+class ImprovedField(LagrangeField):
     """A finite-element displacement with its estimated error added, and its smoothed gradient.
 
     Attributes:
-        space: The elements.
-        values: Nodal displacements, shape (N, 2), mm.
         gradients: Nodal values of the smoothed gradient, shape (N, 2, 2).
         own: The field whose gradient replaces it where it would turn the material inside out; None at small
             strain.
     """
 
-    space: LagrangeSpace
-    values: FloatArray
     gradients: FloatArray
     own: LagrangeField | None = None
-
-    def displacement(self, location: LocatedPoints) -> FloatArray:
-        """Displacement, shape (n, 2), mm."""
-        return LagrangeField(self.space, self.values).displacement(location)
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""

@@ -10,6 +10,7 @@ from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.observations import Observations
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
 
@@ -24,6 +25,24 @@ def medium_mesh() -> TriangleMesh:
 def medium_fem(medium_mesh):
     """`fem` on the medium mesh with the default load."""
     return FemSolver().solve(Problem(medium_mesh))
+
+
+def observed_at(points, displacements, deviations, visible=None) -> Observations:
+    """Simulated markers of 1.6 mm, all seen unless `visible` is given; `deviations` may be one number."""
+    visible = np.ones(len(points), dtype=bool) if visible is None else visible
+    deviations = np.broadcast_to(deviations, np.shape(displacements))
+    return Observations(points, displacements, deviations, visible, "by a test", True, 0.8)
+
+
+def taylor_remainders(model, place, which, scale) -> tuple[np.ndarray, np.ndarray]:
+    """Remainders of the first-order expansion of displacements and forces, for a step and for half of it."""
+    here, remainders = model.response(place), []
+    for step in (0.04 * scale, 0.02 * scale):
+        there = model.response(place + step * np.eye(len(place))[which])
+        left = there.nodal - here.nodal - step * here.nodal_slopes[which]
+        forces = there.forces - here.forces - step * here.force_slopes[which]
+        remainders.append(np.array([np.linalg.norm(left), np.linalg.norm(forces)]))
+    return remainders[0], remainders[1]
 
 
 def bar_mesh(

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from geometry.observations import Observations
 from solvers.assimilation.marker_weighting import FACTORS
 from solvers.assimilation.misfit import misfit_of
 from solvers.fem.assimilating import FemAsmSolver
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.fem.linear_equilibrium import LinearElasticity
 from solvers.lagrange import LagrangeSpace
-from solvers.problem import Load, Problem, contact_functional
+from solvers.problem import Load, Material, Problem, contact_functional
+from tests.solvers.conftest import observed_at
 
 LOADS = ("mean", "point", "patch")
 
@@ -27,9 +28,7 @@ def pulled(mesh, load, *, hidden=()):
     visible[list(hidden)] = False
     moved = FemSolver(estimate=False).solve(problem).displacement(points) + random.normal(size=points.shape)
     deviations = random.uniform(0.02, 0.5, points.shape)
-    return replace(
-        problem, observations=Observations(points, moved, deviations, visible, "by a test", True, 0.8)
-    )
+    return replace(problem, observations=observed_at(points, moved, deviations, visible))
 
 
 @pytest.fixture(scope="module", params=LOADS)
@@ -258,24 +257,11 @@ def test_settings_that_make_no_sense_are_refused(settings, said):
 def test_markers_of_a_richer_model_improve_the_displacement_and_not_the_stress(coarse_mesh, deviation):
     """The finger turns by more than the linear law allows for: to meet the markers it must strain."""
     from geometry.mesh.quadrature import body_quadrature
-    from solvers.fem.finite_strain.solver import FemNonlinearSolver
-    from solvers.problem import Material
 
     pressed = Load(kind="patch", displacement=(None, -10.0))
     truth = FemNonlinearSolver().solve(Problem(coarse_mesh, Material(law="neo-hookean"), pressed))
     points = coarse_mesh.markers
-    problem = Problem(
-        coarse_mesh,
-        observations=Observations(
-            points,
-            truth.displacement(points),
-            np.zeros((9, 2)),
-            np.ones(9, dtype=bool),
-            "by a test",
-            True,
-            0.8,
-        ),
-    )
+    problem = Problem(coarse_mesh, observations=observed_at(points, truth.displacement(points), 0.0))
     rule = body_quadrature(coarse_mesh)
 
     def distance(solution):

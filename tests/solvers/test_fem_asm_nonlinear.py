@@ -7,7 +7,6 @@ import pytest
 
 from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
-from geometry.observations import Observations
 from solvers.assimilation.misfit import misfit_of
 from solvers.fem.assimilating import FemAsmSolver
 from solvers.fem.finite_strain.constraints import DisplacementConstraints
@@ -17,7 +16,7 @@ from solvers.fem.finite_strain.load_state import LoadState
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem, contact_functional
-from tests.solvers.conftest import bar_mesh
+from tests.solvers.conftest import bar_mesh, observed_at
 
 LAWS = ("neo-hookean", "st-venant-kirchhoff")
 MESH = bar_mesh(20.0, 2.0, 20, 2, contact=(16.0, 20.0))
@@ -32,16 +31,9 @@ def pulled(load, *, law="neo-hookean", hidden=(), size=0.3) -> Problem:
     problem = Problem(MESH, Material(law=law), load)
     moved = FemNonlinearSolver(degree=1).solve(problem).displacement(MARKERS)
     visible = ~np.isin(np.arange(len(MARKERS)), hidden)
-    observations = Observations(
-        MARKERS,
-        moved + size * random.normal(size=MARKERS.shape),
-        random.uniform(0.02, 0.2, MARKERS.shape),
-        visible,
-        "by a test",
-        True,
-        0.8,
-    )
-    return replace(problem, observations=observations)
+    moved = moved + size * random.normal(size=MARKERS.shape)
+    deviations = random.uniform(0.02, 0.2, MARKERS.shape)
+    return replace(problem, observations=observed_at(MARKERS, moved, deviations, visible))
 
 
 BENT = Load(displacement=(None, -6.0))
@@ -191,16 +183,7 @@ def test_a_twin_is_met_in_displacement_and_in_stress():
     stiff = Problem(MESH, Material(law="neo-hookean"), BENT)
     truth = FemNonlinearSolver().solve(stiff)
     errors = 0.01 * np.random.default_rng(2).normal(size=MARKERS.shape)
-    observations = Observations(
-        MARKERS,
-        truth.displacement(MARKERS) + errors,
-        np.full_like(MARKERS, 0.01),
-        np.ones(len(MARKERS), dtype=bool),
-        "by a twin",
-        True,
-        0.8,
-    )
-    twin = replace(stiff, observations=observations)
+    twin = replace(stiff, observations=observed_at(MARKERS, truth.displacement(MARKERS) + errors, 0.01))
     solver = FemAsmSolver(weights="precision", scale=0.001)
     rule = body_quadrature(MESH)
 

@@ -8,13 +8,13 @@ from scipy.optimize import least_squares
 from scipy.stats import binom
 
 from geometry.errors import UserError
-from geometry.observations import Observations
 from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, misfit_of
 from solvers.fem.identification.linear_model import LinearModel
 from solvers.fem.identification.solver import FemIdSolver
 from solvers.fem.linear import FemSolver
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Problem
+from tests.solvers.conftest import observed_at
 
 NOISE = 0.01
 TRUTH = {"position": 37.3, "stroke_u": -0.8, "stroke_v": -9.6}
@@ -32,9 +32,7 @@ def twin(problem, truth, *, noise=0.0, deviation=NOISE, seed=0, degree=1):
     markers = problem.mesh.markers
     moved = LagrangeField(space, response.nodal).displacement(problem.mesh.locate(markers))
     moved = moved + noise * np.random.default_rng(seed).normal(size=moved.shape)
-    seen = np.ones(len(markers), dtype=bool)
-    observations = Observations(markers, moved, np.full_like(moved, deviation), seen, "by a twin", True, 0.8)
-    return replace(problem, observations=observations), response.forces[1]
+    return replace(problem, observations=observed_at(markers, moved, deviation)), response.forces[1]
 
 
 def solver(*names, **settings):
@@ -141,13 +139,7 @@ def test_markers_that_were_not_seen_change_nothing(problem):
     hidden[4] = False
     moved = observations.displacements.copy()
     moved[4] = 1e6
-    kept = Observations(
-        *(getattr(observations, name)[hidden] for name in ("points", "displacements", "standard_deviations")),
-        np.ones(8, dtype=bool),
-        "by a twin",
-        True,
-        0.8,
-    )
+    kept = observed_at(observations.points[hidden], observations.displacements[hidden], NOISE)
     masked = replace(observations, displacements=moved, visible=hidden)
     solutions = [solver().solve(replace(observed, observations=each)) for each in (masked, kept)]
     np.testing.assert_array_equal(solutions[0].field.values, solutions[1].field.values)

@@ -15,7 +15,7 @@ from solvers.fem.linear import FemSolver
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Material, Problem
 from solvers.solution import State
-from tests.solvers.conftest import bar_mesh
+from tests.solvers.conftest import bar_mesh, taylor_remainders
 
 NAMES = tuple(MEANINGS)
 
@@ -84,19 +84,7 @@ def test_derivatives_pass_the_taylor_test(problem, finger, place, name):
     """What the first-order expansion leaves falls by four when the step is halved, or is rounding."""
     which = NAMES.index(name)
     scale = parameters_of(problem, NAMES)[which].derivative(0.0)
-    here = finger.response(place)
-    left = []
-    for step in (0.04 * scale, 0.02 * scale):
-        moved = place.copy()
-        moved[which] += step
-        there = finger.response(moved)
-        left.append(
-            [
-                np.linalg.norm(there.nodal - here.nodal - step * here.nodal_slopes[which]),
-                np.linalg.norm(there.forces - here.forces - step * here.force_slopes[which]),
-            ]
-        )
-    first, second = np.array(left)
+    first, second = taylor_remainders(finger, place, which, scale)
     if name in ("stroke_u", "stroke_v", "young"):  # linear: nothing but rounding is left
         assert first.max() < 1e-6
         return

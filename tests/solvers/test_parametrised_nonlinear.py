@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from geometry.observations import Observations
 from solvers.fem.finite_strain.load_path import Steps
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification import finite_strain_model as parametrised_nonlinear
@@ -15,6 +14,7 @@ from solvers.fem.identification.parameters import parameters_of, problem_with
 from solvers.fem.identification.solver import FemIdSolver
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
+from tests.solvers.conftest import observed_at, taylor_remainders
 
 PLACE = {"position": 36.1, "stroke_u": -0.6, "stroke_v": -5.5, "poisson": 0.42, "young": 10.0}
 
@@ -57,19 +57,7 @@ def test_derivatives_pass_the_taylor_test(problem, finger, name):
     """What the first-order expansion leaves falls by four when the step is halved, or is rounding."""
     which = PARAMETERS.index(name)
     scale = parameters_of(problem, [name])[0].derivative(0.0)
-    here = finger.response(place())
-    left = []
-    for step in (0.04 * scale, 0.02 * scale):
-        moved = place()
-        moved[which] += step
-        there = finger.response(moved)
-        left.append(
-            [
-                np.linalg.norm(there.nodal - here.nodal - step * here.nodal_slopes[which]),
-                np.linalg.norm(there.forces - here.forces - step * here.force_slopes[which]),
-            ]
-        )
-    first, second = np.array(left)
+    first, second = taylor_remainders(finger, place(), which, scale)
     if name == "young":  # displacements do not depend on it, and forces are linear in it
         assert first.max() < 1e-6
         return
@@ -79,10 +67,7 @@ def test_derivatives_pass_the_taylor_test(problem, finger, name):
 def test_a_twin_at_finite_strain_is_found(problem, direct):
     """The stroke from 20 % off, without noise; what the prior pulls is little."""
     markers = problem.mesh.markers
-    observations = Observations(
-        *(markers, direct.displacement(markers), np.full_like(markers, 0.01), np.ones(9, dtype=bool)),
-        *("by a twin", True, 0.8),
-    )
+    observations = observed_at(markers, direct.displacement(markers), 0.01)
     own = problem_with(problem, {"poisson": PLACE["poisson"]})
     names = ("position", "stroke_u", "stroke_v")
     solver = FemIdSolver("fem-nonlinear", ",".join(names), degree=1, marker_radius=0.0)
