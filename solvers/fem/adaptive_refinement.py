@@ -44,10 +44,10 @@ def adapted(
     Args:
         problem: With the mesh to start from.
         tolerance: Largest estimated error of u or v at a marker, mm.
-        degree: Of the elements of `fem`.
+        degree: Degree of the elements.
         section: The body, for the arcs of refined fillets.
-        most_triangles: Of a mesh.
-        most_rounds: Of solutions.
+        most_triangles: Largest number of triangles.
+        most_rounds: Largest number of solutions.
         progress: Called after every round.
 
     Raises:

@@ -92,13 +92,10 @@ class DistributedSpace:
         function: The DOLFINx function that forms are written with.
     """
 
-    def __init__(self, space: LagrangeSpace, comm: MPI.Comm | None = None) -> None:
-        mesh = space.mesh
-        comm = comm or communicator()
-        share = slice(None) if comm.rank == 0 else slice(0, 0)
-        self.space = space
-        self.comm = comm
-        self.domain = _create_mesh(comm, mesh.triangles[share], np.array(mesh.points[share]))
+    def __init__(self, space: LagrangeSpace) -> None:
+        mesh, self.space, self.comm = space.mesh, space, communicator()
+        share = slice(None) if self.comm.rank == 0 else slice(0, 0)
+        self.domain = _create_mesh(self.comm, mesh.triangles[share], np.array(mesh.points[share]))
         with _quiet_compiler():
             self.dolfinx_space = _vector_space(self.domain, space.degree)
         self.function = dolfinx.fem.Function(self.dolfinx_space)

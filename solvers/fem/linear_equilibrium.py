@@ -86,8 +86,8 @@ class LinearEquilibrium:
     Attributes:
         elasticity: The stiffness.
         held: Components with a Dirichlet condition, mask of shape (N, 2).
-        factors: Of the stiffness with these components clamped.
-        load: The load's k functionals, none for a `patch`, and the displacements under their unit forces.
+        factors: Solver of the stiffness with these components clamped.
+        load: Solves with the load's k functionals, of which a `patch` has none.
     """
 
     elasticity: LinearElasticity
@@ -132,7 +132,7 @@ class LinearEquilibrium:
 
         Args:
             given: Nodal displacements whose components of `held` are taken, shape (N, 2), mm.
-            values: What the functionals have to be, shape (k,), mm.
+            values: Prescribed values of the functionals, shape (k,), mm.
         """
         nodal = np.where(self.held, given, 0.0)
         if nodal.any():
@@ -144,7 +144,7 @@ class LinearEquilibrium:
         return self.load.solution(self.factors.solve(force))[0]
 
     def unbalanced(self, internal: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What internal forces, shape (N, 2), N/mm, leave unbalanced under any forces of the functionals.
+        """Residual of internal forces, shape (N, 2), N/mm, under the best forces of the functionals.
 
         Returns:
             Residual force r, shape (N, 2), N/mm, zero where displacements are given, and `response(r)`: the

@@ -16,7 +16,7 @@ from solvers.problem import Problem
 
 @dataclass(frozen=True, eq=False)
 class MarkerCompliance:
-    """Finite-element displacements without and under forces at m markers.
+    """Finite-element displacements, free and under forces at m markers.
 
     Attributes:
         equilibrium: The factorised problem; its factors are to be destroyed after use.
@@ -35,8 +35,8 @@ class MarkerCompliance:
 
         Args:
             problem: With the conditions that hold.
-            degree: Of the elements.
-            misfit: Where the markers are.
+            degree: Degree of the elements.
+            misfit: With the markers.
             slack: Compliance of springs between contact and indenter, mm per N/mm, for `mean` and `point`.
         """
         space = LagrangeSpace(problem.mesh, degree)
@@ -45,7 +45,7 @@ class MarkerCompliance:
         return cls(equilibrium, equilibrium.solution(), markers)
 
     def of_markers(self, chosen: BoolArray) -> "MarkerCompliance":
-        """The same for those markers only that a mask of shape (m,) chooses."""
+        """Subset of the markers selected by a mask of shape (m,)."""
         both, markers = np.repeat(chosen, 2), self.markers
         return replace(self, markers=ConstrainedElimination(markers.rows[both], markers.responses[both]))
 

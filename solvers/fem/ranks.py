@@ -40,7 +40,7 @@ Answer = TypeVar("Answer")
 def communicator() -> MPI.Comm:
     """The ranks that share a new finite-element space: all, or this one alone if the pool is idle."""
     pool = _pool.get()
-    return MPI.COMM_WORLD if pool is None or pool.at_work else MPI.COMM_SELF
+    return MPI.COMM_WORLD if pool is None or pool.busy else MPI.COMM_SELF
 
 
 def on_all_ranks(task: Callable[[Problem, Progress], Answer], problem: Problem, progress: Progress) -> Answer:
@@ -52,7 +52,7 @@ def on_all_ranks(task: Callable[[Problem, Progress], Answer], problem: Problem, 
         progress: Called on this rank.
     """
     pool = _pool.get()
-    if pool is None or pool.at_work:
+    if pool is None or pool.busy:
         return task(problem, progress)
     return pool.call(task, problem, progress)
 
@@ -61,7 +61,7 @@ def lead(command: Callable[[], Any], guarded: Callable[[Callable[[], Any]], int]
     """Run a command on rank 0 of several, served by the others; the exit code is the same on all of them.
 
     Args:
-        command: What rank 0 does.
+        command: Run by rank 0.
         guarded: Runs it and reports errors; returns the exit code.
     """
     petsc4py.init()  # on all ranks together: one alone would wait for the others when it first solves
@@ -98,12 +98,12 @@ class RankPool:
 
     Attributes:
         comm: For messages between them.
-        at_work: Whether this rank is in a collective task.
+        busy: Whether this rank is in a collective task.
         broken: Whether another rank may be waiting for this one in a task that this one has left.
     """
 
     comm: MPI.Comm
-    at_work: bool = False
+    busy: bool = False
     broken: bool = False
 
     def call(
@@ -118,7 +118,7 @@ class RankPool:
         """Do what rank 0 sends until it dismisses this rank; returns the exit code that it sends.
 
         Raises:
-            Exception: What a task raised here and not on rank 0.
+            Exception: That of a task that failed here and not on rank 0.
         """
         status = MPI.Status()
         while True:
@@ -142,14 +142,14 @@ class RankPool:
     def _do(
         self, task: Callable[[Problem, Progress], Answer], problem: Problem, progress: Progress
     ) -> Answer:
-        self.broken = self.at_work = True
+        self.broken = self.busy = True
         try:
             answer = task(problem, progress)
         except Exception:
             self._meet(PATIENCE_S)
             raise
         finally:
-            self.at_work = False
+            self.busy = False
         self._meet(math.inf)
         return answer
 

@@ -26,12 +26,12 @@ class CylinderContact:
 
     Attributes:
         nodes: Numbers of the nodes, shape (m,).
-        positions: Of the nodes before the load, shape (m, 2), mm.
-        centre: Of the cylinder before the load, shape (2,), mm: it touches y = 0 from outside.
-        travel: Of the cylinder under the full load, shape (2,), mm.
+        positions: Their positions before the load, shape (m, 2), mm.
+        centre: Centre of the cylinder before the load, where it touches y = 0 from outside, shape (2,), mm.
+        travel: Displacement of the cylinder under the full load, shape (2,), mm.
         radius: mm.
         stiffness: k, N/mm per mm.
-        degree: Of the elements.
+        degree: Degree of the elements.
     """
 
     nodes: IntArray
@@ -100,7 +100,7 @@ class ContactRegion:
 
     Attributes:
         start: Abscissa of the end nearer to the base before the load, mm.
-        end: Of the other end, mm.
+        end: Abscissa of the other end, mm.
         parts: Number of separate intervals between them.
         width: Deformed length of front face in contact, mm.
         spacing: Deformed length between neighbouring nodes there, mm: the resolution of the width.

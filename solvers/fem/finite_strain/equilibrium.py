@@ -25,7 +25,7 @@ from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 
 QUADRATURE_DEGREE = 4
-"""Of the energy's integral: exact for quadratic elements with the quadratic part of the law."""
+"""Exact for the quadratic part of the law on quadratic elements."""
 PROBE = 1e-4
 """Fraction of the load in the finite difference of the internal forces at rest."""
 
@@ -38,7 +38,7 @@ class FiniteStrainEquilibrium:
         clamped: Components that a Dirichlet condition holds, mask of shape (N, 2).
         held: Their displacement under the full load, shape (N, 2), mm.
         constraints: On functionals of the displacements.
-        elimination: Of the constraints, by the tangent that was factorised last.
+        elimination: Solves with the constraints and the last factorised tangent.
         contact: The cylinder, if there is one.
     """
 
@@ -116,7 +116,6 @@ class FiniteStrainEquilibrium:
         self.elimination = self._elimination()
 
     def _elimination(self) -> ConstrainedElimination:
-        """Of the constraints, by the factorised tangent."""
         return ConstrainedElimination.of(
             self.factors.solve, self.constraints.functionals, self.constraints.slacks
         )

@@ -64,8 +64,8 @@ class LoadPath:
             problem: With the full load.
             space: The elements.
             steps: Fractions of the load.
-            tolerance: Of `ConstrainedNewton`.
-            max_iterations: Of `ConstrainedNewton`.
+            tolerance: See `ConstrainedNewton`.
+            max_iterations: See `ConstrainedNewton`.
             constraints: Their targets grow with the load; the load's own if None.
         """
         self._steps, self._space = steps, space
@@ -165,6 +165,6 @@ class LoadPath:
         return reaction_by_residual_work(self._space, self.equilibrium.internal_force(point.nodal))
 
     def region(self, point: LoadState) -> ContactRegion | None:
-        """Where a cylinder touches the finger; None where it does not, or there is none."""
+        """The contact region; None without contact or without a cylinder."""
         contact = self.equilibrium.contact
         return None if contact is None else ContactRegion.of(contact, point)

@@ -10,7 +10,7 @@ class LoadState:
     """A state of the finger, in equilibrium or a guess.
 
     Attributes:
-        fraction: Of the load.
+        fraction: Fraction of the load.
         nodal: Displacements, shape (N, 2), mm.
         forces: Multipliers of the constraints, shape (k,), N/mm.
         contact: Forces of the cylinder on the nodes of the front, shape (m,), N/mm; empty without one.

@@ -18,7 +18,7 @@ SHORTEST = 2.0**-10
 
 @dataclass(frozen=True, eq=False)
 class NewtonResult:
-    """How a Newton iteration ended.
+    """The end of a Newton iteration.
 
     Attributes:
         state: Displacements and forces.

@@ -20,7 +20,7 @@ PARAMETERS = ("position", "stroke_u", "stroke_v", "poisson", "young")
 
 STEPS = Steps(first=0.05, longest=0.2, shortest=1e-3)
 TOLERANCE = 1e-10
-"""Of Newton's method: derivatives need an exact equilibrium."""
+"""Newton's tolerance: derivatives need an exact equilibrium."""
 ITERATIONS = 12
 
 

@@ -43,7 +43,7 @@ class ObservationModel:
         return cls(marker_functionals(misfit, space), misfit.observed.ravel(), deviations)
 
     def with_reaction(self, problem: Problem, reaction: float, deviation: float) -> "ObservationModel":
-        """The same with the reaction along y and its standard deviation, N/mm.
+        """The model with the reaction along y and its standard deviation added, N/mm.
 
         Raises:
             UserError: If the load leaves v free.
@@ -71,7 +71,7 @@ class ObservationModel:
         return self._markers(found.residuals * found.inflation * self.deviations)
 
     def missed_without_each(self, found: Estimate) -> FloatArray:
-        """The same where each marker is predicted by the others, shape (m, 2), mm."""
+        """Predicted minus observed displacements, each marker predicted by the others, shape (m, 2), mm."""
         residuals = np.zeros_like(self.observed)
         for rows in np.arange(self._markers(residuals).size).reshape(-1, 2):
             residuals[rows] = found.left_out(rows)
