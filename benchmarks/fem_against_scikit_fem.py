@@ -14,7 +14,7 @@ from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.dolfinx_compat import Factorisation
-from solvers.fem.linear import FemSolver, Prepared
+from solvers.fem.linear import FactorisedProblem, FemSolver
 from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Problem, contact_functional
@@ -97,7 +97,7 @@ def main() -> Table:
     return table
 
 
-def _both(prepared: Prepared, loads: Sequence[Load]) -> None:
+def _both(prepared: FactorisedProblem, loads: Sequence[Load]) -> None:
     for load in loads:
         prepared.solve(load)
 

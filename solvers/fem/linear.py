@@ -55,7 +55,7 @@ class FemSolver:
         check_problem(self, problem)
         return on_all_ranks(self._solve, problem, progress)
 
-    def prepare(self, problem: Problem) -> "Prepared":
+    def prepare(self, problem: Problem) -> "FactorisedProblem":
         """Assemble and factorise once, to solve for many loads.
 
         Raises:
@@ -63,7 +63,8 @@ class FemSolver:
         """
         check_problem(self, problem)
         space = LagrangeSpace(problem.mesh, self.degree)
-        return Prepared(self, LinearEquilibrium.of(LinearElasticity.of(problem, space, self.linear_solver)))
+        elasticity = LinearElasticity.of(problem, space, self.linear_solver)
+        return FactorisedProblem(self, LinearEquilibrium.of(elasticity))
 
     def _solve(self, problem: Problem, progress: Progress) -> Solution:
         started = time.perf_counter()
@@ -77,7 +78,7 @@ class FemSolver:
         )
 
 
-class Prepared:
+class FactorisedProblem:
     """Solutions for many loads with shared factors of the stiffness.
 
     `mean` and `point` loads share the factorisation, wherever they act; so do patches at one place that hold
