@@ -8,7 +8,7 @@ is rigid. With the free solution K⁻¹ r and the responses K⁻¹ Cᵀ to unit 
     (C K⁻¹ Cᵀ + S) f = g - C K⁻¹ r        x = K⁻¹ r + K⁻¹ Cᵀ f
 
 Source: M. Benzi, G. H. Golub, J. Liesen, Numerical solution of saddle point problems, Acta Numerica 14 (2005)
-1-137, section 5 (Schur complement reduction; there with -f and -S).
+1-137, section 5 (Schur complement reduction, for the multipliers -f).
 """
 
 from collections.abc import Callable

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from solvers.fem.finite_strain.load_path import Steps
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.identification import finite_strain_model as parametrised_nonlinear
+from solvers.fem.identification import finite_strain_model
 from solvers.fem.identification.finite_strain_model import PARAMETERS, FiniteStrainModel
 from solvers.fem.identification.parameters import parameters_of, problem_with
 from solvers.fem.identification.solver import FemIdSolver
@@ -83,7 +82,8 @@ def test_a_twin_at_finite_strain_is_found(problem, direct):
 
 def test_a_load_that_the_finger_cannot_take_is_an_error(problem, monkeypatch):
     """In one step it cannot."""
-    monkeypatch.setattr(parametrised_nonlinear, "STEPS", Steps(first=1.0, longest=1.0, shortest=1.0))
+    one_step = FemNonlinearSolver(first_step=1.0, max_step=1.0, min_step=1.0)
+    monkeypatch.setattr(finite_strain_model, "SOLVER", one_step)
     finger = FiniteStrainModel(problem, LagrangeSpace(problem.mesh, 1), ("stroke_v",))
     with pytest.raises(UserError, match=r"found no equilibrium beyond .* take a smaller prior or model=fem"):
         finger.response(np.array([-90.0]))

@@ -1,7 +1,7 @@
 """The load path from rest to the full load, in adaptive steps."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -25,20 +25,17 @@ PENETRATION = 1e-5
 """Largest gap of a node in contact and penetration of any node, mm."""
 
 
-@dataclass(frozen=True)
-class Steps:
-    """Fractions of the load: of the first step, of the longest and of the shortest one."""
-
-    first: float
-    longest: float
-    shortest: float
-
-
 class LoadPath:
     """Equilibria of a problem as its load grows.
 
     Every step starts from the last two states extrapolated, the first from the linear solution. A step whose
     Newton iteration fails is halved.
+
+    Args:
+        problem: With the full load.
+        space: The elements.
+        constraints: Their targets grow with the load; the load's own if None. The rest are settings of
+            `FemNonlinearSolver`.
 
     Attributes:
         equilibrium: The discrete problem.
@@ -52,23 +49,15 @@ class LoadPath:
         self,
         problem: Problem,
         space: LagrangeSpace,
-        steps: Steps,
+        constraints: DisplacementConstraints | None = None,
         *,
+        first_step: float,
+        max_step: float,
+        min_step: float,
         tolerance: float,
         max_iterations: int,
-        constraints: DisplacementConstraints | None = None,
     ) -> None:
-        """Prepare the path.
-
-        Args:
-            problem: With the full load.
-            space: The elements.
-            steps: Fractions of the load.
-            tolerance: See `ConstrainedNewton`.
-            max_iterations: See `ConstrainedNewton`.
-            constraints: Their targets grow with the load; the load's own if None.
-        """
-        self._steps, self._space = steps, space
+        self._first_step, self._min_step, self._space = first_step, min_step, space
         self.equilibrium = FiniteStrainEquilibrium(problem, space, constraints)
         self._begin = partial(
             ConstrainedNewton,
@@ -79,7 +68,7 @@ class LoadPath:
         )
         self._newton = self._begin()
         contact = self.equilibrium.contact
-        self._longest = steps.longest if contact is None else min(steps.longest, contact.longest_step)
+        self._max_step = max_step if contact is None else min(max_step, contact.longest_step)
         self.points = [self.equilibrium.rest]
         self.halved = self.iterations = 0
         self.reason = ""
@@ -91,7 +80,7 @@ class LoadPath:
 
     def follow(self, progress: Progress) -> None:
         """Go to the full load, or as far as equilibria are found."""
-        step = min(self._steps.first, self._longest)
+        step = min(self._first_step, self._max_step)
         while (rest := 1 - self.points[-1].fraction) > 0:
             fraction = 1 - rest * (1 - 1 / math.ceil(rest / step - 1e-9))  # equal steps to the end
             before = self.iterations
@@ -99,12 +88,12 @@ class LoadPath:
             if point is None:
                 self.halved += 1
                 step /= 2
-                if step < self._steps.shortest:
+                if step < self._min_step:
                     return
                 continue
             self.points.append(point)
             progress(fraction, f"{fraction:.0%} of the load, {self.iterations - before} Newton iterations")
-            step = min(self._longest, step * (2 if hardest <= QUICK else 1))
+            step = min(self._max_step, step * (2 if hardest <= QUICK else 1))
 
     def continued(self, problem: Problem, nodal: FloatArray, forces: FloatArray) -> LoadState | None:
         """Equilibrium under the full load of another problem; None if none is found.

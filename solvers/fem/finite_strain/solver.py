@@ -12,7 +12,7 @@ from geometry.errors import UserError
 from solvers.fem.error_estimate import ErrorEstimator
 from solvers.fem.finite_strain.constraints import DisplacementConstraints
 from solvers.fem.finite_strain.cylinder_contact import ContactRegion
-from solvers.fem.finite_strain.load_path import LoadPath, Steps
+from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.locking import locking_advice
 from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
@@ -70,10 +70,12 @@ class FemNonlinearSolver:
         return LoadPath(
             problem,
             space,
-            Steps(self.first_step, self.max_step, self.min_step),
+            constraints,
+            first_step=self.first_step,
+            max_step=self.max_step,
+            min_step=self.min_step,
             tolerance=self.tolerance,
             max_iterations=self.max_iterations,
-            constraints=constraints,
         )
 
     def _solve(self, problem: Problem, progress: Progress) -> Solution:

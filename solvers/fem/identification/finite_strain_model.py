@@ -7,8 +7,9 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from solvers.elasticity import Lame, lame_derivatives
-from solvers.fem.finite_strain.load_path import LoadPath, Steps
+from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.finite_strain.load_state import LoadState
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification.parameters import problem_with
 from solvers.fem.identification.response import Response
 from solvers.lagrange import LagrangeSpace
@@ -18,10 +19,8 @@ from solvers.solver import silent
 PARAMETERS = ("position", "stroke_u", "stroke_v", "poisson", "young")
 """Parameters that can be found at finite strain."""
 
-STEPS = Steps(first=0.05, longest=0.2, shortest=1e-3)
-TOLERANCE = 1e-10
-"""Newton's tolerance: derivatives need an exact equilibrium."""
-ITERATIONS = 12
+SOLVER = FemNonlinearSolver(tolerance=1e-10)
+"""The criteria of load steps and Newton's method: derivatives need an exact equilibrium."""
 
 
 class FiniteStrainModel:
@@ -68,7 +67,7 @@ class FiniteStrainModel:
         return self._path.continued(problem, nodal, last.forces + step @ last.force_slopes)
 
     def _from_rest(self, problem: Problem) -> LoadState:
-        self._path = LoadPath(problem, self.space, STEPS, tolerance=TOLERANCE, max_iterations=ITERATIONS)
+        self._path = SOLVER.path(problem, self.space)
         self._path.follow(silent)
         last = self._path.points[-1]
         if last.fraction < 1:
