@@ -88,7 +88,7 @@ class Certifier:
         """
         weighted = self._rule.weights[:, None, None] * stress
         forces = sum(derivative.T @ weighted[:, :, axis] for axis, derivative in enumerate(self._derivatives))
-        balance, rest = self._equilibrium.unbalanced(forces)
+        balance, rest = self._equilibrium.residual(forces)
         dual = float((balance * rest).sum())
         return balance, float(np.sqrt(dual / (2 * self._energy(self._solution))))
 

@@ -8,7 +8,7 @@ from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem, contact_functional
 
 
-def held_components(problem: Problem, space: LagrangeSpace) -> BoolArray:
+def dirichlet_mask(problem: Problem, space: LagrangeSpace) -> BoolArray:
     """Mask (N, 2) of components with a Dirichlet condition: the base and, for a `patch`, the contact."""
     held = np.zeros((len(space.nodes), 2), dtype=bool)
     held[space.boundary_nodes("base")] = True
@@ -17,7 +17,7 @@ def held_components(problem: Problem, space: LagrangeSpace) -> BoolArray:
     return held
 
 
-def held_displacement(problem: Problem, space: LagrangeSpace) -> FloatArray:
+def dirichlet_displacement(problem: Problem, space: LagrangeSpace) -> FloatArray:
     """Nodal displacements that the Dirichlet conditions prescribe, zero elsewhere, shape (N, 2), mm."""
     values = np.zeros((len(space.nodes), 2))
     if problem.load.kind == "patch":

@@ -11,8 +11,8 @@ from geometry.arrays import BoolArray, FloatArray
 from solvers.constrained_elimination import ConstrainedElimination
 from solvers.elasticity import linear_energy_density
 from solvers.fem.boundary_conditions import (
-    held_components,
-    held_displacement,
+    dirichlet_displacement,
+    dirichlet_mask,
     load_functionals,
     load_targets,
 )
@@ -63,11 +63,11 @@ class LinearElasticity:
         return cls(problem, distributed, *distributed.derivatives(energy), iterative)
 
     def assemble(self, clamped: BoolArray) -> PETSc.Mat:
-        """The stiffness with the components of the mask `clamped`, shape (N, 2), held."""
+        """The stiffness with the components of the mask `clamped`, shape (N, 2)."""
         return self.distributed.assemble_matrix(self.stiffness, self.distributed.clamp(clamped))
 
     def factorise(self, clamped: BoolArray) -> Factorisation | Multigrid:
-        """Assemble and factorise with the components of the mask `clamped`, shape (N, 2), held."""
+        """Assemble and factorise with the components of the mask `clamped`, shape (N, 2)."""
         matrix = self.assemble(clamped)
         if self.iterative:
             return Multigrid(self.distributed, matrix, clamped)
@@ -85,13 +85,13 @@ class LinearEquilibrium:
 
     Attributes:
         elasticity: The stiffness.
-        held: Components with a Dirichlet condition, mask of shape (N, 2).
+        clamped: Components with a Dirichlet condition, mask of shape (N, 2).
         factors: Solver of the stiffness with these components clamped.
         load: Solves with the load's k functionals, of which a `patch` has none.
     """
 
     elasticity: LinearElasticity
-    held: BoolArray
+    clamped: BoolArray
     factors: Factorisation | Multigrid
     load: ConstrainedElimination
 
@@ -104,17 +104,17 @@ class LinearEquilibrium:
             slack: Compliance of springs through which the functionals' values are given, mm per N/mm.
         """
         problem, space = elasticity.problem, elasticity.distributed.space
-        held = held_components(problem, space)
-        factors = elasticity.factorise(held)
+        clamped = dirichlet_mask(problem, space)
+        factors = elasticity.factorise(clamped)
         load = ConstrainedElimination.of(factors.solve, load_functionals(problem, space), slack)
-        return cls(elasticity, held, factors, load)
+        return cls(elasticity, clamped, factors, load)
 
     def of_problem(self, problem: Problem) -> "LinearEquilibrium":
         """The equilibrium under another load; keeps the factors and responses that still hold."""
         if problem.load == self.elasticity.problem.load:
             return self
         elasticity, space = replace(self.elasticity, problem=problem), self.elasticity.distributed.space
-        if not np.array_equal(held_components(problem, space), self.held):
+        if not np.array_equal(dirichlet_mask(problem, space), self.clamped):
             self.factors.destroy()
             return LinearEquilibrium.of(elasticity)
         load, functionals = self.load, load_functionals(problem, space)
@@ -125,16 +125,16 @@ class LinearEquilibrium:
     def solution(self) -> FloatArray:
         """The nodal displacements that solve the problem, shape (N, 2), mm."""
         problem, space = self.elasticity.problem, self.elasticity.distributed.space
-        return self.minimiser(held_displacement(problem, space), load_targets(problem))
+        return self.minimiser(dirichlet_displacement(problem, space), load_targets(problem))
 
     def minimiser(self, given: FloatArray, values: FloatArray) -> FloatArray:
         """The nodal displacements of least energy, shape (N, 2), mm.
 
         Args:
-            given: Nodal displacements whose components of `held` are taken, shape (N, 2), mm.
+            given: Nodal displacements whose components of `clamped` are taken, shape (N, 2), mm.
             values: Prescribed values of the functionals, shape (k,), mm.
         """
-        nodal = np.where(self.held, given, 0.0)
+        nodal = np.where(self.clamped, given, 0.0)
         if nodal.any():
             nodal = nodal + self.factors.solve(-self.elasticity.internal_force(nodal))
         return self.load.solution(nodal, values)[0]
@@ -143,7 +143,7 @@ class LinearEquilibrium:
         """Displacement under nodal forces, N/mm, while all given values are zero: both (N, 2), in mm."""
         return self.load.solution(self.factors.solve(force))[0]
 
-    def unbalanced(self, internal: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def residual(self, internal: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residual of internal forces, shape (N, 2), N/mm, under the best forces of the functionals.
 
         Returns:
@@ -151,4 +151,4 @@ class LinearEquilibrium:
             square root of their product is the dual norm of r.
         """
         response, forces = self.load.solution(self.factors.solve(internal))
-        return np.where(self.held, 0.0, internal + self.load.weighted(forces)), response
+        return np.where(self.clamped, 0.0, internal + self.load.weighted(forces)), response

@@ -64,11 +64,11 @@ def test_balance_with_a_cylinder_has_its_tangent_as_derivative():
     start = LoadState(1.0, nodal, np.zeros(0), np.full(len(problem.contact.nodes), 0.05))
     pressed = problem.contact.forces(start) > 0
     assert 0 < pressed.sum() < len(pressed)
-    balance, _ = problem.unbalanced(start)
+    balance, _ = problem.residual(start)
     problem.factorise(start)
     change = times_tangent(problem, direction)
     steps = 0.1 * STEPS  # so small that no node comes into contact or leaves it
-    there = [problem.unbalanced(replace(start, nodal=nodal + t * direction))[0] for t in steps]
+    there = [problem.residual(replace(start, nodal=nodal + t * direction))[0] for t in steps]
     left = [np.linalg.norm(force - balance - t * change) for force, t in zip(there, steps, strict=True)]
     np.testing.assert_allclose(slopes(left), 2, atol=0.1)
 
@@ -100,9 +100,9 @@ def test_newton_meets_constraints_and_balance_and_converges_quadratically():
     balance = started(newton(problem), problem)
     assert (balance.converged, balance.reason) == (True, "converged_fnorm_relative")
     assert balance.iterations <= 5
-    left, size = problem.unbalanced(balance.state)
+    left, size = problem.residual(balance.state)
     assert np.abs(left).max() < 1e-8 * size
-    missing = problem.constraints.missing(balance.state.nodal, balance.state.forces, 1.0)
+    missing = problem.constraints.residual(balance.state.nodal, balance.state.forces, 1.0)
     np.testing.assert_allclose(missing, 0, atol=1e-10)
 
 

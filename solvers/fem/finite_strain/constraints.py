@@ -57,6 +57,6 @@ class DisplacementConstraints:
         """f_k b_k of forces of shape (k,), N/mm: shape (N, 2)."""
         return np.asarray(np.einsum("k,knx->nx", forces, self.functionals))
 
-    def missing(self, nodal: FloatArray, forces: FloatArray, fraction: float) -> FloatArray:
+    def residual(self, nodal: FloatArray, forces: FloatArray, fraction: float) -> FloatArray:
         """Residual of the constraints at a fraction of the load, shape (k,), mm."""
         return np.asarray(fraction * self.targets - self.values(nodal) - self.slacks * forces)

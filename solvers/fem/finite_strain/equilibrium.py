@@ -16,7 +16,7 @@ from geometry.arrays import BoolArray, FloatArray
 from geometry.mesh.quadrature import body_quadrature
 from solvers.constrained_elimination import ConstrainedElimination
 from solvers.elasticity import Lame, deformation_jacobian, energy_density_of
-from solvers.fem.boundary_conditions import held_components, held_displacement
+from solvers.fem.boundary_conditions import dirichlet_displacement, dirichlet_mask
 from solvers.fem.dolfinx_compat import DistributedSpace, Factorisation
 from solvers.fem.finite_strain.constraints import DisplacementConstraints
 from solvers.fem.finite_strain.cylinder_contact import CylinderContact
@@ -35,8 +35,8 @@ class FiniteStrainEquilibrium:
 
     Attributes:
         distributed: The elements in DOLFINx.
-        clamped: Components that a Dirichlet condition holds, mask of shape (N, 2).
-        held: Their displacement under the full load, shape (N, 2), mm.
+        clamped: Mask of components with a Dirichlet condition, of shape (N, 2).
+        prescribed: Their displacement under the full load, shape (N, 2), mm.
         constraints: On functionals of the displacements.
         elimination: Solves with the constraints and the last factorised tangent.
         contact: The cylinder, if there is one.
@@ -47,8 +47,8 @@ class FiniteStrainEquilibrium:
     ) -> None:
         """Compile the forms; the constraints are the load's unless others are given."""
         self.distributed = DistributedSpace(space)
-        self.clamped: BoolArray = held_components(problem, space)
-        self.held = held_displacement(problem, space)
+        self.clamped: BoolArray = dirichlet_mask(problem, space)
+        self.prescribed = dirichlet_displacement(problem, space)
         self.constraints = constraints or DisplacementConstraints.of(problem, space)
         self.contact = CylinderContact.of(problem, space) if problem.load.kind == "cylinder" else None
         self._derivatives = space.shape_gradients(body_quadrature(problem.mesh, QUADRATURE_DEGREE).location)
@@ -64,7 +64,7 @@ class FiniteStrainEquilibrium:
         self.factors = Factorisation(self.distributed, self.matrix, self.clamped, positive_definite=False)
         self.elimination = self._elimination()
 
-    def become(self, problem: Problem) -> None:
+    def set_problem(self, problem: Problem) -> None:
         """Take another `mean` or `point` load, with the same components prescribed, and other moduli."""
         self.constraints = DisplacementConstraints.of(problem, self.distributed.space)
         self._set_moduli(problem.material.lame)
@@ -96,7 +96,7 @@ class FiniteStrainEquilibrium:
         self.distributed.set_function(nodal)
         return self.distributed.assemble_nodal(self._force)
 
-    def unbalanced(self, state: LoadState) -> tuple[FloatArray, float]:
+    def residual(self, state: LoadState) -> tuple[FloatArray, float]:
         """Residual force, shape (N, 2), N/mm, zero where clamped, and the largest internal force."""
         internal = self.internal_force(state.nodal)
         balance = internal - self.constraints.at_nodes(state.forces)
@@ -124,7 +124,7 @@ class FiniteStrainEquilibrium:
         """Displacements, mm, under nodal forces, N/mm, by the factorised tangent: both (N, 2)."""
         return self.elimination.solution(self.factors.solve(force))[0]
 
-    def possible(self, nodal: FloatArray) -> bool:
+    def admissible(self, nodal: FloatArray) -> bool:
         """Whether the deformation turns no quadrature point inside out."""
         gradient = np.stack([derivative @ nodal for derivative in self._derivatives], axis=-1)
         return bool(np.isfinite(nodal).all() and (deformation_jacobian(gradient) > 0).all())
@@ -143,9 +143,9 @@ class FiniteStrainEquilibrium:
         """
         if self.contact is not None:
             return self._pressed_at_one_node(self.contact, fraction)
-        nodal = fraction * self.held
+        nodal = fraction * self.prescribed
         if nodal.any():
-            step = PROBE * self.held
+            step = PROBE * self.prescribed
             stiffness = (self.internal_force(step) - self.internal_force(-step)) / (2 * PROBE)
             nodal = nodal + self.factors.solve(-fraction * stiffness)
         nodal, forces = self.elimination.solution(nodal, fraction * self.constraints.targets)

@@ -103,7 +103,7 @@ class LoadPath:
             nodal: Displacements that are near, shape (N, 2), mm.
             forces: Multipliers that are near, shape (k,), N/mm.
         """
-        self.equilibrium.become(problem)
+        self.equilibrium.set_problem(problem)
         return self._settled(self._newton, LoadState(1.0, nodal, forces, np.zeros(0)))
 
     def relaxed(self, kept: BoolArray) -> LoadState | None:

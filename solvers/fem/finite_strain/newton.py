@@ -88,7 +88,7 @@ class ConstrainedNewton:
 
     def solve(self, guess: LoadState) -> NewtonResult:
         """Find equilibrium at the guess's fraction of the load and multipliers of the contact."""
-        self._state, self._torn = guess, not self._equilibrium.possible(guess.nodal)
+        self._state, self._torn = guess, not self._equilibrium.admissible(guess.nodal)
         if self._torn:
             return NewtonResult(guess, False, "diverged_function_domain", 0)
         self._join(guess.nodal, guess.forces, self._unknown)
@@ -114,13 +114,13 @@ class ConstrainedNewton:
         self._equilibrium.matrix.mult(self._part, force)
         balance = distributed.gather(force) - constraints.at_nodes(forces)
         force.destroy()
-        missed = self._scale * constraints.missing(nodal, forces, 0.0)
+        missed = self._scale * constraints.residual(nodal, forces, 0.0)
         self._join(np.where(self._equilibrium.clamped, 0.0, balance), missed, product)
 
     def _evaluate(self, snes: PETSc.SNES, unknown: PETSc.Vec, residual: PETSc.Vec) -> None:
         state = self._at(unknown)
-        balance, self._size = self._equilibrium.unbalanced(state)
-        missed = self._equilibrium.constraints.missing(state.nodal, state.forces, state.fraction)
+        balance, self._size = self._equilibrium.residual(state)
+        missed = self._equilibrium.constraints.residual(state.nodal, state.forces, state.fraction)
         self._join(balance, self._scale * missed, residual)
 
     def _factorise(self, snes: PETSc.SNES, unknown: PETSc.Vec, jacobian: PETSc.Mat, other: PETSc.Mat) -> None:
@@ -131,7 +131,7 @@ class ConstrainedNewton:
         start, _ = self._split(unknown)
         down, _ = self._split(step)
         length = 1.0
-        while not self._equilibrium.possible(start - length * down) and length >= SHORTEST:
+        while not self._equilibrium.admissible(start - length * down) and length >= SHORTEST:
             length /= 2
         self._torn = length < SHORTEST
         step.scale(length)
