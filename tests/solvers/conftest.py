@@ -71,5 +71,4 @@ def bar_mesh(
             "end": mesh.boundary("right"),
         },
         contact_node=int(nodes[np.argmin(np.abs(mesh.points[nodes, 0] - sum(contact) / 2))]),
-        _cache={},
     )

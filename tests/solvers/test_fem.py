@@ -106,7 +106,6 @@ def test_part_without_support_is_reported(coarse_mesh):
         coarse_mesh,
         points=np.concatenate([coarse_mesh.points, coarse_mesh.points - [0.0, 100.0]]),
         triangles=np.concatenate([coarse_mesh.triangles, coarse_mesh.triangles + count]),
-        _cache={},
     )
     with pytest.raises(UserError, match="not connected to the base"):
         Problem(twice)
