@@ -63,7 +63,12 @@ def is_plugin(block: Block) -> bool:
 
 
 ALL_BLOCKS = [block for page in PAGES for block in blocks(page)]
-TO_RUN = [block for block in ALL_BLOCKS if block.language == "python" and not is_plugin(block)]
+TO_RUN = [
+    block
+    for block in ALL_BLOCKS
+    if block.language == "python" and not is_plugin(block) and block.page.name != "notebook.md"
+]
+"""Those of the notebook page run, with their output, in `tests/pinnray/test_notebook.py`."""
 
 
 def table(page: Path, first_column: str, after: str = "") -> list[list[str]]:

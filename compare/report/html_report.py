@@ -79,6 +79,7 @@ def render(comparison: Comparison, pictures: Sequence[Picture], provenance: Mapp
         printed=PRINTED,
         truth_sentences=truth_sentences(comparison),
         entries=[_entry(evaluation, comparison) for evaluation in comparison.evaluations],
+        presets=text.preset_meanings(comparison.settings),
         left_out=left_out_remarks(comparison.left_out),
         design_rows=text.design_rows(design),
         paper_rows=[(symbol, value) for _, symbol, value in text.design_rows(design) if symbol],

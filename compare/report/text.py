@@ -50,6 +50,18 @@ def material_rows(material: Material, laws: Mapping[str, str]) -> list[tuple[str
     return [("Material", constants), *rows]
 
 
+PRESETS = {
+    "fast": "network with random hidden weights, output layer solved exactly (preset fast)",
+    "paper": "the paper’s training (preset paper)",
+}
+
+
+def preset_meanings(settings: Mapping[str, Mapping[str, object]]) -> dict[str, str]:
+    """The kind of training of each solver whose preset says it, from all solvers' settings."""
+    chosen = {name: str(own.get("preset", "")) for name, own in settings.items()}
+    return {name: PRESETS[preset] for name, preset in chosen.items() if preset in PRESETS}
+
+
 def load_sentence(load: Load, design: Parameters) -> str:
     """What the indenter does, in a sentence."""
     width = f"{design.contact_width:g} mm wide contact"
