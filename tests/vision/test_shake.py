@@ -31,15 +31,15 @@ def discs(points, pose, rng, *, hidden=()):
     return DiscDetections(pixels, covariances, radii, np.full(len(points), 100.0))
 
 
-def shaken(rng, after, **changes):
+def motion_between(rng, after, **changes):
     return find_camera_motion(
         SCENE, discs(WORKSPACE.points, POSE, rng), discs(WORKSPACE.points, after, rng, **changes)
     )
 
 
-def test_noise_is_no_way_of_the_camera():
+def test_noise_counts_as_a_static_camera():
     rng = np.random.default_rng(1)
-    found = [shaken(rng, POSE).planes is not None for _ in range(200)]
+    found = [motion_between(rng, POSE).planes is not None for _ in range(200)]
     assert np.mean(found) < 0.05
 
 
@@ -51,10 +51,10 @@ def test_a_nudge_is_undone_and_what_is_left_is_as_large_as_the_standard_deviatio
     assert np.linalg.norm(there - truth, axis=1).min() > 20 * NOISE
     squares = []
     for _ in range(100):
-        shake = shaken(rng, NUDGED)
-        assert shake.planes is not None
-        assert shake.shift > 20 * NOISE
-        undone = shake.undone(exact._replace(centres=there))
+        motion = motion_between(rng, NUDGED)
+        assert motion.planes is not None
+        assert motion.shift > 20 * NOISE
+        undone = motion.undone(exact._replace(centres=there))
         variances = np.diagonal(undone.covariances, axis1=1, axis2=2)
         squares.append(((undone.centres - truth) ** 2 / variances).mean())
     assert 0.4 < np.mean(squares) < 1.6
@@ -62,14 +62,14 @@ def test_a_nudge_is_undone_and_what_is_left_is_as_large_as_the_standard_deviatio
 
 def test_too_few_fiducials_tell_of_a_nudge_but_do_not_undo_it():
     rng = np.random.default_rng(3)
-    shake = shaken(rng, NUDGED, hidden=range(len(WORKSPACE.points) - 3))
-    assert shake.planes is None
-    assert shake.shift > 20 * NOISE
+    motion = motion_between(rng, NUDGED, hidden=range(len(WORKSPACE.points) - 3))
+    assert motion.planes is None
+    assert motion.shift > 20 * NOISE
 
 
 def test_no_fiducial_where_it_was_is_an_error():
     with pytest.raises(UserError, match="no fiducial is seen in the end where it was at the start"):
-        shaken(np.random.default_rng(4), NUDGED, hidden=range(len(WORKSPACE.points)))
+        motion_between(np.random.default_rng(4), NUDGED, hidden=range(len(WORKSPACE.points)))
 
 
 def test_a_film_whose_camera_was_nudged_measures_the_same_with_a_warning():

@@ -28,11 +28,7 @@ LEAST_FILL = 0.4
 
 
 def propose_circles(
-    image: Image,
-    colour: Colour = DARK,
-    *,
-    radii: tuple[float, float],
-    window: PixelBox | None = None,
+    image: Image, colour: Colour = DARK, *, radii: tuple[float, float], window: PixelBox | None = None
 ) -> FloatArray:
     """Find circles that may be markers.
 

@@ -39,11 +39,6 @@ class DiscDetections(NamedTuple):
     radii: FloatArray
     contrasts: FloatArray
 
-    @staticmethod
-    def none() -> "DiscDetections":
-        """No disc."""
-        return DiscDetections(np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0), np.empty(0))
-
     def where(self, kept: BoolArray | IntArray | slice) -> "DiscDetections":
         """Subset selected by a mask, numbers or a slice."""
         return DiscDetections(*(part[kept] for part in self))
@@ -84,7 +79,7 @@ def detect_discs_near(
 ) -> DiscDetections:
     """Detect discs with known radii, shape (n,), near guesses, shape (n, 2), pixels; there may be fewer."""
     if not len(guesses):
-        return DiscDetections.none()
+        return _circles(np.empty((0, 3)))
     if method == "precise":
         return _fitted(image, np.column_stack([guesses, radii]), radii)
     low = np.floor(guesses.min(axis=0) - 2.5 * radii.max()).astype(int)

@@ -19,13 +19,7 @@ from vision.discs.disc_image_model import (
     Y,
 )
 from vision.discs.hough import HoughVotes, sector, vote_for_centres
-from vision.discs.least_squares import (
-    DiscFit,
-    DiscPrior,
-    coherent_pixels,
-    fit_disc_model,
-    noise_correlation,
-)
+from vision.discs.least_squares import DiscFit, DiscPrior, coherent_pixels, fit_disc_model, noise_correlation
 from vision.discs.pixel_windows import PixelWindows, median_where
 from vision.discs.straight_edges import with_edges
 from vision.frames.frame import GreyImage

@@ -26,7 +26,7 @@ NEAR = 2
 WEAK = 0.15
 """Pixels below this fraction of the largest gradient cast no vote."""
 UNCERTAINTY = 0.3
-"""Of a radius that is guessed, relative."""
+"""Relative uncertainty of a guessed radius."""
 MARGIN = 3
 """Reach of the smoothing."""
 

@@ -19,7 +19,7 @@ MARGIN = 0.7
 TILT = (12.0, 38.0)
 """Between the board and the image, degrees."""
 SIZE = (0.35, 0.65)
-"""Of the board's longer side, as a share of the image's."""
+"""Length of the board's longer side over the image's."""
 RIM = 4.0
 """Between the board and the border of the image, pixels."""
 TRIES = 150

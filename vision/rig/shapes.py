@@ -10,7 +10,7 @@ from geometry.arrays import FloatArray
 from vision.calibration.camera import Camera, Pose
 
 CORNERS = 512
-"""Of the polygon that approximates a circle: 0.0004 pixels from it at a radius of 20 pixels."""
+"""Corners of the polygon that approximates a circle, within 0.0004 pixels at a radius of 20 pixels."""
 CHORD = 1e-3
 """Largest distance of an edge's image, a polyline, from the curve that the lens makes of it, pixels."""
 

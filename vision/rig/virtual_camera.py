@@ -47,7 +47,7 @@ def viewing_pose(
     axis = np.deg2rad(direction)
     tilted = _rotation(np.deg2rad(tilt) * np.array([np.cos(axis), np.sin(axis), 0]))
     rotation = turned @ tilted @ facing
-    # The middle of the workspace is seen in the middle of the image, which the principal point is only near.
+    # Aim at the middle of the image, which differs from the principal point.
     aim = np.linalg.solve(camera.matrix, [(camera.width - 1) / 2, (camera.height - 1) / 2, 1.0])
     return Pose(cv2.Rodrigues(rotation)[0].ravel(), distance * aim - rotation @ middle)
 

@@ -59,6 +59,6 @@ def match_layout(pixels: FloatArray, radii: FloatArray, markers: FloatArray, dia
 
 
 def has_half_turn_symmetry(markers: FloatArray) -> bool:
-    """Whether a half turn maps the markers, shape (m, 2), to themselves."""
+    """True if a half turn maps the markers, shape (m, 2), to themselves."""
     middle = markers.mean(axis=0)
     return bool(np.allclose(2 * middle - markers[::-1], markers))

@@ -17,7 +17,7 @@ from geometry.arrays import FloatArray
 from vision.calibration.camera import Camera, Pose
 
 CORNERS = 24
-"""Of the polygon that approximates a circle."""
+"""Number of corners of the polygon that approximates a circle."""
 
 
 class Jacobians(NamedTuple):

@@ -23,12 +23,7 @@ UNDETERMINED = "the fiducials do not determine where the camera is"
 
 
 def camera_plane(
-    camera: Camera,
-    points: FloatArray,
-    pixels: FloatArray,
-    covariances: FloatArray,
-    *,
-    height: float = 0.0,
+    camera: Camera, points: FloatArray, pixels: FloatArray, covariances: FloatArray, *, height: float = 0.0
 ) -> MarkerPlane:
     """Fit the plane z = `height` to fiducials in the plane z = 0, with a calibrated camera.
 

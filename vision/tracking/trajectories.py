@@ -50,12 +50,12 @@ class Tracking:
 
     @property
     def positions(self) -> FloatArray:
-        """Of the markers in every frame, shape (f, m, 2), mm; nan where one was not detected."""
+        """Positions of the markers in every frame, shape (f, m, 2), mm; nan where one was not detected."""
         return self.plane.circles(self.pixels, self.design.marker_radius)
 
     @property
     def rest_positions(self) -> tuple[FloatArray, FloatArray]:
-        """Of the markers at rest, initial and final, shapes (m, 2), mm; nan where one was not detected."""
+        """Initial and final positions of the markers at rest, shapes (m, 2), mm; nan if not detected."""
         plane, radius = self.plane, self.design.marker_radius
         return plane.circles(self.initial.centres, radius), plane.circles(self.final.centres, radius)
 
@@ -66,7 +66,7 @@ class Tracking:
 
     @property
     def displacement_covariance(self) -> FloatArray:
-        """Of the displacements of the visible markers, shape (2 v, 2 v), mm², in the order u1, v1, u2, ..."""
+        """Covariance of the visible displacements, shape (2 v, 2 v), mm², in the order u1, v1, u2, ..."""
         seen = self.visible
         before, after = (positions[seen] for positions in self.rest_positions)
         noise = (self.initial.covariances[seen], self.final.covariances[seen])
