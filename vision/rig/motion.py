@@ -9,10 +9,10 @@ from geometry.finger.parameters import bounded
 
 
 class Motion(CheckedModel):
-    """The frames of a recording, and how much of the load acts while the shutter is open.
+    """Number of frames of each part of a recording, and the load as a function of time.
 
-    Between two frames the shutter opens with the frame; the load grows at constant speed from when it has
-    closed after the last frame at rest until it opens for the first frame that is held.
+    The shutter opens at the start of a frame. The load grows at constant speed, from the closing of the
+    shutter in the last frame at rest until its opening in the first frame that is held.
     """
 
     rest: int = bounded(30, 1, 100_000, "frames", "", "Before the finger is pressed")
