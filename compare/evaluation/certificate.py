@@ -1,4 +1,4 @@
-"""What a solution of the linear problem is worth, measured by finite elements' own energy."""
+"""Error certificate of a solution of the linear problem, by the energy of finite elements."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -104,7 +104,7 @@ class Certificate:
 
     @property
     def has_excess(self) -> bool:
-        """Whether there is more excess than rounding explains; the solution of `fem` has none."""
+        """True if the excess is beyond rounding; the solution of `fem` has none."""
         return self.rel_excess > ROUNDING**2
 
     @property
@@ -114,12 +114,12 @@ class Certificate:
 
     @property
     def misses_energy(self) -> bool:
-        """Whether the solver reports so little energy that its quadrature must have missed some."""
+        """True if the reported energy is so low that the quadrature must have missed some."""
         return self.missed > ENERGY_LIMIT * self.fem_energy
 
     @property
     def faults(self) -> list[str]:
-        """What keeps the solution from counting as converged, in words."""
+        """Reasons why the solution does not count as converged."""
         limit = np.sqrt(ENERGY_LIMIT)
         found = []
         if not self.weak_residual <= limit:
@@ -138,7 +138,7 @@ class Certificate:
         return [fault.replace("\N{NO-BREAK SPACE}", " ") for fault in found]  # for files and terminals
 
     def numbers(self) -> dict[str, Any]:
-        """What `metrics.json` holds of it."""
+        """The numbers for `metrics.json`."""
         plain = (
             *("energy", "fem_energy", "excess", "rel_excess", "violation", "rel_violation"),
             *("energy_norm_error", "weak_residual", "imbalance", "missed", "misses_energy", "base"),

@@ -77,7 +77,7 @@ class Certifier:
         return np.stack([derivative @ nodal for derivative in self._derivatives], axis=-1)
 
     def _imbalance(self, stress: FloatArray) -> tuple[FloatArray, float]:
-        """What the internal forces of a stress leave unbalanced under the load's best forces.
+        """Residual of the internal forces of a stress, with the reactions that balance it best.
 
         Args:
             stress: At the quadrature points, shape (q, 2, 2), MPa.
@@ -93,7 +93,7 @@ class Certifier:
         return balance, float(np.sqrt(dual / (2 * self._energy(self._solution))))
 
     def _load_missed(self, nodal: FloatArray, values: FloatArray) -> FloatArray:
-        """By how much u and v miss what is prescribed, shape (2,), mm; NaN where nothing is."""
+        """Deviation of u and v from the prescribed load, shape (2,), mm; NaN for a free component."""
         load = self._problem.load
         if load.kind == "patch":
             contact = nodal[self._space.boundary_nodes("contact")][:, load.prescribed]

@@ -1,4 +1,4 @@
-"""Whether a result counts as converged: by its solver's own criterion and by its certificate."""
+"""Convergence of a result, by its solver's own criterion and by its certificate."""
 
 import warnings
 from collections.abc import Sequence

@@ -122,7 +122,7 @@ class Evaluation:
 
     @property
     def finite(self) -> bool:
-        """Whether displacement and stress are numbers everywhere."""
+        """True if displacement and stress are finite everywhere."""
         fields = (self.node_displacement, self.edge_displacement, self.stress)
         return all(np.isfinite(values).all() for values in fields)
 

@@ -48,7 +48,7 @@ class ForceCurve:
 
 
 def follows_load(evaluation: Evaluation) -> bool:
-    """Whether the solver recorded forces along the load."""
+    """True if the solver recorded forces along the load."""
     return {"load_fraction", *REACTIONS} <= evaluation.history.keys()
 
 

@@ -1,4 +1,4 @@
-"""What solvers and measurements are called in pictures, tables and reports."""
+"""Names of solvers and measurements in pictures, tables and reports."""
 
 from compare.evaluation.evaluation import Evaluation
 from geometry.observations import Observations
@@ -10,7 +10,7 @@ def solver_label(evaluation: Evaluation) -> str:
 
 
 IN_SAMPLE = "† was given these markers: its errors there are training errors"
-"""What the mark of `solver_at_markers` means."""
+"""Meaning of the mark of `solver_at_markers`."""
 
 
 def solver_at_markers(evaluation: Evaluation) -> str:

@@ -1,4 +1,4 @@
-"""How far each solver is from the measurements and from the reference."""
+"""Errors of a solver at the markers, and its distances from the reference and the truth."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

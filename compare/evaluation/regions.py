@@ -8,7 +8,7 @@ from geometry.mesh.boundary import boundary_loops, mean_thickness, singular_poin
 from solvers.problem import Problem, contact_nodes
 
 NEAR = 0.5
-"""How far from a corner or the contact still counts as there, in mean wall thicknesses."""
+"""Radius of the regions around corners and contact, in mean wall thicknesses."""
 
 REGIONS = {
     "corners": "at re-entrant corners and base ends",

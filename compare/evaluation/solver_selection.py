@@ -1,4 +1,4 @@
-"""Which of the solvers that nobody asked for by name can do a job."""
+"""Drops default solvers that do not support the problem."""
 
 from collections.abc import Collection, Mapping, Sequence
 

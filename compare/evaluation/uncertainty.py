@@ -31,7 +31,7 @@ def evaluated(solution: Solution, mesh: TriangleMesh, markers: ArrayLike | None 
 
 
 def indistinct(differences: ReferenceDifferences, uncertainty: ReferenceDifferences | None) -> list[str]:
-    """In what a solver differs from the reference by less than the reference's own error, in words."""
+    """Quantities in which a solver differs from the reference by less than the reference's error."""
     if uncertainty is None:
         return []
     pairs = {

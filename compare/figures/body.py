@@ -1,4 +1,4 @@
-"""What every picture of the body has in common: pixels, outline, clamped base, scale bar, colour bar."""
+"""Parts that the pictures of the body share: pixels, outline, clamped base, scale bar, colour bar."""
 
 import numpy as np
 from matplotlib.axes import Axes

@@ -112,7 +112,7 @@ def _ribs(pen: Draughtsman, design: Parameters, shape: Section) -> None:
 
 
 def _free_abscissa(design: Parameters, shape: Section, em: float) -> float:
-    """Where the front wall has most room for a dimension: off contact, markers and the cavities' ends, mm."""
+    """Abscissa with most room on the front wall, off contact, markers and cavities' ends, mm."""
     places = np.array([cell[[0, 3], 0] @ (1 - s, s) for cell in shape.cavities for s in (0.3, 0.5, 0.7)])
     end = design.height - design.tip_length
     room = [

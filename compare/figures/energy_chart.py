@@ -36,7 +36,7 @@ def recorded(evaluations: Sequence[Evaluation]) -> dict[Group, list[Evaluation]]
 
 
 def approaches_reference(group: Group) -> bool:
-    """Whether the reference's energy is where the record should end.
+    """True if the record should end at the reference's energy.
 
     The record of a load that grows is a path through other problems, and other columns are no energies.
     """
@@ -117,7 +117,7 @@ def _scale(axes: Axes, group: Group, ordinates: Sequence[FloatArray], members: S
 
 
 def wants_log(values: FloatArray) -> bool:
-    """Whether a logarithmic axis helps: all values are positive and they span more than `LOG_RATIO`."""
+    """True if a logarithmic axis helps: all values are positive and they span more than `LOG_RATIO`."""
     finite = values[np.isfinite(values)]
     return bool(finite.size and finite.min() > 0 and finite.max() > LOG_RATIO * finite.min())
 

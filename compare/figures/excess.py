@@ -1,4 +1,4 @@
-"""Where in the body the energy sits by which each solver is above finite elements."""
+"""Density of the energy by which each solver is above finite elements."""
 
 from collections.abc import Sequence
 

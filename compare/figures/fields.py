@@ -75,7 +75,7 @@ QUANTITIES = (
 
 
 def triangle_values(quantity: Quantity, evaluation: Evaluation) -> FloatArray:
-    """What is drawn: the mean of the quantity over each triangle, shape (t,)."""
+    """Mean of the quantity over each triangle, shape (t,), as it is drawn."""
     return evaluation.per_triangle(quantity.values(evaluation))
 
 

@@ -46,7 +46,7 @@ def legend_columns(labels: Sequence[str]) -> int:
 
 
 def legend_height(labels: Sequence[str]) -> float:
-    """How much room `legend_above` needs for these labels, inches."""
+    """Height that `legend_above` needs for these labels, inches."""
     return LEGEND_LINE * -(-len(labels) // legend_columns(labels))
 
 

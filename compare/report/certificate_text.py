@@ -9,7 +9,7 @@ from compare.evaluation.regions import REGIONS
 
 
 def certificate_sentences(evaluation: Evaluation) -> str:
-    """What the certificate says of a result, or why there is none."""
+    """Sentences on the certificate of a result, or the reason why there is none."""
     label, certificate = solver_label(evaluation), evaluation.certificate
     if evaluation.law != CERTIFIED_LAW:
         return f"{label} has no certificate: there is one for the {CERTIFIED_LAW} law only."

@@ -50,7 +50,7 @@ def write_summary(path: Path, comparison: Comparison) -> None:
 
 
 def seconds(evaluation: Evaluation) -> str:
-    """How long the solver took, s, or a dash if it does not say."""
+    """Time of the solve, s, or a dash if it is not recorded."""
     value = evaluation.stats.get("seconds")
     if not isinstance(value, int | float):
         return "–"

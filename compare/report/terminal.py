@@ -65,7 +65,7 @@ def body_table(comparison: Comparison) -> Table:
 
 
 def above_fem(evaluation: Evaluation) -> str:
-    """By how much the energy is above the least of finite elements, %; a dash where that is no measure."""
+    """Excess energy over the least of finite elements, %; a dash without a certificate."""
     certificate = evaluation.certificate
     if certificate is None:
         return NONE

@@ -63,7 +63,7 @@ def preset_meanings(settings: Mapping[str, Mapping[str, object]]) -> dict[str, s
 
 
 def load_sentence(load: Load, design: Parameters) -> str:
-    """What the indenter does, in a sentence."""
+    """Sentence on the load."""
     width = f"{design.contact_width:g} mm wide contact"
     where = {
         "mean": f"The weighted mean displacement of the {width} is prescribed",
@@ -85,7 +85,7 @@ def load_sentence(load: Load, design: Parameters) -> str:
 
 
 def source_sentence(observations: Observations) -> str:
-    """Where the marker displacements come from, opened by `Simulated` or `Measured`."""
+    """Provenance of the marker displacements, opened by `Simulated` or `Measured`."""
     said = observations.source.lower().startswith(observations.label)
     return sentence(observations.source if said else f"{observations.label}: {observations.source}")
 
@@ -152,7 +152,7 @@ def beside(value: float, own: float | None) -> Markup:
 
 
 def own_error_sentence(label: str, evaluation: Evaluation) -> str:
-    """What a solver says of its own error."""
+    """Sentence on a solver's estimate of its own error."""
     own, markers = evaluation.uncertainty, evaluation.marker_uncertainty
     if own is None or markers is None:
         return f"{label} gives no estimate of its own error."
@@ -165,7 +165,7 @@ def own_error_sentence(label: str, evaluation: Evaluation) -> str:
 
 
 def indistinct_sentence(label: str, reference: str, names: Sequence[str]) -> str:
-    """Where a solver differs from the reference by less than the reference's own error; empty if nowhere."""
+    """Sentence on differences that are smaller than the reference's own error; empty without any."""
     if not names:
         return ""
     said = ", ".join(names[:-1]) + (" and " if names[:-1] else "") + names[-1]

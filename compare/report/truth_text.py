@@ -1,4 +1,4 @@
-"""Is the stress better once a solver is given the markers? In sentences, by the truth of the simulation."""
+"""Sentences on the stress of solvers that were given the markers, by the truth of the simulation."""
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.labels import solver_label
@@ -7,7 +7,7 @@ from compare.evaluation.number_format import percent
 
 
 def truth_sentences(comparison: Comparison) -> list[str]:
-    """What the markers change, against the reference, for each solver that was given them; then the answer.
+    """Sentences on the change that given markers make to displacement and stress, against the reference.
 
     Empty without a truth, without such a solver, or if the reference was given the markers too.
     """
