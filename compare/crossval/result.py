@@ -2,15 +2,30 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Self
+from math import isnan, nan
+from typing import TYPE_CHECKING, Any, Self
 
 from compare.crossval.fold_result import SeedResults
 from compare.crossval.folds import SCHEMES, Fold
-from compare.crossval.scores import COMPARED, LEVEL, Difference, Score, difference, of_scheme, score
+from compare.crossval.scores import (
+    COMPARED,
+    LEVEL,
+    MARKERS,
+    Difference,
+    Interval,
+    Score,
+    difference,
+    of_scheme,
+    score,
+)
 from compare.crossval.study import Study
 from compare.crossval.true_fields import FINER
+from compare.runtime.csv_files import Cell
 from geometry.observations import Observations
 from solvers.assimilation.misfit import assimilates
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 BASELINES = ("fem", "gp")
 """Solvers that the others are compared with."""
@@ -95,6 +110,48 @@ class CrossvalResult:
             failed=failed,
         )
 
+    def table(self) -> "pd.DataFrame":
+        """The columns of `held_out.csv` by solver and scheme; NaN where there is no number."""
+        import pandas as pd
+
+        rows = [
+            {name: nan if cell == "" else cell for name, cell in row.items()} for row in self.held_out_rows()
+        ]
+        return pd.DataFrame(rows).set_index(["solver", "scheme"])
+
+    def held_out_rows(self) -> list[dict[str, Cell]]:
+        """The rows of `held_out.csv`: errors at given and held-out markers by solver and scheme."""
+        rows: list[dict[str, Cell]] = []
+        for label, scores in self.scores.items():
+            for scheme, found in scores.items():
+                row: dict[str, Cell] = {"solver": label, "scheme": scheme}
+                for kind, errors in (("in_sample", found.in_sample), ("held_out", found.held_out)):
+                    for name in MARKERS:
+                        row |= _interval_cells(f"{kind}_{name}", "_mm", errors.get(name))
+                row["within_stated"] = "" if found.coverage is None else found.coverage
+                row |= self._difference_cells(label, scheme, "mae_sum", "_mm")
+                rows.append(row | {"converged": found.converged})
+        return rows
+
+    def field_rows(self) -> list[dict[str, Cell]]:
+        """The rows of `fields.csv`: relative L2 distances from the truth by solver, scheme and field."""
+        return [
+            {"solver": label, "scheme": scheme, "field": name}
+            | _interval_cells("rel_l2", "", interval)
+            | self._difference_cells(label, scheme, name, "")
+            for label, scores in self.scores.items()
+            for scheme, found in scores.items()
+            for name, interval in found.fields.items()
+        ]
+
+    def _difference_cells(self, label: str, scheme: str, what: str, unit: str) -> dict[str, Cell]:
+        row: dict[str, Cell] = {}
+        for baseline in BASELINES:
+            found = self.difference(label, baseline, scheme, what)
+            row |= _interval_cells(f"from_{baseline}", unit, found, "_mean")
+            row[f"from_{baseline}"] = found.verdict if found else ""
+        return row
+
     def content(self) -> dict[str, Any]:
         """The part of `crossval.json` that holds the result."""
         return {
@@ -127,3 +184,11 @@ class CrossvalResult:
 
 def _with_verdicts(differences: Mapping[str, Difference]) -> dict[str, dict[str, Any]]:
     return {what: {**asdict(one), "verdict": one.verdict} for what, one in differences.items()}
+
+
+def _interval_cells(name: str, unit: str, interval: Interval | None, mean: str = "") -> dict[str, Cell]:
+    values = (None, None, None) if interval is None else (interval.mean, interval.low, interval.high)
+    return {
+        f"{name}{end}{unit}": "" if value is None or isnan(value) else value
+        for end, value in zip((mean, "_low", "_high"), values, strict=True)
+    }

@@ -10,7 +10,7 @@ from rich.table import Table
 from compare.crossval.fold_result import SeedResults
 from compare.crossval.folds import ALL, SCHEMES
 from compare.crossval.result import BASELINES, CrossvalResult
-from compare.crossval.scores import FIELDS, LEVEL, MARKERS, Difference, Interval
+from compare.crossval.scores import FIELDS, LEVEL, Difference, Interval
 from compare.evaluation.number_format import NONE, percent, significant
 from compare.runtime.csv_files import Cell, write_csv
 from compare.runtime.terminal_table import terminal_table
@@ -70,37 +70,10 @@ def tables(result: CrossvalResult) -> list[Table]:
 
 def write_tables(out: Path, result: CrossvalResult, results: Mapping[str, SeedResults]) -> None:
     """Write the CSV files: markers and fields by scheme, and every error of every fold."""
-    write_csv(out / "held_out.csv", held_out_rows(result))
+    write_csv(out / "held_out.csv", result.held_out_rows())
     if result.has_fields:
-        write_csv(out / "fields.csv", field_rows(result))
+        write_csv(out / "fields.csv", result.field_rows())
     write_csv(out / "folds.csv", list(_fold_rows(results)))
-
-
-def held_out_rows(result: CrossvalResult) -> list[dict[str, Cell]]:
-    """Errors at given and held-out markers, a row for each solver and scheme."""
-    rows: list[dict[str, Cell]] = []
-    for label, scores in result.scores.items():
-        for scheme, score in scores.items():
-            row: dict[str, Cell] = {"solver": label, "scheme": scheme}
-            for kind, errors in (("in_sample", score.in_sample), ("held_out", score.held_out)):
-                for name in MARKERS:
-                    row |= _interval_cells(f"{kind}_{name}", "_mm", errors.get(name))
-            row["within_stated"] = "" if score.coverage is None else score.coverage
-            row |= _difference_cells(result, label, scheme, "mae_sum", "_mm")
-            rows.append(row | {"converged": score.converged})
-    return rows
-
-
-def field_rows(result: CrossvalResult) -> list[dict[str, Cell]]:
-    """Relative L2 distances from the truth, a row for each solver, scheme and field."""
-    return [
-        {"solver": label, "scheme": scheme, "field": name}
-        | _interval_cells("rel_l2", "", interval)
-        | _difference_cells(result, label, scheme, name, "")
-        for label, scores in result.scores.items()
-        for scheme, score in scores.items()
-        for name, interval in score.fields.items()
-    ]
 
 
 def _fold_rows(results: Mapping[str, SeedResults]) -> Iterable[dict[str, Cell]]:
@@ -118,25 +91,6 @@ def _fold_rows(results: Mapping[str, SeedResults]) -> Iterable[dict[str, Cell]]:
                         "error_u_mm": u,
                         "error_v_mm": v,
                     }
-
-
-def _interval_cells(name: str, unit: str, interval: Interval | None, mean: str = "") -> dict[str, Cell]:
-    values = (None, None, None) if interval is None else (interval.mean, interval.low, interval.high)
-    return {
-        f"{name}{end}{unit}": "" if value is None or isnan(value) else value
-        for end, value in zip((mean, "_low", "_high"), values, strict=True)
-    }
-
-
-def _difference_cells(
-    result: CrossvalResult, label: str, scheme: str, what: str, unit: str
-) -> dict[str, Cell]:
-    row: dict[str, Cell] = {}
-    for baseline in BASELINES:
-        found = result.difference(label, baseline, scheme, what)
-        row |= _interval_cells(f"from_{baseline}", unit, found, "_mean")
-        row[f"from_{baseline}"] = found.verdict if found else ""
-    return row
 
 
 def _marker_row(result: CrossvalResult, label: str, scheme: str) -> list[str]:

@@ -14,6 +14,7 @@ from scipy.stats import t
 
 from compare.cli import main
 from compare.crossval.charts import draw_fields, draw_held_out, draw_weight_sweep
+from compare.crossval.cross_validation import cross_validate
 from compare.crossval.fold_result import FoldResult
 from compare.crossval.folds import (
     ALL,
@@ -30,10 +31,13 @@ from compare.crossval.folds import (
 )
 from compare.crossval.scores import Difference, Interval, difference, of_scheme, score
 from compare.crossval.solver_folds import SolverTask, run_folds
-from compare.crossval.study import SolverVariant
+from compare.crossval.study import SolverVariant, Study, solver_variants
 from compare.crossval.true_fields import FieldSampler
 from compare.crossval.weight_sweep import sweep_weights
+from geometry.errors import UserError
+from geometry.finger.design import Design
 from geometry.mesh.quadrature import body_quadrature
+from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.assimilation.misfit import misfit_of
@@ -373,6 +377,25 @@ def test_measured_markers_have_no_truth(tmp_path, capsys, in_line, observations)
     assert content["solvers"]["gp"]["schemes"]["one-out"]["fields"] == {}
     assert not (tmp_path / "out" / "fields.csv").exists()
     assert not (tmp_path / "out" / "fields.png").exists()
+
+
+def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, observations):
+    study = Study(
+        design=Design(),
+        variants=solver_variants([make_solver("gp")], Material()),
+        out=tmp_path / "out",
+        mesh=MeshSettings(size=1.0),
+        schemes=[ONE],
+        seeds=1,
+        measurements=replace(observations, simulated=False),
+    )
+    result = cross_validate(study)
+    assert capsys.readouterr() == ("", "")
+    row = result.table().loc["gp", ONE]
+    assert row["held_out_mae_sum_mm"] == result.scores["gp"][ONE].held_out["mae_sum"].mean
+    assert np.isnan(row["from_fem_mean_mm"])  # fem is not in the study
+    with pytest.raises(UserError, match="there is no scheme 'two-out'"):
+        cross_validate(replace(study, schemes=["two-out"]))
 
 
 @pytest.mark.parametrize(
