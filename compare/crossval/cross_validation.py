@@ -9,7 +9,7 @@ from compare.crossval.fold_result import FoldResult, SeedResults
 from compare.crossval.folds import LOAD, LoadCase, folds_of, load_cases_of
 from compare.crossval.output_files import write_results
 from compare.crossval.result import CrossvalResult
-from compare.crossval.solver_folds import FailedSolver, SolverTask, run_folds
+from compare.crossval.solver_folds import SolverTask, run_folds
 from compare.crossval.study import Study, visible_markers
 from compare.crossval.true_fields import SampledField, TruthTask, simulate_truth
 from compare.crossval.weight_sweep import SWEPT, sweep_weights
@@ -142,8 +142,10 @@ def _results(
 ) -> tuple[dict[str, list[list[FoldResult]]], dict[str, str]]:
     """The results of every solver, and the error messages of the solvers that failed."""
 
-    def note(_: str, answer: list[list[FoldResult]] | FailedSolver | ProcessFailed) -> str:
-        return "scored" if isinstance(answer, list) else answer.message
+    def note(_: str, answer: list[list[FoldResult]] | str | ProcessFailed) -> str:
+        if isinstance(answer, ProcessFailed):
+            return answer.message
+        return answer if isinstance(answer, str) else "scored"
 
     results, failed = {}, {}
     for name, answer in in_stages(
@@ -152,7 +154,7 @@ def _results(
         if isinstance(answer, list):
             results[name] = answer
         else:
-            failed[name] = answer.message
+            failed[name] = note(name, answer)
     if not results:
         raise UserError("; ".join(f"{name}: {message}" for name, message in failed.items()))
     return {name: results[name] for name in tasks if name in results}, failed

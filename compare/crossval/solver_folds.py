@@ -50,17 +50,6 @@ class SolverTask:
 
 
 @dataclass(frozen=True)
-class FailedSolver:
-    """A solver that ended without a result.
-
-    Attributes:
-        message: Why.
-    """
-
-    message: str
-
-
-@dataclass(frozen=True)
 class _KeptFolds:
     """The content of a file of finished folds."""
 
@@ -72,11 +61,11 @@ class _KeptFolds:
 _FILE = TypeAdapter(_KeptFolds)
 
 
-def run_folds(task: SolverTask, progress: Progress = silent) -> list[list[FoldResult]] | FailedSolver:
+def run_folds(task: SolverTask, progress: Progress = silent) -> list[list[FoldResult]] | str:
     """Run a solver through all folds for every seed, skipping finished folds.
 
     Returns:
-        For every seed the results in the order of the task's folds.
+        For every seed the results in the order of the task's folds; the error message if the solver fails.
     """
     seeds = len(task.observations)
     results: list[list[FoldResult]] = []
@@ -90,7 +79,7 @@ def run_folds(task: SolverTask, progress: Progress = silent) -> list[list[FoldRe
                 runner.run(seed, lambda share, text: progress((len(results) + share) / seeds, text))
             )
     except UserError as error:
-        return FailedSolver(str(error))
+        return str(error)
     return results
 
 
