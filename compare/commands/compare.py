@@ -75,7 +75,7 @@ def compare(
     job = Job(
         design=design,
         solvers=made,
-        spare=_nobodys(made, options, reference) if solvers is None else (),
+        spare=_optional_solvers(made, options, reference) if solvers is None else (),
         mesh=mesh,
         adapt=adapt,
         material=material,
@@ -107,8 +107,8 @@ def compare(
     return NOT_CONVERGED if comparison.unconverged or not tolerance_reached(comparison.adaptation) else 0
 
 
-def _nobodys(solvers: Sequence[Solver], options: SolverOptions, reference: str | None) -> list[str]:
-    """Names of the solvers that no other option asks for."""
+def _optional_solvers(solvers: Sequence[Solver], options: SolverOptions, reference: str | None) -> list[str]:
+    """Names of the solvers that no other option names."""
     asked = {text.partition(".")[0] for text in options.solver_set} | {reference}
     if options.preset is not None:
         asked |= {solver.name for solver in solvers if solver.settings().get("preset") == options.preset}

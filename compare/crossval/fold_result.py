@@ -14,7 +14,7 @@ class FoldResult:
     """A solver in one fold for one seed.
 
     Attributes:
-        fold: What was held out.
+        fold: The held-out markers and the load.
         errors: Predicted minus observed displacement of every marker at the fold's load, shape (m, 2), mm.
         deviations: Standard deviations that the solver states for them, shape (m, 2), mm; None if none.
         fields: Relative L2 distances from the truth; empty without a truth.

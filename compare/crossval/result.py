@@ -61,7 +61,7 @@ class CrossvalResult:
 
     @property
     def has_fields(self) -> bool:
-        """Whether fields were compared with a truth."""
+        """True if fields were compared with a truth."""
         return any(score.fields for each in self.scores.values() for score in each.values())
 
     def difference(self, label: str, baseline: str, scheme: str, what: str) -> Difference | None:

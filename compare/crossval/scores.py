@@ -128,8 +128,8 @@ def difference(results: SeedResults, baseline: SeedResults, what: str) -> Differ
     """Difference of a solver's score from a baseline's; None where one of them has no such score.
 
     Args:
-        results: Of the solver in a scheme.
-        baseline: Of the baseline in the same scheme.
+        results: Results of the solver in a scheme.
+        baseline: Results of the baseline in the same scheme.
         what: One of `COMPARED`.
     """
     own, other = (_values(each, what) for each in (results, baseline))

@@ -35,7 +35,7 @@ class SolverTask:
         load_cases: The loads, the full one first.
         truths: File of the true fields at each load; empty with measured markers.
         observations: For each seed, those at every load.
-        folds: What to hold out.
+        folds: The folds.
         folder: Folder of finished folds.
     """
 
@@ -87,8 +87,8 @@ class FoldRunner:
     """One solver on one mesh, with the work that folds share.
 
     Attributes:
-        problem: Without markers, at the full load, with the solver's law.
-        sampler: Of the shared mesh.
+        problem: The problem without markers, at the full load, with the solver's law.
+        sampler: The points at which fields are sampled.
     """
 
     def __init__(self, task: SolverTask, solver: Solver) -> None:

@@ -86,7 +86,7 @@ def solver_variants(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Study:
-    """What to cross-validate, and where to write.
+    """A cross-validation to run, and its output folder.
 
     Attributes:
         design: The finger.

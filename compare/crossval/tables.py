@@ -33,7 +33,7 @@ class Grid:
 
     Attributes:
         title: Above the table.
-        headings: Of the columns.
+        headings: Headings of the columns.
         rows: As many texts as headings.
         caption: Below the table.
     """

@@ -34,7 +34,7 @@ SEARCH_FILE = "search.json"
 
 @dataclass(frozen=True)
 class GridSearch:
-    """What to search, and where to write.
+    """A grid search to run, and its output folder.
 
     Attributes:
         design: The finger.

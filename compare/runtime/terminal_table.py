@@ -19,7 +19,7 @@ def terminal_table(
 
     Args:
         title: Above the table.
-        headings: Of the columns.
+        headings: Headings of the columns.
         rows: As many texts as headings.
         caption: Below the table.
         left: Headings of the columns that are aligned to the left; the others are aligned to the right.
