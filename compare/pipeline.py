@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -31,7 +30,7 @@ from compare.runtime.output_folder import (
     take_training,
     write_run,
 )
-from compare.runtime.provenance import file_digest, machine, package_versions, sources_digest
+from compare.runtime.provenance import file_digest, package_versions, sources_digest
 from compare.runtime.stages import Stages
 from geometry.atomic import write_json
 from geometry.content_hash import content_hash
@@ -92,7 +91,6 @@ def run(job: Job, stages: Stages) -> Comparison:
     Raises:
         UserError: If the job cannot be done; the output folder is as it was.
     """
-    started = datetime.now(UTC)
     job = checked(job)
     check_output(job.out)
     with replaced_folder(job.out, keep=job.names if job.resume else ()) as folder:
@@ -110,7 +108,7 @@ def run(job: Job, stages: Stages) -> Comparison:
             photographs, warnings = track_figures(folder / TRACK, tracking), tracking.warnings
         comparison = compute(replace(job, measurements=measurements), stages, folder)
         comparison = replace(comparison, warnings=warnings)
-        write(folder, job, comparison, stages, started=started, photographs=photographs)
+        write(folder, job, comparison, stages, photographs=photographs)
     return comparison
 
 
@@ -193,7 +191,6 @@ def write(
     comparison: Comparison,
     stages: Stages,
     *,
-    started: datetime,
     photographs: Sequence[Picture] = (),
 ) -> None:
     """Write every file of a comparison but its solutions, which `compute` has written.
@@ -203,7 +200,6 @@ def write(
         job: What was asked for.
         comparison: What was found.
         stages: Told of the progress.
-        started: When the run started.
         photographs: Pictures of the marker tracking, for the report.
     """
     if comparison.adaptation is not None:
@@ -222,19 +218,16 @@ def write(
                 folder / "force_displacement.csv", curves, job.load, depth=job.design.depth
             )
         write_json(folder / "metrics.json", metrics(comparison))
-        provenance = _provenance(folder, job, comparison, stages, started)
+        provenance = _provenance(folder, job, comparison, stages)
         write_report(folder / "report.html", comparison, [*pictures, *photographs], provenance)
         write_run(folder, provenance)
 
 
-def _provenance(
-    folder: Path, job: Job, comparison: Comparison, stages: Stages, started: datetime
-) -> dict[str, Any]:
+def _provenance(folder: Path, job: Job, comparison: Comparison, stages: Stages) -> dict[str, Any]:
     """Times, and what the numbers depend on: hashes, settings, seeds, devices, versions, machine."""
     adaptation, settings = comparison.adaptation, comparison.settings
     return {
-        "started": started.isoformat(timespec="seconds"),
-        "seconds": {name: round(seconds, 2) for name, seconds in stages.seconds.items()},
+        **stages.record(),
         "design_sha256": job.design.digest,
         "mesh_sha256": comparison.mesh.digest,
         "problem_sha256": Problem(comparison.mesh, job.material, job.load).digest,
@@ -249,7 +242,6 @@ def _provenance(
         "seed": {name: own["seed"] for name, own in settings.items() if "seed" in own},
         "device": {each.solver: each.stats.get("device", "cpu") for each in comparison.evaluations},
         "versions": package_versions(),
-        "machine": machine(),
     }
 
 
