@@ -15,7 +15,7 @@ from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
-from solvers.pinn.finite_basis import newton as local_newton
+from solvers.pinn.finite_basis import newton
 from solvers.pinn.finite_basis.energy import NetworkEnergy
 from solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from solvers.pinn.finite_basis.local import PinnLocalSolver
@@ -300,7 +300,7 @@ def test_finite_strain_of_the_finger_is_that_of_finite_elements(coarse_mesh, med
 
 
 def test_a_load_that_cannot_be_followed_is_reported(monkeypatch):
-    monkeypatch.setattr(local_newton, "MAX_ITERATIONS", 1)
+    monkeypatch.setattr(newton, "MAX_ITERATIONS", 1)
     mesh = bar_mesh(40.0, 4.0, 40, 4, contact=(38.0, 40.0))
     solution = FAST.solve(Problem(mesh, Material(law="neo-hookean"), Load(displacement=(None, -20.0))))
     assert not solution.status.converged

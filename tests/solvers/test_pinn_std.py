@@ -10,7 +10,7 @@ from geometry.finger.design import Design
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
-from solvers.pinn.finite_basis import energy as local_energy
+from solvers.pinn.finite_basis import energy as network_energy
 from solvers.pinn.finite_basis import gate_tree
 from solvers.pinn.finite_basis.gate_tree import GateTree
 from solvers.pinn.finite_basis.local import PinnLocalSolver
@@ -147,9 +147,9 @@ def test_a_broken_law_is_seen(coarse_mesh, monkeypatch, kind):
     solver, problem = kind(wall_spacing=0.8, corner_spacing=0.05), Problem(coarse_mesh)
     reference = FemSolver().solve(problem)
     assert errors(solver.solve(problem), reference)[1] < 0.1
-    law = local_energy.piola_stress_and_tangent
+    law = network_energy.piola_stress_and_tangent
     monkeypatch.setattr(
-        local_energy,
+        network_energy,
         "piola_stress_and_tangent",
         lambda gradient, lame, name: law(gradient, lame._replace(λ=0.18 * lame.λ), name),
     )

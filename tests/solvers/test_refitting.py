@@ -17,6 +17,7 @@ QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3, "tolerance": 
 SOLVERS: dict[str, dict[str, object]] = {
     "fem-asm": {"degree": 1},
     "fem-asm, weights chosen": {"degree": 1, "weights": "precision", "choose": "left-out"},
+    "fem-asm, without weight": {"degree": 1, "asm_weight": 0.0},
     "fem-asm, a soft contact": {"degree": 1, "weights": "precision", "contact_deviation": 1.0},
     "fem-id": {"degree": 1},
     "gp": {},
