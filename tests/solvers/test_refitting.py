@@ -59,13 +59,17 @@ def test_a_refit_is_a_solution(coarse_mesh, observed, name):
         np.testing.assert_allclose(found.reaction, expected.reaction, rtol=1e-5, atol=1e-8)
 
 
-def test_markers_elsewhere_are_solved_afresh(coarse_mesh, observed):
-    solver = make_solver("fem-asm", degree=1, marker_radius=0.3)
+@pytest.mark.parametrize("name", ["fem-asm", "pinn-asm"])
+@pytest.mark.parametrize("change", ["points", "marker_radius"])
+def test_other_markers_are_solved_afresh(coarse_mesh, observed, name, change):
+    solver = make_solver(name, **SOLVERS[name])
     refit = refitter(solver, Problem(coarse_mesh))
-    refit(observed[0])
-    moved = replace(observed[0], points=observed[0].points + np.array([0.5, 0.1]))
-    expected = solver.solve(Problem(coarse_mesh, observations=moved))
-    np.testing.assert_allclose(refit(moved).displacement(moved.points), expected.displacement(moved.points))
+    first = replace(observed[0], marker_radius=0.3)
+    refit(first)
+    changes = {"points": first.points + np.array([0.5, 0.1]), "marker_radius": 0.2}
+    other = replace(first, **{change: changes[change]})
+    expected = solver.solve(Problem(coarse_mesh, observations=other))
+    np.testing.assert_allclose(refit(other).displacement(other.points), expected.displacement(other.points))
 
 
 def test_another_solver_is_just_asked_again(coarse_mesh, observed):

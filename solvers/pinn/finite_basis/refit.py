@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.observations import Observations
+from solvers.assimilation.misfit import Misfit
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, LinearResponse
 from solvers.pinn.finite_basis.network import FiniteBasisField
 from solvers.pinn.finite_basis.newton import LoadStep
@@ -19,7 +20,7 @@ from solvers.solver import Progress, silent
 def network_refitter(solver: FiniteBasisSolver, problem: Problem) -> Callable[[Observations], Solution]:
     """See `Refittable`; one factorisation of each level for all observations if the law is linear."""
     kept: dict[float, tuple[ConstrainedNetwork, LinearResponse]] = {}
-    first: list[Observations] = []
+    factorised: list[Misfit] = []
 
     def refit(observations: Observations) -> Solution:
         own, every = (
@@ -27,14 +28,11 @@ def network_refitter(solver: FiniteBasisSolver, problem: Problem) -> Callable[[O
             for seen in (observations.visible, np.ones_like(observations.visible))
         )
         misfit, whole = solver.misfit(own), solver.misfit(every)
-        first[:] = first or [observations]
-        if (
-            misfit is None
-            or whole is None
-            or problem.material.law != "linear"
-            or misfit.radius != whole.radius
-            or not np.array_equal(first[0].points, observations.points)
-        ):
+        if misfit is None or whole is None or problem.material.law != "linear":
+            return solver.solve(own)
+        factorised[:] = factorised or [whole]
+        markers = factorised[0]
+        if misfit.radius != markers.radius or not np.array_equal(markers.points, observations.points):
             return solver.solve(own)
 
         def train(
