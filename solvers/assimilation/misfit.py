@@ -64,10 +64,6 @@ class Misfit:
         """The misfit of displacements at the markers, shape (m, 2), mm: N mm / mm."""
         return 0.5 * float((self.weights * (displacement - self.observed) ** 2).sum())
 
-    def forces(self, displacement: FloatArray) -> FloatArray:
-        """Forces W (d - B u) that pull at the markers, shape (m, 2), N/mm: minus the gradient."""
-        return self.weights * (self.observed - displacement)
-
     def without(self, marker: int) -> "Misfit":
         """The misfit of the other markers, with unchanged weights."""
         arrays = (self.points, self.observed, self.weights)
