@@ -11,16 +11,14 @@ from compare.evaluation.comparison import Comparison
 from compare.evaluation.convergence import with_certificates
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.force_displacement import force_curves, write_force_displacement
-from compare.evaluation.metrics import pick_reference
+from compare.evaluation.metrics import evaluated, pick_reference
 from compare.evaluation.shared_mesh import check_inside, shared_mesh, write_rounds
 from compare.evaluation.solver_selection import supported_solvers
-from compare.evaluation.uncertainty import evaluated
 from compare.evaluation.virtual_experiment import virtual_experiment
 from compare.figures import Picture, draw_all
 from compare.report.html_report import write_report
 from compare.report.metrics_json import metrics
-from compare.report.table_one import write_table_one
-from compare.report.tables import write_markers, write_summary
+from compare.report.tables import write_markers, write_summary, write_table_one
 from compare.report.vtu_file import write_vtu
 from compare.runtime.output_folder import (
     SOLUTIONS,

@@ -28,9 +28,8 @@ def solve(
     """
     from compare.evaluation.convergence import with_certificates
     from compare.evaluation.force_displacement import force_curves, write_force_displacement
-    from compare.evaluation.labels import solver_label
+    from compare.evaluation.metrics import evaluated
     from compare.evaluation.shared_mesh import check_inside, shared_mesh, tolerance_reached
-    from compare.evaluation.uncertainty import evaluated
     from compare.figures.force_chart import draw_force_displacement
     from compare.report.vtu_file import write_vtu
     from compare.runtime.stages import Stages
@@ -75,7 +74,7 @@ def solve(
             written += [out.with_name(f"{out.stem}_force_displacement.{kind}") for kind in ("csv", "png")]
             write_force_displacement(written[1], curves, load, depth=chosen.depth)
             draw_force_displacement(curves, depth=chosen.depth).save(written[2])
-    print(f"{solver_label(evaluation)}: {evaluation.message}")
+    print(f"{evaluation.label}: {evaluation.message}")
     u, v = solution.reaction
     print(f"energy {solution.energy:.6g} N mm/mm, reaction ({u:.6g}, {v:.6g}) N/mm")
     for path in written:

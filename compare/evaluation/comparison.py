@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import (
+    MEANS,
     held_out_errors,
     marker_errors,
     reference_differences,
@@ -21,9 +22,6 @@ from solvers.problem import Load, Material
 
 if TYPE_CHECKING:
     import pandas as pd
-
-MEANS = ("mae_u", "mae_v", "mae_sum", "mae_rss")
-"""Mean absolute errors at the markers, see `compare.evaluation.metrics.MarkerErrors`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,10 +87,7 @@ class Comparison:
         held_out = held_out_errors(evaluation, self.observations)
         given = marker_errors(evaluation, self.observations) if evaluation.in_sample else None
         row: dict[str, object] = {"converged": evaluation.converged}
-        for kind, errors in (
-            ("in_sample", given),
-            ("held_out", held_out),
-        ):
+        for kind, errors in (("in_sample", given), ("held_out", held_out)):
             row |= {f"{kind}_{name}_mm": getattr(errors, name, float("nan")) for name in MEANS}
         to = reference_differences(evaluation, self.reference)
         true = None if self.truth is None else truth_differences(evaluation, self.truth)

@@ -25,6 +25,8 @@ from solvers.solution import Solution
 
 QUADRATURE_DEGREE = 2
 HISTORY_PREFIX = "history_"
+IN_SAMPLE = "† was given these markers: its errors there are training errors"
+"""Meaning of the mark in `Evaluation.label_at_markers`."""
 UNCERTAINTY: TypeAdapter[ReferenceDifferences | None] = TypeAdapter(ReferenceDifferences | None)
 
 
@@ -119,6 +121,16 @@ class Evaluation:
             in_sample=solution.problem.observations is not None,
             left_out=solution.left_out,
         )
+
+    @property
+    def label(self) -> str:
+        """The solver's name, marked where the solver did not converge."""
+        return self.solver if self.converged else f"{self.solver} (not converged)"
+
+    @property
+    def label_at_markers(self) -> str:
+        """The label for errors at the markers: it has a mark if the solver was given those markers."""
+        return f"{self.label}{' †' * self.in_sample}"
 
     @property
     def finite(self) -> bool:

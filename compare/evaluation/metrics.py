@@ -1,14 +1,18 @@
-"""Errors of a solver at the markers, and its distances from the reference and the truth."""
+"""Errors of a solver at the markers, its distances from the reference and the truth, and its own error."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from compare.evaluation.differences import FieldDifference, ReferenceDifferences, field_difference
 from compare.evaluation.evaluation import Evaluation
 from geometry.arrays import FloatArray
+from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
+from solvers.solution import Solution
 
 COMPONENTS: dict[str, tuple[int, int]] = {"xx": (0, 0), "yy": (1, 1), "xy": (0, 1)}
 
@@ -31,6 +35,10 @@ class MarkerErrors(NamedTuple):
     mae_v: float
     mae_sum: float
     mae_rss: float
+
+
+MEANS = MarkerErrors._fields[2:]
+"""Names of the mean absolute errors."""
 
 
 def marker_errors(evaluation: Evaluation, observations: Observations) -> MarkerErrors:
@@ -112,3 +120,34 @@ def pick_reference(evaluations: Sequence[Evaluation], wanted: str | None = None)
     """The evaluation called `wanted`, else `fem`, else the first."""
     named = {evaluation.solver: evaluation for evaluation in evaluations}
     return named.get(wanted or "fem", evaluations[0])
+
+
+def evaluated(solution: Solution, mesh: TriangleMesh, markers: ArrayLike | None = None) -> Evaluation:
+    """The evaluation of a solution, with its uncertainty if its solver estimates its error.
+
+    The uncertainty is how the improved field of the estimate differs from the solution. For displacements
+    that are prescribed, the energy of the error is the error of the energy.
+    """
+    own, error = Evaluation.of(solution, mesh, markers), solution.error
+    if error is None:
+        return own
+    energy = solution.energy * (1 - error.energy_norm**2)
+    better = Evaluation.of(replace(solution, field=error.field, energy=energy), mesh, markers)
+    return replace(
+        own,
+        uncertainty=reference_differences(better, own),
+        marker_uncertainty=np.abs(better.marker_displacement - own.marker_displacement),
+    )
+
+
+def indistinct(differences: ReferenceDifferences, uncertainty: ReferenceDifferences | None) -> list[str]:
+    """Quantities in which a solver differs from the reference by less than the reference's error."""
+    if uncertainty is None:
+        return []
+    pairs = {
+        "displacement": (differences.displacement.rel_l2, uncertainty.displacement.rel_l2),
+        "von Mises stress": (differences.von_mises.rel_l2, uncertainty.von_mises.rel_l2),
+        "energy": (differences.energy, uncertainty.energy),
+        "displacement of the markers": (differences.mae_markers, uncertainty.mae_markers),
+    }
+    return [name for name, (difference, own) in pairs.items() if abs(difference) < abs(own)]

@@ -7,7 +7,6 @@ from matplotlib.axes import Axes
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.labels import solver_label
 from compare.figures.style import axes_at, heading, legend_above, legend_height, solver_colour
 from geometry.arrays import FloatArray
 from geometry.figure import INK, WIDTH, Figure, figure
@@ -54,7 +53,7 @@ def draw_energy(comparison: Comparison) -> Figure | None:
     colours = {evaluation.solver: solver_colour(number) for number, evaluation in enumerate(evaluations)}
     if not groups:
         return None
-    line = f"{solver_label(reference)} {reference.energy:.4g}"
+    line = f"{reference.label} {reference.energy:.4g}"
     heights = [
         legend_height([*map(record_label, members), *([line] if approaches_reference(group) else [])])
         for group, members in groups.items()
@@ -80,7 +79,7 @@ def draw_energy(comparison: Comparison) -> Figure | None:
 
 def record_label(evaluation: Evaluation) -> str:
     """The solver and the energy of its result."""
-    return f"{solver_label(evaluation)} {evaluation.energy:.4g}"
+    return f"{evaluation.label} {evaluation.energy:.4g}"
 
 
 def _records(axes: Axes, group: Group, members: Sequence[Evaluation], colours: dict[str, str]) -> None:

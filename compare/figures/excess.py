@@ -9,7 +9,6 @@ from compare.evaluation.certificate import Certificate
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.differences import weighted_percentile
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.labels import solver_label
 from compare.evaluation.number_format import percent
 from compare.figures import body
 from compare.figures.canvas import Canvas
@@ -31,7 +30,7 @@ DECADES = 4
 def excesses(evaluations: Sequence[Evaluation]) -> list[tuple[str, Certificate]]:
     """Label and certificate of every solver that has an excess."""
     return [
-        (solver_label(evaluation), evaluation.certificate)
+        (evaluation.label, evaluation.certificate)
         for evaluation in evaluations
         if evaluation.certificate is not None and evaluation.certificate.has_excess
     ]

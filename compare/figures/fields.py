@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.differences import field_difference
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.labels import solver_label
 from compare.evaluation.metrics import COMPONENTS
 from compare.evaluation.number_format import percent, significant
 from compare.figures import body
@@ -131,13 +130,13 @@ def draw_field(comparison: Comparison, quantity: Quantity) -> Figure:
         for row, evaluation in enumerate(ordered):
             values = quantity.values(evaluation)
             axes = panel(row, 0, scale, values, evaluation)
-            axes.set_title(solver_label(evaluation), size=8.5, pad=2, weight="bold")
+            axes.set_title(evaluation.label, size=8.5, pad=2, weight="bold")
             largest = np.abs(evaluation.per_triangle(values)).max()
             _remark(axes, f"largest {size} = {significant(largest, 3)} {quantity.unit}")
             if evaluation is not reference:
                 axes = panel(row, 1, differences, values - base, evaluation)
                 norm = field_difference(values, base, reference.weights).rel_l2
-                axes.set_title(f"minus {solver_label(reference)}", size=8.5, pad=2)
+                axes.set_title(f"minus {reference.label}", size=8.5, pad=2)
                 _remark(axes, f"rel. $L^2$ {percent(norm)}")
             elif columns == 2:
                 _explain(drawn, (2 * MARGIN + width, HEAD + PANEL_TITLE, width, height), reference)
@@ -155,7 +154,7 @@ def _explain(drawn: Figure, box: tuple[float, float, float, float], reference: E
     axes = axes_at(drawn, box)
     axes.set_axis_off()
     text = (
-        f"Reference: {solver_label(reference)}\n"
+        f"Reference: {reference.label}\n"
         f"Scales end at the {PERCENT:g} % point of the area\n"
         "(left: of the reference; right: of differences,\nat most as left). Values beyond take the end\n"
         "colours. Largest: of the means over a triangle."

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from compare.evaluation.force_displacement import ForceCurve, follows_load
-from compare.evaluation.labels import solver_label
 from compare.figures.style import axes_at, heading, legend_above, legend_height, solver_colour
 from geometry.figure import INK, WIDTH, Figure, figure
 
@@ -57,4 +56,4 @@ def draw_force_displacement(curves: Sequence[ForceCurve], *, depth: float) -> Fi
 
 def _label(curve: ForceCurve) -> str:
     end = f"{curve.force[-1]:.3g} N/mm at {curve.travel[-1]:.3g} mm"
-    return f"{solver_label(curve.evaluation)}, {end}"
+    return f"{curve.evaluation.label}, {end}"

@@ -5,8 +5,8 @@ from functools import partial
 from typing import NamedTuple
 
 from compare.evaluation.comparison import Comparison
+from compare.evaluation.evaluation import IN_SAMPLE
 from compare.evaluation.force_displacement import force_curves
-from compare.evaluation.labels import IN_SAMPLE, solver_label
 from compare.figures.colours import PERCENT
 from compare.figures.design_drawing import draw_design
 from compare.figures.energy_chart import draw_energy
@@ -70,7 +70,7 @@ def marker_errors(comparison: Comparison) -> Drawing:
 
 def field(comparison: Comparison, quantity: Quantity) -> Drawing:
     """One scalar field of every solver, and its difference from the reference."""
-    reference = solver_label(comparison.reference)
+    reference = comparison.reference.label
     mixed = (
         " The solvers have different laws: strain is Green-Lagrange where it is finite, stress is Cauchy."
         if len({evaluation.law for evaluation in comparison.evaluations}) > 1
@@ -131,7 +131,7 @@ def energy(comparison: Comparison) -> Drawing | None:
         figure,
         "Energy",
         f"Elastic energy per unit depth as each solver went on and, beside it, its relative distance "
-        f"from that of {solver_label(comparison.reference)} (dashed line). A solver that solves directly "
+        f"from that of {comparison.reference.label} (dashed line). A solver that solves directly "
         f"keeps no record. One that was given the markers pays energy for them: assimilation never "
         f"lowers the least energy. Over factors of the markers’ weight: the energy that they add.",
     )

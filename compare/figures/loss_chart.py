@@ -1,7 +1,6 @@
 """The losses of networks that are trained by gradients, over the epochs."""
 
 from compare.evaluation.comparison import Comparison
-from compare.evaluation.labels import solver_at_markers
 from compare.figures.energy_chart import wants_log
 from compare.figures.style import axes_at, heading, legend_above, legend_height, solver_colour
 from geometry.figure import WIDTH, Figure, figure
@@ -26,7 +25,7 @@ def draw_losses(comparison: Comparison) -> Figure | None:
     if not trained:
         return None
     terms = [name for name in LOSSES if any(name in each.history for each in trained.values())]
-    legend = legend_height([solver_at_markers(evaluation) for evaluation in trained.values()])
+    legend = legend_height([evaluation.label_at_markers for evaluation in trained.values()])
     with figure(HEAD + legend + len(terms) * (HEIGHT + GAP) + FOOT) as drawn:
         heading(drawn, "Losses over the epochs, without their weights")
         for row, term in enumerate(terms):
@@ -35,7 +34,7 @@ def draw_losses(comparison: Comparison) -> Figure | None:
             for number, evaluation in trained.items():
                 if term in evaluation.history:
                     losses = evaluation.history[term]
-                    label = solver_at_markers(evaluation)
+                    label = evaluation.label_at_markers
                     axes.plot(
                         evaluation.history[EPOCH], losses, color=solver_colour(number), lw=1, label=label
                     )

@@ -9,7 +9,6 @@ from matplotlib.ticker import MaxNLocator
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.labels import solver_at_markers
 from compare.evaluation.metrics import MarkerErrors, held_out_errors, marker_errors
 from compare.figures.style import axes_at, heading, solver_colour
 from geometry.arrays import BoolArray
@@ -44,7 +43,7 @@ def draw_marker_errors(comparison: Comparison) -> Figure:
                 _scales(axes, observations.visible, ceiling)
                 axes.set_ylabel(rf"$|\Delta {symbol}|$, mm", size=7)
                 if column == 0:
-                    axes.set_title(solver_at_markers(evaluation), size=8.5, pad=2, weight="bold")
+                    axes.set_title(evaluation.label_at_markers, size=8.5, pad=2, weight="bold")
                 if row == len(evaluations) - 1:
                     axes.set_xlabel("marker (1 is nearest the base)")
                 else:

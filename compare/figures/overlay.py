@@ -10,7 +10,6 @@ from matplotlib.patches import Circle
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.labels import markers_label, solver_at_markers
 from compare.evaluation.metrics import marker_errors
 from compare.figures import body
 from compare.figures.canvas import Canvas, Extent
@@ -113,7 +112,7 @@ def _panel(
     axes.plot(*computed.T, "x", ms=4, color="white", mew=2.0, zorder=4)
     axes.plot(*computed.T, "x", ms=4, color=INK, mew=0.9, zorder=5)
     errors = marker_errors(evaluation, observations)
-    axes.set_title(solver_at_markers(evaluation), size=9, pad=3, weight="bold")
+    axes.set_title(evaluation.label_at_markers, size=9, pad=3, weight="bold")
     note = f"MAE{', given' * evaluation.in_sample}  u {errors.mae_u:.3f} mm,  v {errors.mae_v:.3f} mm"
     axes.text(0.01, 0.01, note, size=7.5, color=MUTED, transform=axes.transAxes)
 
@@ -157,7 +156,7 @@ def _legend(drawn: Figure, observations: Observations, motion: str) -> None:
             mfc="none",
             mec=MEASURED,
             mew=1.1,
-            label=markers_label(observations),
+            label=f"markers, {observations.label}",
         ),
         Line2D([], [], ls="", marker="x", ms=4, color=INK, mew=0.9, label="solver’s markers"),
         Line2D([], [], color="#9a9a9a", lw=0.9, label="undeformed"),

@@ -1,43 +1,20 @@
 """The report: one HTML file that holds its pictures and needs nothing else."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
-from compare.evaluation.certificate import Certificate
 from compare.evaluation.comparison import Comparison
-from compare.evaluation.differences import ReferenceDifferences
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.labels import solver_label
-from compare.evaluation.metrics import TruthDifferences, reference_differences, truth_differences
+from compare.evaluation.metrics import indistinct, reference_differences, truth_differences
 from compare.evaluation.number_format import distance, number, percent
 from compare.evaluation.regions import NEAR
 from compare.evaluation.solver_selection import left_out_remarks
-from compare.evaluation.uncertainty import indistinct
 from compare.figures import Picture
 from compare.report import text
-from compare.report.certificate_text import certificate_sentences
-from compare.report.table_one import PRINTED, millimetres, table_one
-from compare.report.tables import seconds
-from compare.report.truth_text import truth_sentences
+from compare.report.sentences import certificate_sentences, truth_sentences
+from compare.report.tables import PRINTED, millimetres, seconds, table_one
 from compare.runtime.html import template_environment
 from geometry.atomic import write_text
-
-
-@dataclass(frozen=True, eq=False)
-class SolverEntry:
-    """One solver's line in the tables."""
-
-    label: str
-    is_reference: bool
-    evaluation: Evaluation
-    to_truth: TruthDifferences | None
-    differences: ReferenceDifferences
-    indistinct: str
-    reaction: tuple[float, float]
-    seconds: str
-    certificate: Certificate | None
-    certificate_sentences: str
 
 
 def write_report(
@@ -71,9 +48,9 @@ def render(comparison: Comparison, pictures: Sequence[Picture], provenance: Mapp
         comparison=comparison,
         observations=comparison.observations,
         reference=reference,
-        reference_label=solver_label(reference),
+        reference_label=reference.label,
         own=reference.uncertainty,
-        own_error=text.own_error_sentence(solver_label(reference), reference),
+        own_error=text.own_error_sentence(reference),
         beside=text.beside,
         table_one=table_one(comparison),
         printed=PRINTED,
@@ -85,7 +62,7 @@ def render(comparison: Comparison, pictures: Sequence[Picture], provenance: Mapp
         paper_rows=[(symbol, value) for _, symbol, value in text.design_rows(design) if symbol],
         material_rows=text.material_rows(
             comparison.material,
-            {solver_label(evaluation): evaluation.law for evaluation in comparison.evaluations},
+            {evaluation.label: evaluation.law for evaluation in comparison.evaluations},
         ),
         near=NEAR,
         load_sentence=text.load_sentence(comparison.load, design),
@@ -95,22 +72,23 @@ def render(comparison: Comparison, pictures: Sequence[Picture], provenance: Mapp
     )
 
 
-def _entry(evaluation: Evaluation, comparison: Comparison) -> SolverEntry:
+def _entry(evaluation: Evaluation, comparison: Comparison) -> dict[str, object]:
+    """One solver's part of the tables."""
     reference, truth = comparison.reference, comparison.truth
     differences = reference_differences(evaluation, reference)
-    return SolverEntry(
-        label=solver_label(evaluation),
-        is_reference=evaluation is reference,
-        evaluation=evaluation,
-        to_truth=None if truth is None else truth_differences(evaluation, truth),
-        differences=differences,
-        indistinct=text.indistinct_sentence(
-            solver_label(evaluation),
-            solver_label(reference),
+    return {
+        "label": evaluation.label,
+        "is_reference": evaluation is reference,
+        "evaluation": evaluation,
+        "to_truth": None if truth is None else truth_differences(evaluation, truth),
+        "differences": differences,
+        "indistinct": text.indistinct_sentence(
+            evaluation.label,
+            reference.label,
             [] if evaluation is reference else indistinct(differences, reference.uncertainty),
         ),
-        reaction=text.without_rounding(evaluation.reaction),
-        seconds=seconds(evaluation),
-        certificate=evaluation.certificate,
-        certificate_sentences=certificate_sentences(evaluation),
-    )
+        "reaction": text.without_rounding(evaluation.reaction),
+        "seconds": seconds(evaluation),
+        "certificate": evaluation.certificate,
+        "certificate_sentences": certificate_sentences(evaluation),
+    }

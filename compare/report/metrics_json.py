@@ -8,6 +8,7 @@ from compare.evaluation.comparison import Comparison
 from compare.evaluation.differences import FieldDifference, ReferenceDifferences
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import (
+    MEANS,
     MarkerErrors,
     held_out_errors,
     marker_errors,
@@ -73,7 +74,7 @@ def _solver(evaluation: Evaluation, comparison: Comparison) -> dict[str, Any]:
 
 
 def _means(errors: MarkerErrors) -> dict[str, float]:
-    return {name: getattr(errors, name) for name in ("mae_u", "mae_v", "mae_sum", "mae_rss")}
+    return {name: getattr(errors, name) for name in MEANS}
 
 
 def _own_uncertainty(evaluation: Evaluation) -> dict[str, Any] | None:

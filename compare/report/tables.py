@@ -1,12 +1,18 @@
-"""The numbers of a comparison as CSV files."""
+"""The numbers of a comparison as CSV files, among them Table I of the paper.
+
+The paper gives all nine markers to the solver that assimilates them, and judges it by the same nine: that is
+a training error. Errors at markers that a solver was not given are other columns here.
+"""
 
 from pathlib import Path
+from typing import NamedTuple
 
 from compare.evaluation.certificate import Certificate
-from compare.evaluation.comparison import MEANS, Comparison
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.differences import ReferenceDifferences
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import (
+    MEANS,
     TruthDifferences,
     held_out_errors,
     marker_errors,
@@ -14,6 +20,64 @@ from compare.evaluation.metrics import (
     truth_differences,
 )
 from compare.runtime.csv_files import Cell, write_csv
+
+Means = tuple[float, float, float | None, float]
+"""Mean absolute errors at the markers in the order of `MEANS`, mm; None where it is not printed."""
+
+
+class Row(NamedTuple):
+    """One solver's errors in Table I.
+
+    Attributes:
+        solver: Its label.
+        source: Where the displacements of the markers come from.
+        given: Errors at markers that it was given; None if it was given none.
+        held_out: Errors at markers that it was not given: all, or each left out in its turn; None if unknown.
+    """
+
+    solver: str
+    source: str
+    given: Means | None
+    held_out: Means | None
+
+
+PAPER = "paper"
+PRINTED = (
+    Row("FEM", PAPER, None, (1.41, 0.39, None, 1.463)),
+    Row("PINN-Ray std", PAPER, None, (1.37, 0.48, None, 1.452)),
+    Row("PINN-Ray asm", PAPER, (0.03, 0.00, None, 0.03), None),
+)
+"""Table I as it is printed: nine markers of the paper's own experiment, whose data is not published.
+
+Source: X. Wang et al., PINN-Ray, arXiv:2407.08222, Table I.
+"""
+
+
+def table_one(comparison: Comparison) -> list[Row]:
+    """A row of Table I for each solver of this run."""
+    rows, observations = [], comparison.observations
+    for evaluation in comparison.evaluations:
+        given = marker_errors(evaluation, observations)[2:] if evaluation.in_sample else None
+        held_out = held_out_errors(evaluation, observations)
+        rows.append(Row(evaluation.label, observations.label, given, held_out and held_out[2:]))
+    return rows
+
+
+def millimetres(error: float, printed: bool = False) -> str:
+    """A mean error, mm, to 0.001; of those that the paper prints, without a last zero, as there."""
+    text = f"{error:.3f}"
+    return text.removesuffix("0") if printed else text
+
+
+def write_table_one(path: Path, comparison: Comparison) -> None:
+    """Write a row a solver, then those that the paper prints; what does not exist is empty."""
+    rows: list[dict[str, Cell]] = []
+    for row in (*table_one(comparison), *PRINTED):
+        rows.append({"solver": row.solver, "observations": row.source})
+        for column, means in (("in_sample", row.given), ("held_out", row.held_out)):
+            for name, value in zip(MEANS, means or [None] * len(MEANS), strict=True):
+                rows[-1][f"{column}_{name}_mm"] = "" if value is None else value
+    write_csv(path, rows)
 
 
 def write_markers(path: Path, comparison: Comparison) -> None:

@@ -5,11 +5,9 @@ from rich.table import Table
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.labels import solver_label
 from compare.evaluation.metrics import reference_differences, truth_differences
 from compare.evaluation.number_format import NONE, percent
-from compare.report.table_one import MEANS, PAPER, PRINTED, Row, millimetres, table_one
-from compare.report.tables import seconds
+from compare.report.tables import PAPER, PRINTED, Row, millimetres, seconds, table_one
 
 
 def marker_table(comparison: Comparison) -> Table:
@@ -40,7 +38,7 @@ def marker_table(comparison: Comparison) -> Table:
 def body_table(comparison: Comparison) -> Table:
     """Distances over the body, energy and time."""
     evaluations, reference, truth = comparison.evaluations, comparison.reference, comparison.truth
-    label = solver_label(reference)
+    label = reference.label
     lines = [f"from {label}: relative L² difference of the displacement."]
     if reference.uncertainty is not None and len(evaluations) > 1:
         lines.append(f"±: error of {label} itself, estimated; a smaller difference says nothing.")
@@ -86,11 +84,11 @@ def _table(title: str, caption: str) -> Table:
 
 
 def _name(evaluation: Evaluation) -> str:
-    return solver_label(evaluation).replace(" (", "\n(")
+    return evaluation.label.replace(" (", "\n(")
 
 
 def _means(row: Row) -> list[str]:
-    values = [value for means in (row.given, row.held_out) for value in means or [None] * len(MEANS)]
+    values = [value for means in (row.given, row.held_out) for value in means or [None] * 4]
     return [NONE if value is None else millimetres(value, row.source == PAPER) for value in values]
 
 

@@ -151,14 +151,14 @@ def beside(value: float, own: float | None) -> Markup:
     )
 
 
-def own_error_sentence(label: str, evaluation: Evaluation) -> str:
+def own_error_sentence(evaluation: Evaluation) -> str:
     """Sentence on a solver's estimate of its own error."""
     own, markers = evaluation.uncertainty, evaluation.marker_uncertainty
     if own is None or markers is None:
-        return f"{label} gives no estimate of its own error."
+        return f"{evaluation.label} gives no estimate of its own error."
     return (
-        f"The error of {label} itself, by its own estimate: {percent(own.displacement.rel_l2)} in the "
-        f"displacement, {percent(own.von_mises.rel_l2)} in the von Mises stress (relative L²), "
+        f"The error of {evaluation.label} itself, by its own estimate: {percent(own.displacement.rel_l2)} in "
+        f"the displacement, {percent(own.von_mises.rel_l2)} in the von Mises stress (relative L²), "
         f"{percent(np.sqrt(abs(own.energy)))} in the energy norm, {distance(markers.max())} mm at most at a "
         "marker."
     )

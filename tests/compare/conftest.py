@@ -10,7 +10,7 @@ import pytest
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.uncertainty import evaluated
+from compare.evaluation.metrics import evaluated
 from geometry.arrays import FloatArray
 from geometry.finger.design import Design
 from geometry.mesh.point_location import LocatedPoints

@@ -14,7 +14,7 @@ from compare.evaluation.convergence import with_certificate, with_certificates
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import reference_differences
 from compare.evaluation.regions import REGIONS, body_regions
-from compare.report.certificate_text import certificate_sentences
+from compare.report.sentences import certificate_sentences
 from geometry.arrays import FloatArray, IntArray
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design

@@ -11,7 +11,7 @@ from compare.evaluation.comparison import Comparison
 from compare.evaluation.convergence import with_certificate
 from compare.evaluation.evaluation import Evaluation
 from compare.figures.excess import DECADES, draw_excess, excess_scale
-from compare.report.certificate_text import certificate_sentences
+from compare.report.sentences import certificate_sentences
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 

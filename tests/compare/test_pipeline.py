@@ -16,7 +16,6 @@ import pyvista
 from rich.console import Console
 
 from compare.evaluation.comparison import Comparison
-from compare.evaluation.labels import solver_label
 from compare.pipeline import Job, run
 from compare.report.metrics_json import metrics
 from compare.runtime.provenance import package_versions
@@ -455,7 +454,7 @@ def test_a_result_that_its_solver_believes_in_but_finite_elements_do_not_is_mark
     )
     asked = job(FemSolver(), Scripted("linear", degree=1))
     compare(asked)
-    assert [solver_label(evaluation) for evaluation in drawn] == ["fem", "linear (not converged)"]
+    assert [evaluation.label for evaluation in drawn] == ["fem", "linear (not converged)"]
     told = strictly(asked.out / "metrics.json")["solvers"]
     assert [told[name]["status"] for name in ("fem", "linear")] == ["converged", "not converged"]
     assert told["linear"]["message"].startswith("solved directly; the discretisation is the only error,")

@@ -9,8 +9,7 @@ import pytest
 
 from compare.evaluation.differences import ReferenceDifferences
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import reference_differences
-from compare.evaluation.uncertainty import indistinct
+from compare.evaluation.metrics import indistinct, reference_differences
 
 
 def test_it_is_the_difference_of_the_improved_solution(estimated: Evaluation) -> None:
