@@ -20,7 +20,8 @@ from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from vision.discs.disc_detector import METHODS
 from vision.frames.frame import Image
-from vision.frames.video import VideoWriter, open_frames
+from vision.frames.sources import open_frames
+from vision.frames.video import video_writer
 from vision.rig.bench import Bench
 from vision.rig.exposure import Exposure
 from vision.rig.motion import Motion
@@ -46,9 +47,9 @@ def main() -> Table:
         sources: dict[str, Path] = {}
         for name, suffix in (("MJPG", ".avi"), ("mp4v", ".mp4"), ("FFV1", ".mkv")):
             sources[name] = Path(folder) / f"film{suffix}"
-            with VideoWriter(sources[name], (1280, 720), 60.0) as writer:
+            with video_writer(sources[name], (1280, 720), 60.0) as write:
                 for image in whole:
-                    writer.write(image)
+                    write(image)
         for method in METHODS:
             known = FilmedScene(scene.design, scene.workspace, scene.camera, method=method)
             table.add_row(method, "memory, coloured", *_timed(known, whole))

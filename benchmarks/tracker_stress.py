@@ -30,7 +30,7 @@ from vision.discs.colour import DARK
 from vision.discs.colour_picker import pick_colour
 from vision.discs.disc_detector import METHODS, DetectionMethod
 from vision.frames.frame import Frames
-from vision.frames.video import open_frames
+from vision.frames.sources import open_frames
 from vision.rig.bench import BENCH, Bench
 from vision.rig.exposure import Exposure
 from vision.rig.motion import Motion

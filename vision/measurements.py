@@ -1,4 +1,4 @@
-"""Marker displacements as a CSV file: one row a marker, ordered from base to tip, units in the header."""
+"""Marker displacements as a CSV file: one row per marker, from base to tip, units in the header."""
 
 import csv
 import re
@@ -20,9 +20,9 @@ SOURCE_MARK = "# source: "
 
 
 def write_measurements(path: Path, observations: Observations) -> None:
-    """Write observations atomically; `read_measurements` gives the same back.
+    """Write observations atomically; `read_measurements` restores them.
 
-    Markers that were not seen have their position only, and are read back with zeros.
+    A marker that was not seen has only its position, and is read back with zeros.
     """
     with atomic_path(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
         if observations.simulated:
@@ -47,12 +47,12 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
 
     The columns `x_mm, y_mm` (initial position in the finger's frame) and `u_mm, v_mm` (displacement, final
     minus initial) are needed; `std_u_mm, std_v_mm` (standard deviations) and `visible` (1 or 0) may be left
-    out. Of a marker that is not visible only the position is read. Comment lines start with `#`;
-    `# source: TEXT` says where the numbers come from and `# simulated` that no camera was involved.
+    out. Only the position is read of a marker that is not visible. Comment lines start with `#`;
+    `# source: TEXT` names the origin of the numbers, `# simulated` means that no camera was involved.
 
     Raises:
         UserError: If the file cannot be read, a column is missing, a value is no number
-            or a marker is there twice; it names the line.
+            or a marker occurs twice; the message names the line.
     """
     comments, table = _lines(path)
     header = table[0][1] if table else []
@@ -98,8 +98,8 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
 def _lines(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """The comments, and the cells of the other lines with their line numbers.
 
-    A spreadsheet program that saves the file puts a mark before the first line, quotes comments that hold a
-    comma, and fills them up with commas: "simulated" must survive that.
+    A spreadsheet program that saves the file puts a byte-order mark before the first line, quotes comments
+    with a comma, and appends commas to them: the mark "simulated" must survive that.
     """
     comments: list[str] = []
     table: list[tuple[int, list[str]]] = []
@@ -117,7 +117,7 @@ def _lines(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
 
 
 def _marker(cells: Mapping[str, str], where: str) -> dict[str, float]:
-    """The numbers of one row; zeros for what means nothing because the marker was not seen."""
+    """The numbers of one row; zeros instead of the displacement of a marker that was not seen."""
     visible = _number(cells, "visible", where)
     if visible not in (0, 1):
         raise UserError(f"{where}: visible is {cells['visible']!r}; it must be 1 (seen) or 0 (not seen)")

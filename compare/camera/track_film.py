@@ -19,7 +19,8 @@ from geometry.observations import Observations
 from solvers.solver import Progress
 from vision.frames.frame import Frame, Image
 from vision.frames.pictures import write_picture
-from vision.frames.video import VideoWriter, open_frames
+from vision.frames.sources import open_frames
+from vision.frames.video import video_writer
 from vision.measurements import write_measurements
 from vision.tracking.annotation import annotated
 from vision.tracking.frame_tracker import FrameDetections
@@ -52,18 +53,18 @@ def track_film(
     scene = film.scene(design)
     kept: dict[str, tuple[Image, FrameDetections]] = {}
     with open_frames(film.source) as frames, ExitStack() as stack:
-        writer = None
+        write = None
         if video:
-            writer = stack.enter_context(VideoWriter(folder / "annotated.mp4", frames.size, frames.rate))
+            write = stack.enter_context(video_writer(folder / "annotated.mp4", frames.size, frames.rate))
 
         def see(frame: Frame, detections: FrameDetections) -> None:
             kept.setdefault("initial", (frame.image, detections))
             kept["final"] = (frame.image, detections)
             seen = int(np.isfinite(detections.markers.radii).sum())
             status = f"{seen} of {len(detections.places)} markers"
-            if writer is not None:
+            if write is not None:
                 lines = [f"frame {frame.number}, {frame.time:.3f} s", status]
-                writer.write(annotated(frame.image, detections, lines))
+                write(annotated(frame.image, detections, lines))
             if watch is not None:
                 watch(frame, detections)
             share = (frame.number + 1) / frames.count if frames.count else 0.0

@@ -38,7 +38,7 @@ def pick(
     from vision.discs.colour import read_colour
     from vision.discs.colour_picker import pick_colour
     from vision.frames.pictures import SUFFIXES, write_picture
-    from vision.frames.video import open_frames
+    from vision.frames.sources import open_frames
 
     if out.suffix.lower() not in SUFFIXES:
         raise UserError(f"--out {out}: give the name of a picture, such as pick.png")

@@ -10,7 +10,7 @@ import pytest
 from compare.cli import main
 from compare.runtime.exits import BAD_INPUT
 from vision.frames.pictures import write_picture
-from vision.frames.video import open_frames
+from vision.frames.sources import open_frames
 from vision.measurements import read_measurements
 
 QUICK = "--mesh-size 1 --rest 3 --moving 0 --held 3 --noise 2 --tilt 4 --seed 1"

@@ -39,7 +39,7 @@ def test_fit_and_covariance_are_those_of_the_dense_problem(seen):
         camera = CAMERA.with_intrinsics([*unknowns[:8], 0])
         six = unknowns[8:].reshape(6, 6)
         board = Poses(Rotation.from_rotvec(six[:, :3]), six[:, 3:])
-        return (camera.project(board.place(seen.points, seen.view)) - seen.pixels).ravel()
+        return (camera.project(board.to_camera(seen.points, seen.view)) - seen.pixels).ravel()
 
     begin = [*CAMERA.intrinsics[:8], *np.column_stack([placed().rotations.as_rotvec(), placed()[1]]).ravel()]
     dense = least_squares(missed, begin, x_scale="jac", xtol=1e-12, ftol=1e-12, jac="3-point")
@@ -62,7 +62,7 @@ def test_standard_deviations_are_those_of_opencv():
 
 
 def test_the_covariance_covers_the_errors_of_200_fits():
-    rng, exact = np.random.default_rng(11), CAMERA.project(placed().place(ALL.points, ALL.view))
+    rng, exact = np.random.default_rng(11), CAMERA.project(placed().to_camera(ALL.points, ALL.view))
     squares, scores = [], []
     for _ in range(200):
         seen = replace(ALL, pixels=exact + rng.normal(0, 0.3, exact.shape))
@@ -81,5 +81,5 @@ def test_a_known_camera_leaves_only_the_poses():
     assert found.camera.intrinsics.tolist() == CAMERA.intrinsics.tolist()
     assert np.abs(found.residuals).mean() < 0.3
     off = found.poses.moved(np.full((6, 6), 1e-4))  # it is a minimum
-    missed = CAMERA.project(off.place(SOME.points, SOME.view)) - SOME.pixels
+    missed = CAMERA.project(off.to_camera(SOME.points, SOME.view)) - SOME.pixels
     assert np.sum(missed**2) > np.sum(found.residuals**2)

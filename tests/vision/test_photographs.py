@@ -6,7 +6,7 @@ import pytest
 
 from geometry.errors import UserError
 from vision.calibration.photographs import FRAMES_OF_A_VIDEO, photographs
-from vision.frames.video import VideoWriter
+from vision.frames.video import video_writer
 
 
 @pytest.fixture
@@ -41,9 +41,9 @@ def test_leaving_out_what_is_not_there_is_one_line(folder):
 
 
 def test_a_video_gives_frames_spread_evenly(tmp_path):
-    with VideoWriter(tmp_path / "board.mkv", (32, 24), 30) as video:
+    with video_writer(tmp_path / "board.mkv", (32, 24), 30) as write:
         for number in range(130):
-            video.write(np.full((24, 32), number, np.uint8))
+            write(np.full((24, 32), number, np.uint8))
     found = list(photographs([tmp_path / "board.mkv"]))
     assert FRAMES_OF_A_VIDEO <= len(found) <= 1.2 * FRAMES_OF_A_VIDEO
     assert [name.rsplit(":", 1)[1] for name, _ in found[:3]] == ["0", "3", "6"]

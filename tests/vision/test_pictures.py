@@ -11,7 +11,7 @@ import pytest
 
 from geometry.errors import UserError
 from vision.frames.pictures import Decoder, split
-from vision.frames.video import open_frames
+from vision.frames.sources import open_frames
 
 
 def encoded(

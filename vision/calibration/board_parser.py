@@ -1,4 +1,4 @@
-"""The board of a text: 9x6 for a chessboard by its inner corners, charuco:8x6 for ChArUco by its squares."""
+"""Boards from text: 9x6 is a chessboard by its inner corners, charuco:8x6 a ChArUco board by its squares."""
 
 import re
 
@@ -10,10 +10,10 @@ from vision.calibration.chessboard import Board
 def parse_board(
     text: str, square: float, *, marker: float | None = None, dictionary: str = "5X5_100"
 ) -> Board:
-    """The board of a text, with squares and, for ChArUco, markers of these sides, mm.
+    """The board that a text names; sides of its squares and, for ChArUco, of its markers in mm.
 
     Raises:
-        UserError: If there is no such board.
+        UserError: If the text names no possible board.
     """
     if not (found := re.fullmatch(r"(charuco:)?(\d{1,3})x(\d{1,3})", text.strip(), re.IGNORECASE)):
         raise UserError(

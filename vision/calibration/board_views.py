@@ -1,6 +1,6 @@
-"""Where the corners of a board are in photographs, and how much of the image they reach. Units: pixels.
+"""Corners of a board in photographs, and the share of the image that they cover. Units: pixels.
 
-Of every photograph there are as many corners as the board has, shape (n, 2), NaN where one is not seen.
+A view is the corners in one photograph, in the order of the board, shape (n, 2), NaN where one is not seen.
 """
 
 from collections import Counter
@@ -17,17 +17,17 @@ from vision.calibration.chessboard import Board
 from vision.frames.frame import GreyImage
 
 FEWEST_VIEWS = 4
-GUESSES = 8
-"""Photographs that are asked what board they show if it is not the expected one."""
+MAX_SUGGESTIONS = 8
+"""Photographs without the expected board that are searched for another one."""
 
 
 class BoardViews(NamedTuple):
-    """What was found in photographs.
+    """Views of a board in photographs.
 
     Attributes:
-        views: Corners by the name of the photograph.
+        views: By the name of the photograph.
         size: (width, height) of all photographs.
-        boardless: Names of those in which no board was found.
+        boardless: Names of the photographs without a board.
     """
 
     views: dict[str, FloatArray]
@@ -36,14 +36,14 @@ class BoardViews(NamedTuple):
 
 
 def find_views(images: Iterable[tuple[str, GreyImage]], board: Board) -> BoardViews:
-    """Find a board in photographs, of which only one is held at a time.
+    """Find a board in photographs; only one is in memory at a time.
 
     Raises:
         UserError: If the sizes differ, or most photographs show a board of another size.
     """
     views: dict[str, FloatArray] = {}
     boardless: list[str] = []
-    guesses = Counter[str]()
+    others = Counter[str]()
     first, size = "", (0, 0)
     for name, image in images:
         width, height = image.shape[::-1]
@@ -59,33 +59,34 @@ def find_views(images: Iterable[tuple[str, GreyImage]], board: Board) -> BoardVi
             views[name] = corners
             continue
         boardless.append(name)
-        if len(views) < FEWEST_VIEWS and len(boardless) <= GUESSES and (guess := board.suggest(image)):
-            guesses[guess] += 1
-    guess, votes = guesses.most_common(1)[0] if guesses else ("", 0)
+        undecided = len(views) < FEWEST_VIEWS and len(boardless) <= MAX_SUGGESTIONS
+        if undecided and (other := board.suggest(image)):
+            others[other] += 1
+    other, votes = others.most_common(1)[0] if others else ("", 0)
     if len(views) < FEWEST_VIEWS and votes > max(1, len(views)):
         raise UserError(
             f"{len(views)} of {len(views) + len(boardless)} photographs show the board of {board}; "
-            f"{votes} seem to show {guess}"
+            f"{votes} seem to show {other}"
         )
     return BoardViews(views, size, tuple(boardless))
 
 
 def corner_observations(views: Sequence[FloatArray] | FloatArray, board: Board) -> CornerObservations:
-    """The corners that were seen."""
+    """The corners seen in all views."""
     seen = np.isfinite(views).all(axis=2)
     view, corner = np.nonzero(seen)
     return CornerObservations(board.corners[corner], np.asarray(views)[seen], view)
 
 
-def residuals_by_view(values: FloatArray, views: Sequence[FloatArray]) -> FloatArray:
-    """What belongs to the corners that were seen, shape (m, 2), in the shape of the views, (views, n, 2)."""
+def residuals_by_view(residuals: FloatArray, views: Sequence[FloatArray]) -> FloatArray:
+    """Residuals of the corners that were seen, shape (m, 2), in the shape of the views, (views, n, 2)."""
     spread = np.full(np.shape(views), np.nan)
-    spread[np.isfinite(views).all(axis=2)] = values
+    spread[np.isfinite(views).all(axis=2)] = residuals
     return spread
 
 
 def coverage(views: Sequence[FloatArray], size: tuple[int, int]) -> float:
-    """Share of the pixels that lie between the corners of some view."""
+    """Share of the pixels within the convex hull of the corners of at least one view."""
     covered = np.zeros(size[::-1], dtype=np.uint8)
     for view in views:
         seen = view[np.isfinite(view).all(axis=1)]

@@ -1,4 +1,4 @@
-"""A camera: how points in space become pixels, and how the distortion of its lens is undone.
+"""Camera model: projection of points to pixels with lens distortion, and removal of the distortion.
 
 A pinhole behind one of the lenses of `vision.calibration.lens`, in the convention of OpenCV: x to the right,
 y down, z away from the camera; the centre of the first pixel is (0, 0).
@@ -24,7 +24,7 @@ NEWTON_TOLERANCE = 1e-10
 
 
 class Pose(NamedTuple):
-    """Where something is in the camera's frame: a rotation vector (axis times angle) and a shift, mm."""
+    """Pose in the camera's frame: a rotation vector (axis times angle) and a shift, mm."""
 
     rotation: FloatArray
     translation: FloatArray
@@ -93,17 +93,17 @@ class Camera:
 
     @cached_property
     def lens(self) -> Lens:
-        """What bends the rays."""
+        """The lens with its coefficients."""
         return LENSES[self.model](*self.distortion)
 
     @property
     def intrinsic_names(self) -> tuple[str, ...]:
-        """What `intrinsics` are called: fx, fy, cx, cy and the coefficients of the lens."""
+        """Names of `intrinsics`: fx, fy, cx, cy and the coefficients of the lens."""
         return ("fx", "fy", "cx", "cy", *(field.name for field in fields(LENSES[self.model])))
 
     @property
     def intrinsics(self) -> FloatArray:
-        """The numbers of `names`, pixels but for those of the lens."""
+        """Focal lengths and principal point, pixels, and the coefficients of the lens."""
         return np.array([self.fx, self.fy, self.cx, self.cy, *self.distortion], dtype=np.float64)
 
     @property
@@ -117,15 +117,15 @@ class Camera:
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]], dtype=np.float64)
 
     def with_intrinsics(self, values: Sequence[float] | FloatArray) -> "Camera":
-        """The same with other `intrinsics`, of unknown covariance."""
+        """The camera with other `intrinsics`, of unknown covariance."""
         fx, fy, cx, cy, *distortion = map(float, values)
         return replace(self, fx=fx, fy=fy, cx=cx, cy=cy, distortion=tuple(distortion), covariance=None)
 
     def project(self, points: ArrayLike, pose: Pose = IDENTITY) -> FloatArray:
-        """Where points are seen.
+        """Project points to pixels.
 
         Args:
-            points: Shape (n, 3), mm, in the camera's frame or in the one that `pose` puts there.
+            points: Shape (n, 3), mm, in the frame whose pose is `pose`.
             pose: Of the points' frame in the camera's.
 
         Returns:
@@ -135,10 +135,11 @@ class Camera:
             UserError: If a point is not in front of the camera.
         """
         points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
-        return self._pixels(self.lens.distort(_plane(points @ _turn(pose).T + pose.translation)))
+        rotation = np.asarray(cv2.Rodrigues(pose.rotation)[0], dtype=np.float64)
+        return self._pixels(self.lens.distort(_plane(points @ rotation.T + pose.translation)))
 
     def project_with_jacobians(self, points: ArrayLike) -> Projection:
-        """Where points in the camera's frame, shape (n, 3), mm, are seen, with derivatives by both.
+        """Project points in the camera's frame, shape (n, 3), mm, with derivatives by points and intrinsics.
 
         Raises:
             UserError: If a point is not in front of the camera.
@@ -152,34 +153,25 @@ class Camera:
         return Projection(self._pixels(bent), by_point, self._by_intrinsics(plane, bent))
 
     def distort(self, pixels: ArrayLike) -> FloatArray:
-        """Where the lens puts points that a pinhole would show at `pixels`; shapes (n, 2), pixels."""
+        """Pixels of a pinhole camera to pixels behind the lens; shapes (n, 2)."""
         return self._pixels(self.lens.distort(self._on_plane(pixels)))
 
     def undistort(self, pixels: ArrayLike) -> FloatArray:
-        """Where a pinhole would show what the lens puts at `pixels`: the inverse of `distort`.
+        """Pixels behind the lens to pixels of a pinhole camera, the inverse of `distort`; shapes (n, 2).
 
-        Newton's method on every point until it is met within 1e-10 pixels.
-
-        Args:
-            pixels: Shape (n, 2), pixels.
-
-        Returns:
-            Shape (n, 2), pixels.
+        Newton's method on every point, to 1e-10 pixels.
 
         Raises:
             UserError: If a point lies where the distortion cannot be undone: the polynomial folds there.
         """
-        return self._pixels(self._straight(self._on_plane(pixels)))
-
-    def _straight(self, bent: FloatArray) -> FloatArray:
-        """What the lens puts at `bent`; shapes (n, 2)."""
+        bent = self._on_plane(pixels)
         plane, tolerance = bent.copy(), NEWTON_TOLERANCE / max(self.fx, self.fy)
         for _ in range(NEWTON_STEPS):
-            missed, slope = self.lens.distort(plane) - bent, self.lens.jacobian(plane)
-            upright = np.linalg.det(slope) > 0
+            missed, jacobian = self.lens.distort(plane) - bent, self.lens.jacobian(plane)
+            upright = np.linalg.det(jacobian) > 0
             if not upright.all() or np.abs(missed).max(initial=0) < tolerance:
                 break
-            plane -= np.linalg.solve(slope, missed[:, :, None])[:, :, 0]
+            plane -= np.linalg.solve(jacobian, missed[:, :, None])[:, :, 0]
         folded = ~(upright & (np.abs(missed) < 10 * tolerance).all(axis=1))
         if folded.any():
             x, y = self._pixels(bent)[folded][0]
@@ -187,10 +179,10 @@ class Camera:
                 f"the lens distortion cannot be undone at pixel ({x:.1f}, {y:.1f}); calibrate the camera "
                 "with boards that reach the corners of the image"
             )
-        return plane
+        return self._pixels(plane)
 
     def _on_plane(self, pixels: ArrayLike) -> FloatArray:
-        """Where the plane at depth 1 is seen at `pixels` without a lens; shapes (n, 2)."""
+        """Points of the plane at depth 1 that a pinhole shows at `pixels`; shapes (n, 2)."""
         pixels = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
         return np.asarray((pixels - (self.cx, self.cy)) / (self.fx, self.fy))
 
@@ -199,28 +191,24 @@ class Camera:
         return np.asarray(plane * (self.fx, self.fy) + (self.cx, self.cy))
 
     def _by_intrinsics(self, plane: FloatArray, bent: FloatArray) -> FloatArray:
-        """Derivative of the pixels of `plane`, which the lens puts at `bent`, shape (n, 2, intrinsics)."""
+        """Derivative of pixels by the intrinsics, shape (n, 2, intrinsics).
+
+        Args:
+            plane: Points of the plane at depth 1 before the lens, shape (n, 2).
+            bent: The same points behind the lens, shape (n, 2).
+        """
+        zero, one = np.zeros(len(bent)), np.ones(len(bent))
+        by_pinhole = [[bent[:, 0], zero, one, zero], [zero, bent[:, 1], zero, one]]
         by_lens = np.array([[self.fx], [self.fy]]) * self.lens.by_coefficients(plane)
-        return np.concatenate([_by_pinhole(bent), by_lens], axis=2)
-
-
-def _by_pinhole(bent: FloatArray) -> FloatArray:
-    """Derivative of the pixels of `bent`, shape (n, 2), by fx, fy, cx, cy: shape (n, 2, 4)."""
-    zero, one = np.zeros(len(bent)), np.ones(len(bent))
-    return np.array([[bent[:, 0], zero, one, zero], [zero, bent[:, 1], zero, one]]).transpose(2, 0, 1)
+        return np.concatenate([np.array(by_pinhole).transpose(2, 0, 1), by_lens], axis=2)
 
 
 def _plane(points: FloatArray) -> FloatArray:
-    """Where rays to points, shape (n, 3), meet the plane at depth 1, shape (n, 2)."""
+    """Intersections of the rays to points, shape (n, 3), with the plane at depth 1, shape (n, 2)."""
     behind = ~(points[:, 2] > 0)
     if behind.any():
         raise UserError(f"{behind.sum()} of {len(points)} points are not in front of the camera")
     return np.asarray(points[:, :2] / points[:, 2:])
-
-
-def _turn(pose: Pose) -> FloatArray:
-    """The rotation of a pose as a matrix, shape (3, 3)."""
-    return np.asarray(cv2.Rodrigues(pose.rotation)[0], dtype=np.float64)
 
 
 def _check_covariance(covariance: FloatArray, names: tuple[str, ...]) -> None:

@@ -1,9 +1,9 @@
-"""A camera from photographs of a board, with what is known about its errors.
+"""Camera calibration from photographs of a board, with covariance and reprojection errors.
 
 Z. Zhang, "A flexible new technique for camera calibration", IEEE TPAMI 22, 2000: a plane seen in several
-poses determines the camera. All intrinsics and poses are fitted by least squares. The fit's own residuals
-flatter it, so `held_out_rms` repeats it without some of the photographs and asks how well it predicts corners
-there. Units: pixels, mm.
+poses determines the camera. All intrinsics and poses are fitted by least squares. The residuals of the fit
+underestimate its error, so `held_out_rms` predicts corners in photographs that were left out of it.
+Units: pixels, mm.
 """
 
 import math
@@ -22,22 +22,21 @@ from vision.calibration.lens_fit import LENS_CHOICES, LensChoice, fit_lens, held
 from vision.frames.frame import GreyImage
 
 LEAST_COVERAGE = 0.6
-"""Share of the image below which the distortion near its edges is a guess."""
+"""Share of the image below which the distortion near its edges is extrapolated."""
 OUTLIER = 3.0
-"""Error of a view in medians of all from which it deserves a look."""
+"""Reprojection error of a view, in medians of all views, above which a warning names it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """A camera and how well it is known.
+    """A calibrated camera with its reprojection errors.
 
     Attributes:
         camera: With covariance.
-        board: What was photographed.
-        views: Where its corners were seen, by the name of the photograph, shape (n, 2), pixels;
-            NaN where one was not seen.
-        residuals: Seen minus predicted by the fit, likewise.
-        held_out_rms: Root mean square distance in photographs that the camera was not fitted to, pixels.
+        board: In the photographs.
+        views: Corners by the name of the photograph, shape (n, 2), pixels; NaN where one was not seen.
+        residuals: Observed minus predicted by the fit, likewise.
+        held_out_rms: Root mean square reprojection error in photographs left out of the fit, pixels.
         coverage: Share of the image area that was inside a board at least once.
         boardless: Names of the photographs in which no board was found.
     """
@@ -52,12 +51,12 @@ class Calibration:
 
     @property
     def rms(self) -> float:
-        """Root mean square distance between corners and their projections in the fit, pixels."""
+        """Root mean square reprojection error of the fit, pixels."""
         return rms(list(self.residuals.values()))
 
     @property
     def view_errors(self) -> dict[str, float]:
-        """The same for every photograph that shows the board, by name."""
+        """Root mean square reprojection error of every photograph with the board, by name, pixels."""
         return {name: rms([residuals]) for name, residuals in self.residuals.items()}
 
 
@@ -67,9 +66,9 @@ def calibrate(
     """Calibrate a camera from photographs of a board.
 
     Args:
-        images: Names and grey photographs, all of one size; only one is held at a time.
-        board: What they show.
-        lens: What is fitted.
+        images: Names and grey photographs, all of one size; only one is in memory at a time.
+        board: In the photographs.
+        lens: Model to fit.
 
     Raises:
         UserError: If the sizes differ, fewer than 4 photographs show the board, or they do not determine the
@@ -91,10 +90,10 @@ def calibrate_views(
 
     Args:
         views: By name, in the order of `board.corners`, shape (n, 2), pixels; NaN where one was not seen.
-        board: Whose corners they are.
+        board: In the images.
         size: Of the images, pixels.
-        lens: What is fitted.
-        boardless: What to call the photographs without a board.
+        lens: Model to fit.
+        boardless: Names of photographs without a board.
 
     Raises:
         UserError: If there are fewer than 4 views, or they do not determine the camera.
@@ -126,7 +125,7 @@ def calibrate_views(
 def better_lens(
     calibration: Calibration, lens: LensChoice, *, ratio: float = 0.8
 ) -> tuple[LensChoice, float] | None:
-    """A lens that would bring the error held out below `ratio` of what it is, and that error, pixels."""
+    """A lens whose held-out error is below `ratio` times that of the calibration, and this error, pixels."""
     camera, corners = calibration.camera, list(calibration.views.values())
     errors = {}
     for other in LENS_CHOICES:
@@ -141,7 +140,7 @@ def better_lens(
 
 
 def _warn(calibration: Calibration) -> None:
-    """Say what would make the calibration better."""
+    """Warn of outliers and of low coverage."""
     errors = calibration.view_errors
     usual = float(np.median(list(errors.values())))
     for name, error in errors.items():

@@ -1,4 +1,4 @@
-"""Camera files: JSON or YAML with the names of OpenCV's calibration sample, which `cv2.FileStorage` reads."""
+"""Camera files: JSON or YAML with the keys of OpenCV's calibration sample, readable by `cv2.FileStorage`."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -18,7 +18,7 @@ FORMATS = (".json", ".yml", ".yaml")
 
 
 def save_camera(path: Path, camera: Camera) -> None:
-    """Write a camera atomically, as JSON or YAML by the suffix; `load_camera` gives the same camera back.
+    """Write a camera atomically, as JSON or YAML by the suffix; `load_camera` restores it.
 
     Raises:
         UserError: If the suffix is none of `FORMATS`.
@@ -27,7 +27,7 @@ def save_camera(path: Path, camera: Camera) -> None:
 
 
 def save_calibration(path: Path, calibration: Calibration, versions: Mapping[str, str] | None = None) -> None:
-    """Write a camera with what is known about it: errors, coverage, board, and the versions that made it.
+    """Write a camera with its errors, coverage, board and the versions of the programs that made it.
 
     Raises:
         UserError: If the suffix is none of `FORMATS`.
@@ -53,7 +53,7 @@ def save_calibration(path: Path, calibration: Calibration, versions: Mapping[str
 
 
 def load_camera(path: Path) -> Camera:
-    """Read a camera that was written here or by OpenCV's calibration sample.
+    """Read a camera file of this program or of OpenCV's calibration sample.
 
     Raises:
         UserError: If the file cannot be read, a key is missing or its value is of another kind.
@@ -89,7 +89,7 @@ def load_camera(path: Path) -> Camera:
 
 
 def check_format(path: Path) -> None:
-    """Raise `UserError` unless the suffix says how to write a camera."""
+    """Raise `UserError` unless the suffix is one of `FORMATS`."""
     if path.suffix.lower() not in FORMATS:
         raise UserError(f"{path}: a camera is written as {', '.join(FORMATS)}; give a name that ends so")
 
@@ -119,7 +119,7 @@ def _write(path: Path, content: Mapping[str, Entry]) -> None:
 
 
 def _covariance(storage: cv2.FileStorage, size: int, path: Path) -> tuple[tuple[float, ...], ...] | None:
-    """The covariance, or the diagonal one of the standard deviations, or None."""
+    """The covariance in the file, or a diagonal one from standard deviations, or None."""
     if not storage.getNode("intrinsics_covariance").empty():
         covariance = _matrix(storage, "intrinsics_covariance", path, sizes=(size**2,)).reshape(size, size)
     elif not storage.getNode("intrinsics_standard_deviations").empty():

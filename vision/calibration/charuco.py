@@ -1,4 +1,4 @@
-"""A ChArUco board: a chessboard with a marker in every white square, of which any part may be seen."""
+"""ChArUco boards: chessboards with a marker in every white square, any part of which may be seen."""
 
 from dataclasses import dataclass
 
@@ -10,15 +10,15 @@ from geometry.errors import UserError
 from vision.calibration.chessboard import Board
 from vision.frames.frame import GreyImage
 
-REACH = 0.6
-"""Distance from a corner that stays clear of its markers, over the difference of the sides of both."""
+MARKER_FREE = 0.6
+"""Radius around a corner without markers, over the difference of the sides of square and marker."""
 DICTIONARIES = {
     name.removeprefix("DICT_"): int(getattr(cv2.aruco, name))
     for name in sorted(dir(cv2.aruco))
     if name.startswith("DICT_") and name == name.upper()
 }
 LARGEST = [name for name in DICTIONARIES if not name.endswith(("_50", "_100", "_250"))]
-"""Dictionaries that are no part of another one."""
+"""Dictionaries that are not part of a larger one."""
 FEWEST_MARKERS = 3
 
 
@@ -61,9 +61,9 @@ class CharucoBoard(Board):
         return f"{self.columns + 1}x{self.rows + 1} squares with markers {self.dictionary}"
 
     def find(self, image: GreyImage) -> FloatArray | None:
-        """Where `corners` are in an image, shape (n, 2), pixels, NaN where one is not seen; None if few are.
+        """Find `corners` in an image, shape (n, 2), pixels, NaN where one is not seen; None if too few are.
 
-        Boards of the layout before OpenCV 4.6 are found too.
+        Boards of the layout before OpenCV 4.6 are found, too.
 
         Source: S. Garrido-Jurado et al., "Automatic generation and detection of highly reliable fiducial
         markers under occlusion", Pattern Recognition 47, 2014, as in OpenCV,
@@ -79,10 +79,10 @@ class CharucoBoard(Board):
             return None
         corners = np.full((len(self.corners), 2), np.nan)
         corners[np.ravel(numbers)] = np.reshape(pixels, (-1, 2))
-        return self.refine(image, corners, REACH * (self.square - self.marker))
+        return self.refine(image, corners, MARKER_FREE * (self.square - self.marker))
 
     def suggest(self, image: GreyImage) -> str | None:
-        """Another dictionary that most markers in an image seem to be of; None if it is this one."""
+        """Suggest another dictionary for the markers in an image; None if it is this one or there are few."""
         counts = {name: _markers_seen(image, name) for name in LARGEST}
         best = max(counts, key=counts.__getitem__)
         own = self.dictionary.rsplit("_", 1)[0] == best.rsplit("_", 1)[0]

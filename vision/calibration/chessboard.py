@@ -1,4 +1,4 @@
-"""A chessboard to calibrate with, and its corners in a photograph."""
+"""Chessboards for calibration, and the search for their corners in a photograph."""
 
 from dataclasses import dataclass
 
@@ -11,13 +11,13 @@ from vision.calibration.corner_refinement import refine_corners
 from vision.frames.frame import GreyImage
 
 EDGE = 0.45
-"""Part of a square's side along which its edges are alone."""
+"""Radius around a corner in which only its own two edges lie, over a square's side."""
 RADII = (2.5, 12.0)
-"""Of the discs of pixels in which a corner is sought."""
+"""Smallest and largest radius of the pixels that a corner is fitted to."""
 LARGE = 1600
-"""Longer side of an image, pixels, from which on corners are first sought in a smaller one."""
+"""Longer side of an image, pixels, above which corners are first searched in a smaller one."""
 FEWEST_CORNERS = 4
-"""In either half of the corners: as many as determine a pose."""
+"""In either half of the corners: enough to determine a pose."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Board:
         return first, ~first
 
     def find(self, image: GreyImage) -> FloatArray | None:
-        """Where `corners` are in an image, shape (n, 2), pixels; None if it does not show the whole board.
+        """Find `corners` in an image, shape (n, 2), pixels; None if it does not show the whole board.
 
         Source: A. Duda, U. Frese, "Accurate detection and localization of checkerboard corners for
         calibration", BMVC 2018, as in OpenCV; then `vision.calibration.corner_refinement`.
@@ -78,7 +78,7 @@ class Board:
         return refined if whole else None
 
     def _guesses(self, image: GreyImage, shrink: float) -> FloatArray | None:
-        """The corners in an image as OpenCV finds them in a smaller one, shape (n, 2), pixels."""
+        """Corners that OpenCV finds in an image shrunk by a factor, shape (n, 2), pixels of the image."""
         small = _smaller(image, shrink)
         found, corners = cv2.findChessboardCornersSB(
             small, (self.columns, self.rows), flags=cv2.CALIB_CB_ACCURACY
@@ -89,30 +89,30 @@ class Board:
         return np.asarray((np.reshape(corners, (-1, 2)).astype(np.float64) + 0.5) * scale - 0.5)
 
     def refine(self, image: GreyImage, corners: FloatArray, reach: float) -> FloatArray | None:
-        """Corners to hundredths of a pixel from guesses, both of shape (n, 2) with NaN where one is not seen.
+        """Refine corners to hundredths of a pixel, shape (n, 2) with NaN where one is not seen.
 
         Args:
-            image: What shows them.
-            corners: Guesses.
-            reach: How far from a corner the board shows nothing but its edges, mm.
+            image: Of the board.
+            corners: Guesses, shape (n, 2), pixels.
+            reach: Radius around a corner in which the board shows only its two edges, mm.
 
         Returns:
-            None if those that are seen do not determine a pose.
+            None if the corners that are seen do not determine a pose.
         """
         seen = np.isfinite(corners[:, 0])
-        if not self._determine(seen):
+        if not self._determines_pose(seen):
             return None
         homography, _ = cv2.findHomography(self.corners[seen, :2], corners[seen])
-        edges = _slopes(np.asarray(homography, np.float64), self.corners[seen, :2])
+        edges = _homography_jacobian(np.asarray(homography, np.float64), self.corners[seen, :2])
         lengths = np.linalg.norm(edges, axis=2)
         narrowest = np.abs(np.linalg.det(edges)) / lengths.max(axis=1)
         radii = np.clip(reach * narrowest, *RADII)
         refined = np.full_like(corners, np.nan)
         refined[seen] = refine_corners(image, corners[seen], edges, radii)
-        return refined if self._determine(np.isfinite(refined[:, 0])) else None
+        return refined if self._determines_pose(np.isfinite(refined[:, 0])) else None
 
-    def _determine(self, seen: BoolArray) -> bool:
-        """Whether either half of the seen corners determines a pose."""
+    def _determines_pose(self, seen: BoolArray) -> bool:
+        """True if each half of the seen corners determines a pose."""
         for half in self.halves:
             points = self.corners[half & seen, :2]
             if len(points) < FEWEST_CORNERS:
@@ -123,23 +123,23 @@ class Board:
         return True
 
     def suggest(self, image: GreyImage) -> str | None:
-        """Another size that the board in an image seems to have; None if there is none."""
+        """Suggest a size for the board in an image; None if there is no board."""
         small = _smaller(image, max(image.shape) / LARGE)
         found, _, cells = cv2.findChessboardCornersSBWithMeta(small, (3, 3), cv2.CALIB_CB_LARGER)
         return f"{max(cells.shape)}x{min(cells.shape)}" if found else None
 
 
 def _smaller(image: GreyImage, shrink: float) -> GreyImage:
-    """An image with its sides divided by `shrink`; as it is if that is not above 1."""
+    """An image with its sides divided by `shrink`; unchanged if that is not above 1."""
     if shrink <= 1:
         return image
     width, height = (round(side / shrink) for side in image.shape[::-1])
     return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
-def _slopes(homography: FloatArray, points: FloatArray) -> FloatArray:
-    """How far a homography moves points, shape (n, 2), per mm along x and y, in rows, shape (n, 2, 2)."""
+def _homography_jacobian(homography: FloatArray, points: FloatArray) -> FloatArray:
+    """Derivative of a homography by x and y, in rows, shape (n, 2, 2), at points, shape (n, 2)."""
     places = np.column_stack([points, np.ones(len(points))]) @ homography.T
     pixels = places[:, :2] / places[:, 2:]
-    slopes = homography[:2, :2].T - homography[2, :2][:, None] * pixels[:, None, :]
-    return np.asarray(slopes / places[:, 2, None, None])
+    jacobian = homography[:2, :2].T - homography[2, :2][:, None] * pixels[:, None, :]
+    return np.asarray(jacobian / places[:, 2, None, None])

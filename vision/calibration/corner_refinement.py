@@ -1,10 +1,10 @@
-"""Where four squares of a board meet, to hundredths of a pixel: a parametric fit to the grey levels there.
+"""Corner refinement to hundredths of a pixel by a parametric fit to the grey levels around a corner.
 
     I(p) = L + A erf(n₁·(p - q) / s) erf(n₂·(p - q) / s)
 
-is the picture of two edges with normals n₁ and n₂ that cross at q, blurred to the width s. Half a turn about
-q leaves it as it is, like the real one, so that the corner found is unbiased even where the edges are not
-perpendicular and the product is no exact blur. Units: pixels, grey levels.
+is the picture of two edges with normals n₁ and n₂ that cross at q, blurred to the width s. It is symmetric
+about q like the real one, so that the corner is unbiased even where the edges are not perpendicular and the
+product is no exact blur. Units: pixels, grey levels.
 """
 
 import numpy as np
@@ -16,9 +16,9 @@ from geometry.arrays import FloatArray
 STEPS = 12
 START_WIDTH, WIDTHS = 1.2, (0.4, 6.0)
 FARTHEST = 1.5
-"""From the guess, pixels, or a quarter of the radius if that is more; a corner beyond is none."""
+"""Largest distance from the guess, pixels; a quarter of the radius if that is more."""
 LEAST_CONTRAST = 5.0
-"""A, grey levels."""
+"""Smallest A of a corner, grey levels."""
 TURN = 0.2
 """Longest step of an angle, rad."""
 
@@ -26,13 +26,13 @@ TURN = 0.2
 def refine_corners(
     grey: NDArray[np.uint8], guesses: FloatArray, edges: FloatArray, radii: FloatArray
 ) -> FloatArray:
-    """Corners from guesses that are off by a pixel or two, by the Gauss-Newton method on all at once.
+    """Refine guesses that are off by a pixel or two, all at once, by the Gauss-Newton method.
 
     Args:
         grey: Shape (height, width).
         guesses: Shape (n, 2).
         edges: Directions of the two edges through each, in rows, shape (n, 2, 2).
-        radii: Of the discs of pixels that are used, shape (n,).
+        radii: Of the pixels that are used around each, shape (n,).
 
     Returns:
         Shape (n, 2); NaN where there is no such corner.
@@ -68,7 +68,7 @@ def refine_corners(
 
 
 def _picture(parameters: FloatArray, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Levels, shape (n, p), and their derivatives by L, A, q, the angles of the edges and s, (n, 7, p)."""
+    """Grey levels I, shape (n, p), and their derivatives by L, A, q, both angles and s, (n, 7, p)."""
     level, contrast, qx, qy, first, second, width = parameters.T[:, :, None]
     dx, dy = x - qx, y - qy
     across = [(np.cos(angle) * dy - np.sin(angle) * dx) / width for angle in (first, second)]

@@ -1,7 +1,7 @@
-"""Where an adjustment starts: poses of a board for a known camera, and a camera from nothing.
+"""First guesses for the bundle adjustment: board poses for a known camera, and a camera from its views.
 
-The camera is one without distortion and with its axis in the middle of the image, of that focal length in a
-geometric series that explains the views best. Units: mm, pixels.
+The camera has no distortion and its principal point in the middle of the image; its focal length is the best
+of a geometric series. Units: mm, pixels.
 """
 
 from dataclasses import fields
@@ -10,7 +10,6 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from vision.calibration.bundle_adjustment import CornerObservations, Poses
 from vision.calibration.camera import Camera
@@ -21,10 +20,10 @@ FOCAL_LENGTHS = 2.0 ** np.arange(-2.5, 4.5, 0.5)
 
 
 def initial_camera(observations: CornerObservations, size: tuple[int, int], model: str) -> Camera:
-    """A camera near the one that saw a board.
+    """First guess of the camera.
 
     Args:
-        observations: What was seen.
+        observations: Corners of the board.
         size: (width, height) of the images, pixels.
         model: Name of the lens.
 
@@ -37,7 +36,7 @@ def initial_camera(observations: CornerObservations, size: tuple[int, int], mode
         centre = (0.5 * (size[0] - 1), 0.5 * (size[1] - 1))
         camera = Camera(*size, focal, focal, *centre, distortion, model)
         try:
-            placed = initial_poses(camera, observations).place(observations.points, observations.view)
+            placed = initial_poses(camera, observations).to_camera(observations.points, observations.view)
             cost = float(np.sum((camera.project(placed) - observations.pixels) ** 2))
         except UserError:
             continue
@@ -49,7 +48,7 @@ def initial_camera(observations: CornerObservations, size: tuple[int, int], mode
 
 
 def initial_poses(camera: Camera, observations: CornerObservations) -> Poses:
-    """Where the board was in every view.
+    """First guess of the board's pose in every view.
 
     Source: T. Collins, A. Bartoli, "Infinitesimal plane-based pose estimation", IJCV 109, 2014, as in OpenCV.
 
@@ -57,21 +56,15 @@ def initial_poses(camera: Camera, observations: CornerObservations) -> Poses:
         UserError: If the corners of a view are no image of a plane, or the distortion cannot be undone there.
     """
     straight = camera.undistort(observations.pixels)
-    rotations, translations = [], []
-    views = zip(_split(observations.points, observations), _split(straight, observations), strict=True)
-    for points, pixels in views:
+    points, pixels = (np.split(each, observations.starts[1:]) for each in (observations.points, straight))
+    poses = []
+    for corners, seen in zip(points, pixels, strict=True):
         try:
-            found, rotation, shift = cv2.solvePnP(
-                points, pixels, camera.matrix, np.zeros(4), flags=cv2.SOLVEPNP_IPPE
-            )
+            found, *pose = cv2.solvePnP(corners, seen, camera.matrix, np.zeros(4), flags=cv2.SOLVEPNP_IPPE)
         except cv2.error:
             found = False
-        if not found or not np.isfinite([*rotation, *shift]).all():
+        if not found or not np.isfinite(pose).all():
             raise UserError("the corners of a view are no image of a plane")
-        rotations.append(np.ravel(rotation))
-        translations.append(np.ravel(shift))
-    return Poses(Rotation.from_rotvec(rotations), np.array(translations))
-
-
-def _split(values: FloatArray, observations: CornerObservations) -> list[FloatArray]:
-    return np.split(values, observations.starts[1:])
+        poses.append(np.ravel(pose))
+    rotations, translations = np.split(np.array(poses, dtype=np.float64), 2, axis=1)
+    return Poses(Rotation.from_rotvec(rotations), translations)

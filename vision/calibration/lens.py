@@ -1,4 +1,4 @@
-"""Lenses: where a ray from the scene meets the plane at depth 1 after the lens has bent it.
+"""Lens models: distortion of points on the plane at depth 1 in front of the camera.
 
 `BrownLens` is radial and tangential distortion (D. C. Brown, "Close-range camera calibration",
 Photogrammetric Engineering 37, 1971). `FisheyeLens` is for angles of view beyond about 100 degrees: a
@@ -8,24 +8,10 @@ coefficients. No units: a point of the plane is (x / z, y / z).
 """
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from geometry.arrays import FloatArray
-
-
-class Lens(Protocol):
-    """What a lens does to points of the plane at depth 1; its fields are its coefficients."""
-
-    def distort(self, plane: FloatArray) -> FloatArray:
-        """Where the lens puts points; shapes (n, 2)."""
-
-    def jacobian(self, plane: FloatArray) -> FloatArray:
-        """Derivative of `distort` by the points, shape (n, 2, 2)."""
-
-    def by_coefficients(self, plane: FloatArray) -> FloatArray:
-        """Derivative of `distort` by the coefficients, shape (n, 2, coefficients)."""
 
 
 @dataclass(frozen=True)
@@ -39,18 +25,13 @@ class BrownLens:
     k3: float = 0.0
 
     def distort(self, plane: FloatArray) -> FloatArray:
-        """Where the lens puts points; shapes (n, 2)."""
+        """Distorted points; shapes (n, 2)."""
         x, y = plane.T
         s = x**2 + y**2
         radial = 1 + s * (self.k1 + s * (self.k2 + s * self.k3))
-        bent = np.stack(
-            [
-                x * radial + 2 * self.p1 * x * y + self.p2 * (s + 2 * x**2),
-                y * radial + self.p1 * (s + 2 * y**2) + 2 * self.p2 * x * y,
-            ],
-            axis=1,
-        )
-        return np.asarray(bent)
+        bent_x = x * radial + 2 * self.p1 * x * y + self.p2 * (s + 2 * x**2)
+        bent_y = y * radial + self.p1 * (s + 2 * y**2) + 2 * self.p2 * x * y
+        return np.stack([bent_x, bent_y], axis=1)
 
     def jacobian(self, plane: FloatArray) -> FloatArray:
         """Derivative of `distort` by the points, shape (n, 2, 2)."""
@@ -82,7 +63,7 @@ class FisheyeLens:
     k4: float = 0.0
 
     def distort(self, plane: FloatArray) -> FloatArray:
-        """Where the lens puts points; shapes (n, 2)."""
+        """Distorted points; shapes (n, 2)."""
         return np.asarray(plane * self._scale(_radius(plane))[:, None])
 
     def jacobian(self, plane: FloatArray) -> FloatArray:
@@ -101,16 +82,17 @@ class FisheyeLens:
         return np.asarray(plane[:, :, None] * powers[:, None, :])
 
     def _scale(self, r: FloatArray) -> FloatArray:
-        """How much nearer to the axis a point at the distance r comes."""
+        """Distance from the axis after the lens over the one before, r."""
         angle = np.arctan(r)
         s = angle**2
         return np.asarray(angle / r * (1 + s * (self.k1 + s * (self.k2 + s * (self.k3 + s * self.k4)))))
 
 
-LENSES: dict[str, type[BrownLens] | type[FisheyeLens]] = {"brown": BrownLens, "fisheye": FisheyeLens}
+Lens = BrownLens | FisheyeLens
+LENSES: dict[str, type[Lens]] = {"brown": BrownLens, "fisheye": FisheyeLens}
 """By the name of the model."""
 
 
 def _radius(plane: FloatArray) -> FloatArray:
-    """Distance from the axis, shape (n,); a tiny one instead of zero, where the formulas are limits."""
+    """Distance from the axis, shape (n,); 1e-8 instead of zero, where the formulas are limits."""
     return np.maximum(np.hypot(plane[:, 0], plane[:, 1]), 1e-8)

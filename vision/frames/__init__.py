@@ -1,4 +1,4 @@
-"""Frames of videos, cameras, folders of pictures and pipes; videos that hold every frame written.
+"""Frames of videos, cameras, folders of pictures and pipes; writers of videos and pictures.
 
 Imports nothing else of `vision`.
 """

@@ -1,7 +1,7 @@
-"""Frames: what every source of images gives, whether file, folder, camera or pipe.
+"""Frames of one source: a file, a folder, a camera or a pipe.
 
 Images are uint8, shape (height, width) in grey or (height, width, 3) in blue, green, red. They are as the
-sensor read them: a file's note that it should be shown turned is not followed, in photographs neither
+sensor read them: a rotation in a file's metadata is ignored, in films and in photographs
 (`vision.calibration.photographs`), so that one calibration fits both.
 """
 
@@ -32,7 +32,7 @@ class Frame(NamedTuple):
 
 
 class CapturedImage(NamedTuple):
-    """What a source yields: an image, when it was taken, s, and how to call it in a message."""
+    """An image from a source, its time, s, and its name in messages."""
 
     image: Image
     time: float
@@ -48,9 +48,9 @@ class Frames:
     Attributes:
         name: Of the source, for messages.
         size: (width, height), pixels.
-        rate: Frames a second, as the source says or as it was told.
-        count: How many frames the source says that it has; None for a camera or a pipe. Of a video with a
-            variable rate it can be wrong.
+        rate: Frames a second, from the source or the user.
+        count: Number of frames by the source; None for a camera or a pipe. It can be wrong for a video with
+            a variable rate.
 
     Raises:
         UserError: If the source has no frame; on iterating, if an image cannot be read or has another size.
@@ -77,7 +77,7 @@ class Frames:
             yield Frame(number, captured.time - self._first.time, captured.image)
 
     def close(self) -> None:
-        """Let go of the file or the camera."""
+        """Release the file or the camera."""
         self._images.close()
 
     def __enter__(self) -> Self:

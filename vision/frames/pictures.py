@@ -3,6 +3,7 @@
 import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from glob import glob, has_magic
 from pathlib import Path
 
 import cv2
@@ -14,21 +15,23 @@ from vision.frames.frame import CapturedImage, Image, ImageStream
 from vision.frames.quiet_opencv import silenced
 
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm", ".jp2"})
-JPEG, PNG = b"\xff\xd8", b"\x89PNG\r\n\x1a\n"
+JPEG, PNG, PNG_END = b"\xff\xd8", b"\x89PNG\r\n\x1a\n", b"\0\0\0\0IEND\xaeB`\x82"
 DEPTHS = (10, 12, 14, 16)
 """Significant bits of what cameras put into 16-bit pictures."""
 
+_JPEG_MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]", re.DOTALL)
+"""Starts a segment of a JPEG; the excluded ones may stand within its compressed data."""
 _AS_STORED = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
 
 
 def natural_order(path: Path) -> list[tuple[int, str]]:
-    """A key that sorts frame2 before frame10."""
+    """Sort key that puts frame2 before frame10."""
     parts = re.split(r"(\d+)", path.name)
     return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts]
 
 
 def pictures_in(folder: Path) -> list[Path]:
-    """The pictures of a folder in natural order; other files and hidden ones are passed over.
+    """The pictures of a folder in natural order, without other files and hidden ones.
 
     Raises:
         UserError: If there is none.
@@ -43,19 +46,35 @@ def pictures_in(folder: Path) -> list[Path]:
     return sorted(found, key=natural_order)
 
 
+def picture_paths(source: str | Path) -> list[Path]:
+    """The pictures of a folder or of a glob in natural order, or the one file that `source` names.
+
+    Raises:
+        UserError: If there is none.
+    """
+    path = Path(source)
+    if path.is_dir():
+        return pictures_in(path)
+    if path.exists() or not has_magic(str(source)):
+        return [path]
+    if found := sorted(filter(Path.is_file, map(Path, glob(str(source)))), key=natural_order):
+        return found
+    raise UserError(f"{str(source)!r}: there is no such picture")
+
+
 def images_of_files(paths: Sequence[Path], rate: float) -> ImageStream:
-    """Read pictures one by one; see `Decoder` for what is made of 16 bits."""
+    """The images of picture files, decoded one by one to the same scale."""
     decode = Decoder()
     for number, path in enumerate(paths):
-        try:
-            content = path.read_bytes()
-        except OSError as error:
-            raise UserError(f"cannot read the picture {path}: {error.strerror}") from None
-        yield CapturedImage(decode(content, f"the picture {path}"), number / rate, path.name)
+        yield CapturedImage(decode.file(path), number / rate, path.name)
 
 
 def images_of_pipe(read: Callable[[int], bytes], name: str, rate: float) -> ImageStream:
-    """Pictures from a stream of bytes, such as `ffmpeg -f image2pipe` writes; `read` gives b"" at its end."""
+    """The images of a pipe of pictures, such as `ffmpeg -f image2pipe` writes; `read` gives b"" at its end.
+
+    The pipe is cut here: FFmpeg's own reader, by PyAV, takes several JPEG pictures for one, leaves out the
+    last and delays each by one or two, which a live picture shows.
+    """
     decode = Decoder()
     for number, content in enumerate(split(read, name)):
         label = f"picture {number + 1} of {name}"
@@ -63,10 +82,10 @@ def images_of_pipe(read: Callable[[int], bytes], name: str, rate: float) -> Imag
 
 
 class Decoder:
-    """Decodes the pictures of one sequence into 8 bits, all by the same scale.
+    """Decodes the pictures of one sequence into 8 bits, all to the same scale.
 
-    Pictures of 16 bits are taken to have 10, 12, 14 or 16 significant bits, as the brightest pixel of the
-    first one needs: many cameras of 10 to 14 bits leave the highest ones empty.
+    A 16-bit picture has 10, 12, 14 or 16 significant bits, as many as the brightest pixel of the first one
+    needs: many cameras of 10 to 14 bits leave the highest ones empty.
     """
 
     def __init__(self) -> None:
@@ -97,6 +116,18 @@ class Decoder:
             self._white = 2 ** next(bits for bits in DEPTHS if bits >= brightest) - 1
         return np.asarray(cv2.convertScaleAbs(image, alpha=255 / self._white), dtype=np.uint8)
 
+    def file(self, path: Path) -> Image:
+        """The image in a file.
+
+        Raises:
+            UserError: If the file cannot be read, is no whole picture, or has neither 8 nor 16 bits.
+        """
+        try:
+            content = path.read_bytes()
+        except OSError as error:
+            raise UserError(f"cannot read the picture {path}: {error.strerror}") from None
+        return self(content, f"the picture {path}")
+
 
 def write_picture(path: Path, image: Image) -> None:
     """Write a picture atomically, in the format of its suffix."""
@@ -108,12 +139,12 @@ def write_picture(path: Path, image: Image) -> None:
 
 
 def split(read: Callable[[int], bytes], name: str) -> Iterator[bytes]:
-    """Cut a stream of JPEG and PNG pictures into its pictures.
+    """Cut a stream of JPEG and PNG pictures into single ones.
 
-    It warns if the stream ends within a picture, as one does that was interrupted.
+    Warns if the stream ends within a picture, as an interrupted one does.
 
     Raises:
-        UserError: If it carries something else.
+        UserError: If the stream carries something else.
     """
     buffer = bytearray()
     more = True
@@ -135,36 +166,17 @@ def split(read: Callable[[int], bytes], name: str) -> Iterator[bytes]:
 
 
 def picture_end(content: bytes | bytearray) -> int | None:
-    """Where the JPEG or PNG that `content` starts with ends; None if it does not hold all of it."""
-    if content.startswith(JPEG):
-        return _jpeg_end(content)
-    return _png_end(content) if content.startswith(PNG) else None
+    """End of the JPEG or PNG at the start of `content`; None if it does not hold all of it.
 
-
-_MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]", re.DOTALL)
-"""Of a segment of a JPEG, apart from those that may stand within its compressed data."""
-
-
-def _jpeg_end(content: bytes | bytearray) -> int | None:
-    """Walks over the segments, since a preview in one of them has an end marker of its own.
-
-    Source: ITU-T T.81, annex B.
+    Source: PNG specification, third edition, section 5.3; ITU-T T.81, annex B. A JPEG is walked segment by
+    segment, since a preview in one of them has an end marker of its own.
     """
+    if content.startswith(PNG):
+        return end + len(PNG_END) if (end := content.find(PNG_END)) >= 0 else None
     position = len(JPEG)
-    while marker := _MARKER.search(content, position):
+    while content.startswith(JPEG) and (marker := _JPEG_MARKER.search(content, position)):
         position = marker.end()
         if marker[0] == b"\xff\xd9":
             return position
         position += int.from_bytes(content[position : position + 2], "big")
-    return None
-
-
-def _png_end(content: bytes | bytearray) -> int | None:
-    """Source: PNG specification, third edition, section 5.3: length, type, data and checksum of a chunk."""
-    position = len(PNG)
-    while position + 8 <= len(content):
-        kind = content[position + 4 : position + 8]
-        position += 12 + int.from_bytes(content[position : position + 4], "big")
-        if kind == b"IEND":
-            return position if position <= len(content) else None
     return None

@@ -1,6 +1,5 @@
-"""OpenCV without a word on standard error."""
+"""OpenCV without messages on standard error."""
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -10,8 +9,7 @@ import cv2
 
 @contextmanager
 def silenced() -> Iterator[None]:
-    """Keeps remarks of OpenCV and FFmpeg off standard error: what they mean to a user, we say."""
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    """Keeps OpenCV's messages off standard error: the caller reports what they mean to a user."""
     opencv: Any = cv2
     logging = opencv if hasattr(opencv, "setLogLevel") else opencv.utils.logging  # OpenCV 4 and 5
     level = logging.setLogLevel(0)

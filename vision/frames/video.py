@@ -1,156 +1,177 @@
-"""Frames from wherever they come, and videos that hold every frame that was written."""
+"""Video files, read and written by PyAV, the Python binding of FFmpeg's libraries.
 
-import os
-import re
-import sys
-from contextlib import ExitStack
-from functools import partial
-from glob import glob, has_magic
+A frame is converted to blue, green, red by the matrix of ITU-R BT.601, whatever the file says, and is not
+turned: bit for bit what OpenCV reads, so that a colour picked from a camera is the same in its film. The
+colour differences of HEVC with 10 bits alone lie a part of a pixel beside OpenCV's.
+"""
+
+import math
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from fractions import Fraction
 from pathlib import Path
-from typing import Self
+from typing import cast
 
-import cv2
+import av
 import numpy as np
+from av.container import InputContainer
+from av.video import VideoStream
+from av.video.reformatter import Colorspace, Interpolation, VideoReformatter
 
 from geometry.atomic import atomic_path
 from geometry.errors import ShapeError, UserError
-from vision.frames.capture import FASTEST, USUAL_RATE, camera_frames, video_frames
-from vision.frames.frame import Frame, Frames, Image
-from vision.frames.pictures import SUFFIXES, images_of_files, images_of_pipe, natural_order, pictures_in
-from vision.frames.quiet_opencv import silenced
+from vision.frames.frame import CapturedImage, Frames, Image, ImageStream
 
-__all__ = ["CODECS", "Frame", "Frames", "VideoWriter", "open_frames"]
-
+DEFAULT_RATE = 30.0
+MAX_RATE = 1000.0
+"""Frames a second; a higher rate in a file is taken for an error."""
+MISSING_FRACTION = 0.02
+"""Tolerance of a video's frame count, as a fraction: the number in its header may be that wrong."""
+ENCODERS = {"FFV1": ("ffv1", "bgr0"), "MJPG": ("mjpeg", "yuvj420p"), "mp4v": ("mpeg4", "yuv420p")}
+"""FFmpeg's name of a codec and its pixel format, by the codec's four letters."""
 CODECS = {".mkv": "FFV1", ".avi": "MJPG", ".mp4": "mp4v"}
 """By the suffix of a video that is written. FFV1 is lossless."""
+MIN_QUANTISER, BITS_PER_PIXEL = "3", 4
+"""Best quality and highest bit rate of the lossy codecs, as OpenCV has them."""
+MAX_TICKS = 65535
+"""Of MPEG-4's clock in a second: the numerator of the rate."""
 
-LIVE_SIZE = (1280, 720)
 
+def video_frames(path: Path, rate: float | None = None) -> Frames:
+    """Frames of a video file with the file's time stamps; `rate` counts if the file gives none.
 
-def open_frames(
-    source: str | Path | int, *, rate: float | None = None, size: tuple[int, int] = LIVE_SIZE
-) -> Frames:
-    """Frames of a video, of pictures, of a camera or of a pipe.
-
-    Args:
-        source: A video file; a picture; a folder or glob of pictures, taken in natural order; the number of a
-            camera, or its device; or "-", JPEG or PNG pictures one after another on standard input.
-        rate: Frames a second, where the source does not say: of pictures and pipes, 30 if not given. A camera
-            is asked for it.
-        size: (width, height) that a camera is asked for, pixels.
+    Iterating warns if far fewer frames can be read than the file says that it has.
 
     Raises:
-        UserError: If there is no such source or nothing in it can be read.
+        UserError: If it is no video, or not one frame can be read.
     """
-    if rate is not None and not 0 < rate <= FASTEST:
-        raise UserError(f"a rate of {rate:g} frames a second; it must be above 0 and at most {FASTEST:g}")
-    usual = rate or USUAL_RATE
-    path = Path(str(source))
-    if source == "-":
-        if sys.stdin.isatty():
-            raise UserError("nothing is piped to standard input; '-' reads JPEG or PNG pictures from there")
-        name, read = "standard input", partial(os.read, sys.stdin.fileno())
-        return Frames(name, images_of_pipe(read, name, usual), rate=usual)
-    camera = re.fullmatch(r"(?:/dev/video)?(\d+)", str(source))
-    if camera and (isinstance(source, int) or not (path.is_file() or path.is_dir())):
-        return camera_frames(int(camera[1]), size=size, rate=rate)
-    if path.is_dir() and str(source):
-        paths = pictures_in(path)
-    elif path.is_file() and path.suffix.lower() not in SUFFIXES:
-        return video_frames(path, rate)
-    elif path.is_file():
-        paths = [path]
-    elif has_magic(str(source)):
-        paths = sorted(filter(Path.is_file, map(Path, glob(str(source)))), key=natural_order)
-    else:
-        raise UserError(f"{str(source)!r}: there is no such video, picture or folder")
-    if not paths:
-        raise UserError(f"{str(source)!r}: there is no such picture")
-    return Frames(str(source), images_of_files(paths, usual), rate=usual, count=len(paths))
+    try:
+        if not path.stat().st_size:
+            raise UserError(f"cannot read the video {path}: the file is empty")
+        container = av.open(str(path), metadata_errors="ignore")
+    except PermissionError as error:
+        raise UserError(f"cannot read the video {path}: {error.strerror}") from None
+    except (OSError, av.FFmpegError):
+        container = None
+    if container is None or not container.streams.video:
+        raise UserError(
+            f"cannot read the video {path}: it is no video, its end is missing, or FFmpeg lacks its codec"
+        )
+    stream = container.streams.video[0]
+    stream.thread_type = "AUTO"
+    said = float(stream.average_rate or 0)
+    rate = said if 0 < said <= MAX_RATE else rate or DEFAULT_RATE
+    duration = (container.duration or 0) / av.time_base
+    count = stream.frames or round(duration * rate) or None
+    return Frames(str(path), _images_of_video(path, container, rate, count), rate=rate, count=count)
 
 
-class VideoWriter:
-    """Writes a video; when its block ends without an error, the file is there with every frame in it.
+def _images_of_video(path: Path, container: InputContainer, rate: float, count: int | None) -> ImageStream:
+    """Where the file's times do not increase, a frame follows the last one by 1 / `rate`.
 
-    None of the codecs has odd sides: the last column or row is then written twice, and coordinates stay.
+    The end is missing if the last time falls short too: where the rate varies, `count` is only the product of
+    duration and `rate`.
+    """
+    read, first, last = 0, math.nan, -math.inf
+    reformatter, tick = VideoReformatter(), container.streams.video[0].time_base
+    with container:
+        for frame in _decoded(container):
+            time = -math.inf if frame.pts is None or tick is None else float(frame.pts * tick)
+            last = time if time > last else last + 1 / rate if read else 0.0
+            first = first if read else last
+            image = reformatter.reformat(
+                frame,
+                format="bgr24",
+                src_colorspace=Colorspace.ITU601,
+                dst_colorspace=Colorspace.ITU601,
+                interpolation=Interpolation.BICUBIC,
+                threads=1,
+            )
+            yield CapturedImage(np.ascontiguousarray(image.to_ndarray(), np.uint8), last, f"frame {read}")
+            read += 1
+    if not read:
+        raise UserError(f"no frame of the video {path} can be read: it is damaged, or FFmpeg lacks its codec")
+    if count and max(read, (last - first) * rate + 1) < count - max(1, MISSING_FRACTION * count):
+        warnings.warn(
+            f"{path} says that it has {count} frames, but only the first {read} can be read: "
+            "it was cut off or is damaged there",
+            stacklevel=3,
+        )
+
+
+def _decoded(container: InputContainer) -> Iterator[av.VideoFrame]:
+    """Frames of the first video stream, without those that are damaged."""
+    stream = container.streams.video[0]
+    with suppress(av.FFmpegError):  # the end of the file is missing
+        for packet in container.demux(stream):
+            if packet.size:
+                with suppress(av.FFmpegError):
+                    yield from stream.decode(packet)
+    with suppress(av.FFmpegError):
+        yield from stream.decode(None)  # frames that the decoder still holds
+
+
+@contextmanager
+def video_writer(
+    path: str | Path, size: tuple[int, int], rate: float, codec: str | None = None
+) -> Iterator[Callable[[Image], None]]:
+    """Writes a video with the function that it gives: every call appends a frame, grey or coloured.
+
+    When the block ends without an error, the file is there with every frame in it; an old one stays until
+    then. None of the codecs has odd sides: the last column or row is then written twice.
 
     Args:
-        path: Of the video; an old one stays until the new one is whole.
+        path: Of the video.
         size: (width, height) of the frames, pixels.
         rate: Frames a second.
         codec: ffv1, mjpg or mp4v; that of `CODECS` if not given.
 
     Raises:
-        UserError: If the suffix, size or rate is impossible, the file cannot hold the codec, or, at the end,
-            a frame is missing.
+        UserError: If the suffix, size or rate is impossible, or no frame is given or can be written.
+        ShapeError: If a frame has another size.
     """
+    path, (width, height) = Path(path), size
+    codecs = {name.lower(): name for name in ENCODERS}
+    suffix = path.suffix.lower()
+    if suffix not in CODECS or (codec is not None and codec.lower() not in codecs):
+        raise UserError(
+            f"cannot write the video {path}{f' as {codec}' if codec else ''}; "
+            "it can be .mkv (ffv1, lossless), .avi (mjpg) or .mp4 (mp4v)"
+        )
+    if not 0 < rate <= MAX_RATE or min(size) < 1:
+        raise UserError(f"cannot write a video of {width}x{height} pixels, {rate:g} frames a second")
+    name = codecs[codec.lower()] if codec else CODECS[suffix]
+    encoder, pixel_format = ENCODERS[name]
+    right, below = width % 2, height % 2
+    written = 0
 
-    def __init__(
-        self, path: str | Path, size: tuple[int, int], rate: float, codec: str | None = None
-    ) -> None:
-        self.path, self.size, self.rate, self.written = Path(path), size, rate, 0
-        suffix = self.path.suffix.lower()
-        codecs = {name.lower(): name for name in CODECS.values()}
-        if suffix not in CODECS or (codec is not None and codec.lower() not in codecs):
-            raise UserError(
-                f"cannot write the video {path}{f' as {codec}' if codec else ''}; "
-                "it can be .mkv (ffv1, lossless), .avi (mjpg) or .mp4 (mp4v)"
-            )
-        if not 0 < rate <= FASTEST or min(size) < 1:
-            raise UserError(f"cannot write a video of {size[0]}x{size[1]} pixels, {rate:g} frames a second")
-        self._codec = codecs[codec.lower()] if codec else CODECS[suffix]
-        self._right, self._below = size[0] % 2, size[1] % 2
-        self._whole_size = (size[0] + self._right, size[1] + self._below)
-
-    def __enter__(self) -> Self:
-        with ExitStack() as stack:
-            self._partial = stack.enter_context(atomic_path(self.path))
-            code = cv2.VideoWriter.fourcc(*self._codec)
-            with silenced():
-                self._writer = cv2.VideoWriter(
-                    str(self._partial), cv2.CAP_FFMPEG, code, self.rate, self._whole_size
-                )
-            if not self._writer.isOpened():
-                width, height = self.size
-                raise UserError(
-                    f"OpenCV cannot write {width}x{height} pixels as {self._codec} into {self.path}"
-                )
-            stack.push(self._finish)
-            self._stack = stack.pop_all()
-        return self
-
-    def __exit__(self, *raised: object) -> None:
-        self._stack.__exit__(*raised)  # type: ignore[arg-type]
-
-    def write(self, image: Image) -> None:
-        """Append a frame, grey or coloured.
-
-        Raises:
-            ShapeError: If it has another size.
-        """
-        if image.dtype != np.uint8 or image.shape[1::-1] != self.size:
+    def write(image: Image) -> None:
+        nonlocal written
+        if image.dtype != np.uint8 or image.shape[1::-1] != size:
             raise ShapeError(
-                f"a frame for {self.path} is {image.dtype} of shape {image.shape}; it must be uint8 with "
-                f"{self.size[0]}x{self.size[1]} pixels"
+                f"a frame for {path} is {image.dtype} of shape {image.shape}; it must be uint8 with "
+                f"{width}x{height} pixels"
             )
-        coloured = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image
-        self._writer.write(cv2.copyMakeBorder(coloured, 0, self._below, 0, self._right, cv2.BORDER_REPLICATE))
-        self.written += 1
+        coloured = np.broadcast_to(np.atleast_3d(image), (height, width, 3))
+        whole = np.pad(coloured, ((0, below), (0, right), (0, 0)), mode="edge")
+        container.mux(stream.encode(av.VideoFrame.from_ndarray(whole, format="bgr24")))
+        written += 1
 
-    def _finish(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Count the frames of the file: OpenCV does not say when it could not write one."""
-        self._writer.release()
-        if kind is not None:
-            return
-        if not self.written:
-            raise UserError(f"no frame was given for the video {self.path}")
-        with silenced():
-            capture = cv2.VideoCapture(str(self._partial), cv2.CAP_FFMPEG)
-            found = 0
-            while capture.grab():
-                found += 1
-            capture.release()
-        if found != self.written:
+    with atomic_path(path) as partial:
+        try:
+            with av.open(str(partial), "w") as container:
+                fraction = Fraction(rate).limit_denominator(int(MAX_TICKS / max(rate, 1)))
+                stream = cast(VideoStream, container.add_stream(encoder, fraction, {"qmin": MIN_QUANTISER}))
+                stream.width, stream.height = width + right, height + below
+                stream.pix_fmt = pixel_format
+                stream.bit_rate = round(BITS_PER_PIXEL * rate * width * height)
+                stream.codec_context.open()
+                yield write
+                if not written:
+                    raise UserError(f"no frame was given for the video {path}")
+                container.mux(stream.encode())
+        except av.FFmpegError as error:
             raise UserError(
-                f"only {found} of {self.written} frames are in the video {self.path}; is the disk full?"
-            )
+                f"cannot write {width}x{height} pixels as {name} into {path}: {error.strerror}"
+            ) from None

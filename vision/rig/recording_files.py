@@ -13,7 +13,7 @@ from vision.calibration.camera import Pose
 from vision.calibration.camera_file import save_camera
 from vision.frames.frame import Image
 from vision.frames.pictures import write_picture
-from vision.frames.video import CODECS, VideoWriter
+from vision.frames.video import CODECS, video_writer
 from vision.measurements import write_measurements
 from vision.rig.recording import FrameTruth, Recording
 from vision.rig.render import render
@@ -111,7 +111,7 @@ def _writer(recording: Recording, place: Path, stack: ExitStack) -> Callable[[Im
     """A function that appends a frame to the video or to the folder of pictures."""
     if place.suffix:
         size = (recording.camera.width, recording.camera.height)
-        return stack.enter_context(VideoWriter(place, size, recording.motion.rate)).write
+        return stack.enter_context(video_writer(place, size, recording.motion.rate))
     place.mkdir()
     names = (place / f"{number:06d}.png" for number in range(len(recording.motion)))
     return lambda image: write_picture(next(names), image)

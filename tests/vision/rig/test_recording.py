@@ -9,7 +9,7 @@ import pytest
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from vision.calibration.camera_file import load_camera
-from vision.frames.video import open_frames
+from vision.frames.sources import open_frames
 from vision.measurements import read_measurements
 from vision.rig.bench import Bench
 from vision.rig.exposure import Exposure
