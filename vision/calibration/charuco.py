@@ -33,7 +33,7 @@ class CharucoBoard(Board):
         dictionary: Of its markers, a name in `DICTIONARIES`.
 
     Raises:
-        UserError: Besides what a chessboard refuses, if a marker has no room in a square, the dictionary is
+        UserError: As a chessboard, and if a marker has no room in a square, or the dictionary is
             not known or too small.
     """
 

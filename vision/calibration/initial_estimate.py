@@ -28,7 +28,7 @@ def initial_camera(observations: CornerObservations, size: tuple[int, int], mode
         model: Name of the lens.
 
     Raises:
-        UserError: If no focal length explains what was seen.
+        UserError: If the poses cannot be found for any focal length.
     """
     best, least = None, np.inf
     for focal in (size[0] * FOCAL_LENGTHS).tolist():

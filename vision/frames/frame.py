@@ -16,6 +16,10 @@ from geometry.errors import UserError
 Image = NDArray[np.uint8]
 GreyImage = NDArray[np.uint8]
 
+DEFAULT_RATE = 30.0
+MAX_RATE = 1000.0
+"""Frames a second; a higher rate in a file is taken for an error."""
+
 
 class Frame(NamedTuple):
     """One image of a sequence.
@@ -85,6 +89,11 @@ class Frames:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def plausible_rate(said: float, given: float | None) -> float:
+    """Frames a second: as the source says if that is possible, else as the user gave, else the default."""
+    return said if 0 < said <= MAX_RATE else given or DEFAULT_RATE
 
 
 def _size(image: Image) -> tuple[int, int]:

@@ -1,6 +1,6 @@
 """Frames of a connected camera, by OpenCV.
 
-PyAV could open Video4Linux devices, too; OpenCV stays because it falls back to what the camera can do.
+PyAV opens Video4Linux devices, too, but refuses a camera without the requested format; OpenCV takes another.
 """
 
 import time
@@ -10,9 +10,8 @@ import cv2
 import numpy as np
 
 from geometry.errors import UserError
-from vision.frames.frame import CapturedImage, Frames, ImageStream
+from vision.frames.frame import CapturedImage, Frames, ImageStream, plausible_rate
 from vision.frames.quiet_opencv import silenced
-from vision.frames.video import DEFAULT_RATE, MAX_RATE
 
 
 def camera_frames(index: int, *, size: tuple[int, int], rate: float | None = None) -> Frames:
@@ -30,8 +29,7 @@ def camera_frames(index: int, *, size: tuple[int, int], rate: float | None = Non
     capture.set(cv2.CAP_PROP_FRAME_HEIGHT, size[1])
     if rate is not None:
         capture.set(cv2.CAP_PROP_FPS, rate)
-    said = capture.get(cv2.CAP_PROP_FPS)
-    rate = said if 0 < said <= MAX_RATE else rate or DEFAULT_RATE
+    rate = plausible_rate(capture.get(cv2.CAP_PROP_FPS), rate)
     return Frames(f"camera {index}", _images_of_camera(index, capture), rate=rate)
 
 

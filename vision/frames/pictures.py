@@ -17,7 +17,7 @@ from vision.frames.quiet_opencv import silenced
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm", ".jp2"})
 JPEG, PNG, PNG_END = b"\xff\xd8", b"\x89PNG\r\n\x1a\n", b"\0\0\0\0IEND\xaeB`\x82"
 DEPTHS = (10, 12, 14, 16)
-"""Significant bits of what cameras put into 16-bit pictures."""
+"""Possible numbers of significant bits in 16-bit pictures."""
 
 _JPEG_MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]", re.DOTALL)
 """Starts a segment of a JPEG; the excluded ones may stand within its compressed data."""
@@ -72,8 +72,8 @@ def images_of_files(paths: Sequence[Path], rate: float) -> ImageStream:
 def images_of_pipe(read: Callable[[int], bytes], name: str, rate: float) -> ImageStream:
     """The images of a pipe of pictures, such as `ffmpeg -f image2pipe` writes; `read` gives b"" at its end.
 
-    The pipe is cut here: FFmpeg's own reader, by PyAV, takes several JPEG pictures for one, leaves out the
-    last and delays each by one or two, which a live picture shows.
+    The pipe is not read by PyAV: FFmpeg's reader of pictures takes several JPEGs for one, leaves out the last
+    and is one or two behind a live source.
     """
     decode = Decoder()
     for number, content in enumerate(split(read, name)):

@@ -8,10 +8,10 @@ from glob import has_magic
 from pathlib import Path
 
 from geometry.errors import UserError
-from vision.frames.frame import Frames
+from vision.frames.frame import DEFAULT_RATE, MAX_RATE, Frames
 from vision.frames.live_camera import camera_frames
 from vision.frames.pictures import SUFFIXES, images_of_files, images_of_pipe, picture_paths
-from vision.frames.video import DEFAULT_RATE, MAX_RATE, video_frames
+from vision.frames.video import video_frames
 
 LIVE_SIZE = (1280, 720)
 """(width, height) that a camera is asked for, pixels."""

@@ -1,8 +1,8 @@
 """Video files, read and written by PyAV, the Python binding of FFmpeg's libraries.
 
 A frame is converted to blue, green, red by the matrix of ITU-R BT.601, whatever the file says, and is not
-turned: bit for bit what OpenCV reads, so that a colour picked from a camera is the same in its film. The
-colour differences of HEVC with 10 bits alone lie a part of a pixel beside OpenCV's.
+turned: bit for bit as by OpenCV, so that a colour picked from a camera is the same in its film. Only the
+colour differences of HEVC with 10 bits are a fraction of a pixel beside OpenCV's.
 """
 
 import math
@@ -21,11 +21,8 @@ from av.video.reformatter import Colorspace, Interpolation, VideoReformatter
 
 from geometry.atomic import atomic_path
 from geometry.errors import ShapeError, UserError
-from vision.frames.frame import CapturedImage, Frames, Image, ImageStream
+from vision.frames.frame import MAX_RATE, CapturedImage, Frames, Image, ImageStream, plausible_rate
 
-DEFAULT_RATE = 30.0
-MAX_RATE = 1000.0
-"""Frames a second; a higher rate in a file is taken for an error."""
 MISSING_FRACTION = 0.02
 """Tolerance of a video's frame count, as a fraction: the number in its header may be that wrong."""
 ENCODERS = {"FFV1": ("ffv1", "bgr0"), "MJPG": ("mjpeg", "yuvj420p"), "mp4v": ("mpeg4", "yuv420p")}
@@ -60,18 +57,17 @@ def video_frames(path: Path, rate: float | None = None) -> Frames:
         )
     stream = container.streams.video[0]
     stream.thread_type = "AUTO"
-    said = float(stream.average_rate or 0)
-    rate = said if 0 < said <= MAX_RATE else rate or DEFAULT_RATE
+    rate = plausible_rate(float(stream.average_rate or 0), rate)
     duration = (container.duration or 0) / av.time_base
     count = stream.frames or round(duration * rate) or None
     return Frames(str(path), _images_of_video(path, container, rate, count), rate=rate, count=count)
 
 
 def _images_of_video(path: Path, container: InputContainer, rate: float, count: int | None) -> ImageStream:
-    """Where the file's times do not increase, a frame follows the last one by 1 / `rate`.
+    """Images with increasing times: a frame without a later time follows the last one by 1 / `rate`.
 
-    The end is missing if the last time falls short too: where the rate varies, `count` is only the product of
-    duration and `rate`.
+    A missing end is reported only if the last time falls short, too: where the rate varies, `count` is only
+    the product of duration and `rate`.
     """
     read, first, last = 0, math.nan, -math.inf
     reformatter, tick = VideoReformatter(), container.streams.video[0].time_base
