@@ -24,18 +24,23 @@ class Exposure(CheckedModel):
     """Light, lens and sensor of the camera."""
 
     blur: float = bounded(0.8, 0, 20, "px", "", "Standard deviation of the blur of the lens")
-    noise: float = bounded(
-        1.0, 0, 100, "grey levels", "", "Standard deviation of the noise that is there without light too"
-    )
+    noise: float = bounded(1.0, 0, 100, "grey levels", "", "Standard deviation of the read noise")
     full_well: float | None = bounded(
-        None, 100, 1e9, "electrons", "", "That make grey level 255, for photon noise; none: no such noise"
+        None,
+        100,
+        1e9,
+        "electrons",
+        "",
+        "Electrons at grey level 255; none: no photon noise",
     )
-    white: float = bounded(235.0, 10, 1000, "grey levels", "", "Of a white surface in the image's middle")
+    white: float = bounded(
+        235.0, 10, 1000, "grey levels", "", "Grey level of white in the middle of the image"
+    )
     gradient: float = bounded(
         0.1, 0, 0.9, "", "", "Growth of the light from the middle of the image to its side, relative"
     )
     gradient_direction: float = bounded(
-        30.0, -360, 360, "deg", "", "Where the light grows to, from right to down"
+        30.0, -360, 360, "deg", "", "Direction in which the light grows, from right to down"
     )
     monochrome: bool = Field(default=False, description="A camera without colours")
 

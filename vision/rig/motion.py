@@ -15,9 +15,11 @@ class Motion(CheckedModel):
     shutter in the last frame at rest until its opening in the first frame that is held.
     """
 
-    rest: int = bounded(30, 1, 100_000, "frames", "", "Before the finger is pressed")
-    moving: int = bounded(30, 0, 100_000, "frames", "", "While it is pressed; 0 is a jump between two frames")
-    held: int = bounded(30, 1, 100_000, "frames", "", "While it is held")
+    rest: int = bounded(30, 1, 100_000, "frames", "", "Frames before the pressing")
+    moving: int = bounded(
+        30, 0, 100_000, "frames", "", "Frames of the pressing; 0: a jump between two frames"
+    )
+    held: int = bounded(30, 1, 100_000, "frames", "", "Frames held under full load")
     rate: float = bounded(30.0, 0.1, 1000, "1/s", "", "Frames a second")
     shutter: float = bounded(0.3, 0, 0.9, "", "", "Share of the time for which the shutter is open")
 
