@@ -81,7 +81,7 @@ def perform(task: Mapping[str, Any]) -> None:
 
         build_mesh(design, MeshSettings(**task["settings"])).save(output)
     elif task["kind"] == "cad":
-        from geometry.cad.model import write_archive
+        from geometry.cad import write_archive
 
         write_archive(design, task["formats"], output)
     else:

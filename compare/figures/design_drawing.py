@@ -9,10 +9,9 @@ from compare.figures.canvas import Extent
 from compare.figures.dimensions import Draughtsman
 from compare.figures.style import axes_at, heading
 from geometry.figure import CONTACT, MEASURED, WIDTH, Figure, figure
-from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import Parameters
 from geometry.finger.picture import draw_section
-from geometry.finger.section import Section, finger_section, rib_direction, rib_pitch
+from geometry.finger.section import Section, finger_section, marker_positions, rib_direction, rib_pitch
 
 POINT = 8.5 / 72 / WIDTH
 """Height of the type as a share of the drawing's width."""

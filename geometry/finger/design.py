@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 from pydantic import model_validator
 
 from geometry.errors import UserError
-from geometry.finger.checked_model import CheckedModel
 from geometry.finger.parameters import SYMBOLS, Parameters, title, with_unit
 from geometry.finger.validation import check
 from geometry.notebook import fact_table
@@ -15,7 +14,7 @@ if TYPE_CHECKING:
     from geometry.figure import Figure
 
 
-class Design(CheckedModel, Parameters):
+class Design(Parameters):
     """A valid finger; invalid combinations of parameters are refused on construction.
 
     Every parameter goes by its name or by the paper's symbol: `Design(rib_count=6)` equals `Design(N=6)`.

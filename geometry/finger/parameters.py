@@ -1,10 +1,16 @@
-"""The parameters of a finger: names, the paper's symbols, units and bounds; mm and degrees throughout."""
+"""The parameters of a finger: names, the paper's symbols, units and bounds; mm and degrees throughout.
 
+Invalid values are refused in one line: the parameter, the value, and the allowed ones.
+"""
+
+import difflib
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails
 
 from geometry.content_hash import content_hash
+from geometry.errors import UserError
 
 
 def bounded(default: Any, low: float, high: float, unit: str, symbol: str, meaning: str) -> Any:
@@ -18,7 +24,24 @@ def bounded(default: Any, low: float, high: float, unit: str, symbol: str, meani
     )
 
 
-class Parameters(BaseModel):
+class CheckedModel(BaseModel):
+    """A frozen model that refuses invalid values in one line.
+
+    Raises:
+        UserError: With the parameter, the value and what would be right; semicolons between several.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            sentences = (_sentence(problem, type(self)) for problem in error.errors())
+            raise UserError("; ".join(sentences)) from None
+
+
+class Parameters(CheckedModel):
     """Numbers that describe a finger, each within its own bounds; `Design` also checks them together.
 
     Frame: x runs from the base (0) to the tip (`height`); the front (contact) face is y = 0 and the body
@@ -28,8 +51,6 @@ class Parameters(BaseModel):
     `height` to `back_thickness` are the paper's nine. The paper does not give base wall, fillets, the
     contact's width and the markers: those values are this project's.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     name: str = Field(
         default="default",
@@ -78,17 +99,14 @@ class Parameters(BaseModel):
     @property
     def contact_abscissa(self) -> float:
         """X of the contact's middle on the front face, mm."""
-        if self.contact_position is not None:
-            return self.contact_position
-        return (self.height - self.tip_length) / 2
+        middle = (self.height - self.tip_length) / 2
+        return middle if self.contact_position is None else self.contact_position
 
     @property
     def contact_ends(self) -> tuple[float, float]:
         """X of both ends of the contact, mm."""
-        return (
-            self.contact_abscissa - self.contact_width / 2,
-            self.contact_abscissa + self.contact_width / 2,
-        )
+        half = self.contact_width / 2
+        return self.contact_abscissa - half, self.contact_abscissa + half
 
     @property
     def digest(self) -> str:
@@ -118,3 +136,38 @@ def title(name: str, model: type[BaseModel] = Parameters) -> str:
 
 SYMBOLS = {symbol: name for name in Parameters.model_fields if (symbol := parameter_info(name, "symbol"))}
 """Parameter names by the paper's symbols."""
+
+
+def unknown_parameter(key: str, model: type[BaseModel]) -> str:
+    """The message for a parameter that `model` does not have: near matches, or the whole list."""
+    known = list(model.model_fields)
+    near = difflib.get_close_matches(key.lower(), known, n=3, cutoff=0.6)
+    near = near or [name for name in known if key.lower() in name or key.lower()[:3] == name[:3]]
+    titles = ", ".join(title(name, model) for name in near or known)
+    hint = f"did you mean {titles}?" if near else f"there are {titles}"
+    return f"unknown parameter {key!r}; {hint}"
+
+
+def _sentence(problem: ErrorDetails, model: type[BaseModel]) -> str:
+    kind, value, context = problem["type"], problem["input"], problem.get("ctx", {})
+    if not problem["loc"]:
+        return str(context.get("error", problem["msg"]))
+    name = str(problem["loc"][0])
+    if kind == "extra_forbidden":
+        return unknown_parameter(name, model)
+    titled = title(name, model)
+    if kind in ("greater_than_equal", "less_than_equal"):
+        given = with_unit(float(value), name, model)
+        return f"{titled} = {given} is outside its range, {_bounds(name, model)}"
+    if kind in ("int_from_float", "int_parsing", "int_type"):
+        return f"{titled} = {value!r} is not a whole number; give one from {_bounds(name, model)}"
+    if kind in ("float_parsing", "float_type", "finite_number"):
+        return f"{titled} = {value!r} is not a finite number; give one from {_bounds(name, model)}"
+    if kind == "string_pattern_mismatch":
+        return f"{titled} = {value!r} must be a letter or digit, then only letters, digits, '.', '_', '-'"
+    return f"{titled} = {value!r}: {problem['msg'].lower()}"
+
+
+def _bounds(name: str, model: type[BaseModel]) -> str:
+    low, high = parameter_info(name, "low", model), parameter_info(name, "high", model)
+    return f"{low:g} to {with_unit(high, name, model)}"

@@ -7,10 +7,8 @@ from matplotlib.path import Path as Outline
 
 from geometry.arrays import FloatArray
 from geometry.figure import BODY, CONTACT, INK, MEASURED, Figure, body_figure
-from geometry.finger.fillets import fillet_points
-from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import Parameters
-from geometry.finger.section import Section, corner_angles, finger_section
+from geometry.finger.section import Section, corner_angles, fillet_points, finger_section, marker_positions
 
 
 def plot_design(design: Parameters) -> Figure:

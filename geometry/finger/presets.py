@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from geometry.errors import UserError
-from geometry.finger.checked_model import unknown_parameter
 from geometry.finger.design import Design, by_parameter_name
-from geometry.finger.parameters import SYMBOLS, Parameters, title
+from geometry.finger.parameters import SYMBOLS, Parameters, title, unknown_parameter
 
 FOLDER = Path(__file__).parent.parent / "designs"
 """Folder of the presets, one TOML file each."""

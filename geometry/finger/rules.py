@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.distance import pdist
 
-from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import Parameters
 from geometry.finger.section import (
     back_offset_line,
     corner_angles,
     finger_section,
     inside_distance,
+    marker_positions,
     polygon_sides,
     rib_pitch,
 )

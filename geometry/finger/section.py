@@ -1,4 +1,4 @@
-"""The finger's section in closed form: outline, cavities and ribs; no CAD."""
+"""The finger's section in closed form: outline, cavities, ribs, fillets and markers; no CAD."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -90,6 +90,25 @@ def rib_axes(parameters: Parameters) -> FloatArray:
     return axes
 
 
+def marker_positions(parameters: Parameters) -> FloatArray:
+    """Centres of the markers, ordered from base to tip, shape (m, 2), mm.
+
+    `front`: `marker_count` of them on the front wall's centre line at x = height k / (marker_count + 1).
+    `joints`: where each rib's axis meets either wall's centre line, and one in the tip on the bisector of the
+    apex, half the tip's length from it: 2 rib_count + 1.
+
+    Both layouts are assumptions: the paper shows nine markers, printed with the finger, without positions.
+    """
+    p = parameters
+    if p.marker_layout == "front":
+        x = p.height * np.arange(1, p.marker_count + 1) / (p.marker_count + 1)
+        return np.stack([x, np.full_like(x, -p.front_thickness / 2)], axis=1)
+    half_angle = np.arctan2(p.base_width, p.height) / 2
+    tip = np.array([p.height - p.tip_length / 2, -p.tip_length / 2 * np.tan(half_angle)])
+    points = np.concatenate([rib_axes(p).reshape(-1, 2), tip[None]])
+    return np.asarray(points[np.lexsort((-points[:, 1], points[:, 0]))], dtype=np.float64)
+
+
 def back_offset_line(parameters: Parameters, distance: float) -> tuple[float, float]:
     """Slope and intercept, mm, of the line y = slope * x + intercept `distance` mm inside the back face."""
     p = parameters
@@ -109,6 +128,22 @@ def corner_angles(corners: FloatArray) -> FloatArray:
     return np.asarray(np.arctan2(cross, (ahead * behind).sum(axis=1)), dtype=np.float64)
 
 
+def fillet_points(corners: FloatArray, which: int, radius: float) -> FloatArray:
+    """Start, middle and end of the fillet at corner `which` of a convex polygon, shape (3, 2), mm."""
+    corner, (behind, ahead) = corners[which], _along_sides(corners, which)
+    tangent = radius / np.tan(corner_angles(corners)[which] / 2)
+    centre = fillet_centre(corners, which, radius)
+    middle = centre + radius * (corner - centre) / np.linalg.norm(corner - centre)
+    return np.array([corner + behind * tangent, middle, corner + ahead * tangent])
+
+
+def fillet_centre(corners: FloatArray, which: int, radius: float) -> FloatArray:
+    """Centre of the fillet at corner `which` of a convex polygon, shape (2,), mm."""
+    bisector = _along_sides(corners, which).sum(axis=0)
+    distance = radius / np.sin(corner_angles(corners)[which] / 2)
+    return np.asarray(corners[which] + distance * bisector / np.linalg.norm(bisector), dtype=np.float64)
+
+
 def inside_distance(corners: FloatArray, points: FloatArray) -> FloatArray:
     """Distance of points (n, 2) inside a convex counter-clockwise polygon, (n,), mm; negative outside.
 
@@ -118,6 +153,12 @@ def inside_distance(corners: FloatArray, points: FloatArray) -> FloatArray:
     ahead = ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
     apart = points[:, None] - corners
     return np.asarray((ahead[:, 0] * apart[..., 1] - ahead[:, 1] * apart[..., 0]).min(axis=1))
+
+
+def _along_sides(corners: FloatArray, which: int) -> FloatArray:
+    """Unit vectors from a corner to the one before and the one after it, shape (2, 2)."""
+    sides = corners[[which - 1, (which + 1) % len(corners)]] - corners[which]
+    return np.asarray(sides / np.linalg.norm(sides, axis=1, keepdims=True), dtype=np.float64)
 
 
 def _wall_side(p: Parameters, x: float) -> tuple[FloatArray, FloatArray]:

@@ -1,10 +1,8 @@
 """The section as a drawing in true scale: one path and a circle for every marker."""
 
 from geometry.arrays import FloatArray
-from geometry.finger.fillets import fillet_points
-from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import Parameters
-from geometry.finger.section import finger_section
+from geometry.finger.section import fillet_points, finger_section, marker_positions
 
 MARGIN = 2.0
 """White space around the section, mm."""

@@ -7,16 +7,14 @@ import gmsh
 import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
-from geometry.cad.model import section_brep
+from geometry.cad import section_brep
 from geometry.errors import UserError
 from geometry.finger.design import Design
-from geometry.finger.markers import marker_positions
-from geometry.finger.section import finger_section
-from geometry.mesh.boundary import boundary_edges
+from geometry.finger.section import finger_section, marker_positions
+from geometry.mesh.boundary import boundary_edges, elements_through_thickness
 from geometry.mesh.element_size import refinements, set_sizes
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
-from geometry.mesh.walls import elements_through_thickness
 
 MIN_ELEMENTS = 3
 """Least number of elements through the thickness of every wall and rib."""
@@ -96,7 +94,10 @@ def _triangulate(
     number[used] = np.arange(len(used))
     position = np.argsort(tags)[np.searchsorted(np.sort(tags), used)]
     points = coordinates.reshape(-1, 3)[position, :2].copy()
-    return points, _counter_clockwise(points, number[triangles])
+    triangles = number[triangles]
+    clockwise = signed_areas(points, triangles) < 0
+    triangles[clockwise] = triangles[clockwise][:, [0, 2, 1]]
+    return points, triangles
 
 
 def _named(design: Design, points: FloatArray, triangles: IntArray) -> TriangleMesh:
@@ -146,9 +147,3 @@ def _points_at(wanted: FloatArray) -> list[int]:
         if (np.hypot(wanted[:, 0] - x, wanted[:, 1] - y) < TOLERANCE).any():
             found.append(tag)
     return found
-
-
-def _counter_clockwise(points: FloatArray, triangles: IntArray) -> IntArray:
-    clockwise = signed_areas(points, triangles) < 0
-    triangles[clockwise] = triangles[clockwise][:, [0, 2, 1]]
-    return triangles

@@ -14,8 +14,7 @@ from itertools import product
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
-from geometry.finger.fillets import fillet_centre
-from geometry.finger.section import Section
+from geometry.finger.section import Section, fillet_centre
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 

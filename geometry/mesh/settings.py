@@ -1,7 +1,6 @@
 """Settings of the mesh: element sizes."""
 
-from geometry.finger.checked_model import CheckedModel
-from geometry.finger.parameters import bounded
+from geometry.finger.parameters import CheckedModel, bounded
 
 
 class MeshSettings(CheckedModel):

@@ -7,8 +7,7 @@ import ezdxf
 import numpy as np
 import pytest
 
-from geometry import Design, UserError, cad_files, finger_section, marker_positions
-from geometry.cad import model as cad
+from geometry import Design, UserError, cad, cad_files, finger_section, marker_positions
 from geometry.finger.svg import section_svg
 from tests.meshes import body_area, body_perimeter
 

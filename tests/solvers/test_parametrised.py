@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
+from geometry.mesh.boundary import walls_and_ribs
 from geometry.mesh.quadrature import body_quadrature, edge_quadrature
-from geometry.mesh.walls import walls_and_ribs
 from solvers.elasticity import lame_constants, lame_derivatives
 from solvers.fem.identification.linear_model import LinearModel
 from solvers.fem.identification.parameters import MEANINGS, parameters_of, parse_parameters, problem_with

@@ -4,7 +4,7 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.finger.design import Design
-from geometry.finger.markers import marker_positions
+from geometry.finger.section import marker_positions
 
 MARKERS = {layout: marker_positions(Design(marker_layout=layout)) for layout in ("front", "joints")}
 

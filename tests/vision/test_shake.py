@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from geometry.finger.markers import marker_positions
+from geometry.finger.section import marker_positions
 from tests.vision.films import CAMERA, DESIGN, WORKSPACE, bent, frames_of, images
 from vision.calibration.camera import Pose
 from vision.discs.disc_detector import DiscDetections

@@ -8,7 +8,7 @@ import pytest
 
 from geometry.errors import UserError
 from geometry.finger.design import Design
-from geometry.finger.markers import marker_positions
+from geometry.finger.section import marker_positions
 from tests.vision.films import CAMERA, DESIGN, WORKSPACE, bent, frames_of, images, recording
 from vision.calibration.camera import Camera
 from vision.rig.motion import Motion

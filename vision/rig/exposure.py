@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from geometry.finger.checked_model import CheckedModel
-from geometry.finger.parameters import bounded
+from geometry.finger.parameters import CheckedModel, bounded
 from vision.frames.frame import Image
 
 LUMA = (0.114, 0.587, 0.299)

@@ -4,8 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.arrays import FloatArray
-from geometry.finger.checked_model import CheckedModel
-from geometry.finger.parameters import bounded
+from geometry.finger.parameters import CheckedModel, bounded
 
 
 class Motion(CheckedModel):

@@ -6,7 +6,7 @@ import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
-from geometry.finger.markers import marker_positions
+from geometry.finger.section import marker_positions
 from vision.discs.colour import DARK
 from vision.discs.disc_detector import DiscDetections, detect_discs, detect_discs_near
 from vision.frames.frame import Image

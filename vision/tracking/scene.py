@@ -6,8 +6,8 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import Parameters
+from geometry.finger.section import marker_positions
 from vision.calibration.camera import Camera
 from vision.discs.colour import DARK, Colour
 from vision.discs.disc_detector import DetectionMethod, DiscDetections, detect_discs

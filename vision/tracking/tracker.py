@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.errors import UserError
-from geometry.finger.markers import marker_positions
+from geometry.finger.section import marker_positions
 from vision.discs.disc_detector import FLOOR, DiscDetections
 from vision.frames.frame import Frame, Frames
 from vision.tracking.camera_motion import CameraMotion, find_camera_motion

@@ -16,8 +16,8 @@ from scipy.sparse import csc_matrix, diags, kron
 from scipy.sparse.linalg import SuperLU, splu
 
 from geometry.arrays import FloatArray
+from geometry.mesh.boundary import walls_and_ribs
 from geometry.mesh.quadrature import body_quadrature, edge_quadrature
-from geometry.mesh.walls import walls_and_ribs
 from solvers.constrained_elimination import ConstrainedElimination
 from solvers.elasticity import lame_derivatives
 from solvers.fem.boundary_conditions import load_functionals

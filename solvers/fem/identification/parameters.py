@@ -6,7 +6,7 @@ from math import log
 import numpy as np
 
 from geometry.errors import UserError
-from geometry.mesh.walls import walls_and_ribs
+from geometry.mesh.boundary import walls_and_ribs
 from solvers.assimilation.estimation import Parameter
 from solvers.problem import Load, Problem, contact_ends
 from solvers.solver import UnsupportedProblemError

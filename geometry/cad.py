@@ -12,10 +12,8 @@ import cadquery as cq
 from cadquery.occ_impl.exporters.dxf import DxfDocument
 
 from geometry.arrays import FloatArray
-from geometry.finger.fillets import fillet_points
-from geometry.finger.markers import marker_positions
 from geometry.finger.parameters import Parameters
-from geometry.finger.section import finger_section
+from geometry.finger.section import fillet_points, finger_section, marker_positions
 from geometry.finger.svg import section_svg
 
 BODY_COLOUR = (0.15, 0.15, 0.17)
