@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from compare.camera.film import Film
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Comparison, supported_solvers
 from compare.evaluation.convergence import with_certificates
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.force_displacement import force_curves, write_force_displacement
 from compare.evaluation.metrics import evaluated, pick_reference
 from compare.evaluation.shared_mesh import check_inside, shared_mesh, write_rounds
-from compare.evaluation.solver_selection import supported_solvers
 from compare.evaluation.virtual_experiment import virtual_experiment
 from compare.figures import Picture, draw_all
 from compare.report.html_report import write_report

@@ -1,6 +1,6 @@
 """A finished comparison: one finger, one mesh, many solvers, one set of marker displacements."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -12,13 +12,13 @@ from compare.evaluation.metrics import (
     reference_differences,
     truth_differences,
 )
-from compare.evaluation.solver_selection import left_out_remarks
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.adaptation import Adaptation
 from solvers.problem import Load, Material
+from solvers.solver import Solver, UnsupportedProblemError, check_load, with_law
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,3 +98,33 @@ class Comparison:
         row |= {"energy_N_mm_per_mm": evaluation.energy}
         row |= {f"reaction_{axis}_N_per_mm": float(evaluation.reaction[n]) for n, axis in enumerate("uv")}
         return row | {"seconds_s": evaluation.stats.get("seconds", float("nan"))}
+
+
+def supported_solvers(
+    solvers: Sequence[Solver], spare: Collection[str], material: Material, load: Load
+) -> tuple[list[Solver], dict[str, str]]:
+    """The solvers that take a material and a load, and by name why others are left out.
+
+    Raises:
+        UnsupportedProblemError: If one does not that is not among the spare ones, or none does.
+    """
+    chosen: list[Solver] = []
+    left_out: dict[str, str] = {}
+    for solver in solvers:
+        try:
+            check_load(solver, load)
+            with_law(material, solver)
+            chosen.append(solver)
+        except UnsupportedProblemError as error:
+            left_out[solver.name] = f"no load {load.kind!r}" if load.kind not in solver.loads else str(error)
+            if solver.name not in spare or len(left_out) == len(solvers):
+                raise
+    return chosen, left_out
+
+
+def left_out_remarks(left_out: Mapping[str, str]) -> list[str]:
+    """A line a reason, with the solvers that it holds for."""
+    reasons: dict[str, list[str]] = {}
+    for name, reason in left_out.items():
+        reasons.setdefault(reason, []).append(name)
+    return [f"left out: {', '.join(names)} ({reason})" for reason, names in reasons.items()]

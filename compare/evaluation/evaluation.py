@@ -106,7 +106,10 @@ class Evaluation:
             message=solution.status.message,
             energy=float(solution.energy),
             reaction=np.asarray(solution.reaction, dtype=np.float64),
-            stats={name: _plain(value) for name, value in solution.stats.items()},
+            stats={
+                name: value.item() if isinstance(value, np.generic) else value  # Python's own, for JSON
+                for name, value in solution.stats.items()
+            },
             history={name: np.asarray(column) for name, column in solution.history.items()},
             marker_displacement=solution.displacement(mesh.markers if markers is None else markers),
             node_displacement=displacement[: len(mesh.points)],
@@ -176,8 +179,3 @@ class Evaluation:
         }
         header["uncertainty"] = UNCERTAINTY.validate_python(header["uncertainty"])
         return cls(history=history, **(header | arrays))
-
-
-def _plain(value: float | int | str) -> float | int | str:
-    """A NumPy number as Python's own, which JSON takes."""
-    return value.item() if isinstance(value, np.generic) else value

@@ -4,11 +4,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 
-from compare.figures.canvas import Extent, Pixels
+from compare.figures.canvas import Canvas, Extent, Pixels
 from compare.figures.colours import Scale
 from compare.figures.style import HALO
 from geometry.arrays import FloatArray, IntArray
 from geometry.figure import INK, MUTED
+from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 PIXELS = 1800
@@ -28,9 +29,29 @@ def prepare(axes: Axes, extent: Extent) -> None:
     axes.set_aspect("equal", adjustable="box", anchor="W")
 
 
-def show(axes: Axes, pixels: Pixels, extent: Extent) -> None:
-    """Put a picture of a canvas where it belongs."""
-    axes.imshow(pixels, extent=extent, interpolation="hanning", zorder=1, aspect="equal")
+def show(axes: Axes, canvas: Canvas, colours: Pixels, points: FloatArray | None = None) -> None:
+    """Show a canvas with triangles in `colours`, shape (t, 3), and nodes at `points` if given, mm."""
+    picture = canvas.picture(colours, points)
+    axes.imshow(picture, extent=canvas.extent, interpolation="hanning", zorder=1, aspect="equal")
+
+
+def panel(
+    axes: Axes,
+    canvas: Canvas,
+    mesh: TriangleMesh,
+    colours: Pixels,
+    title: str,
+    note: str,
+    *,
+    bold: bool = True,
+) -> None:
+    """The undeformed body in the colours of its triangles, shape (t, 3), with its outline, title and note."""
+    prepare(axes, canvas.extent)
+    show(axes, canvas, colours)
+    outline(axes, boundary_edges(mesh.triangles), mesh.points, width=0.35)
+    axes.set_title(title, size=8.5, pad=2, weight="bold" if bold else "normal")
+    # In the corner below the tip, which no finger fills, above the scale bar.
+    axes.text(0.99, 0.33, note, ha="right", size=7, color=MUTED, transform=axes.transAxes)
 
 
 def outline(

@@ -5,8 +5,7 @@ Type, axes and legends are matplotlib's; both use the same extent in mm, so that
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
-from types import TracebackType
+from contextlib import AbstractContextManager, contextmanager
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -49,30 +48,30 @@ class Extent(NamedTuple):
         return self.top - self.bottom
 
 
-class Canvas:
+class Canvas(AbstractContextManager["Canvas"]):
     """A picture of a mesh that is coloured triangle by triangle, again and again; to be closed after use."""
 
     def __init__(self, mesh: TriangleMesh, extent: Extent, *, width: int) -> None:
         """Set the camera: `extent` fills a picture of `width` pixels, seen from the front."""
         pyvista.OFF_SCREEN = True
         self.extent = extent
-        self._count = len(mesh.triangles)
-        faces = np.column_stack([np.full(self._count, 3), mesh.triangles])
-        self._surface = pyvista.PolyData(_in_space(mesh.points), faces.ravel())
-        self._surface.cell_data["colour"] = np.zeros((self._count, 3), dtype=np.uint8)
+        faces = np.insert(mesh.triangles, 0, 3, axis=1)
+        self._surface = pyvista.PolyData(np.pad(mesh.points, ((0, 0), (0, 1))), faces.ravel())
+        self._surface.cell_data["colour"] = np.zeros((len(faces), 3), dtype=np.uint8)
         size = (width, round(width * extent.height / extent.width))
         with _without_warnings():
             self._plotter = pyvista.Plotter(off_screen=True, window_size=list(size))
             self._plotter.add_mesh(self._surface, scalars="colour", rgb=True, lighting=False)
-            self._aim()
+        camera = self._plotter.camera
+        middle = ((extent.left + extent.right) / 2, (extent.bottom + extent.top) / 2)
+        camera.parallel_projection = True
+        camera.focal_point = (*middle, 0.0)
+        camera.position = (*middle, 100.0)
+        camera.up = (0.0, 1.0, 0.0)
+        camera.parallel_scale = extent.height / 2
+        camera.clipping_range = (50.0, 150.0)
 
-    def __enter__(self) -> Self:
-        """The canvas itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Free the graphics memory."""
         self._plotter.close()
 
@@ -87,27 +86,13 @@ class Canvas:
             Red, green, blue and opacity, shape (height, width, 4).
         """
         if points is not None:
-            self._surface.points = _in_space(points)
+            self._surface.points = np.pad(points, ((0, 0), (0, 1)))
         self._surface.cell_data["colour"] = colours
         self._surface.Modified()  # VTK would show the picture before
         self._plotter.render()
         with _without_warnings():
             image = self._plotter.screenshot(None, transparent_background=True, return_img=True)
         return np.array(image, dtype=np.uint8)
-
-    def _aim(self) -> None:
-        camera, extent = self._plotter.camera, self.extent
-        middle = ((extent.left + extent.right) / 2, (extent.bottom + extent.top) / 2)
-        camera.parallel_projection = True
-        camera.focal_point = (*middle, 0.0)
-        camera.position = (*middle, 100.0)
-        camera.up = (0.0, 1.0, 0.0)
-        camera.parallel_scale = extent.height / 2
-        camera.clipping_range = (50.0, 150.0)
-
-
-def _in_space(points: FloatArray) -> FloatArray:
-    return np.column_stack([points, np.zeros(len(points))])
 
 
 @contextmanager

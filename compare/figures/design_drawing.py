@@ -7,7 +7,7 @@ from matplotlib.patches import Circle
 from compare.figures import body
 from compare.figures.canvas import Extent
 from compare.figures.dimensions import Draughtsman
-from compare.figures.style import axes_at, heading
+from compare.figures.style import arrow, axes_at, heading
 from geometry.figure import CONTACT, MEASURED, WIDTH, Figure, figure
 from geometry.finger.parameters import Parameters
 from geometry.finger.picture import draw_section
@@ -35,7 +35,9 @@ def draw_design(design: Parameters) -> Figure:
         pen = Draughtsman(axes, em)
         pen.text((-1.7 * em, -design.base_width / 2), "clamped", va="center", rotation=90)
         _lengths(pen, design)
-        _contact(pen, design)
+        axes.plot(design.contact_ends, (0, 0), color=CONTACT, linewidth=3, solid_capstyle="butt", zorder=5)
+        x, style = design.contact_abscissa, "-|>,head_width=0.25,head_length=0.5"
+        arrow(axes, (x, 2.8 * em), (x, 0), style=style, colour=CONTACT, width=1.8, gap=2)
         _ribs(pen, design, shape)
         _markers(pen, design)
         markers = f"{len(marker_positions(design))} markers, layout “{design.marker_layout}”"
@@ -60,19 +62,6 @@ def _lengths(pen: Draughtsman, design: Parameters) -> None:
     )
     pen.between((0, 0), (d.height, 0), second, rf"$H$ = {d.height:g} mm")
     pen.between((0, -d.base_width), (0, 0), (-3.8 * em, 0), rf"$L$ = {d.base_width:g} mm")
-
-
-def _contact(pen: Draughtsman, design: Parameters) -> None:
-    x, em = design.contact_abscissa, pen.em
-    pen.axes.plot(design.contact_ends, (0, 0), color=CONTACT, linewidth=3, solid_capstyle="butt", zorder=5)
-    shape = {
-        "arrowstyle": "-|>,head_width=0.25,head_length=0.5",
-        "color": CONTACT,
-        "lw": 1.8,
-        "shrinkA": 0,
-        "shrinkB": 2,
-    }
-    pen.axes.annotate("", xy=(x, 0), xytext=(x, 2.8 * em), arrowprops=shape, zorder=6)
 
 
 def _ribs(pen: Draughtsman, design: Parameters, shape: Section) -> None:

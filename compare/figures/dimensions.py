@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Arc
 from matplotlib.text import Text
 
-from compare.figures.style import HALO
+from compare.figures.style import HALO, arrow
 from geometry.arrays import FloatArray
 from geometry.figure import INK
 
@@ -109,11 +109,4 @@ class Draughtsman:
         )
 
     def _arrow(self, tail: Point, head: Point, style: str) -> None:
-        shape = {
-            "arrowstyle": f"{style},head_width=0.12,head_length=0.3",
-            "color": INK,
-            "lw": LINE,
-            "shrinkA": 0,
-            "shrinkB": 0,
-        }
-        self.axes.annotate("", xy=tuple(head), xytext=tuple(tail), arrowprops=shape, zorder=6)
+        arrow(self.axes, tail, head, style=f"{style},head_width=0.12,head_length=0.3", width=LINE)

@@ -1,13 +1,13 @@
-"""A scalar field of every solver on one colour scale, with the differences from the reference beside it."""
+"""Fields of every solver on one colour scale: quantities with their differences, and the excess energy."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
 
 from compare.evaluation.comparison import Comparison
-from compare.evaluation.differences import field_difference
+from compare.evaluation.differences import field_difference, weighted_percentile
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import COMPONENTS
 from compare.evaluation.number_format import percent, significant
@@ -17,12 +17,14 @@ from compare.figures.colours import PERCENT, Scale, sequential, symmetric
 from compare.figures.style import axes_at, heading
 from geometry.arrays import FloatArray
 from geometry.figure import MUTED, WIDTH, Figure, figure
-from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 MARGIN = 0.1
 HEAD, PANEL_TITLE, FOOT = 0.3, 0.2, 0.55
 """Heights in inches: heading; the name above a panel; the colour bars."""
+
+DECADES = 4
+"""Powers of ten on the colour scale of the excess energy."""
 
 
 class Quantity(NamedTuple):
@@ -102,10 +104,7 @@ def difference_scale(
 def draw_field(comparison: Comparison, quantity: Quantity) -> Figure:
     """Draw a quantity on the undeformed body: a row a solver, its difference from the reference beside it."""
     mesh, reference = comparison.mesh, comparison.reference
-    ordered = [
-        reference,
-        *(evaluation for evaluation in comparison.evaluations if evaluation is not reference),
-    ]
+    ordered = [reference, *(each for each in comparison.evaluations if each is not reference)]
     columns = 1 if len(ordered) == 1 else 2
     width = (WIDTH - MARGIN * (columns + 1)) / columns
     extent = body.field_extent(mesh)
@@ -113,41 +112,34 @@ def draw_field(comparison: Comparison, quantity: Quantity) -> Figure:
     scale = field_scale(quantity, mesh, reference)
     differences = difference_scale(quantity, mesh, ordered, reference)
     total = HEAD + len(ordered) * (PANEL_TITLE + height) + FOOT
-    edges = boundary_edges(mesh.triangles)
     base = quantity.values(reference)
     size = f"$|{quantity.symbol}|$" if quantity.signed else f"${quantity.symbol}$"
-
-    def panel(row: int, column: int, colours: Scale, values: FloatArray, of: Evaluation) -> Axes:
-        left, top = MARGIN + column * (width + MARGIN), HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
-        axes = axes_at(drawn, (left, top, width, height))
-        body.prepare(axes, extent)
-        body.show(axes, canvas.picture(colours.paint(of.per_triangle(values))), extent)
-        body.outline(axes, edges, mesh.points, width=0.35)
-        return axes
 
     with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // 2) as canvas:
         heading(drawn, f"{quantity.title}, undeformed body")
         for row, evaluation in enumerate(ordered):
+            top = HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
+            axes = axes_at(drawn, (MARGIN, top, width, height))
             values = quantity.values(evaluation)
-            axes = panel(row, 0, scale, values, evaluation)
-            axes.set_title(evaluation.label, size=8.5, pad=2, weight="bold")
-            largest = np.abs(evaluation.per_triangle(values)).max()
-            _remark(axes, f"largest {size} = {significant(largest, 3)} {quantity.unit}")
+            means = evaluation.per_triangle(values)
+            note = f"largest {size} = {significant(np.abs(means).max(), 3)} {quantity.unit}"
+            body.panel(axes, canvas, mesh, scale.paint(means), evaluation.label, note)
+            beside = (2 * MARGIN + width, top, width, height)
             if evaluation is not reference:
-                axes = panel(row, 1, differences, values - base, evaluation)
-                norm = field_difference(values, base, reference.weights).rel_l2
-                axes.set_title(f"minus {reference.label}", size=8.5, pad=2)
-                _remark(axes, f"rel. $L^2$ {percent(norm)}")
+                axes = axes_at(drawn, beside)
+                colours = differences.paint(evaluation.per_triangle(values - base))
+                note = f"rel. $L^2$ {percent(field_difference(values, base, reference.weights).rel_l2)}"
+                body.panel(axes, canvas, mesh, colours, f"minus {reference.label}", note, bold=False)
             elif columns == 2:
-                _explain(drawn, (2 * MARGIN + width, HEAD + PANEL_TITLE, width, height), reference)
+                _explain(drawn, beside, reference)
         body.scale_bar(axes, extent)
-        _bars(drawn, quantity, scale, differences, columns, width, total)
+        bars = [(scale, f"${quantity.symbol}$"), (differences, f"difference of ${quantity.symbol}$")]
+        for column, (shared, title) in enumerate(bars[:columns]):
+            left = MARGIN + column * (width + MARGIN) + 0.1 * width
+            axes = axes_at(drawn, (left, total - FOOT + 0.1, 0.8 * width, 0.09))
+            extend = "max" if column == 0 and not quantity.signed else "both"
+            body.colour_bar(axes, shared, f"{title}, {quantity.unit}", extend=extend)
     return drawn
-
-
-def _remark(axes: Axes, text: str) -> None:
-    """A number in the corner below the tip, which no finger fills, above the scale bar."""
-    axes.text(0.99, 0.33, text, ha="right", size=7, color=MUTED, transform=axes.transAxes)
 
 
 def _explain(drawn: Figure, box: tuple[float, float, float, float], reference: Evaluation) -> None:
@@ -162,22 +154,39 @@ def _explain(drawn: Figure, box: tuple[float, float, float, float], reference: E
     axes.text(0.02, 0.95, text, va="top", size=7, color=MUTED, linespacing=1.35, transform=axes.transAxes)
 
 
-def _bars(
-    drawn: Figure,
-    quantity: Quantity,
-    scale: Scale,
-    differences: Scale,
-    columns: int,
-    width: float,
-    total: float,
-) -> None:
-    inset = 0.1 * width
-    for column, (colours, title) in enumerate(
-        [
-            (scale, f"${quantity.symbol}$, {quantity.unit}"),
-            (differences, f"difference of ${quantity.symbol}$, {quantity.unit}"),
-        ][:columns]
-    ):
-        left = MARGIN + column * (width + MARGIN) + inset
-        axes = axes_at(drawn, (left, total - FOOT + 0.1, width - 2 * inset, 0.09))
-        body.colour_bar(axes, colours, title, extend="max" if column == 0 and not quantity.signed else "both")
+def excess_scale(mesh: TriangleMesh, densities: Sequence[FloatArray]) -> Scale:
+    """The logarithmic scale that every solver shares; it ends at the highest percentile of any of them."""
+    high = max(weighted_percentile(density, mesh.areas, PERCENT) for density in densities)
+    return Scale(high / 10**DECADES, high, mpl.colormaps["viridis"], log=True)
+
+
+def draw_excess(comparison: Comparison) -> Figure | None:
+    """Draw the density of the excess energy of every solver that has one; None if none has."""
+    mesh = comparison.mesh
+    entries = [
+        (evaluation.label, evaluation.certificate)
+        for evaluation in comparison.evaluations
+        if evaluation.certificate is not None and evaluation.certificate.has_excess
+    ]
+    if not entries:
+        return None
+    columns = min(len(entries), 2)
+    rows = -(-len(entries) // columns)
+    width = (WIDTH - MARGIN * (columns + 1)) / columns
+    extent = body.field_extent(mesh)
+    height = width * extent.height / extent.width
+    scale = excess_scale(mesh, [certificate.density for _, certificate in entries])
+    total = HEAD + rows * (PANEL_TITLE + height) + FOOT
+    with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // 2) as canvas:
+        heading(drawn, "Excess energy over finite elements, undeformed body")
+        for number, (label, certificate) in enumerate(entries):
+            row, column = divmod(number, columns)
+            top = HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
+            axes = axes_at(drawn, (MARGIN + column * (width + MARGIN), top, width, height))
+            colours = scale.paint(np.maximum(certificate.density, scale.low))
+            note = f"{percent(certificate.rel_excess, 2)} of the energy"
+            body.panel(axes, canvas, mesh, colours, label, note)
+        body.scale_bar(axes, extent)
+        bar = axes_at(drawn, (0.2 * WIDTH, total - FOOT + 0.1, 0.6 * WIDTH, 0.09))
+        body.colour_bar(bar, scale, "density of the excess energy, MPa", extend="both")
+    return drawn

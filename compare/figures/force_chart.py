@@ -17,7 +17,10 @@ def draw_force_displacement(curves: Sequence[ForceCurve], *, depth: float) -> Fi
 
     A solver that follows the load has a mark at each of its equilibria, a linear one a dashed line.
     """
-    labels = [_label(curve) for curve in curves]
+    labels = [
+        f"{curve.evaluation.label}, {curve.force[-1]:.3g} N/mm at {curve.travel[-1]:.3g} mm"
+        for curve in curves
+    ]
     height = legend_height(labels)
     with figure(HEAD + height + HEIGHT + FOOT) as drawn:
         heading(drawn, "Force of the indenter along its travel")
@@ -52,8 +55,3 @@ def draw_force_displacement(curves: Sequence[ForceCurve], *, depth: float) -> Fi
         whole.spines["right"].set(visible=True, color=INK)
         legend_above(axes)
     return drawn
-
-
-def _label(curve: ForceCurve) -> str:
-    end = f"{curve.force[-1]:.3g} N/mm at {curve.travel[-1]:.3g} mm"
-    return f"{curve.evaluation.label}, {end}"

@@ -10,8 +10,7 @@ from compare.evaluation.force_displacement import force_curves
 from compare.figures.colours import PERCENT
 from compare.figures.design_drawing import draw_design
 from compare.figures.energy_chart import draw_energy
-from compare.figures.excess import DECADES, draw_excess
-from compare.figures.fields import QUANTITIES, Quantity, draw_field
+from compare.figures.fields import DECADES, QUANTITIES, Quantity, draw_excess, draw_field
 from compare.figures.force_chart import draw_force_displacement
 from compare.figures.loss_chart import draw_losses
 from compare.figures.marker_chart import draw_marker_errors
@@ -168,10 +167,9 @@ def mesh(comparison: Comparison) -> Drawing:
     return Drawing(
         draw_mesh(comparison.mesh),
         "Mesh",
-        f"The mesh that every solver shares: {numbers.nodes} nodes, {numbers.triangles} triangles, edges "
-        f"from {numbers.shortest:.3g} to {numbers.longest:.3g} mm. Quality is twice the ratio of the "
-        f"inscribed to the circumscribed radius (1 for an equilateral triangle): worst "
-        f"{numbers.worst:.2f}, mean {numbers.mean:.2f}. Orange: the contact. Dots: the markers.",
+        f"The mesh that every solver shares: {numbers['size']}, edges from {numbers['edges']}. Quality is "
+        f"twice the ratio of the inscribed to the circumscribed radius (1 for an equilateral triangle): "
+        f"{numbers['quality']}. Orange: the contact. Dots: the markers.",
     )
 
 

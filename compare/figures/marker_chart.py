@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import MarkerErrors, held_out_errors, marker_errors
-from compare.figures.style import axes_at, heading, solver_colour
+from compare.figures.style import axes_at, heading, legend_below_heading, solver_colour
 from geometry.arrays import BoolArray
 from geometry.figure import MUTED, WIDTH, Figure, figure
 from geometry.observations import Observations
@@ -32,7 +32,11 @@ def draw_marker_errors(comparison: Comparison) -> Figure:
     ceiling = _ceiling(evaluations, observations)
     with figure(HEAD + len(evaluations) * step + FOOT) as drawn:
         heading(drawn, f"Absolute error at the markers, against {observations.label} displacements")
-        _legend(drawn)
+        handles = [
+            Patch(facecolor=MUTED, edgecolor=MUTED, label="at a marker that the solver was not given"),
+            Patch(facecolor="white", edgecolor=MUTED, label="at one that it was given"),
+        ]
+        legend_below_heading(drawn, handles, length=1.4)
         for row, evaluation in enumerate(evaluations):
             held_out = held_out_errors(evaluation, observations)
             given = marker_errors(evaluation, observations) if evaluation.in_sample else None
@@ -92,20 +96,3 @@ def _scales(axes: Axes, visible: BoolArray, ceiling: float) -> None:
     axes.tick_params(labelsize=7)
     axes.grid(axis="y", color="#dddddd", linewidth=0.5)
     axes.set_axisbelow(True)
-
-
-def _legend(drawn: Figure) -> None:
-    handles = [
-        Patch(facecolor=MUTED, edgecolor=MUTED, label="at a marker that the solver was not given"),
-        Patch(facecolor="white", edgecolor=MUTED, label="at one that it was given"),
-    ]
-    drawn.legend(
-        handles=handles,
-        loc="upper left",
-        bbox_to_anchor=(0.0, 1 - 0.24 / drawn.get_figheight()),
-        ncols=2,
-        columnspacing=1.2,
-        handletextpad=0.5,
-        borderaxespad=0.1,
-        handlelength=1.4,
-    )

@@ -1,7 +1,5 @@
 """A picture of the mesh: the whole, and close-ups where it is finest and where a rib meets a wall."""
 
-from typing import NamedTuple
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
@@ -20,39 +18,16 @@ HEAD, INSET_TITLE = 0.48, 0.24
 LINE = "#3d5a80"
 
 
-class MeshNumbers(NamedTuple):
-    """Size and quality of a mesh.
-
-    Attributes:
-        nodes: Number of nodes.
-        triangles: Number of triangles.
-        shortest: Length of the shortest edge, mm.
-        longest: Length of the longest edge, mm.
-        worst: Smallest quality (`quality`) of a triangle.
-        mean: Mean quality.
-    """
-
-    nodes: int
-    triangles: int
-    shortest: float
-    longest: float
-    worst: float
-    mean: float
-
-
-def mesh_numbers(mesh: TriangleMesh) -> MeshNumbers:
-    """Size and quality of a mesh."""
+def mesh_numbers(mesh: TriangleMesh) -> dict[str, str]:
+    """Size of a mesh, range of its edge lengths and quality of its triangles (`quality`), as text."""
     ends = mesh.points[mesh.edges]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     good = quality(mesh)
-    return MeshNumbers(
-        nodes=len(mesh.points),
-        triangles=len(mesh.triangles),
-        shortest=float(length.min()),
-        longest=float(length.max()),
-        worst=float(good.min()),
-        mean=float(good.mean()),
-    )
+    return {
+        "size": f"{len(mesh.points)} nodes, {len(mesh.triangles)} triangles",
+        "edges": f"{length.min():.3g} to {length.max():.3g} mm",
+        "quality": f"worst {good.min():.2f}, mean {good.mean():.2f}",
+    }
 
 
 def quality(mesh: TriangleMesh) -> FloatArray:
@@ -99,10 +74,7 @@ def draw_mesh(mesh: TriangleMesh) -> Figure:
         ("B: inner corner", _window(joint, 1.4 * span, ratio)),
     ]
     numbers = mesh_numbers(mesh)
-    note = (
-        f"{numbers.nodes} nodes, {numbers.triangles} triangles; edges {numbers.shortest:.3g} to "
-        f"{numbers.longest:.3g} mm; quality: worst {numbers.worst:.2f}, mean {numbers.mean:.2f}"
-    )
+    note = f"{numbers['size']}; edges {numbers['edges']}; quality: {numbers['quality']}"
     with figure(HEAD + height + INSET_TITLE + inset_height + MARGIN) as drawn:
         heading(drawn, "Mesh, shared by every solver", note)
         axes = axes_at(drawn, (MARGIN, HEAD, width, height))
@@ -140,8 +112,7 @@ def draw_mesh(mesh: TriangleMesh) -> Figure:
 def _window(middle: FloatArray, width: float, ratio: float) -> Extent:
     """A rectangle around a point, `ratio` times as high as wide, mm."""
     half = np.array([width, width * ratio]) / 2
-    (left, bottom), (right, top) = middle - half, middle + half
-    return Extent(float(left), float(right), float(bottom), float(top))
+    return Extent.around(np.stack([middle - half, middle + half]), margin=0.0)
 
 
 def _draw(axes: Axes, mesh: TriangleMesh, window: Extent, width: float) -> None:

@@ -1,7 +1,5 @@
 """The deformed finger of every solver, with its markers and those that were seen."""
 
-from collections.abc import Sequence
-
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,13 +12,11 @@ from compare.evaluation.metrics import marker_errors
 from compare.figures import body
 from compare.figures.canvas import Canvas, Extent
 from compare.figures.colours import Scale
-from compare.figures.style import axes_at, heading
-from geometry.arrays import FloatArray, IntArray
+from compare.figures.style import arrow, axes_at, heading, legend_below_heading
+from geometry.arrays import FloatArray
 from geometry.figure import INK, MEASURED, MUTED, WIDTH, Figure, figure
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
-from solvers.problem import Load
 
 MARGIN = 0.12
 HEAD, PANEL_TITLE, FOOT = 0.55, 0.27, 0.48
@@ -29,14 +25,14 @@ HEAD, PANEL_TITLE, FOOT = 0.55, 0.27, 0.48
 
 def draw_overlay(comparison: Comparison) -> Figure:
     """Draw every solver's deformed finger, one panel each, at true scale."""
-    mesh, load, evaluations = comparison.mesh, comparison.load, comparison.evaluations
+    mesh, evaluations = comparison.mesh, comparison.evaluations
     extent = overlay_extent(comparison)
     columns = 1 if len(evaluations) <= 3 else 2
     rows = -(-len(evaluations) // columns)
     width = (WIDTH - MARGIN * (columns + 1)) / columns
     height = width * extent.height / extent.width
-    scale = displacement_scale(mesh, evaluations)
-    edges = boundary_edges(mesh.triangles)
+    high = max(float(_magnitude(mesh, evaluation).max()) for evaluation in evaluations)
+    scale = Scale(0.0, high or 1.0, mpl.colormaps["viridis"])
     total = HEAD + rows * (PANEL_TITLE + height) + FOOT
     with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // columns) as canvas:
         heading(drawn, "Deformed finger, true scale")
@@ -45,27 +41,21 @@ def draw_overlay(comparison: Comparison) -> Figure:
             left = MARGIN + column * (width + MARGIN)
             top = HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
             axes = axes_at(drawn, (left, top, width, height))
-            _panel(axes, canvas, scale, edges, mesh, evaluation, comparison.observations)
-            if load.radius is None:
-                _contact_path(axes, mesh, evaluation)
-            else:
-                _cylinder(axes, mesh, load, load.radius)
+            _panel(axes, canvas, scale, comparison, evaluation)
+            _motion(axes, comparison, evaluation)
             body.scale_bar(axes, extent)
-        body.colour_bar(
-            axes_at(drawn, (0.25 * WIDTH, total - FOOT + 0.06, 0.5 * WIDTH, 0.09)),
-            scale,
-            "displacement magnitude, mm",
-        )
-        _legend(
-            drawn, comparison.observations, "contact’s motion" if load.radius is None else "cylinder’s motion"
-        )
+        bar = axes_at(drawn, (0.25 * WIDTH, total - FOOT + 0.06, 0.5 * WIDTH, 0.09))
+        body.colour_bar(bar, scale, "displacement magnitude, mm")
+        moved = "contact" if comparison.load.radius is None else "cylinder"
+        label = f"markers, {comparison.observations.label}"
+        handles = [
+            Line2D([], [], ls="", marker="o", ms=5, mfc="none", mec=MEASURED, mew=1.1, label=label),
+            Line2D([], [], ls="", marker="x", ms=4, color=INK, mew=0.9, label="solver’s markers"),
+            Line2D([], [], color="#9a9a9a", lw=0.9, label="undeformed"),
+            Line2D([], [], color=INK, lw=1, marker=">", ms=3.5, markevery=[1], label=f"{moved}’s motion"),
+        ]
+        legend_below_heading(drawn, handles, length=1.6)
     return drawn
-
-
-def displacement_scale(mesh: TriangleMesh, evaluations: Sequence[Evaluation]) -> Scale:
-    """From zero to the largest displacement magnitude of a triangle in any of the solutions, mm."""
-    high = max(float(_magnitude(mesh, evaluation).max()) for evaluation in evaluations)
-    return Scale(0.0, high or 1.0, mpl.colormaps["viridis"])
 
 
 def overlay_extent(comparison: Comparison) -> Extent:
@@ -88,20 +78,13 @@ def _magnitude(mesh: TriangleMesh, evaluation: Evaluation) -> FloatArray:
     return np.asarray(size[mesh.triangles].mean(axis=1))
 
 
-def _panel(
-    axes: Axes,
-    canvas: Canvas,
-    scale: Scale,
-    edges: IntArray,
-    mesh: TriangleMesh,
-    evaluation: Evaluation,
-    observations: Observations,
-) -> None:
-    extent = canvas.extent
+def _panel(axes: Axes, canvas: Canvas, scale: Scale, comparison: Comparison, evaluation: Evaluation) -> None:
+    mesh, observations = comparison.mesh, comparison.observations
+    edges = boundary_edges(mesh.triangles)
     deformed = mesh.points + evaluation.node_displacement
-    body.prepare(axes, extent)
+    body.prepare(axes, canvas.extent)
     body.outline(axes, edges, mesh.points, colour="#9a9a9a", width=0.6, zorder=0)
-    body.show(axes, canvas.picture(scale.paint(_magnitude(mesh, evaluation)), deformed), extent)
+    body.show(axes, canvas, scale.paint(_magnitude(mesh, evaluation)), deformed)
     body.outline(axes, edges, deformed, width=0.4)
     body.clamp(axes, mesh.points[mesh.boundary("base").ravel()])
     seen = observations.visible
@@ -117,58 +100,17 @@ def _panel(
     axes.text(0.01, 0.01, note, size=7.5, color=MUTED, transform=axes.transAxes)
 
 
-def _contact_path(axes: Axes, mesh: TriangleMesh, evaluation: Evaluation) -> None:
+def _motion(axes: Axes, comparison: Comparison, evaluation: Evaluation) -> None:
+    """The path of the contact, on average, or of a cylinder, which is drawn where it ends."""
+    mesh, load = comparison.mesh, comparison.load
     nodes = np.unique(mesh.boundary("contact"))
-    start = mesh.points[nodes].mean(axis=0)
-    _arrow(axes, start, start + evaluation.node_displacement[nodes].mean(axis=0))
-
-
-def _cylinder(axes: Axes, mesh: TriangleMesh, load: Load, radius: float) -> None:
-    """The cylinder where it ends, and the way of the point that touched first; it can leave the picture."""
-    nodes = np.unique(mesh.boundary("contact"))
+    if load.radius is None:
+        start = mesh.points[nodes].mean(axis=0)
+        arrow(axes, start, start + evaluation.node_displacement[nodes].mean(axis=0))
+        return
     middle = np.ptp(mesh.points[nodes, 0]) / 2 + mesh.points[nodes, 0].min()
     start = np.array([middle if load.position is None else load.position, 0.0])
     end = start + load.values
-    circle = Circle((end[0], end[1] + radius), radius, fill=False, color=MUTED, lw=0.8, zorder=3)
-    axes.add_patch(circle)
-    _arrow(axes, start, end)
-
-
-def _arrow(axes: Axes, start: FloatArray, end: FloatArray) -> None:
-    arrow = {
-        "arrowstyle": "-|>,head_width=0.18,head_length=0.35",
-        "color": INK,
-        "lw": 1.0,
-        "shrinkA": 0,
-        "shrinkB": 0,
-    }
-    axes.annotate("", xy=tuple(end), xytext=tuple(start), arrowprops=arrow, zorder=6)
-
-
-def _legend(drawn: Figure, observations: Observations, motion: str) -> None:
-    handles = [
-        Line2D(
-            [],
-            [],
-            ls="",
-            marker="o",
-            ms=5,
-            mfc="none",
-            mec=MEASURED,
-            mew=1.1,
-            label=f"markers, {observations.label}",
-        ),
-        Line2D([], [], ls="", marker="x", ms=4, color=INK, mew=0.9, label="solver’s markers"),
-        Line2D([], [], color="#9a9a9a", lw=0.9, label="undeformed"),
-        Line2D([], [], color=INK, lw=1, marker=">", ms=3.5, markevery=[1], label=motion),
-    ]
-    drawn.legend(
-        handles=handles,
-        loc="upper left",
-        bbox_to_anchor=(0.0, 1 - 0.24 / drawn.get_figheight()),
-        ncols=4,
-        columnspacing=1.2,
-        handletextpad=0.5,
-        borderaxespad=0.1,
-        handlelength=1.6,
-    )
+    centre = (end[0], end[1] + load.radius)  # it can lie outside the picture
+    axes.add_patch(Circle(centre, load.radius, fill=False, color=MUTED, lw=0.8, zorder=3))
+    arrow(axes, start, end)

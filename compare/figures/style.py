@@ -3,8 +3,10 @@
 from collections.abc import Sequence
 
 from matplotlib import patheffects
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
+from geometry.arrays import FloatArray
 from geometry.figure import INK, MUTED, Figure
 
 HALO = [patheffects.withStroke(linewidth=2.5, foreground="white")]
@@ -26,13 +28,36 @@ def axes_at(drawn: Figure, box: Sequence[float]) -> Axes:
     """Axes at left, top, width, height in inches, measured from the figure's top left corner."""
     left, top, width, height = box
     total_width, total_height = drawn.get_size_inches()
-    return drawn.add_axes(
-        (
-            left / total_width,
-            1 - (top + height) / total_height,
-            width / total_width,
-            height / total_height,
-        )
+    bottom = 1 - (top + height) / total_height
+    return drawn.add_axes((left / total_width, bottom, width / total_width, height / total_height))
+
+
+def arrow(
+    axes: Axes,
+    start: Sequence[float] | FloatArray,
+    end: Sequence[float] | FloatArray,
+    *,
+    style: str = "-|>,head_width=0.18,head_length=0.35",
+    colour: str = INK,
+    width: float = 1.0,
+    gap: float = 0.0,
+) -> None:
+    """An arrow between two points in the axes' coordinates; `gap` is left at its end, points."""
+    shape = {"arrowstyle": style, "color": colour, "lw": width, "shrinkA": 0, "shrinkB": gap}
+    axes.annotate("", xy=tuple(end), xytext=tuple(start), arrowprops=shape, zorder=6)
+
+
+def legend_below_heading(drawn: Figure, handles: Sequence[Artist], *, length: float) -> None:
+    """A legend in one line below the heading; `length` is that of its handles, in heights of the type."""
+    drawn.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(0.0, 1 - 0.24 / drawn.get_figheight()),
+        ncols=len(handles),
+        columnspacing=1.2,
+        handletextpad=0.5,
+        borderaxespad=0.1,
+        handlelength=length,
     )
 
 

@@ -3,12 +3,11 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import Comparison, left_out_remarks
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import indistinct, reference_differences, truth_differences
 from compare.evaluation.number_format import distance, number, percent
 from compare.evaluation.regions import NEAR
-from compare.evaluation.solver_selection import left_out_remarks
 from compare.figures import Picture
 from compare.report import text
 from compare.report.sentences import certificate_sentences, truth_sentences

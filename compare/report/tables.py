@@ -136,19 +136,13 @@ def _summary(evaluation: Evaluation, comparison: Comparison) -> dict[str, Cell]:
     empty = dict.fromkeys(_differences("reference_uncertainty", to), "")
     own = reference.uncertainty
     row |= _differences("reference_uncertainty", own) if own else empty
-    row |= _to_truth(None if truth is None else truth_differences(evaluation, truth))
+    true = None if truth is None else truth_differences(evaluation, truth)
+    for name in TruthDifferences._fields:
+        row[f"to_truth_{name}_rel_l2"] = getattr(true, name).rel_l2 if true else ""
     row |= {"energy_N_mm_per_mm": evaluation.energy}
     row |= _certificate(evaluation.certificate)
     row |= {f"reaction_{axis}_N_per_mm": float(evaluation.reaction[n]) for n, axis in enumerate("uv")}
     row |= {"seconds_s": evaluation.stats.get("seconds", ""), "status": evaluation.message}
-    return row
-
-
-def _to_truth(differences: TruthDifferences | None) -> dict[str, Cell]:
-    """The distances from the virtual experiment's fields, which are empty where markers were measured."""
-    row: dict[str, Cell] = {f"to_truth_{name}_rel_l2": "" for name in TruthDifferences._fields}
-    if differences is not None:
-        row |= {f"to_truth_{name}_rel_l2": each.rel_l2 for name, each in differences._asdict().items()}
     return row
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pyvista
 
 from compare.evaluation.evaluation import Evaluation
-from geometry.arrays import FloatArray
+from compare.evaluation.metrics import COMPONENTS
 from geometry.atomic import atomic_path
 from geometry.mesh.triangle_mesh import TriangleMesh
 
@@ -25,24 +25,19 @@ def write_vtu(path: Path, mesh: TriangleMesh, evaluation: Evaluation) -> None:
     of which YZ and XZ are zero), `stress_zz_MPa`, `von_mises_MPa`, `energy_density_MPa`.
 
     For the whole: `solver`, `converged` (1 or 0), `status`, `energy_N_mm_per_mm`, `reaction_N_per_mm`.
-
-    Args:
-        path: Where to write; the suffix is .vtu.
-        mesh: The mesh of n nodes and t triangles that the evaluation was made on.
-        evaluation: The solver's result.
     """
     grid = _grid(mesh)
-    grid.point_data["displacement_mm"] = in_space(evaluation.node_displacement)
+    grid.point_data["displacement_mm"] = np.pad(evaluation.node_displacement, ((0, 0), (0, 1)))
     strain = evaluation.per_triangle(evaluation.strain)
-    for name, (row, column) in {"xx": (0, 0), "yy": (1, 1), "xy": (0, 1)}.items():
+    for name, (row, column) in COMPONENTS.items():
         grid.cell_data[f"strain_{name}"] = strain[:, row, column]
     stress, stress_zz = (
         evaluation.per_triangle(values) for values in (evaluation.stress, evaluation.stress_zz)
     )
-    grid.cell_data["stress_MPa"] = symmetric_tensor(stress, stress_zz)
-    components = grid.GetCellData().GetArray("stress_MPa")
+    components = [stress[:, 0, 0], stress[:, 1, 1], stress_zz, stress[:, 0, 1]]
+    grid.cell_data["stress_MPa"] = np.pad(np.column_stack(components), ((0, 0), (0, 2)))
     for number, name in enumerate(SYMMETRIC):
-        components.SetComponentName(number, name)
+        grid.GetCellData().GetArray("stress_MPa").SetComponentName(number, name)
     grid.cell_data["stress_zz_MPa"] = stress_zz
     grid.cell_data["von_mises_MPa"] = evaluation.per_triangle(evaluation.von_mises)
     grid.cell_data["energy_density_MPa"] = evaluation.per_triangle(evaluation.energy_density)
@@ -74,23 +69,5 @@ def write_mesh(path: Path, mesh: TriangleMesh) -> None:
 
 
 def _grid(mesh: TriangleMesh) -> pyvista.UnstructuredGrid:
-    return pyvista.UnstructuredGrid({pyvista.CellType.TRIANGLE: mesh.triangles}, in_space(mesh.points))
-
-
-def in_space(vectors: FloatArray) -> FloatArray:
-    """Vectors of shape (n, 2) with z = 0, shape (n, 3)."""
-    return np.column_stack([vectors, np.zeros(len(vectors))])
-
-
-def symmetric_tensor(in_plane: FloatArray, zz: FloatArray) -> FloatArray:
-    """Six components in VTK's order.
-
-    Args:
-        in_plane: Shape (t, 2, 2).
-        zz: Out-of-plane component, shape (t,).
-
-    Returns:
-        Shape (t, 6): xx, yy, zz, xy, yz, xz.
-    """
-    zero = np.zeros(len(zz))
-    return np.column_stack([in_plane[:, 0, 0], in_plane[:, 1, 1], zz, in_plane[:, 0, 1], zero, zero])
+    points = np.pad(mesh.points, ((0, 0), (0, 1)))
+    return pyvista.UnstructuredGrid({pyvista.CellType.TRIANGLE: mesh.triangles}, points)

@@ -3,7 +3,7 @@ from typing import ClassVar
 
 import pytest
 
-from compare.evaluation.solver_selection import left_out_remarks, supported_solvers
+from compare.evaluation.comparison import left_out_remarks, supported_solvers
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution
 from solvers.solver import Progress, UnsupportedProblemError, silent

@@ -10,7 +10,7 @@ from compare.evaluation.certificate import Certificate, Region
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.convergence import with_certificate
 from compare.evaluation.evaluation import Evaluation
-from compare.figures.excess import DECADES, draw_excess, excess_scale
+from compare.figures.fields import DECADES, draw_excess, excess_scale
 from compare.report.sentences import certificate_sentences
 from geometry.mesh.triangle_mesh import TriangleMesh
 
