@@ -31,15 +31,9 @@ def draw_all(
     comparison: Comparison,
     progress: Callable[[float, str], None] = lambda done, what: None,
 ) -> list[Picture]:
-    """Write every picture of a comparison as PNG.
+    """Write every picture of a comparison as PNG, in the order of a report.
 
-    Args:
-        folder: Where to write; created if it is missing.
-        comparison: What to draw.
-        progress: Called before every picture with the share done, from 0 to 1, and what comes next.
-
-    Returns:
-        The pictures in the order of a report.
+    `progress` is called before every picture with the share done, from 0 to 1, and what comes next.
     """
     from compare.figures.gallery import DRAWINGS
 

@@ -21,11 +21,7 @@ def write_report(
 ) -> None:
     """Write the report as one HTML file, atomically.
 
-    Args:
-        path: The file.
-        comparison: What was found.
-        pictures: In the order in which they appear.
-        provenance: Facts of the run (seed, versions, hashes, times); a mapping becomes a group.
+    `provenance` are facts of the run (seed, versions, hashes, times); a mapping in it becomes a group.
     """
     write_text(path, render(comparison, pictures, provenance))
 
