@@ -38,8 +38,7 @@ from geometry.observations import Observations
 from solvers.adaptation import check_adaptable
 from solvers.assimilation.misfit import assimilates
 from solvers.problem import Load, Material, Problem
-from solvers.solver import Solver, UnsupportedProblemError, with_law
-from solvers.training import TrainedSolver, TrainingContext
+from solvers.solver import Solver, TrainedSolver, TrainingContext, UnsupportedProblemError, with_law
 from vision.measurements import read_measurements, write_measurements
 
 TRACK = "track"

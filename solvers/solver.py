@@ -1,11 +1,14 @@
 """The interface of a solver: settings live in the solver, the problem is the argument."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from pydantic import ValidationError
 
 from geometry.errors import UserError
+from geometry.observations import Observations
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution
 
@@ -87,3 +90,56 @@ def with_law(material: Material, solver: Solver) -> Material:
         raise UnsupportedProblemError(
             f"{solver.name}: {error.errors()[0]['msg'].removeprefix('Value error, ')}"
         ) from None
+
+
+class TrainingDiverged(UserError):
+    """The training diverged; the message says when, by which quantity, and what to try."""
+
+
+@dataclass(frozen=True)
+class TrainingContext:
+    """Runtime context of a training, which does not change its result.
+
+    Attributes:
+        folder: Folder for checkpoints and the history; None to write nothing.
+        resume: Whether to continue from the checkpoint in `folder` if there is one.
+        reference_energy: Energy of a reference solution per depth, N mm/mm, for the progress text.
+    """
+
+    folder: Path | None = None
+    resume: bool = False
+    reference_energy: float | None = None
+
+
+@runtime_checkable
+class TrainedSolver(Solver, Protocol):
+    """A solver whose training can be saved and resumed."""
+
+    def in_context(self, context: TrainingContext) -> Solver:
+        """The same solver with this context, which is no setting."""
+        ...
+
+
+@runtime_checkable
+class Refittable(Protocol):
+    """A solver that shares work between fits to different observations of the same markers."""
+
+    def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
+        """A function that solves the problem with other observations, like `solve` but without `left_out`."""
+        ...
+
+
+@runtime_checkable
+class Transferable(Protocol):
+    """A solver whose estimates at one load hold at another."""
+
+    def transferred(self, solution: Solution, problem: Problem, other: Problem) -> Solution:
+        """The solution of another problem with the parameters estimated in a solution of the first."""
+        ...
+
+
+def refitter(solver: Solver, problem: Problem) -> Callable[[Observations], Solution]:
+    """A function that solves a problem for any observations, sharing work where the solver can."""
+    if isinstance(solver, Refittable):
+        return solver.refitter(problem)
+    return lambda observations: solver.solve(replace(problem, observations=observations))

@@ -18,10 +18,9 @@ from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.assimilation.misfit import assimilates
-from solvers.assimilation.refitting import Transferable, refitter
 from solvers.problem import Material, Problem
 from solvers.solution import Solution
-from solvers.solver import Progress, Solver, UnsupportedProblemError, silent, with_law
+from solvers.solver import Progress, Solver, Transferable, UnsupportedProblemError, refitter, silent, with_law
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,8 +16,7 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.problem import Load, Material, Problem, contact_functional
 from solvers.registry import make_solver
 from solvers.solution import Solution
-from solvers.solver import Progress
-from solvers.training import TrainedSolver, TrainingContext, TrainingDiverged
+from solvers.solver import Progress, TrainedSolver, TrainingContext, TrainingDiverged
 
 RESULT_FILE = "result.json"
 TRAINED, DIVERGED, FAILED = "trained", "diverged", "failed"

@@ -16,12 +16,10 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
-from geometry.mesh.quadrature import body_quadrature
 from geometry.observations import Observations
 from solvers.assimilation.misfit import Misfit, leave_one_out_displacements, misfit_of, standard_deviations
-from solvers.elasticity import linear_energy_density
+from solvers.energy_and_force import energy_and_force
 from solvers.problem import Problem
-from solvers.section_force import section_force
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, UnsupportedProblemError, check_problem, silent
 from solvers.statistics.kernel_field import SMOOTHNESS, Kernel, KernelField
@@ -95,16 +93,14 @@ class GaussianProcessSolver:
             )
         deviations = standard_deviations(problem.observations)
         field = _fit(misfit, deviations, self._base(problem), self.kernel)
-        rule = body_quadrature(problem.mesh, 4)
-        gradient = field.gradient(rule.location)
-        density = linear_energy_density(gradient, problem.material.lame)
-        lengths = field.mean.lengths
+        energy, reaction = energy_and_force(problem, field, 4)
+        lengths = field.lengths
         solution = Solution(
             solver=self.name,
             problem=problem,
             field=field,
-            energy=float((rule.weights * density).sum()),
-            reaction=section_force(problem, rule, gradient),
+            energy=energy,
+            reaction=reaction,
             status=Status(
                 True,
                 f"an interpolation of the markers without mechanics, over lengths of {lengths[0]:.3g} mm in "
@@ -131,24 +127,10 @@ class GaussianProcessSolver:
 
 
 @dataclass(frozen=True, eq=False)
-class GaussianProcessField:
-    """The posterior of two processes.
+class GaussianProcessField(KernelField):
+    """The posterior mean of two processes, with the processes of scikit-learn for u and v."""
 
-    Attributes:
-        mean: The posterior mean.
-        processes: The processes of scikit-learn for u and v.
-    """
-
-    mean: KernelField
-    processes: tuple[Any, Any]
-
-    def displacement(self, location: LocatedPoints) -> FloatArray:
-        """Displacement, shape (n, 2), mm."""
-        return self.mean.displacement(location)
-
-    def gradient(self, location: LocatedPoints) -> FloatArray:
-        """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
-        return self.mean.gradient(location)
+    processes: list[Any]
 
     def standard_deviation(self, location: LocatedPoints) -> FloatArray:
         """Standard deviation of the displacement, shape (n, 2), mm."""
@@ -176,5 +158,4 @@ def _fit(misfit: Misfit, deviations: FloatArray, base: FloatArray, kernel: Kerne
             processes.append(process.fit(points, observed[:, axis]))
     variances, lengths = np.exp([process.kernel_.theta for process in processes]).T
     coefficients = variances * np.stack([process.alpha_ for process in processes], axis=1)
-    mean = KernelField(points, coefficients, lengths, kernel)
-    return GaussianProcessField(mean, (processes[0], processes[1]))
+    return GaussianProcessField(points, coefficients, lengths, kernel, processes)

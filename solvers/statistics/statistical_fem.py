@@ -26,13 +26,11 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from geometry.mesh.quadrature import body_quadrature
 from geometry.observations import Observations
 from solvers.assimilation.misfit import leave_one_out_displacements, standard_deviations
-from solvers.elasticity import linear_energy_density
+from solvers.energy_and_force import energy_and_force
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
-from solvers.section_force import section_force
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, check_problem, silent
 from solvers.statistics.kernel_field import Kernel
@@ -122,9 +120,7 @@ class StatFemSolver:
         started = time.perf_counter()
         posterior = Posterior.of(data, np.arange(len(data.points)))
         field = StatFemField(posterior, tuple(shape.field for shape in shapes))
-        rule = body_quadrature(problem.mesh, 4)
-        gradient = field.gradient(rule.location)
-        density = linear_energy_density(gradient, problem.material.lame)
+        energy, reaction = energy_and_force(problem, field, 4)
         constants = posterior.constants
         discrepancy = constants.amplitudes
         _, variances = posterior.at(data.points, data.shapes)
@@ -132,8 +128,8 @@ class StatFemSolver:
             solver=self.name,
             problem=problem,
             field=field,
-            energy=float((rule.weights * density).sum()),
-            reaction=section_force(problem, rule, gradient),
+            energy=energy,
+            reaction=reaction,
             status=Status(
                 True,
                 f"fem times {constants.factor:.3g} plus a discrepancy of {discrepancy[0]:.2g} mm in u and "

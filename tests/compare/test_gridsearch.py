@@ -42,8 +42,7 @@ from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 from solvers.solution import DisplacementField, Solution
-from solvers.solver import silent
-from solvers.training import TrainingDiverged
+from solvers.solver import TrainingDiverged, silent
 
 COARSE = MeshSettings(size=1.0)
 TINY = {"preset": "paper", "epochs": 2, "width": 4, "layers": 1, "base_points": 5}

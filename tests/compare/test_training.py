@@ -17,8 +17,7 @@ from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
 from solvers.problem import Material, Problem
 from solvers.solution import Solution
-from solvers.solver import Progress, silent
-from solvers.training import TrainingContext
+from solvers.solver import Progress, TrainingContext, silent
 
 
 @dataclass(frozen=True)

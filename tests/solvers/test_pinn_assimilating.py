@@ -20,7 +20,7 @@ from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.pinn.paper.mlp_field import MlpField
 from solvers.problem import Load, Material, Problem, contact_functional
 from solvers.registry import make_solver
-from solvers.training import TrainedSolver
+from solvers.solver import TrainedSolver
 from tests.solvers.autograd_reference import PlainPinn
 from tests.solvers.conftest import bar_mesh
 

@@ -6,7 +6,7 @@ import pytest
 from solvers.pinn.paper.solver import PaperPinnSolver
 from solvers.pinn.threading import torch_threads
 from solvers.problem import Load, Material, Problem
-from solvers.training import TrainedSolver
+from solvers.solver import TrainedSolver
 from tests.solvers.autograd_reference import PlainPinn
 from tests.solvers.conftest import bar_mesh
 

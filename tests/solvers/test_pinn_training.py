@@ -15,7 +15,7 @@ from geometry.errors import UserError
 from solvers.pinn.paper.solver import PaperPinnSolver
 from solvers.problem import Load, Problem
 from solvers.solution import Solution
-from solvers.training import TrainingContext, TrainingDiverged
+from solvers.solver import TrainingContext, TrainingDiverged
 from tests.solvers.conftest import bar_mesh
 
 SMALL = PaperPinnSolver(epochs=40, width=8, layers=2, base_points=20, threads=1, checkpoint_every=7)

@@ -8,10 +8,10 @@ import pytest
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
-from solvers.assimilation.refitting import Refittable, refitter
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Problem
 from solvers.registry import make_solver
+from solvers.solver import Refittable, refitter
 
 QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3, "tolerance": 0.05}
 SOLVERS: dict[str, dict[str, object]] = {

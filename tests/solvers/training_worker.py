@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from solvers.problem import Problem
-from solvers.training import TrainingContext
+from solvers.solver import TrainingContext
 from tests.solvers.conftest import bar_mesh
 from tests.solvers.test_pinn_training import SMALL
 

@@ -1,15 +1,11 @@
 """Energy, reaction and convergence status of a gradient-trained network."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.mesh.quadrature import body_quadrature
-from solvers.elasticity import linear_energy_density
+from solvers.energy_and_force import energy_and_force
 from solvers.pinn.paper.training import Training
 from solvers.problem import Problem, contact_functional
-from solvers.section_force import section_force
 from solvers.solution import DisplacementField, Status
 
 ENERGY_CHANGE = 0.01
@@ -19,20 +15,11 @@ VIOLATION = 0.01
 """Largest error of the displacement of base and contact, as a share of the stroke."""
 
 
-class TrainingAssessment(NamedTuple):
-    """Energy per depth, N mm/mm; the indenter's force per depth, shape (2,), N/mm; convergence status."""
-
-    energy: float
-    reaction: FloatArray
-    status: Status
-
-
-def assess_training(problem: Problem, field: DisplacementField, training: Training) -> TrainingAssessment:
-    """Energy and reaction by quadrature in the elements; status by energy change and boundary conditions."""
-    rule = body_quadrature(problem.mesh)
-    gradient = field.gradient(rule.location)
-    energy = float((rule.weights * linear_energy_density(gradient, problem.material.lame)).sum())
-    reaction = section_force(problem, rule, gradient)
+def assess_training(
+    problem: Problem, field: DisplacementField, training: Training
+) -> tuple[float, FloatArray, Status]:
+    """Energy and reaction as by `energy_and_force`; status by energy change and boundary conditions."""
+    energy, reaction = energy_and_force(problem, field)
     change = _late_change(training.history[:, training.columns.index("energy")])
     base, contact = _violations(problem, field)
     converged = change <= ENERGY_CHANGE and max(base, contact) <= VIOLATION
@@ -46,7 +33,7 @@ def assess_training(problem: Problem, field: DisplacementField, training: Traini
         if converged
         else "so the training has not settled: take more epochs"
     )
-    return TrainingAssessment(energy, reaction, Status(converged, message))
+    return energy, reaction, Status(converged, message)
 
 
 def _late_change(energy: FloatArray) -> float:

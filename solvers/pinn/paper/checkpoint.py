@@ -1,12 +1,18 @@
-"""Checkpoints of a training: safetensors files, replaced atomically, with the digest of their problem."""
+"""Files of a training: checkpoints, with the digest of their problem, and the history.
 
-from collections.abc import Mapping
+Checkpoints are safetensors files, replaced atomically; the history is CSV and, for TensorBoard, event files.
+"""
+
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 
+from geometry.arrays import FloatArray
 from geometry.atomic import atomic_path
 from geometry.errors import UserError
 
@@ -39,3 +45,41 @@ def load_checkpoint(folder: Path, digest: str) -> dict[str, torch.Tensor] | None
             f"{path} belongs to another problem or other settings; remove it, or train without --resume"
         )
     return state
+
+
+UNITS = {"PDE": "MPa", "BC": "mm2", "ASM": "mm2", "total": "MPa", "energy": "N mm/mm", "seconds": "s"}
+
+
+class HistoryFiles:
+    """Writes `history.csv` and, if TensorBoard is installed, its event files.
+
+    Args:
+        folder: Where they are written.
+        columns: Names of the columns, the epoch first.
+        done: Number of epochs already recorded there.
+    """
+
+    def __init__(self, folder: Path, columns: Sequence[str], done: int) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._path, self._columns, self._done = folder / "history.csv", columns, done
+        self._board = _summary_writer(folder, done)
+
+    def write(self, history: FloatArray) -> None:
+        """Write a history of shape (epochs, columns)."""
+        titles = [f"{name} [{UNITS[name]}]" if name in UNITS else name for name in self._columns]
+        with atomic_path(self._path) as partial:
+            np.savetxt(partial, history, delimiter=",", header=",".join(titles), comments="", fmt="%.9g")
+        if self._board is not None:
+            for row in history[self._done :]:
+                for name, value in zip(self._columns[1:], row[1:], strict=True):
+                    self._board.add_scalar(name, value, int(row[0]))
+            self._board.flush()
+            self._done = len(history)
+
+
+def _summary_writer(folder: Path, done: int) -> Any:
+    try:
+        from torch.utils.tensorboard import SummaryWriter
+    except ImportError:
+        return None
+    return SummaryWriter(folder, purge_step=done + 1)

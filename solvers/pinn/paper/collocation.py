@@ -1,6 +1,6 @@
 """Collocation points of the energy, and points of the base, for the paper's training."""
 
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -13,28 +13,18 @@ Collocation = Literal["nodes", "elements", "random"]
 `random`: as many points as nodes, drawn uniformly in the body."""
 
 
-class CollocationPoints(NamedTuple):
-    """Points and their weights in a mean over the body.
-
-    Attributes:
-        points: Shape (n, 2), mm.
-        weights: Shape (n,); they sum to one.
-    """
-
-    points: FloatArray
-    weights: FloatArray
-
-
-def collocation_points(mesh: TriangleMesh, collocation: Collocation, seed: int) -> CollocationPoints:
-    """Collocation points of the body.
+def collocation_points(
+    mesh: TriangleMesh, collocation: Collocation, seed: int
+) -> tuple[FloatArray, FloatArray]:
+    """Points of the body, shape (n, 2), mm, and their weights in a mean over it, shape (n,), of sum one.
 
     The mean over nodes is the paper's. It has a bias towards dense parts of the mesh.
     """
     if collocation == "elements":
         rule = body_quadrature(mesh)
-        return CollocationPoints(rule.location.points, rule.weights / rule.weights.sum())
+        return rule.location.points, rule.weights / rule.weights.sum()
     points = mesh.points if collocation == "nodes" else _uniform_points(mesh, len(mesh.points), seed)
-    return CollocationPoints(points, np.full(len(points), 1 / len(points)))
+    return points, np.full(len(points), 1 / len(points))
 
 
 def base_points(mesh: TriangleMesh, count: int) -> FloatArray:

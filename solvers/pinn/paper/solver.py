@@ -14,18 +14,28 @@ from solvers.assimilation.marker_weighting import MarkerWeighting
 from solvers.assimilation.misfit import assimilates
 from solvers.pinn.paper.assessment import assess_training
 from solvers.pinn.paper.collocation import Collocation, base_points, collocation_points
-from solvers.pinn.paper.distributed import ONE_PROCESS, ProcessGroup
-from solvers.pinn.paper.loss_gradient import Loss
-from solvers.pinn.paper.loss_terms import DisplacementTerm, EnergyTerm, LossTerm, stiffness_matrix
+from solvers.pinn.paper.loss import (
+    ONE_PROCESS,
+    DisplacementTerm,
+    EnergyTerm,
+    Loss,
+    LossTerm,
+    ProcessGroup,
+    stiffness_matrix,
+)
 from solvers.pinn.paper.mlp_field import MlpField
 from solvers.pinn.paper.modified_mlp import ModifiedMlp
-from solvers.pinn.paper.progress import TrainingProgress
-from solvers.pinn.paper.training import OPTIMISERS, CheckpointStore, Training, TrainingSettings
+from solvers.pinn.paper.training import (
+    OPTIMISERS,
+    CheckpointStore,
+    Training,
+    TrainingProgress,
+    TrainingSettings,
+)
 from solvers.pinn.threading import pool, torch_threads
 from solvers.problem import Problem, contact_functional
 from solvers.solution import Solution
-from solvers.solver import Progress, check_problem, silent
-from solvers.training import TrainingContext
+from solvers.solver import Progress, TrainingContext, check_problem, silent
 
 PRECISIONS = {"single": torch.float32, "double": torch.float64}
 
@@ -142,15 +152,15 @@ class PaperPinnSolver:
             )
             training.run(report)
             field = MlpField(self.network, training.parameters.double().cpu())
-            result = assess_training(problem, field, training)
+            energy, reaction, status = assess_training(problem, field, training)
         seconds = time.perf_counter() - started
         return Solution(
             solver=self.name,
             problem=problem,
             field=field,
-            energy=result.energy,
-            reaction=result.reaction,
-            status=result.status,
+            energy=energy,
+            reaction=reaction,
+            status=status,
             stats={
                 "seconds": seconds,
                 "epochs": training.epoch,
@@ -182,15 +192,13 @@ class PaperPinnSolver:
         def tensor(array: FloatArray) -> torch.Tensor:
             return torch.tensor(np.asarray(array), dtype=PRECISIONS[self.precision], device=self.device)
 
-        body = collocation_points(problem.mesh, self.collocation, self.seed)
+        body, shares = collocation_points(problem.mesh, self.collocation, self.seed)
         base = base_points(problem.mesh, self.base_points)
         contact, functional = contact_functional(problem)
         targets = np.array([[value or 0.0] for value in problem.load.displacement])
         wanted = np.array([[float(value is not None)] for value in problem.load.displacement])
         terms: list[LossTerm] = [
-            EnergyTerm(
-                tensor(body.points), tensor(body.weights), tensor(stiffness_matrix(problem.material.lame))
-            ),
+            EnergyTerm(tensor(body), tensor(shares), tensor(stiffness_matrix(problem.material.lame))),
             DisplacementTerm(
                 "BC",
                 tensor(base),

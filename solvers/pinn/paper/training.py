@@ -3,17 +3,16 @@
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import torch
 
 from geometry.arrays import FloatArray
-from solvers.pinn.paper.checkpoint import load_checkpoint, save_checkpoint
-from solvers.pinn.paper.history import HistoryFiles
-from solvers.pinn.paper.loss_gradient import Loss, LossEvaluation
-from solvers.training import TrainingDiverged
+from solvers.pinn.paper.checkpoint import HistoryFiles, load_checkpoint, save_checkpoint
+from solvers.pinn.paper.loss import Loss, LossEvaluation
+from solvers.solver import Progress, TrainingDiverged
 
 OPTIMISERS: dict[str, Callable[..., torch.optim.Optimizer]] = {"adam": torch.optim.Adam}
 """By the names of the settings; called with the parameters and `lr`."""
@@ -172,3 +171,42 @@ class Training:
             self._store.folder, {**tensors, "history": torch.from_numpy(history)}, self._store.digest
         )
         self._files.write(history)
+
+
+@dataclass(frozen=True)
+class TrainingProgress:
+    """Reports epochs, loss terms, energy and the time left.
+
+    Attributes:
+        progress: Receives the text.
+        epochs: Number of epochs in all.
+        done: Number of epochs before this run.
+        area: Of the body, mm², which times the mean energy density is the energy.
+        reference: Energy of a reference solution, N mm/mm.
+        started: Start of this run, s.
+    """
+
+    progress: Progress
+    epochs: int
+    done: int
+    area: float
+    reference: float | None
+    started: float = field(default_factory=time.perf_counter)
+
+    def __call__(self, epoch: int, evaluation: LossEvaluation) -> None:
+        """Report the state after an epoch."""
+        energy = self.area * evaluation.terms["PDE"]
+        terms = ", ".join(f"{name} {value:.3g}" for name, value in evaluation.terms.items())
+        ratio = f" ({energy / self.reference:.3g} x reference)" if self.reference else ""
+        pace = (time.perf_counter() - self.started) / (epoch - self.done)
+        self.progress(
+            epoch / self.epochs,
+            f"epoch {epoch} of {self.epochs}: {terms}, energy {energy:.4g} N mm/mm{ratio}, "
+            f"{_duration(pace * (self.epochs - epoch))} left",
+        )
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 100 * 60 else f"{seconds / 3600:.1f} h"
