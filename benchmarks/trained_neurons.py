@@ -10,12 +10,12 @@ from dataclasses import replace
 import torch
 
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
+from solvers.pinn.finite_basis.energy import energy_density
 from solvers.pinn.finite_basis.load_conditions import load_conditions
 from solvers.pinn.finite_basis.network import FiniteBasisField
 from solvers.pinn.finite_basis.patches import boxes_around
 from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.problem import Problem
-from solvers.tangent import energy_density
 
 SCALE = 2.0
 """Spacing relative to the solver's settings: few neurons, so that training can gain something."""

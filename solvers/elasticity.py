@@ -120,14 +120,6 @@ def neo_hookean_stress(gradient: Field, lame: Lame, log: Callable[[Field], Field
     )
 
 
-def st_venant_kirchhoff_energy_density(gradient: Field, lame: Lame) -> Field:
-    """ψ = λ/2 (tr E)^2 + μ E : E per reference volume, MPa, with the Green-Lagrange strain E.
-
-    Unsuitable for strong compression: the energy stays finite as J tends to zero.
-    """
-    return _quadratic_energy_density(green_lagrange_strain(gradient), lame)
-
-
 def _quadratic_energy_density(strain: PlaneTensor, lame: Lame) -> Field:
     """λ/2 (tr ε)^2 + μ ε : ε of an in-plane strain ε, MPa."""
     trace = strain.xx + strain.yy
@@ -155,12 +147,14 @@ def strain_of(law: LawName, gradient: Field, lame: Lame) -> PlaneTensor:
 
 
 def energy_density_of(law: LawName, gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> Field:
-    """Strain energy of a law per reference volume, MPa; `log` is that of the library."""
-    if law == "linear":
-        return linear_energy_density(gradient, lame)
-    if law == "st-venant-kirchhoff":
-        return st_venant_kirchhoff_energy_density(gradient, lame)
-    return neo_hookean_energy_density(gradient, lame, log)
+    """Strain energy of a law per reference volume, MPa; `log` is that of the library.
+
+    St Venant-Kirchhoff's is ψ = λ/2 (tr E)^2 + μ E : E with the Green-Lagrange strain E. It is unsuitable for
+    strong compression: it stays finite as J tends to zero.
+    """
+    if law == "neo-hookean":
+        return neo_hookean_energy_density(gradient, lame, log)
+    return _quadratic_energy_density(strain_of(law, gradient, lame), lame)
 
 
 def stress_of(law: LawName, gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> PlaneTensor:

@@ -60,7 +60,9 @@ def make_solver(name: str, **settings: Any) -> Solver:
     if name in BUILT_IN:
         place = BUILT_IN[name]
         if name in PRESETS and "preset" in settings:
-            place = _preset(name, settings.pop("preset"))
+            if (preset := settings.pop("preset")) not in PRESETS[name]:
+                raise UserError(f"{name} has no preset {preset!r}; it has {', '.join(PRESETS[name])}")
+            place = PRESETS[name][preset]
         module, _, attribute = place.partition(":")
         factory = getattr(import_module(module), attribute)
     else:
@@ -97,13 +99,6 @@ def usable_solvers() -> dict[str, Solver]:
         except (UserError, ImportError) as error:
             warnings.warn(f"solver {name!r} is left out: {error}", stacklevel=2)
     return solvers
-
-
-def _preset(name: str, preset: str) -> str:
-    """Import path of a preset's class."""
-    if preset not in PRESETS[name]:
-        raise UserError(f"{name} has no preset {preset!r}; it has {', '.join(PRESETS[name])}")
-    return PRESETS[name][preset]
 
 
 def _typed(name: str, factory: Any, settings: Mapping[str, Any]) -> dict[str, Any]:

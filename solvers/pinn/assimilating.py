@@ -1,57 +1,97 @@
 """`pinn-asm` and `pinn-local-asm`: the networks of `pinn-std` and `pinn-local` with the markers' misfit."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
+
+import numpy as np
 
 from geometry.observations import Observations
 from solvers.assimilation.marker_weighting import Choice
-from solvers.assimilation.misfit import Weighting
+from solvers.assimilation.misfit import Misfit, Weighting
+from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, LinearResponse
 from solvers.pinn.finite_basis.local import PinnLocalSolver
-from solvers.pinn.finite_basis.refit import network_refitter
+from solvers.pinn.finite_basis.network import FiniteBasisField
+from solvers.pinn.finite_basis.newton import LoadStep
+from solvers.pinn.finite_basis.solver import FiniteBasisSolver
 from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.pinn.paper.solver import PaperPinnSolver
+from solvers.pinn.threading import pool
 from solvers.problem import Problem
 from solvers.solution import Solution
+from solvers.solver import Progress, silent
+
+
+def network_refitter(solver: FiniteBasisSolver, problem: Problem) -> Callable[[Observations], Solution]:
+    """See `Refittable`; one factorisation of each level for all observations if the law is linear."""
+    kept: dict[float, tuple[ConstrainedNetwork, LinearResponse]] = {}
+    factorised: list[Misfit] = []
+
+    def refit(observations: Observations) -> Solution:
+        own, every = (
+            replace(problem, observations=replace(observations, visible=seen))
+            for seen in (observations.visible, np.ones_like(observations.visible))
+        )
+        misfit, whole = solver.misfit(own), solver.misfit(every)
+        if misfit is None or whole is None or problem.material.law != "linear":
+            return solver.solve(own)
+        factorised[:] = factorised or [whole]
+        markers = factorised[0]
+        if misfit.radius != markers.radius or not np.array_equal(markers.points, observations.points):
+            return solver.solve(own)
+
+        def train(
+            scale: float, coarse: FiniteBasisField | None, progress: Progress
+        ) -> tuple[ConstrainedNetwork, LoadStep]:
+            if scale not in kept:
+                network = solver.level(every, scale)
+                response = network.linear_response(network.zero_output)
+                if response is None:
+                    raise ValueError("a linear energy has derivatives everywhere")
+                kept[scale] = network, response
+            network, response = kept[scale]
+            seen = np.concatenate([np.ones(network.load_count, bool), np.repeat(observations.visible, 2)])
+            (rows,) = np.nonzero(seen)
+            network = network.with_misfit(misfit, rows)
+            response = response._replace(unit=response.unit[rows])
+            return network, LoadStep(1.0, network.constrained_step(network.zero_output, response), 1)
+
+        with pool():
+            return solver.trained(own, train, silent)
+
+    return refit
 
 
 @dataclass(frozen=True, kw_only=True)
-class PinnAsmSolver(PinnStdSolver):
+class _MarkerSettings:
+    """Settings of `MarkerWeighting`."""
+
+    weights: Weighting = "paper"
+    asm_weight: float = 1000.0
+    scale: float = 1.0
+    marker_radius: float | None = None
+    contact_deviation: float = 0.0
+    choose: Choice = "given"
+    assimilates: ClassVar[bool] = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class PinnAsmSolver(_MarkerSettings, PinnStdSolver):
     """The network of `PinnStdSolver`, random hidden weights and exact output layer, with the markers' misfit.
 
     Energy plus misfit is minimised. The settings that are not the network's are those of `MarkerWeighting`.
     """
 
-    weights: Weighting = "paper"
-    asm_weight: float = 1000.0
-    scale: float = 1.0
-    marker_radius: float | None = None
-    contact_deviation: float = 0.0
-    choose: Choice = "given"
     name: ClassVar[str] = "pinn-asm"
-    assimilates: ClassVar[bool] = True
-
-    def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
-        """See `Refittable`."""
-        return network_refitter(self, problem)
+    refitter = network_refitter
 
 
 @dataclass(frozen=True, kw_only=True)
-class PinnLocalAsmSolver(PinnLocalSolver):
+class PinnLocalAsmSolver(_MarkerSettings, PinnLocalSolver):
     """The network of `PinnLocalSolver` with the markers' misfit, as in `PinnAsmSolver`."""
 
-    weights: Weighting = "paper"
-    asm_weight: float = 1000.0
-    scale: float = 1.0
-    marker_radius: float | None = None
-    contact_deviation: float = 0.0
-    choose: Choice = "given"
     name: ClassVar[str] = "pinn-local-asm"
-    assimilates: ClassVar[bool] = True
-
-    def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
-        """See `Refittable`."""
-        return network_refitter(self, problem)
+    refitter = network_refitter
 
 
 @dataclass(frozen=True, kw_only=True)

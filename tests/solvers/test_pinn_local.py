@@ -17,9 +17,8 @@ from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.pinn.finite_basis import newton
 from solvers.pinn.finite_basis.energy import NetworkEnergy
-from solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from solvers.pinn.finite_basis.local import PinnLocalSolver
-from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
+from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField, HardConstraint
 from solvers.pinn.finite_basis.patches import PATCH, boxes_around, cut_into_patches
 from solvers.pinn.finite_basis.point_spacing import (
     PointSpacing,

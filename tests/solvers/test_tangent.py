@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from solvers.elasticity import lame_constants
-from solvers.tangent import energy_density, piola_stress_and_tangent
+from solvers.pinn.finite_basis.energy import energy_density, piola_stress_and_tangent
 
 
 @pytest.mark.parametrize(

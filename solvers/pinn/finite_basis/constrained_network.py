@@ -193,12 +193,7 @@ class ConstrainedNetwork:
         )
 
     def _marker_forces(self, springs: ConstrainedElimination, gap: FloatArray) -> MarkerForces | None:
-        """The forces at the markers, the load's forces eliminated.
-
-        Args:
-            springs: All springs.
-            gap: To be closed by the springs, shape (n,), mm.
-        """
+        """The forces at the markers, the load's forces eliminated, of springs that close gaps (n,), mm."""
         if self.energy.material.law != "linear" or self.weighting is None:
             return None
         load, soft = slice(self.load_count), slice(self.load_count, None)

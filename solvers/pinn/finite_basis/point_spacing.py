@@ -1,29 +1,16 @@
 """Spacing of a network's neurons and quadrature points: dense in thin walls and at re-entrant corners."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from geometry.arrays import FloatArray, IntArray
+from geometry.arrays import FloatArray
 from geometry.mesh.boundary import boundary_edges, boundary_widths, mean_thickness, re_entrant_points
 from geometry.mesh.quadrature import triangle_rule
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.pinn.finite_basis.load_conditions import contact_end_points
 from solvers.problem import Problem, contact_ends, contact_nodes
-
-
-class Singularities(NamedTuple):
-    """Points where the strain is singular or nearly so.
-
-    Attributes:
-        points: Shape (s, 2), mm.
-        spacing: Distance between neighbouring points there, mm.
-    """
-
-    points: FloatArray
-    spacing: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,13 +22,14 @@ class PointSpacing:
     Attributes:
         boundary: Points of the boundary, shape (b, 2), mm.
         walls: The spacing there, shape (b,), mm.
-        singularities: Points of equal spacing, one entry a kind.
+        singularities: Points, shape (s, 2), mm, where the strain is singular or nearly so, and the spacing
+            there, mm, one entry a kind.
         growth: Growth of the spacing per distance from a singularity.
     """
 
     boundary: FloatArray
     walls: FloatArray
-    singularities: tuple[Singularities, ...]
+    singularities: tuple[tuple[FloatArray, float], ...]
     growth: float
 
     @classmethod
@@ -63,25 +51,25 @@ class PointSpacing:
             sharp = np.concatenate([sharp, contact_end_points(problem)])
         left, right = contact_ends(problem)
         kinds = [
-            Singularities(sharp, corner * mean),
-            Singularities(mesh.points[contact_nodes(problem)], wall * (right - left)),
+            (sharp, corner * mean),
+            (mesh.points[contact_nodes(problem)], wall * (right - left)),
         ]
         if len(round_):
-            kinds.append(Singularities(round_, max(wall * radius, corner * mean)))
+            kinds.append((round_, max(wall * radius, corner * mean)))
         return cls(boundary, wall * np.minimum(widths, mean), tuple(kinds), growth)
 
     def at(self, points: FloatArray) -> FloatArray:
         """The spacing at points (n, 2), mm: (n,), mm."""
         _, nearest = cKDTree(self.boundary).query(points)
         found = self.walls[nearest]
-        for kind in self.singularities:
-            distance, _ = cKDTree(kind.points).query(points)
-            found = np.minimum(found, kind.spacing + self.growth * distance)
+        for singular, spacing in self.singularities:
+            distance, _ = cKDTree(singular).query(points)
+            found = np.minimum(found, spacing + self.growth * distance)
         return np.asarray(found)
 
     def distance(self, points: FloatArray) -> FloatArray:
         """Distance of points (n, 2), mm, from the nearest singularity: (n,), mm."""
-        distance, _ = cKDTree(np.concatenate([kind.points for kind in self.singularities])).query(points)
+        distance, _ = cKDTree(np.concatenate([singular for singular, _ in self.singularities])).query(points)
         return np.asarray(distance)
 
 
@@ -134,7 +122,8 @@ def spread_points(
     """
     points = np.unique(np.round(triangles.reshape(-1, 2), 9), axis=0)
     distance = spacing.distance(points)
-    inside = _distance_from_boundary(points, mesh) > 1e-9
+    from_boundary, _ = cKDTree(mesh.points[np.unique(boundary_edges(mesh.triangles))]).query(points)
+    inside = from_boundary > 1e-9
     tree, radius = cKDTree(points), share * spacing.at(points)
     free = np.ones(len(points), dtype=bool)
     kept: list[int] = []
@@ -143,10 +132,3 @@ def spread_points(
             kept.append(int(index))
             free[tree.query_ball_point(points[index], radius[index])] = False
     return np.asarray(points[kept])
-
-
-def _distance_from_boundary(points: FloatArray, mesh: TriangleMesh) -> FloatArray:
-    """Distance of points from the nearest boundary node, which is zero only at the nodes, shape (n,), mm."""
-    nodes: IntArray = np.unique(boundary_edges(mesh.triangles))
-    distance, _ = cKDTree(mesh.points[nodes]).query(points)
-    return np.asarray(distance)
