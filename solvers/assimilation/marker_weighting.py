@@ -1,7 +1,7 @@
 """Weighting of the markers' misfit: the settings for it, the L-curve, and the choice of a factor on it."""
 
 from dataclasses import dataclass, fields
-from typing import Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
@@ -19,13 +19,10 @@ FACTORS: FloatArray = 10.0 ** np.arange(-9, 3.25, 0.25)
 
 
 @dataclass(frozen=True, kw_only=True)
-class MarkerWeighting:
-    """Weights of the misfit that a solver minimises together with the energy.
-
-    All but the first are settings of the solver.
+class MarkerSettings:
+    """Settings of a solver that minimises the misfit to the markers together with the energy.
 
     Attributes:
-        solver_name: For messages.
         weights: "paper" or "precision", see `misfit_of`.
         asm_weight: The paper's λ_ASM, MPa/mm², for "paper".
         scale: The model's own error as an energy per depth, N mm/mm, for "precision".
@@ -38,13 +35,20 @@ class MarkerWeighting:
             markers left out one at a time; "evidence": that of the largest evidence, for "precision".
     """
 
-    solver_name: str
-    weights: Weighting
-    asm_weight: float
-    scale: float
-    marker_radius: float | None
+    weights: Weighting = "paper"
+    asm_weight: float = 1000.0
+    scale: float = 1.0
+    marker_radius: float | None = None
     contact_deviation: float = 0.0
     choose: Choice = "given"
+    assimilates: ClassVar[bool] = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class MarkerWeighting(MarkerSettings):
+    """Weights of the misfit by a solver's settings; messages have the solver's name."""
+
+    solver_name: str
 
     def __post_init__(self) -> None:
         for setting, kind in (("weights", Weighting), ("choose", Choice)):

@@ -14,7 +14,7 @@ this is; A. M. Stuart, Inverse problems: a Bayesian perspective, Acta Numerica 1
 for the posterior's mode.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -69,10 +69,6 @@ class Misfit:
         arrays = (self.points, self.observed, self.weights)
         points, observed, weights = (np.delete(values, marker, axis=0) for values in arrays)
         return Misfit(points, observed, weights, self.radius)
-
-    def scaled(self, factor: float) -> "Misfit":
-        """The misfit times a factor."""
-        return replace(self, weights=factor * self.weights)
 
 
 def misfit_of(

@@ -35,7 +35,7 @@ class FemAsmSolver:
     Attributes:
         degree: Degree of the elements, 1 or 2.
 
-    The other settings are those of `MarkerWeighting`.
+    The other settings are those of `MarkerSettings`.
     """
 
     degree: int = 2
@@ -147,7 +147,7 @@ class FemAsmSolver:
                 "degree": self.degree,
                 "ranks": elasticity.distributed.comm.size,
                 "weight_factor": factor,
-                "misfit": misfit.scaled(factor).value(misfit.observed - fit.residual),
+                "misfit": factor * misfit.value(misfit.observed - fit.residual),
                 "marker_force": float(np.linalg.norm(fit.forces, axis=1).max()),
             },
             history=self.weighting.curve(forces),

@@ -7,14 +7,13 @@ from typing import ClassVar
 import numpy as np
 
 from geometry.observations import Observations
-from solvers.assimilation.marker_weighting import Choice
+from solvers.assimilation.marker_weighting import MarkerSettings
 from solvers.assimilation.misfit import Misfit, Weighting
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, LinearResponse
-from solvers.pinn.finite_basis.local import PinnLocalSolver
 from solvers.pinn.finite_basis.network import FiniteBasisField
 from solvers.pinn.finite_basis.newton import LoadStep
 from solvers.pinn.finite_basis.solver import FiniteBasisSolver
-from solvers.pinn.finite_basis.standard import PinnStdSolver
+from solvers.pinn.finite_basis.standard_and_local import PinnLocalSolver, PinnStdSolver
 from solvers.pinn.paper.solver import PaperPinnSolver
 from solvers.pinn.threading import pool
 from solvers.problem import Problem
@@ -63,31 +62,15 @@ def network_refitter(solver: FiniteBasisSolver, problem: Problem) -> Callable[[O
 
 
 @dataclass(frozen=True, kw_only=True)
-class _MarkerSettings:
-    """Settings of `MarkerWeighting`."""
-
-    weights: Weighting = "paper"
-    asm_weight: float = 1000.0
-    scale: float = 1.0
-    marker_radius: float | None = None
-    contact_deviation: float = 0.0
-    choose: Choice = "given"
-    assimilates: ClassVar[bool] = True
-
-
-@dataclass(frozen=True, kw_only=True)
-class PinnAsmSolver(_MarkerSettings, PinnStdSolver):
-    """The network of `PinnStdSolver`, random hidden weights and exact output layer, with the markers' misfit.
-
-    Energy plus misfit is minimised. The settings that are not the network's are those of `MarkerWeighting`.
-    """
+class PinnAsmSolver(MarkerSettings, PinnStdSolver):
+    """The network of `PinnStdSolver`, random hidden weights and exact outputs, with the markers' misfit."""
 
     name: ClassVar[str] = "pinn-asm"
     refitter = network_refitter
 
 
 @dataclass(frozen=True, kw_only=True)
-class PinnLocalAsmSolver(_MarkerSettings, PinnLocalSolver):
+class PinnLocalAsmSolver(MarkerSettings, PinnLocalSolver):
     """The network of `PinnLocalSolver` with the markers' misfit, as in `PinnAsmSolver`."""
 
     name: ClassVar[str] = "pinn-local-asm"
@@ -99,7 +82,7 @@ class PaperPinnAsmSolver(PaperPinnSolver):
     """The networks and the training of `PaperPinnSolver`, with the paper's L_ASM in the loss.
 
     Attributes:
-        marker_radius: As in `MarkerWeighting`; the paper takes the displacement of the centre.
+        marker_radius: As in `MarkerSettings`; the paper takes the displacement of the centre.
     """
 
     weights: Weighting = "paper"

@@ -13,9 +13,8 @@ import torch
 from geometry.arrays import FloatArray, IntArray
 from solvers.elasticity import Lame, LawName, energy_density_of
 from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
-from solvers.pinn.finite_basis.patches import boxes_around, cut_into_patches
 from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
-from solvers.pinn.threading import imap_in_threads
+from solvers.pinn.threading import boxes_around, cut_into_patches, imap_in_threads
 from solvers.problem import Material
 
 

@@ -18,9 +18,8 @@ from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.pinn.finite_basis.gate_tree import GateTree
-from solvers.pinn.finite_basis.patches import boxes_around, cut_into_patches
 from solvers.pinn.finite_basis.shepard_windows import ShepardWindows
-from solvers.pinn.threading import imap_in_threads
+from solvers.pinn.threading import boxes_around, cut_into_patches, imap_in_threads
 
 Windows = ShepardWindows | GateTree
 """A partition of unity by windows."""

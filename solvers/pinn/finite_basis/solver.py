@@ -12,7 +12,7 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
 from solvers.assimilation.marker_forces import MarkerFit
-from solvers.assimilation.marker_weighting import MarkerWeighting
+from solvers.assimilation.marker_weighting import MarkerSettings, MarkerWeighting
 from solvers.assimilation.misfit import Misfit, assimilates, leave_one_out_displacements
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
 from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField, HardConstraint, Windows
@@ -78,7 +78,7 @@ class FiniteBasisSolver(ABC):
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
 
     def __post_init__(self) -> None:
-        of_markers = {entry.name for entry in fields(MarkerWeighting)}
+        of_markers = {entry.name for entry in fields(MarkerSettings)}
         for setting, value in asdict(self).items():
             if setting not in ("seed", "growth", *of_markers) and not value > 0:
                 raise UserError(f"{self.name}: {setting} must be positive, got {value}")
