@@ -94,12 +94,6 @@ def test_without_a_marker_the_others_weigh_the_same(problem):
     assert rest.points.tolist() == np.delete(misfit.points, 4, axis=0).tolist()
 
 
-def test_a_factor_weighs_all_markers(problem):
-    misfit = misfit_of(problem)
-    moved = misfit.observed + 1.0
-    assert misfit.scaled(3.0).value(moved) == pytest.approx(3 * misfit.value(moved), rel=1e-14)
-
-
 def test_a_marker_moves_by_the_mean_over_its_disc(problem):
     """That of x^2 y over a disc around (a, b) is a^2 b + b r^2 / 4, of a square distance more by r^2 / 2."""
     misfit = misfit_of(problem, marker_radius=0.5)
