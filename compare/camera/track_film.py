@@ -6,13 +6,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.live import Live
 from rich.table import Table
+from rich.text import Text
 
 from compare.camera.film import Film
 from compare.evaluation.number_format import NONE
 from compare.figures import Picture
-from compare.runtime.csv_files import Cell, write_csv
-from compare.runtime.terminal_table import terminal_table
+from compare.runtime.tables import Cell, terminal_table, write_csv
+from geometry.arrays import FloatArray
 from geometry.atomic import write_json
 from geometry.finger.parameters import Parameters
 from geometry.observations import Observations
@@ -124,6 +126,22 @@ def track_summary(tracking: Tracking, observations: Observations) -> dict[str, A
         "warnings": list(tracking.warnings),
         "description": observations.source,
     }
+
+
+def displacement_line(live: Live) -> Callable[[Frame, FrameDetections], None]:
+    """A function that shows the displacements, mm, since its first frame; a dash for an invisible marker."""
+    start: FloatArray | None = None
+
+    def show(frame: Frame, detections: FrameDetections) -> None:
+        nonlocal start
+        if start is None:
+            start = detections.places
+        moved = (detections.places - start).tolist()
+        seen = np.isfinite(detections.markers.radii)
+        cells = [f"{u:+.2f},{v:+.2f}" if known else "–" for (u, v), known in zip(moved, seen, strict=True)]
+        live.update(Text(f"{frame.time:8.2f} s  {'  '.join(cells)}", no_wrap=True, overflow="ellipsis"))
+
+    return show
 
 
 def track_table(tracking: Tracking, observations: Observations) -> Table:

@@ -38,8 +38,7 @@ def calibrate(
         without: Photograph to leave out; may be repeated.
         out: Camera file, .json or .yaml.
     """
-    from compare.camera.calibration_chart import draw_calibration
-    from compare.camera.calibration_table import calibration_table, view_table
+    from compare.camera.calibration_report import calibration_table, draw_calibration, view_table
     from vision.calibration.board_parser import parse_board
     from vision.calibration.camera_calibration import better_lens
     from vision.calibration.camera_calibration import calibrate as calibrated

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 from rich.console import Console
 
 from compare.camera.film import Film
-from compare.commands.film_options import FilmOptions
+from compare.commands.camera_options import FilmOptions
 from compare.commands.options import (
     OUTPUT,
     Adapt,

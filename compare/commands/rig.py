@@ -5,8 +5,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from compare.commands.camera_options import EXPOSURE, MOTION, BoardOptions, CameraOptions, SceneOptions
 from compare.commands.options import OUTPUT, FingerOptions, OutputPath, PhysicsOptions, SolverOptions
-from compare.commands.rig_options import EXPOSURE, MOTION, BoardOptions, CameraOptions, SceneOptions
+from geometry.errors import UserError
 from vision.rig.exposure import Exposure
 from vision.rig.motion import Motion
 
@@ -40,10 +41,13 @@ def rig(
         codec: ffv1 or png (lossless), mjpg or mp4v.
         out: Output folder.
     """
-    from compare.camera.rig_displacements import rig_displacements
+    from compare.evaluation.shared_mesh import shared_mesh
+    from compare.evaluation.virtual_experiment import experiment_source, simulate
     from compare.runtime.output_folder import check_output, replaced_folder, write_run
     from compare.runtime.provenance import machine, package_versions
     from compare.runtime.stages import Stages
+    from solvers.problem import Problem
+    from solvers.solver import with_law
     from vision.rig.bench import Bench
     from vision.rig.boards import board_poses, board_scene
     from vision.rig.occluders import cables
@@ -58,10 +62,24 @@ def rig(
     board, covered = boards.read(), scene.covered()
     check_codec(codec)
     check_output(out)
+    solvers = options.read(solver or "")
+    if len(solvers) > 1:
+        raise UserError("the rig films one finger; name one --solver")
+    filmed = solvers[0] if solvers else None
     with Stages() as stages:
-        mesh, displacement, source = rig_displacements(
-            design, mesh_settings, material, load, options.read(solver or ""), stages
-        )
+        mesh, _ = shared_mesh(design, mesh_settings, stages)
+        if filmed is None:
+            problem = Problem(mesh, material, load)
+            with stages.stage("virtual experiment") as progress:
+                solution = simulate(problem, progress)
+            source = experiment_source(problem)
+        else:
+            with stages.stage(filmed.name) as progress:
+                solution = filmed.solve(Problem(mesh, with_law(material, filmed), load), progress)
+            if not solution.status.converged:
+                raise UserError(f"{filmed.name} {solution.status.message}; its displacements are not filmed")
+            source = f"displacements of {filmed.name}, rendered by the virtual rig; no camera was involved"
+        displacement = solution.displacement(mesh.at_nodes())
         bench = Bench(mesh, design, workspace, scene.paint)
         recording = Recording(
             bench=bench,

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.live import Live
 
-from compare.commands.film_options import FilmOptions
+from compare.commands.camera_options import FilmOptions
 from compare.commands.options import FingerOptions, Flag, OutputFlag, OutputPath
 from compare.runtime.exits import say
 
@@ -37,8 +37,7 @@ def track(
         without_video: Write no annotated video.
         out: Output folder.
     """
-    from compare.camera.live_display import displacement_line
-    from compare.camera.track_film import track_film, track_table
+    from compare.camera.track_film import displacement_line, track_film, track_table
     from compare.runtime.output_folder import check_output, replaced_folder, write_run
     from compare.runtime.provenance import machine, package_versions
     from compare.runtime.stages import Stages

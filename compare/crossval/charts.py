@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from matplotlib.axes import Axes
 
-from compare.crossval.scores import Score
+from compare.crossval.scores import FIELD_NAMES, Score
 from compare.figures.style import (
     LEGEND_LINE,
     SOLVER_COLOURS,
@@ -27,8 +27,6 @@ SHIFT = 0.03
 
 SMALLEST = 1e-4
 """Misfit below which nothing is drawn, mm: no camera resolves it."""
-
-PANELS = {"displacement": "displacement", "strain": "strain", "von_mises": "von Mises stress"}
 
 
 def draw_held_out(errors: Mapping[str, Sequence[float]], simulated: bool) -> Figure:
@@ -53,14 +51,14 @@ def draw_held_out(errors: Mapping[str, Sequence[float]], simulated: bool) -> Fig
 def draw_fields(scores: Mapping[str, Mapping[str, Score]], schemes: Sequence[str]) -> Figure:
     """Draw relative L2 distances from the truth by scheme, a chart for each field."""
     height = legend_height(list(scores))
-    width = (WIDTH - LEFT - 0.1 - (len(PANELS) - 1) * GAP) / len(PANELS)
+    width = (WIDTH - LEFT - 0.1 - (len(FIELD_NAMES) - 1) * GAP) / len(FIELD_NAMES)
     with figure(HEAD + height + HEIGHT + FOOT + 0.25) as drawn:
         heading(
             drawn,
             "Distance from the truth over the body",
             "Relative L², %, by what is held out; the line at 100 % is a field of zero.",
         )
-        for column, (name, title) in enumerate(PANELS.items()):
+        for column, (name, title) in enumerate(FIELD_NAMES.items()):
             box = (LEFT + column * (width + GAP), HEAD + height, width, HEIGHT)
             axes = axes_at(drawn, box)
             for number, (label, each) in enumerate(scores.items()):
@@ -82,9 +80,9 @@ def draw_weight_sweep(sweep: Mapping[str, Sequence[float]]) -> Figure:
     """
     panels: dict[str, dict[str, str]] = {
         "root mean square, mm": {"in_sample_mm": "markers given", "left_out_mm": "each left out"},
-        "distance from the truth, %": PANELS,
+        "distance from the truth, %": FIELD_NAMES,
     }
-    between, legend = LEFT, len(PANELS) * LEGEND_LINE
+    between, legend = LEFT, len(FIELD_NAMES) * LEGEND_LINE
     width = (WIDTH - LEFT - 0.1 - between) / 2
     with figure(HEAD + legend + HEIGHT + FOOT) as drawn:
         heading(

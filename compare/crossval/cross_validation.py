@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from compare.crossval.fold_result import FoldResult, SeedResults
-from compare.crossval.folds import LOAD, LoadCase, folds_of, load_cases_of
+from compare.crossval.folds import LOAD, FoldResult, LoadCase, SeedResults, folds_of, load_cases_of
 from compare.crossval.output_files import write_results
 from compare.crossval.result import CrossvalResult
 from compare.crossval.solver_folds import SolverTask, run_folds

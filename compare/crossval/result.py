@@ -5,8 +5,7 @@ from dataclasses import asdict, dataclass
 from math import isnan, nan
 from typing import TYPE_CHECKING, Any, Self
 
-from compare.crossval.fold_result import SeedResults
-from compare.crossval.folds import SCHEMES, Fold
+from compare.crossval.folds import SCHEMES, Fold, SeedResults
 from compare.crossval.scores import (
     COMPARED,
     LEVEL,
@@ -20,7 +19,7 @@ from compare.crossval.scores import (
 )
 from compare.crossval.study import Study
 from compare.crossval.true_fields import FINER
-from compare.runtime.csv_files import Cell
+from compare.runtime.tables import Cell
 from geometry.observations import Observations
 from solvers.assimilation.misfit import assimilates
 

@@ -7,7 +7,7 @@ from math import nan, sqrt
 import numpy as np
 from scipy.stats import norm, t
 
-from compare.crossval.fold_result import FoldResult, SeedResults
+from compare.crossval.folds import FoldResult, SeedResults
 from geometry.arrays import FloatArray
 
 LEVEL = 0.95
@@ -18,7 +18,8 @@ RESAMPLES = 2000
 
 MARKERS = ("mae_u", "mae_v", "mae_sum", "mae_rss")
 FIELDS = ("displacement", "strain", "von_mises", "von_mises_finite")
-COMPARED = ("mae_sum", "displacement", "strain", "von_mises")
+FIELD_NAMES = {"displacement": "displacement", "strain": "strain", "von_mises": "von Mises stress"}
+COMPARED = ("mae_sum", *FIELD_NAMES)
 """Scores of which differences from the baselines are computed."""
 
 

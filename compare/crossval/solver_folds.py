@@ -9,8 +9,7 @@ import numpy as np
 from pydantic import ConfigDict, TypeAdapter
 from pydantic_core import to_jsonable_python
 
-from compare.crossval.fold_result import FoldResult
-from compare.crossval.folds import Fold, LoadCase, hide_markers
+from compare.crossval.folds import Fold, FoldResult, LoadCase, hide_markers
 from compare.crossval.study import SolverVariant
 from compare.crossval.true_fields import FieldSampler, SampledField
 from geometry.atomic import atomic_path

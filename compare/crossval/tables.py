@@ -7,13 +7,11 @@ from pathlib import Path
 
 from rich.table import Table
 
-from compare.crossval.fold_result import SeedResults
-from compare.crossval.folds import ALL, SCHEMES
+from compare.crossval.folds import ALL, SCHEMES, SeedResults
 from compare.crossval.result import BASELINES, CrossvalResult
 from compare.crossval.scores import FIELDS, LEVEL, Difference, Interval
 from compare.evaluation.number_format import NONE, percent, significant
-from compare.runtime.csv_files import Cell, write_csv
-from compare.runtime.terminal_table import terminal_table
+from compare.runtime.tables import Cell, terminal_table, write_csv
 
 SHORT = {"not told apart": "≈"}
 """Short forms of verdicts."""

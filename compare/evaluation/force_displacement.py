@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from compare.evaluation.evaluation import Evaluation
-from compare.runtime.csv_files import Cell, write_csv
+from compare.runtime.tables import Cell, write_csv
 from geometry.arrays import FloatArray
 from solvers.problem import Load
 

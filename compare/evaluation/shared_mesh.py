@@ -3,9 +3,9 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from compare.runtime.csv_files import write_csv
 from compare.runtime.exits import say
 from compare.runtime.stages import Stages
+from compare.runtime.tables import write_csv
 from geometry.cache import finger_mesh
 from geometry.errors import OutsideBodyError, UserError
 from geometry.finger.design import Design

@@ -9,8 +9,7 @@ from rich.table import Table
 
 from compare.evaluation.number_format import NONE
 from compare.gridsearch.training_run import TrainingMetrics, TrainingRun
-from compare.runtime.csv_files import Cell, write_csv
-from compare.runtime.terminal_table import terminal_table
+from compare.runtime.tables import Cell, terminal_table, write_csv
 
 UNITS = {
     "base_violation": "mm",

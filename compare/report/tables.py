@@ -19,7 +19,7 @@ from compare.evaluation.metrics import (
     reference_differences,
     truth_differences,
 )
-from compare.runtime.csv_files import Cell, write_csv
+from compare.runtime.tables import Cell, write_csv
 
 Means = tuple[float, float, float | None, float]
 """Mean absolute errors at the markers in the order of `MEANS`, mm; None where it is not printed."""

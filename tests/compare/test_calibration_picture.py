@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from compare.camera.calibration_chart import draw_calibration, undistorted
+from compare.camera.calibration_report import draw_calibration, undistorted
 from tests.compare.drawn_pages import page_of
 from vision.calibration.camera import Camera
 from vision.calibration.camera_calibration import Calibration

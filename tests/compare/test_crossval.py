@@ -15,7 +15,6 @@ from scipy.stats import t
 from compare.cli import main
 from compare.crossval.charts import draw_fields, draw_held_out, draw_weight_sweep
 from compare.crossval.cross_validation import cross_validate
-from compare.crossval.fold_result import FoldResult
 from compare.crossval.folds import (
     ALL,
     DRAWS,
@@ -24,6 +23,7 @@ from compare.crossval.folds import (
     RANDOM,
     TIP,
     Fold,
+    FoldResult,
     LoadCase,
     folds_of,
     hide_markers,

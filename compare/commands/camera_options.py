@@ -1,4 +1,4 @@
-"""Options of the virtual rig, and the objects that they describe."""
+"""Options of a film to track and of the virtual rig, and the objects that they describe."""
 
 import re
 from dataclasses import dataclass
@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Literal
 
 from cyclopts import Group, Parameter
 
-from compare.commands.options import Repeated
+from compare.camera.film import Film
+from compare.commands.options import Repeated, existing
 from geometry.errors import UserError
 from vision.tracking.workspace import Workspace
 
@@ -23,6 +24,38 @@ BOARDS = Group("Calibration", sort_key=8)
 
 MOST_PIXELS = 4_000_000
 """Largest frame: its cells, up to 16 per pixel, have to fit into the memory."""
+
+
+@Parameter(name="*", group=CAMERA)
+@dataclass(frozen=True, kw_only=True)
+class FilmOptions:
+    """Camera, fiducials, marker colour and tracking method of a film.
+
+    Attributes:
+        camera: Camera file of `pinnray calibrate`.
+        workspace: JSON file of the fiducials; default: those around the design.
+        colour: Colour of the markers, as printed by `pinnray pick`.
+        method: Disc detector; hough is the paper's pipeline.
+    """
+
+    camera: Path | None = None
+    workspace: Path | None = None
+    colour: str = "dark"
+    method: Literal["precise", "hough"] = "precise"
+
+    def film(self, source: str) -> Film:
+        """The film from `source`.
+
+        Raises:
+            UserError: If the camera's or the workspace's file does not exist.
+        """
+        return Film(
+            source,
+            camera=existing(self.camera),
+            workspace=existing(self.workspace),
+            colour=self.colour,
+            method=self.method,
+        )
 
 
 @Parameter(name="*", group=CAMERA)

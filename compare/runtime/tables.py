@@ -1,9 +1,23 @@
-"""Tables for the terminal, all of one style."""
+"""Tables: as CSV files, written atomically, and for the terminal."""
 
+import csv
 from collections.abc import Collection, Iterable, Sequence
+from pathlib import Path
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
+
+from geometry.atomic import atomic_path
+
+Cell = str | int | float | bool
+
+
+def write_csv(path: Path, rows: Sequence[dict[str, Cell]]) -> None:
+    """Write rows with equal keys under a header, atomically; numbers keep all their digits."""
+    with atomic_path(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
 
 
 def terminal_table(
