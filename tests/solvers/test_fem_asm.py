@@ -213,7 +213,7 @@ def test_the_evidence_is_the_normal_density_of_the_markers(problem):
     variances = problem.observations.standard_deviations[problem.observations.visible].ravel() ** 2
     expected = [
         multivariate_normal.logpdf(
-            forces.missed.ravel(), cov=factor * SOFT.scale * forces.compliance + np.diag(variances)
+            forces.prior_residual.ravel(), cov=factor * SOFT.scale * forces.compliance + np.diag(variances)
         )
         for factor in (0.01, 1.0)
     ]

@@ -33,7 +33,7 @@ def associate_markers(found: FloatArray, expected: FloatArray, fields: FloatArra
         found: Detections in the finger's frame, shape (n, 2).
         expected: Predicted positions of the markers, shape (m, 2).
         fields: Covariances of the displacement from there along x and y, one for each possible size of step,
-            shape (k, 2, m, m), mm²; see `moved` and `placed`.
+            shape (k, 2, m, m), mm²; see `step_covariances` and `rest_covariances`.
 
     Returns:
         The number of its detection for every marker, shape (m,); -1 where it is missing or not certain.
