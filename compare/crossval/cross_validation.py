@@ -56,25 +56,15 @@ def cross_validate(study: Study, stages: Stages | None = None) -> CrossvalResult
     study.out.mkdir(parents=True, exist_ok=True)
     with locked(study.out):
         write_json(study.out / DEFINITION, definition)
-        shared = study.out / "mesh.npz"
-        mesh.save(shared)
-        truths = [] if measured else _truths(study, load_cases, shared, stages)
+        mesh.save(study.mesh_file)
+        truths = [] if measured else _truths(study, load_cases, stages)
         if measured:
             observations = [[measured]] * study.seeds
         else:
             observations = _noisy(study, mesh, truths, experiment_source(problem))
         folds = folds_of(study.schemes, len(observations[0][0].points), load_cases)
         tasks = {
-            variant.label: SolverTask(
-                variant=variant,
-                mesh=shared,
-                material=study.material,
-                load_cases=load_cases,
-                truths=truths,
-                observations=observations,
-                folds=folds,
-                folder=study.out / "runs" / variant.folder_name,
-            )
+            variant.label: SolverTask(study, variant, load_cases, truths, observations, folds)
             for variant in study.variants
         }
         results, failed = _results(study, tasks, stages)
@@ -86,19 +76,9 @@ def cross_validate(study: Study, stages: Stages | None = None) -> CrossvalResult
     return found
 
 
-def _truths(study: Study, load_cases: Sequence[LoadCase], shared: Path, stages: Stages) -> list[Path]:
+def _truths(study: Study, load_cases: Sequence[LoadCase], stages: Stages) -> list[Path]:
     """Files of the true fields at every load, each simulated in a process of its own."""
-    stroke = -float(study.load.displacement[1] or 0.0)
-    tasks = {
-        f"truth, {case.name}": TruthTask(
-            design=study.design.replaced(contact_position=case.contact),
-            settings=study.mesh,
-            shared=shared,
-            material=study.material,
-            stroke=case.share * stroke,
-        )
-        for case in load_cases
-    }
+    tasks = {f"truth, {case.name}": TruthTask(study, case) for case in load_cases}
     found: dict[str, Path] = {}
     for name, answer in in_stages(
         simulate_truth,

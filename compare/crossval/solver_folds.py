@@ -10,14 +10,14 @@ from pydantic import ConfigDict, TypeAdapter
 from pydantic_core import to_jsonable_python
 
 from compare.crossval.folds import Fold, FoldResult, LoadCase, hide_markers
-from compare.crossval.study import SolverVariant
+from compare.crossval.study import SolverVariant, Study
 from compare.crossval.true_fields import FieldSampler, SampledField
 from geometry.atomic import atomic_path
 from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.assimilation.misfit import assimilates
-from solvers.problem import Material, Problem
+from solvers.problem import Problem
 from solvers.solution import Solution
 from solvers.solver import Progress, Solver, Transferable, UnsupportedProblemError, refitter, silent, with_law
 
@@ -27,24 +27,25 @@ class SolverTask:
     """All that a process needs to run one solver.
 
     Attributes:
+        study: The study.
         variant: The solver.
-        mesh: File of the shared mesh.
-        material: Elastic constants.
         load_cases: The loads, the full one first.
         truths: File of the true fields at each load; empty with measured markers.
         observations: For each seed, those at every load.
         folds: The folds.
-        folder: Folder of finished folds.
     """
 
+    study: Study
     variant: SolverVariant
-    mesh: Path
-    material: Material
     load_cases: Sequence[LoadCase]
     truths: Sequence[Path]
     observations: Sequence[Sequence[Observations]]
     folds: Sequence[Fold]
-    folder: Path
+
+    @property
+    def folder(self) -> Path:
+        """Folder of finished folds."""
+        return self.study.out / "runs" / self.variant.label.replace(" ", "_")
 
 
 @dataclass(frozen=True)
@@ -91,9 +92,9 @@ class FoldRunner:
 
     def __init__(self, task: SolverTask, solver: Solver) -> None:
         self._task, self._solver = task, solver
-        mesh = TriangleMesh.load(task.mesh)
-        self.problem = Problem(mesh, with_law(task.material, solver), task.load_cases[0].load)
-        finite = task.material.model_copy(update={"law": "neo-hookean", "plane": "strain"})
+        mesh, material = TriangleMesh.load(task.study.mesh_file), task.study.material
+        self.problem = Problem(mesh, with_law(material, solver), task.load_cases[0].load)
+        finite = material.model_copy(update={"law": "neo-hookean", "plane": "strain"})
         self._finite = replace(self.problem, material=finite)
         markers = task.observations[0][0]
         self.sampler = FieldSampler.of(mesh, markers.points, markers.marker_radius)

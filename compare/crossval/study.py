@@ -43,11 +43,6 @@ class SolverVariant:
     solver: str
     settings: Mapping[str, object]
 
-    @property
-    def folder_name(self) -> str:
-        """Name of the folder of its finished folds."""
-        return self.label.replace(" ", "_")
-
     def make(self, seed: int) -> Solver:
         """The solver; `seed` is added to its own seed, if it draws random numbers."""
         settings = dict(self.settings)
@@ -113,6 +108,11 @@ class Study:
     noise: float = 0.005
     measurements: Observations | None = None
     processes: int = field(default_factory=cores)
+
+    @property
+    def mesh_file(self) -> Path:
+        """File of the shared mesh."""
+        return self.out / "mesh.npz"
 
     def check(self) -> None:
         """Raise a `UserError` for what cannot be done, before anything is computed."""

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from compare.crossval.folds import LoadCase
+from compare.crossval.study import Study
 from compare.evaluation.differences import field_difference
 from compare.evaluation.virtual_experiment import SOURCES, simulate
 from compare.runtime.provenance import package_versions, sources_digest
@@ -12,13 +14,11 @@ from geometry.arrays import FloatArray
 from geometry.atomic import atomic_path
 from geometry.cache import cache_folder, finger_mesh
 from geometry.content_hash import content_hash
-from geometry.finger.design import Design
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
-from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.assimilation.misfit import disc_quadrature, radius_within
-from solvers.problem import Load, Material, Problem
+from solvers.problem import Load, Problem
 from solvers.solution import Solution, State
 from solvers.solver import Progress, silent
 
@@ -124,21 +124,10 @@ class FieldSampler:
 
 @dataclass(frozen=True)
 class TruthTask:
-    """All that a process needs to simulate a truth.
+    """A load case of a study, of which a process simulates the truth."""
 
-    Attributes:
-        design: The finger, with the contact at its place.
-        settings: Element sizes of the shared mesh.
-        shared: File of the shared mesh.
-        material: Elastic constants.
-        stroke: -v of the indenter, mm.
-    """
-
-    design: Design
-    settings: MeshSettings
-    shared: Path
-    material: Material
-    stroke: float
+    study: Study
+    case: LoadCase
 
 
 def simulate_truth(task: TruthTask, progress: Progress = silent) -> Path:
@@ -147,13 +136,16 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> Path:
     Raises:
         UserError: If the simulation cannot be run or does not reach the full load.
     """
-    shared = TriangleMesh.load(task.shared)
+    study = task.study
+    design = study.design.replaced(contact_position=task.case.contact)
+    stroke = -task.case.share * float(study.load.displacement[1] or 0.0)
+    shared = TriangleMesh.load(study.mesh_file)
     parts = [
-        task.design.digest,
-        task.settings.model_dump(),
+        design.digest,
+        study.mesh.model_dump(),
         shared.digest,
-        task.material.model_dump(),
-        task.stroke,
+        study.material.model_dump(),
+        stroke,
         FINER,
         package_versions(),
         sources_digest([*SOURCES, __name__, "compare.evaluation.virtual_experiment"]),
@@ -162,9 +154,9 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> Path:
     if file.exists():
         progress(1.0, "from the cache")
         return file
-    finer = task.settings.model_copy(update={"size": FINER * task.settings.size})
-    mesh = finger_mesh(task.design, settings=finer)
-    problem = Problem(mesh, task.material, Load(displacement=(0.0, -task.stroke)))
-    sampler = FieldSampler.of(shared, shared.markers, task.design.marker_radius)
+    finer = study.mesh.model_copy(update={"size": FINER * study.mesh.size})
+    mesh = finger_mesh(design, settings=finer)
+    problem = Problem(mesh, study.material, Load(displacement=(0.0, -stroke)))
+    sampler = FieldSampler.of(shared, shared.markers, design.marker_radius)
     sampler.of_solution(simulate(problem, progress), shared).save(file)
     return file

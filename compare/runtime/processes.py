@@ -104,15 +104,9 @@ def in_stages(
     kind: str,
     note: Callable[[str, Output | ProcessFailed], str],
 ) -> Generator[tuple[str, Output | ProcessFailed], None, None]:
-    """`in_processes` with a stage for every task and one for all.
+    """`in_processes` with a stage for every task and one for all, of the name `kind`, such as "runs".
 
-    Args:
-        work: A function of a module, called with a task and a progress report.
-        tasks: Tasks by name.
-        processes: Largest number of processes at a time.
-        stages: Shows the progress.
-        kind: Name of the tasks together, such as "runs".
-        note: Text for a task's name and answer.
+    `note` turns a task's name and its answer into a short text.
     """
     lines: dict[str, tuple[ExitStack, Progress]] = {}
 
