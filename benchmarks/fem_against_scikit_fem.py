@@ -13,9 +13,9 @@ from skfem.models.elasticity import linear_elasticity
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
-from solvers.fem.dolfinx_compat import Factorisation
 from solvers.fem.linear import FactorisedProblem, FemSolver
 from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium
+from solvers.fem.linear_solvers import Factorisation
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Problem, contact_functional
 

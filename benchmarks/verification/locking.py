@@ -5,8 +5,8 @@ from benchmarks.verification.record import Case, Row, about, at_most, between, s
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
+from solvers.fem.error_estimate import locking_factor
 from solvers.fem.linear import FemSolver
-from solvers.fem.locking import locking_factor
 from solvers.problem import Material, Problem
 
 DEFLECTION = {0.3: about(0.946, 0.02), 0.45: about(0.892, 0.02), 0.499: at_most(0.35), 0.4999: at_most(0.15)}

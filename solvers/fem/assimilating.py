@@ -10,20 +10,69 @@ from typing import ClassVar
 
 import numpy as np
 
+from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
 from geometry.observations import Observations
+from solvers.assimilation.marker_forces import MarkerForces
 from solvers.assimilation.marker_weighting import Choice, MarkerWeighting
 from solvers.assimilation.misfit import Misfit, Weighting, leave_one_out_displacements
-from solvers.fem.boundary_conditions import reaction_by_residual_work
+from solvers.constrained_elimination import ConstrainedElimination
+from solvers.fem.boundary_conditions import marker_functionals, reaction_by_residual_work
 from solvers.fem.finite_strain.assimilation import assimilated
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
-from solvers.fem.marker_compliance import MarkerCompliance
+from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium
 from solvers.fem.ranks import on_all_ranks
-from solvers.lagrange import LagrangeField
+from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, check_problem, silent
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerCompliance:
+    """Finite-element displacements, free and under forces at m markers.
+
+    Attributes:
+        equilibrium: The factorised problem; its factors are to be destroyed after use.
+        undisturbed: Nodal displacements without forces at the markers, shape (N, 2), mm.
+        markers: The 2 m displacements of the markers as functionals, and the nodal displacements under their
+            unit forces, while base and load hold at zero.
+    """
+
+    equilibrium: LinearEquilibrium
+    undisturbed: FloatArray
+    markers: ConstrainedElimination
+
+    @classmethod
+    def of(cls, problem: Problem, degree: int, misfit: Misfit, slack: float = 0.0) -> "MarkerCompliance":
+        """Factorise once; solve once for the problem and once for every component of a marker.
+
+        Args:
+            problem: With the conditions that hold.
+            degree: Degree of the elements.
+            misfit: With the markers.
+            slack: Compliance of springs between contact and indenter, mm per N/mm, for `mean` and `point`.
+        """
+        space = LagrangeSpace(problem.mesh, degree)
+        equilibrium = LinearEquilibrium.of(LinearElasticity.of(problem, space), slack)
+        markers = ConstrainedElimination.of(equilibrium.response, marker_functionals(misfit, space))
+        return cls(equilibrium, equilibrium.solution(), markers)
+
+    def of_markers(self, chosen: BoolArray) -> "MarkerCompliance":
+        """Subset of the markers selected by a mask of shape (m,)."""
+        both, markers = np.repeat(chosen, 2), self.markers
+        return replace(self, markers=ConstrainedElimination(markers.rows[both], markers.responses[both]))
+
+    def forces(self, misfit: Misfit) -> MarkerForces:
+        """The minimisers of energy plus misfit, in terms of the forces at the markers."""
+        compliance = self.markers.flexibility
+        missed = misfit.observed - self.markers.values(self.undisturbed).reshape(-1, 2)
+        return MarkerForces(0.5 * (compliance + compliance.T), misfit.weights, missed)
+
+    def under(self, forces: FloatArray) -> FloatArray:
+        """Nodal displacements under forces at the markers, shape (m, 2), N/mm: shape (N, 2), mm."""
+        return self.undisturbed + np.tensordot(forces.ravel(), self.markers.responses, axes=1)
 
 
 @dataclass(frozen=True)
@@ -66,10 +115,9 @@ class FemAsmSolver:
             UserError: If a factor is to be chosen at finite strain, or a patch is to have a deviation.
         """
         check_problem(self, problem)
-        linear = problem.material.law in FemSolver.laws
         if self.weighting.misfit(problem) is not None:
-            return on_all_ranks(self._solve if linear else self._solve_nonlinear, problem, progress)
-        if linear:
+            return on_all_ranks(self._solve, problem, progress)
+        if problem.material.law in FemSolver.laws:
             plain = FemSolver(degree=self.degree, estimate=False).solve(problem, progress)
             status = Status(True, "without markers, or with weights of zero, this is fem")
             return replace(plain, solver=self.name, status=status)
@@ -114,10 +162,9 @@ class FemAsmSolver:
 
         return refit
 
-    def _solve_nonlinear(self, problem: Problem, progress: Progress) -> Solution:
-        return assimilated(problem, self.weighting, degree=self.degree, progress=progress)
-
     def _solve(self, problem: Problem, progress: Progress) -> Solution:
+        if problem.material.law not in FemSolver.laws:
+            return assimilated(problem, self.weighting, degree=self.degree, progress=progress)
         started = time.perf_counter()
         finger, misfit = self.prepare(problem)
         progress(0.9, "solved for the forces at the markers")

@@ -1,10 +1,10 @@
-"""Vector spaces and direct solves with DOLFINx from 0.5 (Debian 12) to 0.11, behind one interface."""
+"""Vector spaces with DOLFINx from 0.5 (Debian 12) to 0.11, behind one interface."""
 
 import inspect
 import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, ClassVar
+from typing import Any
 
 import dolfinx
 import dolfinx.fem.petsc
@@ -14,7 +14,6 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
-from geometry.errors import UserError
 from solvers.elasticity import Lame
 from solvers.fem.ranks import communicator
 from solvers.lagrange import LagrangeSpace
@@ -178,65 +177,3 @@ class DistributedSpace:
         if self.comm.size > 1:
             self.comm.Allreduce(MPI.IN_PLACE, values, op=MPI.SUM)
         return values
-
-
-class Factorisation:
-    """A symmetric matrix factorised by MUMPS, for any number of right-hand sides.
-
-    Args:
-        space: The space of right-hand sides and solutions.
-        matrix: The assembled matrix.
-        clamped: Mask of shape (N, 2): components whose right-hand side is set to zero.
-        positive_definite: False where a tangent may be indefinite.
-
-    Attributes:
-        message: The method in words.
-        stats: The same for a table.
-    """
-
-    message: ClassVar[str] = "solved directly"
-    stats: ClassVar[dict[str, float | int | str]] = {"linear_solver": "direct"}
-
-    def __init__(
-        self, space: DistributedSpace, matrix: PETSc.Mat, clamped: BoolArray, *, positive_definite: bool
-    ) -> None:
-        self._space = space
-        self._clamped = clamped
-        self._matrix = matrix
-        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        matrix.setOption(PETSc.Mat.Option.SPD, positive_definite)
-        self._ksp = PETSc.KSP().create(space.comm)
-        self._ksp.setOperators(matrix)
-        self._ksp.setType(PETSc.KSP.Type.PREONLY)
-        preconditioner = self._ksp.getPC()
-        preconditioner.setType(PETSc.PC.Type.CHOLESKY)
-        preconditioner.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-        preconditioner.destroy()  # the name only: petsc4py would keep it, and the factors, for ever
-        self._ksp.setErrorIfNotConverged(True)
-        self.update()
-
-    def update(self) -> None:
-        """Factorise again after the matrix has got new values in its old places: the analysis is kept."""
-        self._ksp.setOperators(self._matrix)
-        try:
-            self._ksp.setUp()
-        except PETSc.Error as error:
-            raise UserError(
-                "MUMPS cannot factorise the stiffness matrix: "
-                "is there enough memory, and is no element nearly flat?"
-            ) from error
-
-    def solve(self, nodal: FloatArray) -> FloatArray:
-        """Solve for a right-hand side of shape (N, 2); the solution has the same shape."""
-        right, solution = self._matrix.createVecs()
-        self._space.distribute(np.where(self._clamped, 0.0, nodal), right)
-        self._ksp.solve(right, solution)
-        values = self._space.gather(solution)
-        right.destroy()
-        solution.destroy()
-        return values
-
-    def destroy(self) -> None:
-        """Free the factors."""
-        self._ksp.destroy()
-        self._matrix.destroy()

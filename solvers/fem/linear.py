@@ -7,9 +7,8 @@ from typing import ClassVar, get_args
 
 from geometry.errors import UserError
 from solvers.fem.boundary_conditions import reaction_by_residual_work
-from solvers.fem.error_estimate import ErrorEstimator
+from solvers.fem.error_estimate import ErrorEstimator, locking_advice
 from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium, LinearSolver
-from solvers.fem.locking import locking_advice
 from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Problem

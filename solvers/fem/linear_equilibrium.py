@@ -16,8 +16,8 @@ from solvers.fem.boundary_conditions import (
     load_functionals,
     load_targets,
 )
-from solvers.fem.dolfinx_compat import DistributedSpace, Factorisation
-from solvers.fem.multigrid import Multigrid
+from solvers.fem.dolfinx_compat import DistributedSpace
+from solvers.fem.linear_solvers import Factorisation, Multigrid
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 

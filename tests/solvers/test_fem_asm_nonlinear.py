@@ -9,10 +9,9 @@ from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
 from solvers.assimilation.misfit import misfit_of
 from solvers.fem.assimilating import FemAsmSolver
-from solvers.fem.finite_strain.constraints import DisplacementConstraints
+from solvers.fem.finite_strain.constraints import DisplacementConstraints, LoadState
 from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
 from solvers.fem.finite_strain.load_path import LoadPath
-from solvers.fem.finite_strain.load_state import LoadState
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem, contact_functional

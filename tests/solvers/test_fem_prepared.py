@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from solvers.fem import linear_equilibrium, multigrid
+from solvers.fem import linear_equilibrium, linear_solvers
 from solvers.fem.linear import FemSolver
 from solvers.fem.linear_equilibrium import Factorisation, LinearElasticity
 from solvers.problem import Load, Problem
@@ -81,7 +81,7 @@ def test_iterations_find_what_the_factorisation_finds(coarse_mesh, degree, kind)
 
 
 def test_iterations_that_do_not_converge_are_an_error(coarse_mesh, monkeypatch):
-    monkeypatch.setattr(multigrid, "MAX_ITERATIONS", 3)
+    monkeypatch.setattr(linear_solvers, "MAX_ITERATIONS", 3)
     with pytest.raises(UserError, match=r"after 3 iterations .* take linear_solver=direct"):
         FemSolver(linear_solver="iterative").solve(Problem(coarse_mesh))
 

@@ -17,9 +17,8 @@ from geometry.errors import UserError
 from solvers.assimilation.marker_forces import residual_phrase
 from solvers.assimilation.marker_weighting import MarkerWeighting
 from solvers.assimilation.misfit import leave_one_out_displacements
-from solvers.fem.finite_strain.constraints import DisplacementConstraints
+from solvers.fem.finite_strain.constraints import DisplacementConstraints, LoadState
 from solvers.fem.finite_strain.load_path import LoadPath
-from solvers.fem.finite_strain.load_state import LoadState
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem

@@ -1,4 +1,4 @@
-"""Prescribed values of functionals of the displacements, rigid or through springs."""
+"""Displacements and forces at one stage of the load, and the constraints, rigid or through springs."""
 
 from dataclasses import dataclass
 
@@ -9,6 +9,23 @@ from solvers.assimilation.misfit import Misfit
 from solvers.fem.boundary_conditions import load_functionals, load_targets, marker_functionals
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class LoadState:
+    """A state of the finger, in equilibrium or a guess.
+
+    Attributes:
+        fraction: Fraction of the load.
+        nodal: Displacements, shape (N, 2), mm.
+        forces: Multipliers of the constraints, shape (k,), N/mm.
+        contact: Forces of the cylinder on the nodes of the front, shape (m,), N/mm; empty without one.
+    """
+
+    fraction: float
+    nodal: FloatArray
+    forces: FloatArray
+    contact: FloatArray
 
 
 @dataclass(frozen=True, eq=False)

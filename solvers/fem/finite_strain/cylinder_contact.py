@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
-from solvers.fem.finite_strain.load_state import LoadState
+from solvers.fem.finite_strain.constraints import LoadState
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem, contact_ends
 

@@ -17,10 +17,10 @@ from geometry.mesh.quadrature import body_quadrature
 from solvers.constrained_elimination import ConstrainedElimination
 from solvers.elasticity import Lame, deformation_jacobian, energy_density_of
 from solvers.fem.boundary_conditions import dirichlet_displacement, dirichlet_mask
-from solvers.fem.dolfinx_compat import DistributedSpace, Factorisation
-from solvers.fem.finite_strain.constraints import DisplacementConstraints
+from solvers.fem.dolfinx_compat import DistributedSpace
+from solvers.fem.finite_strain.constraints import DisplacementConstraints, LoadState
 from solvers.fem.finite_strain.cylinder_contact import CylinderContact
-from solvers.fem.finite_strain.load_state import LoadState
+from solvers.fem.linear_solvers import Factorisation
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 

@@ -9,11 +9,10 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from solvers.fem.error_estimate import ErrorEstimator
+from solvers.fem.error_estimate import ErrorEstimator, locking_advice
 from solvers.fem.finite_strain.constraints import DisplacementConstraints
 from solvers.fem.finite_strain.cylinder_contact import ContactRegion
 from solvers.fem.finite_strain.load_path import LoadPath
-from solvers.fem.locking import locking_advice
 from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem

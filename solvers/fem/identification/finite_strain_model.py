@@ -7,8 +7,8 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from solvers.elasticity import Lame, lame_derivatives
+from solvers.fem.finite_strain.constraints import LoadState
 from solvers.fem.finite_strain.load_path import LoadPath
-from solvers.fem.finite_strain.load_state import LoadState
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification.parameters import problem_with
 from solvers.fem.identification.response import Response

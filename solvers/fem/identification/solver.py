@@ -15,9 +15,8 @@ from solvers.assimilation.misfit import leave_one_out_displacements
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification.finite_strain_model import PARAMETERS, FiniteStrainModel
 from solvers.fem.identification.linear_model import LinearModel
-from solvers.fem.identification.observation_model import ObservationModel
 from solvers.fem.identification.parameters import parameters_of, parse_parameters, problem_with
-from solvers.fem.identification.response import Response
+from solvers.fem.identification.response import ObservationModel, Response
 from solvers.fem.identification.summary import sentence
 from solvers.fem.linear import FemSolver
 from solvers.lagrange import LagrangeField, LagrangeSpace
