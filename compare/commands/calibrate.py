@@ -39,12 +39,12 @@ def calibrate(
         out: Camera file, .json or .yaml.
     """
     from compare.camera.calibration_report import calibration_table, draw_calibration, view_table
-    from vision.calibration.board_parser import parse_board
     from vision.calibration.camera_calibration import better_lens
     from vision.calibration.camera_calibration import calibrate as calibrated
     from vision.calibration.camera_file import check_format, save_calibration
+    from vision.calibration.charuco import parse_board
     from vision.calibration.lens_fit import LensChoice
-    from vision.calibration.photographs import photographs
+    from vision.frames.sources import photographs
 
     check_format(out)
     if not images:

@@ -144,7 +144,7 @@ class BoardOptions:
 
     def read(self) -> "Board":
         """The board."""
-        from vision.calibration.board_parser import parse_board
+        from vision.calibration.charuco import parse_board
 
         if not 0 <= self.boards <= 1000:
             raise UserError(f"--boards {self.boards}: give 0 to 1000 photographs")

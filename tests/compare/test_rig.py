@@ -7,8 +7,7 @@ import pytest
 
 from compare.cli import main
 from vision.calibration.chessboard import Board
-from vision.calibration.photographs import photographs
-from vision.frames.sources import open_frames
+from vision.frames.sources import open_frames, photographs
 from vision.measurements import read_measurements
 
 QUICK = "--mesh-size 1 --size 480x270 --rest 2 --moving 0 --held 2"

@@ -6,10 +6,9 @@ import pytest
 
 from geometry.errors import UserError
 from tests.vision.chessboards import drawn
-from vision.calibration.board_parser import parse_board
-from vision.calibration.charuco import CharucoBoard
+from vision.calibration.charuco import CharucoBoard, parse_board
 from vision.calibration.chessboard import Board
-from vision.calibration.photographs import photographs
+from vision.frames.sources import photographs
 
 SMALL = Board(5, 4, 10.0)
 TO_PIXELS = np.array([[4.2, 0.7, 90.0], [-0.5, 3.9, 75.0], [1e-3, -6e-4, 1.0]])

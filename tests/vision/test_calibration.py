@@ -16,7 +16,7 @@ from vision.calibration.camera_calibration import better_lens, calibrate, calibr
 from vision.calibration.camera_file import load_camera
 from vision.calibration.chessboard import Board
 from vision.calibration.lens_fit import LensChoice
-from vision.calibration.photographs import photographs
+from vision.frames.sources import photographs
 
 SIZE = (CAMERA.width, CAMERA.height)
 NOISE = 0.05

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from vision.calibration.photographs import FRAMES_OF_A_VIDEO, photographs
+from vision.frames.sources import FRAMES_OF_A_VIDEO, photographs
 from vision.frames.video import video_writer
 
 

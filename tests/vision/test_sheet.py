@@ -5,8 +5,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 
 from geometry.finger.design import Design
-from vision.tracking.fiducial_sheet import workspace_svg
-from vision.tracking.workspace import default_workspace
+from vision.tracking.workspace import default_workspace, workspace_svg
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -1,5 +1,6 @@
 """ChArUco boards: chessboards with a marker in every white square, any part of which may be seen."""
 
+import re
 from dataclasses import dataclass
 
 import cv2
@@ -103,3 +104,27 @@ def _markers_seen(image: GreyImage, dictionary: str) -> int:
     detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(DICTIONARIES[dictionary]))
     _, numbers, _ = detector.detectMarkers(image)
     return 0 if numbers is None else len(numbers)
+
+
+def parse_board(
+    text: str, square: float, *, marker: float | None = None, dictionary: str = "5X5_100"
+) -> Board:
+    """Parse 9x6, a chessboard by inner corners, or charuco:8x6, a ChArUco board by squares; sides in mm.
+
+    Raises:
+        UserError: If the text names no possible board.
+    """
+    if not (found := re.fullmatch(r"(charuco:)?(\d{1,3})x(\d{1,3})", text.strip(), re.IGNORECASE)):
+        raise UserError(
+            f"cannot read the board {text!r}; give its inner corners, such as 9x6, or the squares of a "
+            "ChArUco board, such as charuco:8x6"
+        )
+    columns, rows = int(found[2]), int(found[3])
+    if not found[1]:
+        if marker is not None:
+            raise UserError(f"the chessboard {text} has no markers; for a ChArUco board give charuco:{text}")
+        return Board(columns, rows, square)
+    if marker is None:
+        raise UserError(f"the board {text} has markers; give their side in mm by --marker")
+    name = dictionary.upper().removeprefix("DICT_")
+    return CharucoBoard(columns - 1, rows - 1, square, marker, name)

@@ -2,7 +2,7 @@
 
 Images are uint8, shape (height, width) in grey or (height, width, 3) in blue, green, red. They are as the
 sensor read them: a rotation in a file's metadata is ignored, in films and in photographs
-(`vision.calibration.photographs`), so that one calibration fits both.
+(`vision.frames.sources`), so that one calibration fits both.
 """
 
 from collections.abc import Generator, Iterator

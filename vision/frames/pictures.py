@@ -3,8 +3,10 @@
 import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from glob import glob, has_magic
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -12,7 +14,6 @@ import numpy as np
 from geometry.atomic import atomic_path
 from geometry.errors import UserError
 from vision.frames.frame import CapturedImage, Image, ImageStream
-from vision.frames.quiet_opencv import silenced
 
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm", ".jp2"})
 JPEG, PNG, PNG_END = b"\xff\xd8", b"\x89PNG\r\n\x1a\n", b"\0\0\0\0IEND\xaeB`\x82"
@@ -22,6 +23,18 @@ DEPTHS = (10, 12, 14, 16)
 _JPEG_MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]", re.DOTALL)
 """Starts a segment of a JPEG; the excluded ones may stand within its compressed data."""
 _AS_STORED = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
+
+
+@contextmanager
+def silenced() -> Iterator[None]:
+    """Keeps OpenCV's messages off standard error: the caller reports what they mean to a user."""
+    opencv: Any = cv2
+    logging = opencv if hasattr(opencv, "setLogLevel") else opencv.utils.logging  # OpenCV 4 and 5
+    level = logging.setLogLevel(0)
+    try:
+        yield
+    finally:
+        logging.setLogLevel(level)
 
 
 def natural_order(path: Path) -> list[tuple[int, str]]:

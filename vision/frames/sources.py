@@ -1,20 +1,36 @@
-"""Frames of any source: a video file, pictures, a camera or a pipe."""
+"""Frames and photographs of any source: a video file, pictures, a camera or a pipe."""
 
 import os
 import re
 import sys
+import time
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from glob import has_magic
+from itertools import chain, count
 from pathlib import Path
 
+import cv2
+import numpy as np
+
 from geometry.errors import UserError
-from vision.frames.frame import DEFAULT_RATE, MAX_RATE, Frames
-from vision.frames.live_camera import camera_frames
-from vision.frames.pictures import SUFFIXES, images_of_files, images_of_pipe, picture_paths
+from vision.frames.frame import (
+    DEFAULT_RATE,
+    MAX_RATE,
+    CapturedImage,
+    Frames,
+    GreyImage,
+    Image,
+    ImageStream,
+    plausible_rate,
+)
+from vision.frames.pictures import SUFFIXES, Decoder, images_of_files, images_of_pipe, picture_paths, silenced
 from vision.frames.video import video_frames
 
 LIVE_SIZE = (1280, 720)
 """(width, height) that a camera is asked for, pixels."""
+FRAMES_OF_A_VIDEO = 40
+"""Largest number of photographs from a video, spread evenly."""
 
 
 def open_frames(
@@ -50,3 +66,70 @@ def open_frames(
         raise UserError(f"{str(source)!r}: there is no such video, picture or folder")
     paths = picture_paths(str(source))
     return Frames(str(source), images_of_files(paths, usual), rate=usual, count=len(paths))
+
+
+def camera_frames(index: int, *, size: tuple[int, int], rate: float | None = None) -> Frames:
+    """Frames of a camera as they come, by OpenCV; it is asked for a size, (width, height), and a rate.
+
+    PyAV opens Video4Linux devices, too, but refuses a camera without the requested format.
+
+    Raises:
+        UserError: If there is no such camera; on iterating, if it stops.
+    """
+    with silenced():
+        capture = cv2.VideoCapture(index)
+    if not capture.isOpened():
+        raise UserError(f"camera {index} cannot be opened; is it connected, and not used by another program?")
+    capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*"MJPG"))  # over USB, raw images come slower
+    capture.set(cv2.CAP_PROP_FRAME_WIDTH, size[0])
+    capture.set(cv2.CAP_PROP_FRAME_HEIGHT, size[1])
+    if rate is not None:
+        capture.set(cv2.CAP_PROP_FPS, rate)
+    rate = plausible_rate(capture.get(cv2.CAP_PROP_FPS), rate)
+    return Frames(f"camera {index}", _images_of_camera(index, capture), rate=rate)
+
+
+def _images_of_camera(index: int, capture: cv2.VideoCapture) -> ImageStream:
+    try:
+        for number in count():
+            with silenced():
+                done, image = capture.read()
+            if not done:
+                raise UserError(f"camera {index} gives no image after {number} frames")
+            yield CapturedImage(np.asarray(image, dtype=np.uint8), time.monotonic(), f"frame {number}")
+    finally:
+        capture.release()
+
+
+def photographs(sources: Iterable[Path], *, without: Sequence[str] = ()) -> Iterator[tuple[str, GreyImage]]:
+    """Names and photographs, shape (height, width), as the sensor read them: never turned.
+
+    Args:
+        sources: Pictures, folders of them, patterns such as photos/*.jpg, or videos.
+        without: Names to leave out, with or without their folders.
+
+    Raises:
+        UserError: If a source cannot be read, or there is no photograph of a name in `without`.
+    """
+    absent = set(without)
+    for name, image in chain.from_iterable(map(_images, sources)):
+        names = {name, Path(name).name}
+        if names.isdisjoint(without):
+            grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+            yield name, np.asarray(grey, dtype=np.uint8)
+        absent -= names
+    if absent:
+        raise UserError(f"there is no photograph {', '.join(sorted(absent))} to leave out")
+
+
+def _images(source: Path) -> Iterator[tuple[str, Image]]:
+    """Names and images of one source."""
+    if not source.is_file() or source.suffix.lower() in SUFFIXES:
+        for path in picture_paths(source):
+            yield str(path), Decoder().file(path)
+        return
+    with open_frames(source) as frames:
+        every = max(1, (frames.count or 0) // FRAMES_OF_A_VIDEO)
+        for frame in frames:
+            if frame.number % every == 0:
+                yield f"{source}:{frame.number}", frame.image

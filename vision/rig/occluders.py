@@ -11,7 +11,7 @@ from geometry.errors import UserError
 from vision.calibration.camera import Camera, Pose
 from vision.rig.bench import Bench
 from vision.rig.motion import Motion
-from vision.rig.pixel_coverage import pixel_coverage
+from vision.rig.render import pixel_coverage
 from vision.rig.shapes import Paint, Shape, area, closed, seen_edges
 
 CABLES: dict[str, Paint] = {"dark": (0.10, 0.10, 0.11), "light": (0.52, 0.50, 0.50)}

@@ -18,7 +18,7 @@ from vision.measurements import write_measurements
 from vision.rig.recording import FrameTruth, Recording
 from vision.rig.render import render
 from vision.rig.shapes import Scene
-from vision.tracking.fiducial_sheet import workspace_svg
+from vision.tracking.workspace import workspace_svg
 
 PICTURES = "png"
 FILES = {codec.lower(): f"video{suffix}" for suffix, codec in CODECS.items()} | {PICTURES: "frames"}

@@ -1,4 +1,4 @@
-"""Workspaces: layouts of fiducials around the finger, at known places in its frame, and their JSON files.
+"""Workspaces: layouts of fiducials around the finger, at known places in its frame; JSON and print.
 
 The fiducials are dark discs, printed or drilled, that do not move with the finger. Their layout must have no
 symmetry of rotation or reflection, so that their places identify them even if some are hidden. Units: mm.
@@ -15,9 +15,12 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.finger.parameters import Parameters
+from geometry.finger.section import finger_section
 
 MARGIN = 12.0
 """Distance of the fiducials from the finger's bounding box before loading."""
+SHEET_MARGIN, RULER = 10.0, 50.0
+"""White space around the printed fiducials, and length of the line to measure on the print."""
 
 Point = tuple[float, float]
 
@@ -90,3 +93,34 @@ def load_workspace(path: Path) -> Workspace:
         return Workspace(**content)
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
+
+
+def workspace_svg(workspace: Workspace, parameters: Parameters) -> str:
+    """SVG of the fiducials, the finger's outline between them, and a ruler; one user unit is 1 mm, y up."""
+    radius = workspace.fiducial_diameter / 2
+    left, bottom = workspace.points.min(axis=0) - radius - SHEET_MARGIN
+    right, top = workspace.points.max(axis=0) + radius + SHEET_MARGIN
+    width, height = right - left, top - bottom
+    discs = "\n".join(
+        f'    <circle cx="{x:.6g}" cy="{y:.6g}" r="{radius:.6g}"/>' for x, y in workspace.points
+    )
+    outline = " ".join(f"{x:.6f},{y:.6f}" for x, y in finger_section(parameters).outer)
+    middle = (left + right) / 2
+    start, end, base = middle - RULER / 2, middle + RULER / 2, bottom + 4
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+<svg xmlns="http://www.w3.org/2000/svg" width="{width:.6g}mm" height="{height:.6g}mm"
+     viewBox="{left:.6g} {-top:.6g} {width:.6g} {height:.6g}">
+  <title>fiducials of {parameters.name}</title>
+  <g transform="scale(1 -1)">
+  <g id="fiducials" fill="black">
+{discs}
+  </g>
+  <g fill="none" stroke="#909090" stroke-width="0.2">
+    <polygon id="finger" points="{outline}"/>
+    <line id="ruler" x1="{start:.6g}" x2="{end:.6g}" y1="{base:.6g}" y2="{base:.6g}"/>
+  </g>
+  </g>
+  <text x="{middle:.6g}" y="{-bottom - 5:.6g}" font-size="3" text-anchor="middle"
+        fill="#606060">print at 100 %: this line is {RULER:g} mm long</text>
+</svg>
+"""

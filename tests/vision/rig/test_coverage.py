@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shapely import Polygon, box
 
-from vision.rig.pixel_coverage import pixel_coverage
+from vision.rig.render import pixel_coverage
 from vision.rig.shapes import circle, closed, rectangle
 
 SIZE = (14, 11)
