@@ -5,7 +5,6 @@ A view is the corners in one photograph, in the order of the board, shape (n, 2)
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -21,22 +20,13 @@ MAX_SUGGESTIONS = 8
 """Photographs without the expected board that are searched for another one."""
 
 
-class BoardViews(NamedTuple):
-    """Views of a board in photographs.
-
-    Attributes:
-        views: By the name of the photograph.
-        size: (width, height) of all photographs.
-        boardless: Names of the photographs without a board.
-    """
-
-    views: dict[str, FloatArray]
-    size: tuple[int, int]
-    boardless: tuple[str, ...]
-
-
-def find_views(images: Iterable[tuple[str, GreyImage]], board: Board) -> BoardViews:
+def find_views(
+    images: Iterable[tuple[str, GreyImage]], board: Board
+) -> tuple[dict[str, FloatArray], tuple[int, int], tuple[str, ...]]:
     """Find a board in photographs; only one is in memory at a time.
+
+    Returns:
+        The views by the name of the photograph, (width, height) of all, and names of those without the board.
 
     Raises:
         UserError: If the sizes differ, or most photographs show a board of another size.
@@ -68,7 +58,7 @@ def find_views(images: Iterable[tuple[str, GreyImage]], board: Board) -> BoardVi
             f"{len(views)} of {len(views) + len(boardless)} photographs show the board of {board}; "
             f"{votes} seem to show {other}"
         )
-    return BoardViews(views, size, tuple(boardless))
+    return views, size, tuple(boardless)
 
 
 def corner_observations(views: Sequence[FloatArray] | FloatArray, board: Board) -> CornerObservations:

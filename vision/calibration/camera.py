@@ -191,12 +191,7 @@ class Camera:
         return np.asarray(plane * (self.fx, self.fy) + (self.cx, self.cy))
 
     def _by_intrinsics(self, plane: FloatArray, bent: FloatArray) -> FloatArray:
-        """Derivative of pixels by the intrinsics, shape (n, 2, intrinsics).
-
-        Args:
-            plane: Points of the plane at depth 1 before the lens, shape (n, 2).
-            bent: The same points behind the lens, shape (n, 2).
-        """
+        """Derivative of pixels by the intrinsics, shape (n, 2, intrinsics), at points before the lens."""
         zero, one = np.zeros(len(bent)), np.ones(len(bent))
         by_pinhole = [[bent[:, 0], zero, one, zero], [zero, bent[:, 1], zero, one]]
         by_lens = np.array([[self.fx], [self.fy]]) * self.lens.by_coefficients(plane)

@@ -72,17 +72,10 @@ def load_camera(path: Path) -> Camera:
     model = "fisheye" if storage.getNode("fisheye_model").real() else "brown"
     sizes = (4,) if model == "fisheye" else (4, 5)
     distortion = _matrix(storage, "distortion_coefficients", path, sizes=sizes)
+    coefficients = tuple(np.resize([*distortion, 0.0], max(sizes)).tolist())
+    fx, fy, cx, cy = matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
     try:
-        camera = Camera(
-            width=width,
-            height=height,
-            fx=float(matrix[0, 0]),
-            fy=float(matrix[1, 1]),
-            cx=float(matrix[0, 2]),
-            cy=float(matrix[1, 2]),
-            distortion=tuple(np.resize([*distortion, 0.0], max(sizes)).tolist()),
-            model=model,
-        )
+        camera = Camera(width, height, fx, fy, cx, cy, coefficients, model)
         return replace(camera, covariance=_covariance(storage, len(camera.intrinsic_names), path))
     except UserError as error:
         raise UserError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None

@@ -105,8 +105,9 @@ def read_colour(text: str) -> Colour:
         return Darker(float(rest)) if rest else DARK
     if re.fullmatch(rf"{number},{number}(:{number},{number}){{0,2}}", text.strip()):
         pairs = [tuple(map(float, pair.split(","))) for pair in text.strip().split(":")]
-        low, high = (tuple(side) for side in zip(*pairs, strict=True))
-        return ColourRange(_filled(low, LOWEST), _filled(high, HIGHEST))
+        pairs += list(zip(LOWEST, HIGHEST, strict=True))[len(pairs) :]
+        (dark, light), (low_a, high_a), (low_b, high_b) = pairs
+        return ColourRange((dark, low_a, low_b), (light, high_a, high_b))
     raise UserError(
         f"cannot read the colour {text!r}; give dark, dark:CONTRAST or ranges of L*, a* and b* such as "
         "20,60:40,80:-10,30"
@@ -129,8 +130,3 @@ def _lightness_of_grey() -> Image:
 def _in_8_bits(colour: Lab) -> FloatArray:
     """OpenCV's encoding, rounded, shape (3,)."""
     return np.asarray(np.rint(np.array(colour) * (2.55, 1, 1) + (0, 128, 128)))
-
-
-def _filled(given: tuple[float, ...], usual: Lab) -> Lab:
-    lightness, a, b = (*given, *usual[len(given) :])
-    return lightness, a, b

@@ -79,12 +79,7 @@ def _example(lab: FloatArray, place: Sequence[float]) -> BoolArray:
 
 
 def _width(beyond: FloatArray, least: FloatArray) -> FloatArray:
-    """Width of the range to one side, shape (3,).
-
-    Args:
-        beyond: Distance of the surroundings to that side, shape (n, 3).
-        least: Distances below these are the marker's own noise, shape (3,).
-    """
+    """Width of the range, shape (3,), to a side with the surroundings `beyond`; `least` is the noise."""
     widths = np.full(3, USUAL_WIDTH)
     for channel in range(3):
         other = beyond[beyond[:, channel] > least[channel], channel]

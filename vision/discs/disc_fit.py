@@ -12,18 +12,7 @@ from numpy.typing import ArrayLike
 
 from geometry.arrays import BoolArray, FloatArray, frozen_array
 from geometry.errors import UserError
-from vision.discs.disc_image_model import (
-    BLUR,
-    CONTRAST,
-    RADIUS,
-    SHADE_X,
-    SHADE_Y,
-    SLANT,
-    STRETCH,
-    WIDTH,
-    X,
-    Y,
-)
+from vision.discs import disc_image_model as model
 from vision.discs.fit_stages import fit_discs_of_one_size
 from vision.discs.least_squares import DiscFit
 from vision.frames.frame import GreyImage
@@ -97,7 +86,7 @@ def fit_discs(grey: GreyImage, guesses: ArrayLike, *, radii: ArrayLike | None = 
     if not (guesses[:, 2] > 0).all() or not (known > 0).all():
         raise UserError("the radius of a disc must be above zero")
     tolerance = np.inf if radii is None else KNOWN_RADIUS
-    fit = DiscFit.start(np.zeros((len(guesses), WIDTH)), np.zeros((len(guesses), 2), dtype=np.int64))
+    fit = DiscFit.start(np.zeros((len(guesses), model.WIDTH)), np.zeros((len(guesses), 2), dtype=np.int64))
     sizes = np.rint(np.log(known) / np.log(1.4))
     for size in np.unique(sizes):  # discs of one size share the shape of their windows
         (alike,) = np.nonzero(sizes == size)
@@ -108,11 +97,15 @@ def fit_discs(grey: GreyImage, guesses: ArrayLike, *, radii: ArrayLike | None = 
 def _accepted(fit: DiscFit, guesses: FloatArray, least_seen: float) -> FittedDiscs:
     """The fitted discs, with NaN for those that fail a check."""
     parameters = fit.parameters
-    shade, blur, radii = parameters[:, [SHADE_X, SHADE_Y]], parameters[:, BLUR], parameters[:, RADIUS]
+    shade, blur, radii = (
+        parameters[:, [model.SHADE_X, model.SHADE_Y]],
+        parameters[:, model.BLUR],
+        parameters[:, model.RADIUS],
+    )
     # The gradient of the light is blurred as well, which shifts the image of the disc.
-    centres = fit.origins + parameters[:, [X, Y]] + blur[:, None] ** 2 * shade
+    centres = fit.origins + parameters[:, [model.X, model.Y]] + blur[:, None] ** 2 * shade
     deviations = np.sqrt(np.linalg.eigvalsh(fit.covariances)[:, 1])
-    contrast = parameters[:, CONTRAST]
+    contrast = parameters[:, model.CONTRAST]
     ratio = radii / guesses[:, 2]
     found = (
         fit.settled
@@ -128,7 +121,7 @@ def _accepted(fit: DiscFit, guesses: FloatArray, least_seen: float) -> FittedDis
         centres=centres * kept[:, None],
         covariances=fit.covariances * kept[:, None, None],
         radii=radii * kept,
-        shapes=parameters[:, [STRETCH, SLANT]] * kept[:, None],
+        shapes=parameters[:, [model.STRETCH, model.SLANT]] * kept[:, None],
         contrast=contrast * kept,
         blur=blur * kept,
         seen=fit.seen,

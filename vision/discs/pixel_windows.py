@@ -64,13 +64,8 @@ class PixelWindows:
 
     def at(self, places: IntArray) -> "PixelWindows":
         """The pixels of some discs."""
-        return replace(
-            self,
-            origins=self.origins[places],
-            values=self.values[places],
-            within=self.within[places],
-            noise=self.noise[places],
-        )
+        by_disc = ("origins", "values", "within", "noise")
+        return replace(self, **{name: getattr(self, name)[places] for name in by_disc})
 
     def smoothed(self, values: Array, size: int) -> Array:
         """Means over `size`² pixels, with zero outside the ring, shape (n, p)."""

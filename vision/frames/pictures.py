@@ -43,36 +43,27 @@ def natural_order(path: Path) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts]
 
 
-def pictures_in(folder: Path) -> list[Path]:
-    """The pictures of a folder in natural order, without other files and hidden ones.
-
-    Raises:
-        UserError: If there is none.
-    """
-    found = [
-        path
-        for path in folder.iterdir()
-        if path.suffix.lower() in SUFFIXES and not path.name.startswith(".") and path.is_file()
-    ]
-    if not found:
-        raise UserError(f"{folder} holds no picture, such as PNG or JPEG")
-    return sorted(found, key=natural_order)
-
-
 def picture_paths(source: str | Path) -> list[Path]:
-    """The pictures of a folder or of a glob in natural order, or the one file that `source` names.
+    """The pictures of a folder, but hidden ones, or of a glob, in natural order, or the file `source` itself.
 
     Raises:
         UserError: If there is none.
     """
     path = Path(source)
     if path.is_dir():
-        return pictures_in(path)
-    if path.exists() or not has_magic(str(source)):
-        return [path]
-    if found := sorted(filter(Path.is_file, map(Path, glob(str(source)))), key=natural_order):
-        return found
-    raise UserError(f"{str(source)!r}: there is no such picture")
+        shown = (file for file in path.iterdir() if not file.name.startswith("."))
+        found = [file for file in shown if file.suffix.lower() in SUFFIXES and file.is_file()]
+    elif path.exists() or not has_magic(str(source)):
+        found = [path]
+    else:
+        found = [file for file in map(Path, glob(str(source))) if file.is_file()]
+    if not found:
+        raise UserError(
+            f"{path} holds no picture, such as PNG or JPEG"
+            if path.is_dir()
+            else f"{str(source)!r}: there is no such picture"
+        )
+    return sorted(found, key=natural_order)
 
 
 def images_of_files(paths: Sequence[Path], rate: float) -> ImageStream:

@@ -25,12 +25,7 @@ class Exposure(CheckedModel):
     blur: float = bounded(0.8, 0, 20, "px", "", "Standard deviation of the blur of the lens")
     noise: float = bounded(1.0, 0, 100, "grey levels", "", "Standard deviation of the read noise")
     full_well: float | None = bounded(
-        None,
-        100,
-        1e9,
-        "electrons",
-        "",
-        "Electrons at grey level 255; none: no photon noise",
+        None, 100, 1e9, "electrons", "", "Electrons at grey level 255; none: no photon noise"
     )
     white: float = bounded(
         235.0, 10, 1000, "grey levels", "", "Grey level of white in the middle of the image"

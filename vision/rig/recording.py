@@ -43,11 +43,6 @@ class FrameTruth(NamedTuple):
     seen: FloatArray
 
 
-def nothing(frame: int) -> Sequence[Shape]:
-    """No occluders in any frame."""
-    return ()
-
-
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Settings of a film; `frames` renders it.
@@ -66,7 +61,7 @@ class Recording:
     pose: Pose
     exposure: Exposure = Exposure()
     motion: Motion = Motion()
-    occluders: Callable[[int], Sequence[Shape]] = nothing
+    occluders: Callable[[int], Sequence[Shape]] = lambda frame: ()
     seed: int = 0
 
     def frames(self) -> Iterator[tuple[Image, FrameTruth]]:

@@ -1,7 +1,7 @@
 """Files of a recording: the video, the truth, and the inputs of a tracker."""
 
 import csv
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from vision.frames.frame import Image
 from vision.frames.pictures import write_picture
 from vision.frames.video import CODECS, video_writer
 from vision.measurements import write_measurements
-from vision.rig.recording import FrameTruth, Recording
+from vision.rig.recording import Recording
 from vision.rig.render import render
 from vision.rig.shapes import Scene
 from vision.tracking.workspace import workspace_svg
@@ -62,7 +62,9 @@ def record(
         table.writerow(TRUTH_COLUMNS)
         for number, (image, truth) in enumerate(recording.frames()):
             write(image)
-            table.writerows(_rows(number, number / rate, truth))
+            markers = np.column_stack([truth.world, truth.pixels, truth.discs, truth.seen]).tolist()
+            known = (number, number / rate, truth.load)
+            table.writerows((*known, marker, *values) for marker, values in enumerate(markers, start=1))
             progress((number + 1) / count, f"{number + 1} of {count} frames")
     write_measurements(folder / "observations_true.csv", recording.observations(source))
     of_discs = recording.observations(f"{source}; middles of the markers' discs", discs=True)
@@ -94,14 +96,10 @@ def photograph(
     Their frame numbers, and so their noise, follow those of the recording.
     """
     folder.mkdir()
+    first = len(recording.motion)
     for number, pose in enumerate(poses):
         image = render(
-            scene,
-            recording.camera,
-            pose,
-            recording.exposure,
-            seed=recording.seed,
-            frame=len(recording.motion) + number,
+            scene, recording.camera, pose, recording.exposure, seed=recording.seed, frame=first + number
         )
         write_picture(folder / f"{number:03d}.png", image)
         progress((number + 1) / len(poses), f"{number + 1} of {len(poses)} photographs")
@@ -115,12 +113,6 @@ def _writer(recording: Recording, place: Path, stack: ExitStack) -> Callable[[Im
     place.mkdir()
     names = (place / f"{number:06d}.png" for number in range(len(recording.motion)))
     return lambda image: write_picture(next(names), image)
-
-
-def _rows(number: int, time: float, truth: FrameTruth) -> Iterator[tuple[float, ...]]:
-    markers = np.column_stack([truth.world, truth.pixels, truth.discs, truth.seen]).tolist()
-    for marker, values in enumerate(markers, start=1):
-        yield (number, time, truth.load, marker, *values)
 
 
 def _settings(recording: Recording) -> dict[str, object]:

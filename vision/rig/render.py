@@ -34,7 +34,7 @@ def render(
     Returns:
         Shape (height, width, 3), BGR, or (height, width) if the exposure is monochrome.
     """
-    light = light_of(scene, camera, pose, exposure.blur)
+    light = mean_light([scene], camera, pose, exposure.blur)
     return exposure.develop(light, noise_of(seed, frame))
 
 
@@ -43,25 +43,18 @@ def noise_of(seed: int, frame: int) -> np.random.Generator:
     return np.random.default_rng([seed, frame])
 
 
-def light_of(scene: Scene, camera: Camera, pose: Pose, blur: float) -> Light:
-    """The light of a scene on the pixels: its integral over each, through a lens with this blur, pixels."""
-    return mean_light([scene], camera, pose, blur)
-
-
 def mean_light(scenes: Sequence[Scene], camera: Camera, pose: Pose, blur: float) -> Light:
-    """The mean light of scenes, as of a finger that moves while the shutter is open; see `light_of`."""
-    cells = fineness(blur)
+    """The mean light of scenes on the pixels: its integral over each, through a lens with this blur, pixels.
+
+    Several scenes are a finger that moves while the shutter is open.
+    """
+    cells = int(np.clip(np.ceil(2 / blur), 2, 4)) if blur else 1  # along a side of a pixel
     size = (camera.width * cells, camera.height * cells)
     canvas = _painted(scenes[0], camera, pose, cells, size)
     for scene in scenes[1:]:
         canvas += _painted(scene, camera, pose, cells, size)
     canvas /= len(scenes)
     return _on_pixels(canvas, blur, cells)
-
-
-def fineness(blur: float) -> int:
-    """Cells along a side of a pixel, enough to resolve the blur."""
-    return int(np.clip(np.ceil(2 / blur), 2, 4)) if blur else 1
 
 
 def _painted(scene: Scene, camera: Camera, pose: Pose, cells: int, size: tuple[int, int]) -> Light:

@@ -14,15 +14,8 @@ RIM = 0.06
 def default_camera(width: int = 1280, height: int = 720) -> Camera:
     """A camera with slight barrel distortion; without a covariance."""
     focus = 1.02 * width
-    return Camera(
-        width=width,
-        height=height,
-        fx=focus,
-        fy=focus,
-        cx=0.507 * width,
-        cy=0.491 * height,
-        distortion=(-0.1, 0.02, 5e-4, -3e-4, 0.0),
-    )
+    distortion = (-0.1, 0.02, 5e-4, -3e-4, 0.0)
+    return Camera(width, height, focus, focus, 0.507 * width, 0.491 * height, distortion)
 
 
 def viewing_pose(

@@ -47,10 +47,8 @@ def annotated(
     ):
         colour = SEEN if np.isfinite(seen) else LOST
         if not np.isfinite(seen):
-            centre = (round(float(guess[0])), round(float(guess[1])))
-            cv2.drawMarker(
-                canvas, centre, LOST, cv2.MARKER_TILTED_CROSS, round(16 * size), width, cv2.LINE_AA
-            )
+            centre, cross = np.rint(guess).astype(int).tolist(), cv2.MARKER_TILTED_CROSS
+            cv2.drawMarker(canvas, centre, LOST, cross, round(16 * size), width, cv2.LINE_AA)
         _write(canvas, str(number), guess + size * np.array([-5, -14]), 0.55 * size, colour)
     for number, line in enumerate(text):
         _write(canvas, line, size * np.array([14, 26 + 24 * number]), 0.6 * size, (30, 30, 30))

@@ -53,11 +53,8 @@ def mean_detections(frames: Sequence[DiscDetections], method: DetectionMethod) -
 def _kept(away: FloatArray, weights: FloatArray, count: IntArray, noise: FloatArray) -> FloatArray:
     """Share of a frame's covariance that the mean over frames keeps, shape (m,).
 
-    Args:
-        away: Discs relative to their means, shape (f, m, 2), pixels; nan where one was not detected.
-        weights: Inverse covariances, shape (f, m, 2, 2), 1/pixels².
-        count: Number of frames in which a disc was detected, shape (m,).
-        noise: Share of the covariance that is noise, shape (m,).
+    `away` are the discs less their means, shape (f, m, 2), nan where one was not detected, `weights` the
+    inverse covariances, `count` the frames with a disc, `noise` the share of its covariance that is noise.
     """
     squares, steps = _squares(away, weights), np.diff(away, axis=0)
     freedom, pairs = 2 * (count - 1), np.isfinite(steps[..., 0]).sum(axis=0)

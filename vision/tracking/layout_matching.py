@@ -56,9 +56,3 @@ def match_layout(pixels: FloatArray, radii: FloatArray, markers: FloatArray, dia
             "and give the design, the workspace and the markers' colour"
         )
     return best
-
-
-def has_half_turn_symmetry(markers: FloatArray) -> bool:
-    """True if a half turn maps the markers, shape (m, 2), to themselves."""
-    middle = markers.mean(axis=0)
-    return bool(np.allclose(2 * middle - markers[::-1], markers))

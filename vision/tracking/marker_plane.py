@@ -32,15 +32,12 @@ class PlaneProjection(Protocol):
 
     def pixels(self, points: FloatArray, parameters: FloatArray) -> FloatArray:
         """Project points of the plane, shape (n, 2), mm, to pixels, shape (n, 2)."""
-        ...
 
     def points(self, pixels: FloatArray, parameters: FloatArray) -> FloatArray:
         """The inverse of `pixels`."""
-        ...
 
     def jacobians(self, points: FloatArray, parameters: FloatArray) -> Jacobians:
         """Derivatives of `pixels`."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +45,7 @@ class MarkerPlane:
     """The markers' plane and its projection to pixels.
 
     Attributes:
-        view: How it is seen.
+        projection: To pixels.
         parameters: Shape (k,).
         covariance: Of the parameters, shape (k, k).
         residual: Root mean square residual of the fiducials, mm.

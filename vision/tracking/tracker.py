@@ -12,7 +12,6 @@ from vision.frames.frame import Frame, Frames
 from vision.tracking.camera_motion import CameraMotion, find_camera_motion
 from vision.tracking.frame_means import mean_detections
 from vision.tracking.frame_tracker import FrameDetections, FrameTracker
-from vision.tracking.layout_matching import has_half_turn_symmetry
 from vision.tracking.rest_detection import find_rest_intervals
 from vision.tracking.scene import FilmedScene
 from vision.tracking.trajectories import Tracking
@@ -109,7 +108,8 @@ def _oriented_by_motion(scene: FilmedScene, tracking: Tracking) -> Tracking:
     before, after = tracking.rest_positions
     turned = float(np.nanmean((after - before)[:, 1])) > 0
     if turned:
-        if not has_half_turn_symmetry(tracking.expected):
+        markers = tracking.expected
+        if not np.allclose(2 * markers.mean(axis=0) - markers[::-1], markers):  # by a half turn
             raise UserError(
                 "the markers move out of the front face: the image is mirrored; flip it, or show fiducials"
             )

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from geometry.errors import ShapeError
 from geometry.finger.design import Design
 from vision.rig.bench import Bench
-from vision.rig.render import light_of
+from vision.rig.render import mean_light
 from vision.rig.shapes import Scene
 from vision.rig.virtual_camera import default_camera, viewing_pose
 from vision.tracking.workspace import default_workspace
@@ -32,7 +32,7 @@ def test_every_marker_is_drawn_where_the_truth_says_it_is(bench):
     pose = viewing_pose(CAMERA, WORKSPACE)
     scene = bench.scene(displacement)
     drawn = Scene((1.0, 1.0, 1.0), scene.shapes[-9:])
-    dark = 1 - light_of(drawn, CAMERA, pose, 0.8)[:, :, 0].astype(np.float64)
+    dark = 1 - mean_light([drawn], CAMERA, pose, 0.8)[:, :, 0].astype(np.float64)
     y, x = np.mgrid[:720, :1280]
     truth = CAMERA.project(bench.markers(displacement), pose)
     for centre in truth:

@@ -9,7 +9,7 @@ from vision.calibration.charuco import CharucoBoard
 from vision.calibration.chessboard import Board
 from vision.rig.boards import INK, PAPER, board_poses, board_scene
 from vision.rig.exposure import Exposure
-from vision.rig.render import light_of, render
+from vision.rig.render import mean_light, render
 from vision.rig.virtual_camera import default_camera
 
 CAMERA = default_camera(960, 540)
@@ -36,7 +36,7 @@ def test_the_corners_of_a_board_are_found_where_they_are(board, limit):
 
 def test_the_squares_of_a_board_leave_no_seam():
     (pose,) = board_poses(CHARUCO, CAMERA, 1, seed=1)
-    light = light_of(board_scene(CHARUCO), CAMERA, pose, 0.0)
+    light = mean_light([board_scene(CHARUCO)], CAMERA, pose, 0.0)
     assert light.min() == pytest.approx(INK[2], abs=1e-5)
     assert light.max() == pytest.approx(PAPER[1], abs=1e-5)
 

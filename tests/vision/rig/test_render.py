@@ -7,7 +7,7 @@ from scipy.special import erf
 from geometry.errors import UserError
 from vision.calibration.camera import Camera, Pose
 from vision.rig.exposure import Exposure
-from vision.rig.render import light_of, noise_of, render
+from vision.rig.render import mean_light, noise_of, render
 from vision.rig.shapes import Scene, Shape, circle, closed, rectangle
 
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
@@ -19,7 +19,7 @@ PLAIN = Exposure(white=200, gradient=0, blur=0, noise=0)
 
 
 def light(shape, camera, pose, blur=0.0):
-    return light_of(Scene(BLACK, [shape]), camera, pose, blur)[:, :, 0].astype(np.float64)
+    return mean_light([Scene(BLACK, [shape])], camera, pose, blur)[:, :, 0].astype(np.float64)
 
 
 @pytest.mark.parametrize("blur", [0.0, 0.5, 0.8, 1.5, 3.0])
