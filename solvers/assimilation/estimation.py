@@ -155,13 +155,10 @@ class Estimate:
         return np.asarray(self.resolution >= MIN_RESOLUTION)
 
     def left_out(self, rows: IntArray) -> FloatArray:
-        """Leave-one-out residuals over φ σ, to first order: (I - H)^-1 r.
+        """Residuals over φ σ of observations left out together, shape (k,), to first order: (I - H)^-1 r.
 
         H = A (A^T A + 1)^-1 A^T; exact for a linear model and the same φ (D. M. Allen, Technometrics 16
         (1974) 125-127).
-
-        Args:
-            rows: Observations left out together, shape (k,).
         """
         own = self.sensitivities[rows]
         return np.linalg.solve(np.eye(len(rows)) - own @ self.covariance @ own.T, self.residuals[rows])

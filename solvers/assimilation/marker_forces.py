@@ -87,9 +87,7 @@ class MarkerForces:
     def log_evidence(self, scale: float, factor: float = 1.0) -> float:
         """Log evidence of d up to a constant, for W = scale / σ² and the prior exp(-E / (factor scale)).
 
-        Args:
-            scale: Scale of the weights, N mm / mm.
-            factor: Factor of the scale.
+        The scale is in N mm / mm.
         """
         values, _ = self._modes
         spread = 1 + factor * values

@@ -1,47 +1,19 @@
 """Weighting of the markers' misfit: the settings for it, the L-curve, and the choice of a factor on it."""
 
 from dataclasses import dataclass, fields
-from typing import ClassVar, Literal, get_args
+from typing import get_args
 
 import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from solvers.assimilation.marker_forces import MarkerForces, root_mean_square
-from solvers.assimilation.misfit import Misfit, Weighting, misfit_of
+from solvers.assimilation.misfit import Choice, MarkerSettings, Misfit, Weighting, misfit_of
 from solvers.problem import Problem
 from solvers.solver import Solver
 
-Choice = Literal["given", "left-out", "evidence"]
-
 FACTORS: FloatArray = 10.0 ** np.arange(-9, 3.25, 0.25)
 """Factors of the weights on the L-curve, among which one can be chosen."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class MarkerSettings:
-    """Settings of a solver that minimises the misfit to the markers together with the energy.
-
-    Attributes:
-        weights: "paper" or "precision", see `misfit_of`.
-        asm_weight: The paper's λ_ASM, MPa/mm², for "paper".
-        scale: The model's own error as an energy per depth, N mm/mm, for "precision".
-        marker_radius: Radius of the disc over which a marker's displacement is averaged, mm; None: that of
-            the observations; 0: its centre.
-        contact_deviation: Standard deviation of the contact's displacement about the prescribed one, mm,
-            where the prior is exp(-E / scale): a spring of stiffness scale / contact_deviation² between
-            contact and indenter. Zero: the contact moves as prescribed.
-        choose: Factor of the weights. "given": one; "left-out": that of `FACTORS` with the least error at
-            markers left out one at a time; "evidence": that of the largest evidence, for "precision".
-    """
-
-    weights: Weighting = "paper"
-    asm_weight: float = 1000.0
-    scale: float = 1.0
-    marker_radius: float | None = None
-    contact_deviation: float = 0.0
-    choose: Choice = "given"
-    assimilates: ClassVar[bool] = True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,13 +65,7 @@ class MarkerWeighting(MarkerSettings):
             raise UserError(
                 f"{self.solver_name}: every point of a patch moves as prescribed; contact_deviation must be 0"
             )
-        return misfit_of(
-            problem,
-            weights=self.weights,
-            asm_weight=self.asm_weight,
-            scale=self.scale,
-            marker_radius=self.marker_radius,
-        )
+        return misfit_of(problem, self)
 
     def curve(self, forces: MarkerForces) -> dict[str, FloatArray]:
         """The L-curve: energy, misfits and, for "precision", evidence over the factors of the weights."""

@@ -15,7 +15,7 @@ for the posterior's mode.
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy.special import roots_legendre
@@ -29,6 +29,7 @@ from solvers.problem import Problem
 from solvers.solver import Solver
 
 Weighting = Literal["paper", "precision"]
+Choice = Literal["given", "left-out", "evidence"]
 
 MIN_STANDARD_DEVIATION = 0.005
 """Minimum standard deviation of an observation, mm: about that of a well-calibrated camera.
@@ -38,6 +39,39 @@ Simulated displacements have none.
 
 RINGS, ANGLES = 4, 12
 """Quadrature of a disc: Gauss points in the squared radius, equidistant angles."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MarkerSettings:
+    """Settings of a solver that minimises the misfit to the markers together with the energy.
+
+    Attributes:
+        weights: "paper": the loss λ_ASM 1/m Σ |u - d|² beside the mean energy density, times the body's area
+            A, is W = 2 A λ_ASM / m. "precision": W = scale / σ², with standard deviations σ of at least
+            `MIN_STANDARD_DEVIATION`. The minimiser of J is then the mode of the posterior for the prior
+            exp(-E / scale) and independent normal errors of the observations.
+        asm_weight: λ_ASM, MPa/mm², for "paper".
+        scale: Model error for "precision", as an energy per depth, N mm / mm: a typical deviation from the
+            model's solution has half of it in every degree of freedom.
+        marker_radius: Radius of the discs over which the displacement is averaged, mm; 0: the centres; None:
+            the observations' own; less where a marker is nearer to the boundary of the body.
+        contact_deviation: Standard deviation of the contact's displacement about the prescribed one, mm,
+            where the prior is exp(-E / scale): a spring of stiffness scale / contact_deviation² between
+            contact and indenter. Zero: the contact moves as prescribed.
+        choose: Factor of the weights. "given": one; "left-out": that of `FACTORS` with the least error at
+            markers left out one at a time; "evidence": that of the largest evidence, for "precision".
+    """
+
+    weights: Weighting = "paper"
+    asm_weight: float = 1000.0
+    scale: float = 1.0
+    marker_radius: float | None = None
+    contact_deviation: float = 0.0
+    choose: Choice = "given"
+    assimilates: ClassVar[bool] = True
+
+
+DEFAULTS = MarkerSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,39 +105,19 @@ class Misfit:
         return Misfit(points, observed, weights, self.radius)
 
 
-def misfit_of(
-    problem: Problem,
-    *,
-    weights: Weighting = "paper",
-    asm_weight: float = 1000.0,
-    scale: float = 1.0,
-    marker_radius: float | None = None,
-) -> Misfit | None:
-    """The misfit to a problem's observations; None where it has none.
-
-    Args:
-        problem: The problem with its observations; markers that were not seen are left out.
-        weights: "paper": the loss λ_ASM 1/m Σ |u - d|² beside the mean energy density, times the body's area
-            A, is W = 2 A λ_ASM / m. "precision": W = scale / σ², with standard deviations σ of at least
-            `MIN_STANDARD_DEVIATION`. The minimiser of J is then the mode of the posterior for the prior
-            exp(-E / scale) and independent normal errors of the observations.
-        asm_weight: λ_ASM, MPa/mm², for "paper".
-        scale: Model error for "precision", as an energy per depth, N mm / mm: a typical deviation from the
-            model's solution has half of it in every degree of freedom.
-        marker_radius: Radius of the discs over which the displacement is averaged, mm; None for the
-            observations' own; less where a marker is nearer to the boundary of the body.
-    """
+def misfit_of(problem: Problem, settings: MarkerSettings = DEFAULTS) -> Misfit | None:
+    """The misfit to a problem's observations; None where it has none. Markers not seen are left out."""
     observations = problem.observations
     if observations is None:
         return None
     seen = observations.visible
-    if weights == "paper":
+    if settings.weights == "paper":
         area = float(problem.mesh.areas.sum())
-        diagonal = np.full((int(seen.sum()), 2), 2 * area * asm_weight / seen.sum())
+        diagonal = np.full((int(seen.sum()), 2), 2 * area * settings.asm_weight / seen.sum())
     else:
-        diagonal = scale / standard_deviations(observations) ** 2
+        diagonal = settings.scale / standard_deviations(observations) ** 2
     points = observations.points[seen]
-    radius = observations.marker_radius if marker_radius is None else marker_radius
+    radius = observations.marker_radius if settings.marker_radius is None else settings.marker_radius
     radius = radius_within(problem.mesh, points, radius)
     return Misfit(points, observations.displacements[seen], diagonal, radius)
 
@@ -129,9 +143,7 @@ def standard_deviations(observations: Observations) -> FloatArray:
 def leave_one_out_displacements(problem: Problem, residuals: FloatArray) -> FloatArray:
     """Displacement of each marker as predicted without it, (m, 2), mm; NaN where it was not seen.
 
-    Args:
-        problem: The problem with its observations.
-        residuals: Observed minus predicted, shape (number of markers seen, 2), mm.
+    Residuals are observed minus predicted, shape (number of markers seen, 2), mm.
     """
     observations = problem.observations
     if observations is None:

@@ -14,8 +14,8 @@ from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.assimilation.marker_forces import MarkerForces
-from solvers.assimilation.marker_weighting import Choice, MarkerWeighting
-from solvers.assimilation.misfit import Misfit, Weighting, leave_one_out_displacements
+from solvers.assimilation.marker_weighting import MarkerWeighting
+from solvers.assimilation.misfit import Choice, Misfit, Weighting, leave_one_out_displacements
 from solvers.constrained_elimination import ConstrainedElimination
 from solvers.fem.boundary_conditions import marker_functionals, reaction_by_residual_work
 from solvers.fem.finite_strain.assimilation import assimilated

@@ -7,8 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from geometry.observations import Observations
-from solvers.assimilation.marker_weighting import MarkerSettings
-from solvers.assimilation.misfit import Misfit, Weighting
+from solvers.assimilation.misfit import MarkerSettings, Misfit, Weighting
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, LinearResponse
 from solvers.pinn.finite_basis.network import FiniteBasisField
 from solvers.pinn.finite_basis.newton import LoadStep

@@ -17,7 +17,13 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from geometry.observations import Observations
-from solvers.assimilation.misfit import Misfit, leave_one_out_displacements, misfit_of, standard_deviations
+from solvers.assimilation.misfit import (
+    MarkerSettings,
+    Misfit,
+    leave_one_out_displacements,
+    misfit_of,
+    standard_deviations,
+)
 from solvers.energy_and_force import energy_and_force
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
@@ -85,7 +91,7 @@ class GaussianProcessSolver:
     def _fitted(self, problem: Problem, least: int) -> tuple[Solution, Misfit, FloatArray]:
         """The solution, the misfit of the markers seen, and their standard deviations (m, 2), mm."""
         started = time.perf_counter()
-        misfit = misfit_of(problem, marker_radius=0.0)
+        misfit = misfit_of(problem, MarkerSettings(marker_radius=0.0))
         count = 0 if misfit is None else len(misfit.points)
         if misfit is None or problem.observations is None or count < least:
             raise UnsupportedProblemError(

@@ -7,7 +7,7 @@ import pytest
 
 from geometry.finger.presets import load_design
 from geometry.observations import Observations
-from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, assimilates, misfit_of
+from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, MarkerSettings, assimilates, misfit_of
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
 from solvers.registry import make_solver
@@ -44,14 +44,16 @@ def test_paper_weights_are_its_loss_times_the_area(problem):
         for marker, (u, v) in zip(seen, moved, strict=True)
     ) / len(seen)
     area = problem.mesh.areas.sum()
-    assert misfit_of(problem, asm_weight=7.0).value(moved) == pytest.approx(area * 7.0 * loss, rel=1e-12)
+    assert misfit_of(problem, MarkerSettings(asm_weight=7.0)).value(moved) == pytest.approx(
+        area * 7.0 * loss, rel=1e-12
+    )
 
 
 def test_precision_weights_are_the_log_likelihood_times_the_scale(problem):
     """The density of the errors by SciPy, whose logarithm falls by the misfit over the scale."""
     from scipy.stats import norm
 
-    misfit = misfit_of(problem, weights="precision", scale=0.3)
+    misfit = misfit_of(problem, MarkerSettings(weights="precision", scale=0.3))
     seen = problem.observations.visible
     deviations = problem.observations.standard_deviations[seen]
     deviations = np.where(deviations < MIN_STANDARD_DEVIATION, MIN_STANDARD_DEVIATION, deviations)
@@ -66,7 +68,7 @@ def test_precision_weights_are_the_log_likelihood_times_the_scale(problem):
 @pytest.mark.parametrize("weights", ["paper", "precision"])
 def test_the_gradient_of_the_misfit_is_the_weighted_residual(problem, weights):
     """Taylor's remainder of a quadratic is the misfit of the step itself, for any step."""
-    misfit = misfit_of(problem, weights=weights)
+    misfit = misfit_of(problem, MarkerSettings(weights=weights))
     random = np.random.default_rng(5)
     moved, step = random.normal(size=(2, *misfit.observed.shape))
     for size in (1.0, 1e-3):
@@ -96,7 +98,7 @@ def test_without_a_marker_the_others_weigh_the_same(problem):
 
 def test_a_marker_moves_by_the_mean_over_its_disc(problem):
     """That of x^2 y over a disc around (a, b) is a^2 b + b r^2 / 4, of a square distance more by r^2 / 2."""
-    misfit = misfit_of(problem, marker_radius=0.5)
+    misfit = misfit_of(problem, MarkerSettings(marker_radius=0.5))
     (x, y), shares = misfit.sampling()[0].T, misfit.sampling()[1]
     a, b = misfit.points.T
     np.testing.assert_allclose(shares @ (x**2 * y), a**2 * b + b * 0.5**2 / 4, rtol=1e-12)
@@ -104,14 +106,14 @@ def test_a_marker_moves_by_the_mean_over_its_disc(problem):
 
 
 def test_without_a_radius_it_is_the_centre_that_moves(problem):
-    points, shares = misfit_of(problem, marker_radius=0.0).sampling()
+    points, shares = misfit_of(problem, MarkerSettings(marker_radius=0.0)).sampling()
     np.testing.assert_array_equal(shares @ points, misfit_of(problem).points)
 
 
 def test_a_disc_does_not_reach_beyond_the_body(problem):
     """The markers are in the middle of a wall of 2 mm."""
     assert misfit_of(problem).radius == 0.8
-    assert misfit_of(problem, marker_radius=3.0).radius == pytest.approx(1.0, rel=1e-9)
+    assert misfit_of(problem, MarkerSettings(marker_radius=3.0)).radius == pytest.approx(1.0, rel=1e-9)
     assert misfit_of(problem).without(0).radius == 0.8
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from geometry.errors import UserError
 from solvers.assimilation.marker_weighting import FACTORS
-from solvers.assimilation.misfit import misfit_of
+from solvers.assimilation.misfit import MarkerSettings, misfit_of
 from solvers.fem.assimilating import FemAsmSolver
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
@@ -51,7 +51,7 @@ def dense(problem, solver):
     node_of_dof = np.repeat(elasticity.distributed._node_of_dof, 2) * 2 + np.tile([0, 1], len(space.nodes))
     stiffness = np.zeros((size, size))
     stiffness[np.ix_(node_of_dof, node_of_dof)] = matrix.getDenseArray()
-    misfit = misfit_of(problem, weights=solver.weights, scale=solver.scale)
+    misfit = misfit_of(problem, MarkerSettings(weights=solver.weights, scale=solver.scale))
     points, weights = misfit.sampling()
     at = np.kron(weights @ space.shape_functions(problem.mesh.locate(points)).toarray(), np.eye(2))
     conditions, values, slacks = [], [], []
@@ -157,7 +157,7 @@ def test_strong_weights_go_through_the_markers(problem):
 def test_energy_plus_misfit_is_least(problem):
     """Taylor: no slope at the minimiser in any direction that keeps the conditions, and a curvature."""
     solution = SOFT.solve(problem)
-    misfit = misfit_of(problem, weights="precision", scale=SOFT.scale)
+    misfit = misfit_of(problem, MarkerSettings(weights="precision", scale=SOFT.scale))
     points, weights = misfit.sampling()
     space = solution.field.space
     elasticity = LinearElasticity.of(problem, space)

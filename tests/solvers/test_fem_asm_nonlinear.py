@@ -7,7 +7,7 @@ import pytest
 
 from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
-from solvers.assimilation.misfit import misfit_of
+from solvers.assimilation.misfit import MarkerSettings, misfit_of
 from solvers.fem.assimilating import FemAsmSolver
 from solvers.fem.finite_strain.constraints import DisplacementConstraints, LoadState
 from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
@@ -80,7 +80,7 @@ def test_small_displacements_give_the_linear_minimiser(kind):
 def functional(problem, space, slack):
     """The misfit's constraints and J of nodal displacements, without any multipliers."""
     constraints = DisplacementConstraints.of(problem, space, slack)
-    misfit = misfit_of(problem, weights="precision", scale=SOFT.scale)
+    misfit = misfit_of(problem, MarkerSettings(weights="precision", scale=SOFT.scale))
     constraints = constraints.joined(DisplacementConstraints.springs(misfit, space))
     equilibrium = FiniteStrainEquilibrium(problem, space, constraints)
     points, weights = misfit.sampling()

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from solvers.pinn.paper.assessment import assess_training
+from solvers.pinn.paper.trained_field import assess_training
 from solvers.problem import Load, Problem
 
 

@@ -16,7 +16,7 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.assimilation.estimation import Estimate, Prediction
-from solvers.assimilation.misfit import misfit_of, standard_deviations
+from solvers.assimilation.misfit import MarkerSettings, misfit_of, standard_deviations
 from solvers.constrained_elimination import ConstrainedElimination
 from solvers.fem.boundary_conditions import marker_functionals
 from solvers.lagrange import LagrangeSpace
@@ -115,7 +115,7 @@ class ObservationModel:
         cls, problem: Problem, space: LagrangeSpace, observations: Observations, radius: float | None
     ) -> "ObservationModel":
         """Of the markers alone, each the mean over a disc of the radius, mm; None: the observations' own."""
-        misfit = misfit_of(replace(problem, observations=observations), marker_radius=radius)
+        misfit = misfit_of(replace(problem, observations=observations), MarkerSettings(marker_radius=radius))
         if misfit is None:
             raise UserError("there are no markers to find parameters by")
         deviations = standard_deviations(observations).ravel()

@@ -14,7 +14,7 @@ from geometry.arrays import FloatArray, IntArray
 from solvers.elasticity import Lame, LawName, energy_density_of
 from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
 from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
-from solvers.pinn.threading import boxes_around, cut_into_patches, imap_in_threads
+from solvers.pinn.threading import boxes_around, imap_in_threads
 from solvers.problem import Material
 
 
@@ -63,19 +63,18 @@ class NetworkEnergy:
         cls, basis: FiniteBasis, material: Material, points: FloatArray, weights: FloatArray
     ) -> "NetworkEnergy":
         """The energy by a quadrature rule: points (q, 2), mm, and weights (q,), mm^2."""
-        cuts = cut_into_patches(points)
-        places = [torch.from_numpy(points[cut]) for cut in cuts]
-        near = basis.windows.near(boxes_around(places))
-        keys = []
-        for windows in near:
+        cuts, keys = basis.patches(points), []
+        for _, _, windows in cuts:
             first, second = torch.triu_indices(len(windows), len(windows))
             keys.append(windows[first] * basis.windows.count + windows[second])
         count = basis.windows.count
         diagonal = torch.arange(count) * (count + 1)
         known, number = torch.unique(torch.cat([*keys, diagonal]), return_inverse=True)
         pairs = number[:-count].split([len(key) for key in keys])
-        rules = [torch.from_numpy(weights[cut]) for cut in cuts]
-        patches = [QuadraturePatch(*parts) for parts in zip(places, rules, near, pairs, strict=True)]
+        patches = [
+            QuadraturePatch(places, torch.from_numpy(weights[cut]), near, blocks)
+            for (cut, places, near), blocks in zip(cuts, pairs, strict=True)
+        ]
         rows, columns = np.divmod(known.numpy(), count)
         return cls(basis, material, patches, rows, columns)
 

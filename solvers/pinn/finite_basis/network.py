@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 import torch
 
-from geometry.arrays import FloatArray
+from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.triangle_mesh import TriangleMesh
@@ -113,6 +113,12 @@ class FiniteBasis:
         bias = rng.uniform(-1, 1, shape) - np.einsum("xmc,cx->mc", weights, centres)
         return cls(windows, torch.from_numpy(np.concatenate([weights, bias[None]])), constraint)
 
+    def patches(self, points: FloatArray) -> list[tuple[IntArray, torch.Tensor, torch.Tensor]]:
+        """Patches of points (n, 2), mm: their numbers, their places and the windows that reach them."""
+        numbers = cut_into_patches(points)
+        places = [torch.from_numpy(points[patch]) for patch in numbers]
+        return list(zip(numbers, places, self.windows.near(boxes_around(places)), strict=True))
+
     def values(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
         """Basis functions of windows `near` (w,) at points (n, 2), mm: (n, m + 1, w)."""
         window = self.windows.values(points, near).mul_(self.constraint.at(points)[0])
@@ -135,9 +141,7 @@ class FiniteBasis:
     def functionals(self, points: FloatArray, weights: FloatArray) -> FloatArray:
         """Sums of weights (k, n) times the basis functions at points (n, 2), mm: (k, c, m + 1)."""
         found = torch.zeros(len(weights), self.windows.count, self.per_window, dtype=torch.float64)
-        patches = cut_into_patches(points)
-        places = [torch.from_numpy(points[patch]) for patch in patches]
-        for patch, place, near in zip(patches, places, self.windows.near(boxes_around(places)), strict=True):
+        for patch, place, near in self.patches(points):
             of_patch = torch.from_numpy(weights[:, patch])
             found.index_add_(1, near, torch.einsum("kn,nuw->kwu", of_patch, self.values(place, near)))
         return np.asarray(found)
@@ -192,11 +196,9 @@ class FiniteBasisField:
     def _evaluate(
         self, points: FloatArray, field: Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
     ) -> FloatArray:
-        patches = cut_into_patches(points)
-        places = [torch.from_numpy(points[patch]) for patch in patches]
-        near = self.basis.windows.near(boxes_around(places))
-        parts = imap_in_threads(lambda work: field(*work).numpy(), list(zip(places, near, strict=True)))
+        patches = self.basis.patches(points)
+        parts = imap_in_threads(lambda patch: field(*patch[1:]).numpy(), patches)
         found: FloatArray = np.concatenate(list(parts))
         result: FloatArray = np.empty_like(found)
-        result[np.concatenate(patches)] = found
+        result[np.concatenate([patch for patch, *_ in patches])] = found
         return result

@@ -28,11 +28,7 @@ class ShepardWindows:
         return len(self.centres)
 
     def near(self, boxes: torch.Tensor) -> list[torch.Tensor]:
-        """Numbers of the windows that reach each of some boxes, ascending, (w,) each.
-
-        Args:
-            boxes: Their lower left and upper right corners, shape (b, 2, 2), mm.
-        """
+        """Numbers of the windows that reach each of some boxes (b, 2, 2), mm, ascending, (w,) each."""
         found = []
         for low, high in boxes:
             distance = self.centres.clamp(low, high).sub_(self.centres)

@@ -12,8 +12,8 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
 from solvers.assimilation.marker_forces import MarkerFit
-from solvers.assimilation.marker_weighting import MarkerSettings, MarkerWeighting
-from solvers.assimilation.misfit import Misfit, assimilates, leave_one_out_displacements
+from solvers.assimilation.marker_weighting import MarkerWeighting
+from solvers.assimilation.misfit import MarkerSettings, Misfit, assimilates, leave_one_out_displacements
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
 from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField, HardConstraint, Windows
 from solvers.pinn.finite_basis.newton import LoadStep, find_equilibrium, follow_load

@@ -62,7 +62,12 @@ class HistoryFiles:
     def __init__(self, folder: Path, columns: Sequence[str], done: int) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._path, self._columns, self._done = folder / "history.csv", columns, done
-        self._board = _summary_writer(folder, done)
+        try:
+            from torch.utils.tensorboard import SummaryWriter
+        except ImportError:
+            self._board: Any = None
+        else:
+            self._board = SummaryWriter(folder, purge_step=done + 1)
 
     def write(self, history: FloatArray) -> None:
         """Write a history of shape (epochs, columns)."""
@@ -75,11 +80,3 @@ class HistoryFiles:
                     self._board.add_scalar(name, value, int(row[0]))
             self._board.flush()
             self._done = len(history)
-
-
-def _summary_writer(folder: Path, done: int) -> Any:
-    try:
-        from torch.utils.tensorboard import SummaryWriter
-    except ImportError:
-        return None
-    return SummaryWriter(folder, purge_step=done + 1)

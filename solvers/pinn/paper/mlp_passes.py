@@ -94,12 +94,7 @@ class MlpPass:
         return torch.matmul(self._backward_pass.first, self._weights.first[:, :, :2].mT).sum(1)
 
     def backward_values(self, factors: torch.Tensor, sums: Weights) -> None:
-        """Add to `sums` the gradient of Σ factors * values in the parameters.
-
-        Args:
-            factors: Shape (networks, n).
-            sums: Views of a tensor in the shape of the parameters in logistic form.
-        """
+        """Add the gradient of Σ factors * values in the weights to `sums`; factors (networks, n)."""
         backward = self._backward(factors[..., None])
         _add_products(self._forward_pass, backward.first, backward.arguments, sums)
         _add_biases(backward.arguments, sums)

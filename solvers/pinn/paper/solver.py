@@ -12,7 +12,6 @@ from geometry.content_hash import content_hash
 from geometry.errors import UserError
 from solvers.assimilation.marker_weighting import MarkerWeighting
 from solvers.assimilation.misfit import assimilates
-from solvers.pinn.paper.assessment import assess_training
 from solvers.pinn.paper.collocation import Collocation, base_points, collocation_points
 from solvers.pinn.paper.loss import (
     ONE_PROCESS,
@@ -23,13 +22,12 @@ from solvers.pinn.paper.loss import (
     ProcessGroup,
     stiffness_matrix,
 )
-from solvers.pinn.paper.mlp_field import MlpField
 from solvers.pinn.paper.modified_mlp import ModifiedMlp
+from solvers.pinn.paper.trained_field import MlpField, assess_training
 from solvers.pinn.paper.training import (
     OPTIMISERS,
     CheckpointStore,
     Training,
-    TrainingProgress,
     TrainingSettings,
 )
 from solvers.pinn.threading import pool, torch_threads
@@ -143,14 +141,7 @@ class PaperPinnSolver:
             initial = self.network.initial(self.seed, PRECISIONS[self.precision]).to(self.device)
             settings = TrainingSettings(**{e.name: getattr(self, e.name) for e in fields(TrainingSettings)})
             training = Training(loss, initial, settings, area, self._store(problem, processes))
-            report = TrainingProgress(
-                progress if processes.rank == 0 else silent,
-                self.epochs,
-                training.epoch,
-                area,
-                self._context.reference_energy,
-            )
-            training.run(report)
+            training.run(progress if processes.rank == 0 else silent, self._context.reference_energy)
             field = MlpField(self.network, training.parameters.double().cpu())
             energy, reaction, status = assess_training(problem, field, training)
         seconds = time.perf_counter() - started

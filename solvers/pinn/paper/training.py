@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -90,20 +90,25 @@ class Training:
         """The columns of every epoch, shape (epochs, columns); losses are those before the epoch's step."""
         return np.array(self._rows).reshape(-1, len(self.columns))
 
-    def run(self, report: Callable[[int, LossEvaluation], None]) -> None:
-        """Train up to the settings' number of epochs; `report` is called after each.
+    def run(self, progress: Progress, reference: float | None) -> None:
+        """Train up to the settings' number of epochs, and report each.
+
+        Args:
+            progress: Receives the terms of the loss, the energy and the time left.
+            reference: Energy of a reference solution, N mm/mm.
 
         Raises:
             TrainingDiverged: If the loss is not a number or has grown beyond all bounds.
         """
-        last = self._state()
+        last, done, started = self._state(), self.epoch, time.perf_counter()
         try:
             while self.epoch < self._settings.epochs and not self.settled():
                 evaluation = self._step()
                 last = self._state()
                 if self._settings.checkpoint_every and self.epoch % self._settings.checkpoint_every == 0:
                     self._save(last)
-                report(self.epoch, evaluation)
+                pace = (time.perf_counter() - started) / (self.epoch - done)
+                progress(self.epoch / self._settings.epochs, self._text(evaluation, pace, reference))
         except KeyboardInterrupt:
             self._save(last)
             raise
@@ -133,6 +138,15 @@ class Training:
         seconds = time.perf_counter() - self._started
         self._rows.append((self.epoch + 1, *terms.values(), total, self._area * terms["PDE"], seconds))
         return evaluations[0]
+
+    def _text(self, evaluation: LossEvaluation, pace: float, reference: float | None) -> str:
+        energy, epochs = self._area * evaluation.terms["PDE"], self._settings.epochs
+        terms = ", ".join(f"{name} {value:.3g}" for name, value in evaluation.terms.items())
+        ratio = f" ({energy / reference:.3g} x reference)" if reference else ""
+        return (
+            f"epoch {self.epoch} of {epochs}: {terms}, energy {energy:.4g} N mm/mm{ratio}, "
+            f"{_duration(pace * (epochs - self.epoch))} left"
+        )
 
     def _check(self, total: float) -> None:
         first = self._rows[0][self.columns.index("total")] if self._rows else total
@@ -171,39 +185,6 @@ class Training:
             self._store.folder, {**tensors, "history": torch.from_numpy(history)}, self._store.digest
         )
         self._files.write(history)
-
-
-@dataclass(frozen=True)
-class TrainingProgress:
-    """Reports epochs, loss terms, energy and the time left.
-
-    Attributes:
-        progress: Receives the text.
-        epochs: Number of epochs in all.
-        done: Number of epochs before this run.
-        area: Of the body, mm², which times the mean energy density is the energy.
-        reference: Energy of a reference solution, N mm/mm.
-        started: Start of this run, s.
-    """
-
-    progress: Progress
-    epochs: int
-    done: int
-    area: float
-    reference: float | None
-    started: float = field(default_factory=time.perf_counter)
-
-    def __call__(self, epoch: int, evaluation: LossEvaluation) -> None:
-        """Report the state after an epoch."""
-        energy = self.area * evaluation.terms["PDE"]
-        terms = ", ".join(f"{name} {value:.3g}" for name, value in evaluation.terms.items())
-        ratio = f" ({energy / self.reference:.3g} x reference)" if self.reference else ""
-        pace = (time.perf_counter() - self.started) / (epoch - self.done)
-        self.progress(
-            epoch / self.epochs,
-            f"epoch {epoch} of {self.epochs}: {terms}, energy {energy:.4g} N mm/mm{ratio}, "
-            f"{_duration(pace * (self.epochs - epoch))} left",
-        )
 
 
 def _duration(seconds: float) -> str:
