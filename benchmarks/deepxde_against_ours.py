@@ -18,7 +18,8 @@ from benchmarks.judge import Judge, Judged, Watch
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
-from solvers.pinn.finite_basis.standard_and_local import PinnLocalSolver, PinnStdSolver
+from solvers.pinn.finite_basis.local import PinnLocalSolver
+from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.problem import Load, Problem
 from solvers.solver import Solver
 

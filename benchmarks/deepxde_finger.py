@@ -26,7 +26,7 @@ from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
 from solvers.elasticity import Lame
-from solvers.pinn.finite_basis.network import HardConstraint
+from solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from solvers.problem import Problem, contact_functional
 
 os.environ.setdefault("DDE_BACKEND", "pytorch")  # read when DeepXDE is imported

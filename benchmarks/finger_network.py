@@ -14,7 +14,7 @@ import torch
 from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
-from solvers.pinn.finite_basis.network import HardConstraint
+from solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from solvers.pinn.paper.loss import stiffness_matrix
 from solvers.pinn.paper.modified_mlp import ModifiedMlp
 from solvers.pinn.threading import map_in_threads, slices

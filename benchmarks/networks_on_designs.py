@@ -11,7 +11,8 @@ from compare.evaluation.metrics import reference_differences
 from geometry.cache import finger_mesh
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
-from solvers.pinn.finite_basis.standard_and_local import PinnLocalSolver, PinnStdSolver
+from solvers.pinn.finite_basis.local import PinnLocalSolver
+from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.problem import Problem
 from tests.geometry.test_mesher import random_design
 

@@ -14,7 +14,8 @@ from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
-from solvers.pinn.finite_basis.standard_and_local import PinnLocalSolver, PinnStdSolver
+from solvers.pinn.finite_basis.local import PinnLocalSolver
+from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.problem import Problem
 from solvers.solver import Solver
 

@@ -27,7 +27,8 @@ from benchmarks.trained_neurons import trained_neurons
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
-from solvers.pinn.finite_basis.standard_and_local import PinnLocalSolver, PinnStdSolver
+from solvers.pinn.finite_basis.local import PinnLocalSolver
+from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.pinn.paper.modified_mlp import ModifiedMlp
 from solvers.problem import Problem
 from solvers.solution import DisplacementField

@@ -13,7 +13,7 @@ from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
 from solvers.pinn.finite_basis.energy import energy_density
 from solvers.pinn.finite_basis.load_conditions import load_conditions
 from solvers.pinn.finite_basis.network import FiniteBasisField
-from solvers.pinn.finite_basis.standard_and_local import PinnStdSolver
+from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.pinn.threading import boxes_around
 from solvers.problem import Problem
 

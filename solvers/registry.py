@@ -17,7 +17,7 @@ GROUP = "pinnray.solvers"
 
 PRESETS = {
     "pinn-std": {
-        "fast": "solvers.pinn.finite_basis.standard_and_local:PinnStdSolver",
+        "fast": "solvers.pinn.finite_basis.standard:PinnStdSolver",
         "paper": "solvers.pinn.paper.solver:PaperPinnSolver",
     },
     "pinn-asm": {
@@ -38,7 +38,7 @@ BUILT_IN = {
     "gp": "solvers.statistics.gaussian_process:GaussianProcessSolver",
     "statfem": "solvers.statistics.statistical_fem:StatFemSolver",
     "pinn-std": PRESETS["pinn-std"]["fast"],
-    "pinn-local": "solvers.pinn.finite_basis.standard_and_local:PinnLocalSolver",
+    "pinn-local": "solvers.pinn.finite_basis.local:PinnLocalSolver",
     "pinn-asm": PRESETS["pinn-asm"]["fast"],
     "pinn-local-asm": "solvers.pinn.assimilating:PinnLocalAsmSolver",
 }

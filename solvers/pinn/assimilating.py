@@ -9,10 +9,11 @@ import numpy as np
 from geometry.observations import Observations
 from solvers.assimilation.misfit import MarkerSettings, Misfit, Weighting
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, LinearResponse
+from solvers.pinn.finite_basis.local import PinnLocalSolver
 from solvers.pinn.finite_basis.network import FiniteBasisField
 from solvers.pinn.finite_basis.newton import LoadStep
 from solvers.pinn.finite_basis.solver import FiniteBasisSolver
-from solvers.pinn.finite_basis.standard_and_local import PinnLocalSolver, PinnStdSolver
+from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.pinn.paper.solver import PaperPinnSolver
 from solvers.pinn.threading import pool
 from solvers.problem import Problem

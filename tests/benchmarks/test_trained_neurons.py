@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from benchmarks.trained_neurons import lagrangian_gradient, with_neurons
-from solvers.pinn.finite_basis.standard_and_local import PinnStdSolver
+from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.problem import Problem
 
 

@@ -449,7 +449,7 @@ def test_a_full_disk_is_one_line(folder, capsys, monkeypatch, without_pictures):
 
 
 def test_a_missing_library_is_one_line(folder, capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "solvers.pinn.finite_basis.standard_and_local", None)
+    monkeypatch.setitem(sys.modules, "solvers.pinn.finite_basis.standard", None)
     assert main(["compare", "--solvers", "pinn-std"]) == BAD_INPUT
     assert capsys.readouterr().err.startswith("error: solver 'pinn-std' cannot be loaded: ")
 

@@ -16,7 +16,7 @@ from solvers.assimilation.misfit import assimilates
 from solvers.fem.assimilating import FemAsmSolver
 from solvers.pinn.assimilating import PaperPinnAsmSolver, PinnAsmSolver, PinnLocalAsmSolver
 from solvers.pinn.finite_basis.newton import find_equilibrium
-from solvers.pinn.finite_basis.standard_and_local import PinnStdSolver
+from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.pinn.paper.trained_field import MlpField
 from solvers.problem import Load, Material, Problem, contact_functional
 from solvers.registry import make_solver

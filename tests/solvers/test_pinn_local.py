@@ -17,7 +17,9 @@ from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.pinn.finite_basis import newton
 from solvers.pinn.finite_basis.energy import NetworkEnergy
-from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField, HardConstraint
+from solvers.pinn.finite_basis.hard_constraint import HardConstraint
+from solvers.pinn.finite_basis.local import PinnLocalSolver
+from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
 from solvers.pinn.finite_basis.point_spacing import (
     PointSpacing,
     graded_quadrature,
@@ -26,7 +28,6 @@ from solvers.pinn.finite_basis.point_spacing import (
 )
 from solvers.pinn.finite_basis.shepard_windows import ShepardWindows
 from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
-from solvers.pinn.finite_basis.standard_and_local import PinnLocalSolver
 from solvers.pinn.threading import PATCH, boxes_around, cut_into_patches
 from solvers.problem import Load, Material, Problem
 from solvers.solution import State

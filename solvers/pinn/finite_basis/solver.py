@@ -15,7 +15,8 @@ from solvers.assimilation.marker_forces import MarkerFit
 from solvers.assimilation.marker_weighting import MarkerWeighting
 from solvers.assimilation.misfit import MarkerSettings, Misfit, assimilates, leave_one_out_displacements
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
-from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField, HardConstraint, Windows
+from solvers.pinn.finite_basis.hard_constraint import HardConstraint
+from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField, Windows
 from solvers.pinn.finite_basis.newton import LoadStep, find_equilibrium, follow_load
 from solvers.pinn.finite_basis.point_spacing import (
     PointSpacing,
