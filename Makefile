@@ -17,7 +17,7 @@ compare: setup ## the main job: compare all solvers on the default finger
 # Each worker computes on one thread: two that share two cores would wait for each other.
 PYTEST = OMP_NUM_THREADS=1 $(BIN)/pytest -n $(or $(WORKERS),$(shell nproc)) --dist loadfile
 
-test: setup ## run the tests that take less than ten seconds
+test: setup ## run the quick tests, some six minutes on two cores
 	$(PYTEST) -m "not slow" $(ARGS)
 
 test-all: setup ## run all tests, as CI does

@@ -122,6 +122,7 @@ def run_folder(tmp_path_factory) -> Path:
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", sorted((DOCS / "examples").glob("*.py")), ids=id_of)
 def test_examples_run_and_find_their_number(path, capsys):
     runpy.run_path(str(path), run_name="__main__")
@@ -133,6 +134,7 @@ def test_examples_pin_a_number(path):
     assert re.search(r"^    assert abs\(.+\) < [\d.]+$", path.read_text(encoding="utf-8"), re.MULTILINE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("block", TO_RUN, ids=id_of)
 def test_python_in_the_docs_runs(block, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -407,6 +409,7 @@ def test_the_guide_has_every_cad_file(tmp_path):
     assert_same(names(table(GUIDE, "file", after="### CAD")), [path.name for path in tmp_path.iterdir()])
 
 
+@pytest.mark.slow
 def test_the_guide_has_every_file_of_a_grid_search(tmp_path):
     from compare.cli import main
 
@@ -421,6 +424,7 @@ def test_the_guide_has_every_file_of_a_grid_search(tmp_path):
     assert sorted(documented) == sorted(actual)
 
 
+@pytest.mark.slow
 def test_the_guide_has_every_file_of_a_cross_validation(tmp_path):
     from compare.cli import main
 

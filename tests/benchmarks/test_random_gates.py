@@ -3,10 +3,13 @@
 import itertools
 
 import numpy as np
+import pytest
 
 from benchmarks.random_gates import random_gates
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
+
+pytestmark = pytest.mark.slow
 
 
 def test_more_units_are_nearer_to_finite_elements_and_gradients_are_differences(coarse_mesh):

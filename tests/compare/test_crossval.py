@@ -320,6 +320,7 @@ def run(line: str, out: Path) -> int:
     return main([*shlex.split(f"crossval {line} --mesh-size 1"), "--out", str(out)])
 
 
+@pytest.mark.slow
 def test_the_command_writes_what_the_guide_says_and_goes_on(tmp_path, capsys, in_line, monkeypatch):
     line = "--solvers fem,gp,fem-asm --schemes tip-out --solver-set fem-asm.choose=given"
     assert run(f"{line} --seeds 1", tmp_path / "out") == 0

@@ -107,6 +107,7 @@ def test_no_text_leaves_the_page_or_runs_into_another(
     assert pages[name].overlaps() == []
 
 
+@pytest.mark.slow
 def test_eight_solvers_find_room_too(
     mesh: TriangleMesh,
     fem: Evaluation,

@@ -203,6 +203,7 @@ def test_a_run_without_a_solution_says_why(fem, tmp_path, monkeypatch, error, st
 # The search
 
 
+@pytest.mark.slow
 def test_a_whole_search(tmp_path, capsys, monkeypatch):
     """In processes of its own; again, nothing is left to do."""
     monkeypatch.chdir(tmp_path)

@@ -175,6 +175,7 @@ def test_an_interrupted_search_ends_as_if_it_had_not_been(tmp_path):
         assert getattr(resumed.measured, name) == getattr(whole.measured, name)
 
 
+@pytest.mark.slow
 def test_a_run_of_the_search_that_diverges_is_recorded(tmp_path):
     wanted = GridSearch(
         design=Design(),

@@ -77,6 +77,7 @@ def test_a_cap_ends_it_and_it_says_so(coarse_mesh, cap):
     assert said in adaptation.message
 
 
+@pytest.mark.slow
 def test_fillets_get_rounder():
     """The polygon that a fillet's arc is meshed as has too much area; refined with the section, less."""
     design = Design(fillet_radius=1.0)

@@ -56,6 +56,7 @@ def graded():
     return finger_mesh(Design(), settings=MeshSettings(size=0.4, corner_size=0.01, contact_size=0.05))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["mean", "patch"])
 @pytest.mark.parametrize("degree", [1, 2])
 def test_estimates_on_the_finger_are_within_a_factor_of_two(coarse_mesh, medium_mesh, graded, kind, degree):
@@ -166,6 +167,7 @@ def test_estimates_at_finite_strain_are_within_a_factor_of_two(coarse_mesh, grad
     assert solution.error.phrase in solution.status.message
 
 
+@pytest.mark.slow
 def test_a_finite_strain_solution_that_stops_early_or_has_no_limit_has_no_estimate(coarse_mesh):
     material = Material(law="neo-hookean")
     point = Problem(coarse_mesh, material, Load(kind="point", displacement=(0.0, -0.1)))

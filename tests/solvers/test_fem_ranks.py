@@ -56,6 +56,7 @@ def test_every_rank_may_run_the_whole_program(start, expected, coarse_mesh):
     assert report["sharing"] == [2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("program", "code", "said"),
     [

@@ -133,6 +133,7 @@ def distances(found, exact, problem: Problem) -> tuple[float, float]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weights", ["paper", "precision"])
 @pytest.mark.parametrize("solver", [PinnAsmSolver, PinnLocalAsmSolver])
 def test_it_is_near_the_exact_minimiser_of_finite_elements(problem, solver, weights):
@@ -151,6 +152,7 @@ def test_the_curve_is_that_of_finite_elements(problem):
         np.testing.assert_allclose(ours[name][matter], exact[name][matter], rtol=0.2, err_msg=name)
 
 
+@pytest.mark.slow
 def test_what_it_says_of_a_marker_that_is_left_out_is_what_it_says_without(problem):
     """In closed form, against a network that was not given that marker; its own weights are those of all."""
     settings = {**QUICK, "weights": "precision", "scale": 1e-4}
@@ -242,6 +244,7 @@ def test_without_weight_it_is_the_network_without_markers(problem, plain, settin
     np.testing.assert_allclose(found, plain.displacement(markers), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_as_the_weight_goes_to_zero_so_do_the_markers(problem, plain):
     markers = problem.mesh.markers
     far, near = (

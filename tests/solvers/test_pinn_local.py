@@ -82,6 +82,7 @@ def test_sides_that_meet_in_a_corner_are_no_narrow_cavity(coarse_mesh):
     assert widths.min() > 1.8, "the walls of 2 mm are the narrowest"
 
 
+@pytest.mark.slow
 def test_there_is_a_third_level_only_where_two_are_not_enough(coarse_mesh):
     small = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3}
     levels = [
@@ -91,6 +92,7 @@ def test_there_is_a_third_level_only_where_two_are_not_enough(coarse_mesh):
     assert levels == [3, 2]
 
 
+@pytest.mark.slow
 def test_points_of_a_fillet_are_no_sharp_corners():
     mesh = finger_mesh(Design(fillet_radius=1.0), settings=MeshSettings(size=0.5))
     sharp, round_, radius = re_entrant_points(mesh)
@@ -259,6 +261,7 @@ def graded_mesh():
     return finger_mesh(Design(), settings=MeshSettings(size=0.5, corner_size=0.01, contact_size=0.01))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("plane", "load"),
     [

@@ -13,6 +13,7 @@ from tests.solvers.conftest import bar_mesh
 TINY = {"width": 8, "layers": 2, "base_points": 20, "precision": "double"}
 
 
+@pytest.mark.slow
 def test_first_500_epochs_are_those_of_the_plain_implementation():
     """To rounding, which Adam lets grow once its steps are too long for the boundary's stiff penalty.
 

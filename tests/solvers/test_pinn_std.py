@@ -156,6 +156,7 @@ def test_a_broken_law_is_seen(coarse_mesh, monkeypatch, kind):
     assert errors(solver.solve(problem), reference)[1] > 0.1
 
 
+@pytest.mark.slow
 def test_same_seed_same_network_other_seed_other_network(coarse_mesh):
     problem = Problem(coarse_mesh)
     first, again, other = (

@@ -195,6 +195,7 @@ def test_status_says_what_was_reached(problem, straight):
     assert "take more epochs" in straight.status.message
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_two_processes_train_as_one(problem, tmp_path):
     """In double precision; 15 epochs let rounding of another order of summation grow little."""

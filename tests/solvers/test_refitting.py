@@ -43,6 +43,7 @@ def observed(coarse_mesh: TriangleMesh) -> list[Observations]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SOLVERS)
 def test_a_refit_is_a_solution(coarse_mesh, observed, name):
     solver = make_solver(name.split(",")[0], **SOLVERS[name])

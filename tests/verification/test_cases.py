@@ -7,6 +7,8 @@ import pytest
 from benchmarks.verification.cases import CASES
 from benchmarks.verification.document import PAGE, page
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_numbers_are_what_they_have_to_be(case):

@@ -13,6 +13,8 @@ from solvers import elasticity
 from solvers.fem import linear_equilibrium
 from solvers.problem import Material
 
+pytestmark = pytest.mark.slow
+
 
 def passes(rows, **properties):
     """Whether all rows pass that have the properties."""

@@ -61,6 +61,7 @@ def test_standard_deviations_are_those_of_opencv():
     np.testing.assert_allclose(found.standard_deviations, expected.ravel()[:9], rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_the_covariance_covers_the_errors_of_200_fits():
     rng, exact = np.random.default_rng(11), CAMERA.project(placed().to_camera(ALL.points, ALL.view))
     squares, scores = [], []

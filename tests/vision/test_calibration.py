@@ -72,6 +72,7 @@ def test_parts_of_the_board_are_enough(known):
     ]
 
 
+@pytest.mark.slow
 def test_a_fisheye_is_recovered_and_proposed():
     true = Camera(1280, 720, 430.0, 431.0, 645.0, 352.0, (0.03, -0.01, 2e-3, -5e-4), "fisheye")
     rng = np.random.default_rng(8)

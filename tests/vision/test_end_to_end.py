@@ -16,6 +16,8 @@ from vision.calibration.camera_calibration import calibrate_views
 from vision.calibration.chessboard import Board
 from vision.rig.boards import board_poses
 
+pytestmark = pytest.mark.slow
+
 LENS = Camera(1280, 720, 1350.0, 1348.0, 640.0, 362.0, distortion=(-0.2, 0.03, 4e-4, -3e-4, 0.0))
 BOARD = Board(9, 6, 8.0)
 CORNER_NOISE = 0.02

@@ -11,6 +11,8 @@ from vision.rig.exposure import Exposure
 from vision.rig.render import render
 from vision.rig.virtual_camera import default_camera
 
+pytestmark = pytest.mark.slow
+
 CAMERA = default_camera(640, 360)
 EXPOSURE = Exposure(monochrome=True, blur=0.8, noise=2.0)
 

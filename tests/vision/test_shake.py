@@ -72,6 +72,7 @@ def test_no_fiducial_where_it_was_is_an_error():
         motion_between(np.random.default_rng(4), NUDGED, hidden=range(len(WORKSPACE.points)))
 
 
+@pytest.mark.slow
 def test_a_film_whose_camera_was_nudged_measures_the_same_with_a_warning():
     start, end = images()[:3], images()[3:]
     turn = cv2.getRotationMatrix2D((640, 360), 0.1, 1.0) + np.array([[0, 0, 1.3], [0, 0, -0.8]])
