@@ -1,4 +1,4 @@
-"""What the tests of several folders share."""
+"""Fixtures that the tests of several folders share."""
 
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""What a result is said to depend on."""
+"""Provenance of a result: versions, machine, hashes."""
 
 import hashlib
 import importlib

@@ -1,4 +1,4 @@
-"""What the tests of MPI ranks run on them: `python -m tests.solvers.rank_programs PROGRAM MESH.npz`.
+"""Programs that the tests run on MPI ranks: `python -m tests.solvers.rank_programs PROGRAM MESH.npz`.
 
 Like `compare`, a program imports a solver only where it needs it: on rank 0, before the others do.
 """

@@ -1,4 +1,4 @@
-"""What every solver must do, whoever wrote it; run over all that are registered."""
+"""The contract of every solver, over all that are registered."""
 
 import sys
 from dataclasses import replace

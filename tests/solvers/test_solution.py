@@ -1,4 +1,4 @@
-"""What follows from the displacement gradient of any solution."""
+"""Strain, stress and energy density from the displacement gradient of any solution."""
 
 from typing import get_args
 
