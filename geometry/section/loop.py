@@ -1,0 +1,182 @@
+"""A closed curve of straight lines and circular arcs."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from geometry.arrays import BoolArray, FloatArray, IntArray, frozen_array
+from geometry.errors import ShapeError, UserError
+
+STRAIGHT = 1e-12
+"""Largest absolute bulge of a straight piece."""
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """A closed curve: piece i runs from corner i to the next one, straight or along a circular arc.
+
+    Attributes:
+        points: Corners, shape (n, 2), mm.
+        bulges: Tangent of a quarter of each arc's angle, shape (n,): positive to the left, as in DXF; zero
+            for a straight line. An arc is less than a full circle.
+        names: Name of each piece, such as `base` or `front`; empty for a piece without one.
+
+    Raises:
+        ShapeError: If the three do not fit together.
+        UserError: If a piece has no length or a number is not finite.
+    """
+
+    points: FloatArray
+    bulges: FloatArray
+    names: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        points = frozen_array(self.points, dtype=np.float64, shape=(None, 2), name="points")
+        bulges = frozen_array(self.bulges, dtype=np.float64, shape=(len(points),), name="bulges")
+        if len(self.names) != len(points):
+            raise ShapeError(f"a loop of {len(points)} corners needs as many names, got {len(self.names)}")
+        if not (np.isfinite(points).all() and np.isfinite(bulges).all()):
+            raise UserError("a closed curve has a coordinate that is not a finite number")
+        if len(points) < 2 or (np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1) == 0).any():
+            raise UserError("a closed curve has a piece without length")
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "bulges", bulges)
+
+    @classmethod
+    def polygon(cls, corners: ArrayLike, names: Sequence[str] | None = None) -> Self:
+        """The closed polygon through corners of shape (n, 2), mm."""
+        points = np.asarray(corners, dtype=np.float64)
+        return cls(points, np.zeros(len(points)), tuple(names or [""] * len(points)))
+
+    @cached_property
+    def ends(self) -> FloatArray:
+        """Both ends of every piece, shape (n, 2, 2), mm."""
+        return np.stack([self.points, np.roll(self.points, -1, axis=0)], axis=1)
+
+    @property
+    def straight(self) -> IntArray:
+        """Numbers of the straight pieces."""
+        return np.flatnonzero(np.abs(self.bulges) <= STRAIGHT)
+
+    @cached_property
+    def lengths(self) -> FloatArray:
+        """Length of every piece, shape (n,), mm."""
+        chords = np.linalg.norm(self.ends[:, 1] - self.ends[:, 0], axis=1)
+        angle = 2 * np.arctan(np.abs(self.bulges))  # half the arc's angle
+        return np.asarray(chords * np.divide(angle, np.sin(angle), out=np.ones_like(angle), where=angle > 0))
+
+    @cached_property
+    def area(self) -> float:
+        """Enclosed area, mm^2; negative for a clockwise curve."""
+        start, end = self.ends[:, 0], self.ends[:, 1]
+        chord = np.linalg.norm(end - start, axis=1)
+        origin = self.points[0]
+        a, b = start - origin, end - origin
+        polygon = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()
+        return float(polygon + (chord**2 / 8 * _segment(self.bulges)).sum())
+
+    @property
+    def bounds(self) -> FloatArray:
+        """Smallest and largest x and y, shape (2, 2), mm."""
+        extremes = [self.points]
+        for which in np.flatnonzero(np.abs(self.bulges) > STRAIGHT):
+            centre, radius = self.circle(int(which))
+            around = centre + radius * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]], dtype=np.float64)
+            extremes.append(around[self._on_arc(int(which), around)])
+        points = np.concatenate(extremes)
+        return np.stack([points.min(axis=0), points.max(axis=0)])
+
+    def circle(self, which: int) -> tuple[FloatArray, float]:
+        """Centre, shape (2,), mm, and radius, mm, of the arc `which`."""
+        start, end = self.ends[which]
+        bulge = float(self.bulges[which])
+        left = np.array([start[1] - end[1], end[0] - start[0]])
+        centre = 0.5 * (start + end) + left * (1 - bulge**2) / (4 * bulge)
+        return centre, float(np.linalg.norm(start - centre))
+
+    def along(self, which: int, fractions: ArrayLike) -> FloatArray:
+        """Points at fractions (k,) of the length of piece `which`, shape (k, 2), mm."""
+        share = np.atleast_1d(np.asarray(fractions, dtype=np.float64))
+        start, end = self.ends[which]
+        if abs(self.bulges[which]) <= STRAIGHT:
+            return np.asarray(start + share[:, None] * (end - start))
+        centre, _ = self.circle(which)
+        angles = share * 4 * np.arctan(self.bulges[which])
+        x, y = start - centre
+        turned = np.stack(
+            [x * np.cos(angles) - y * np.sin(angles), x * np.sin(angles) + y * np.cos(angles)], axis=1
+        )
+        points = np.asarray(centre + turned)
+        points[share == 0], points[share == 1] = start, end
+        return points
+
+    def flattened(self, deviation: float = 1e-3) -> tuple[FloatArray, IntArray]:
+        """A polygon within `deviation`, mm, of the curve, whose corners lie on it.
+
+        Returns:
+            Its corners, shape (k, 2), mm, and for each of its sides the number of the piece, shape (k,).
+        """
+        points, pieces = [], []
+        for which in range(len(self.points)):
+            count = 1
+            if abs(self.bulges[which]) > STRAIGHT:
+                _, radius = self.circle(which)
+                step = 2 * np.arccos(max(1 - deviation / radius, 0.5))
+                count = max(int(np.ceil(abs(4 * np.arctan(self.bulges[which])) / step)), 2)
+            points.append(self.along(which, np.arange(count) / count))
+            pieces.append(np.full(count, which))
+        return np.concatenate(points), np.concatenate(pieces)
+
+    def reversed(self) -> Self:
+        """The same curve in the other direction."""
+        names = (*self.names[-2::-1], self.names[-1])
+        return type(self)(self.points[::-1], -np.roll(self.bulges[::-1], -1), names)
+
+    def transformed(self, matrix: ArrayLike, shift: ArrayLike = (0.0, 0.0)) -> Self:
+        """The curve under x -> matrix x + shift, with a matrix of a rotation or reflection times a scale.
+
+        A reflection keeps the order of the corners, so that a counter-clockwise curve becomes clockwise.
+        """
+        turn = np.asarray(matrix, dtype=np.float64)
+        sign = np.sign(np.linalg.det(turn))
+        return type(self)(self.points @ turn.T + np.asarray(shift), sign * self.bulges, self.names)
+
+    def named(self, which: int, name: str) -> Self:
+        """The curve with another name of one piece."""
+        names = (*self.names[:which], name, *self.names[which + 1 :])
+        return type(self)(self.points, self.bulges, names)
+
+    def split(self, which: int, fractions: Sequence[float]) -> Self:
+        """The curve with piece `which` cut at fractions of its length, between 0 and 1 and rising."""
+        shares = np.diff([0.0, *fractions, 1.0])
+        quarter = np.arctan(self.bulges[which])
+        return type(self)(
+            np.insert(self.points, which + 1, self.along(which, fractions), axis=0),
+            np.concatenate([self.bulges[:which], np.tan(quarter * shares), self.bulges[which + 1 :]]),
+            (*self.names[:which], *[self.names[which]] * len(shares), *self.names[which + 1 :]),
+        )
+
+    def pieces(self, name: str) -> Iterator[int]:
+        """Numbers of the pieces with a name."""
+        return (which for which, own in enumerate(self.names) if own == name)
+
+    def _on_arc(self, which: int, points: FloatArray) -> BoolArray:
+        """Mask of the points (k, 2) of an arc's circle that lie on the arc: beyond its chord."""
+        start, end = self.ends[which]
+        along, away = end - start, points - start
+        right = along[1] * away[:, 0] - along[0] * away[:, 1]
+        return np.asarray(np.sign(self.bulges[which]) * right >= 0)
+
+
+def _segment(bulges: FloatArray) -> FloatArray:
+    """Area between chord and arc over an eighth of the chord squared: (θ - sin θ) / sin²(θ/2)."""
+    angle = 4 * np.arctan(bulges)
+    flat = np.abs(bulges) < 1e-3  # where the difference cancels: 8 b / 3 (1 + b² / 5 ...)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        exact = (angle - np.sin(angle)) / np.sin(angle / 2) ** 2
+    series = 8 * bulges / 3 * (1 + bulges**2 / 5)
+    return np.asarray(np.where(flat, series, exact))
