@@ -1,0 +1,83 @@
+"""Wall thickness against closed forms."""
+
+import time
+
+import numpy as np
+import pytest
+
+from geometry.section.loop import Loop
+from geometry.section.section import Section
+from geometry.section.thickness import boundary_samples, through, wall_thickness
+
+
+def disc(radius: float, pieces: int = 2) -> Loop:
+    angles = 2 * np.pi * np.arange(pieces) / pieces
+    corners = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return Loop(corners, np.full(pieces, np.tan(np.pi / 2 / pieces)), ("",) * pieces)
+
+
+def rectangle(x: float, y: float, width: float, height: float) -> Loop:
+    return Loop.polygon([[x, y], [x + width, y], [x + width, y + height], [x, y + height]])
+
+
+@pytest.mark.parametrize("pieces", [2, 3, 8])
+def test_ring(pieces):
+    ring = Section(disc(10, pieces), (disc(7, pieces).reversed(),))
+    points, thickness = wall_thickness(ring, 0.5)
+    assert thickness == pytest.approx(3, abs=1e-9)
+    assert len(points) > 2 * np.pi * 17 / 0.5
+
+
+def test_disc_is_as_thick_as_its_diameter():
+    assert wall_thickness(Section(disc(4)), 0.3)[1] == pytest.approx(8, abs=1e-9)
+
+
+def test_beam():
+    points, thickness = wall_thickness(Section(rectangle(0, 0, 50, 4)), 1.0)
+    long = np.isclose(points[:, 1] % 4, 0)
+    assert thickness[long] == pytest.approx(4)
+    assert thickness[~long] == pytest.approx(50)
+
+
+def test_wedge_is_as_thick_as_its_tangent():
+    length, height = 40.0, 10.0
+    wedge = Section(Loop.polygon([[0, 0], [0, -height], [length, 0]]))
+    points, thickness = wall_thickness(wedge, 0.5, corners=True)
+    front = points[:, 1] == 0
+    assert thickness[front] == pytest.approx((length - points[front, 0]) * height / length)
+    assert len(wall_thickness(wedge, 0.5)[0]) == 0  # every ray ends beyond a sharp corner
+
+
+def test_wall_between_outline_and_cavity():
+    frame = Section(rectangle(0, 0, 20, 10), (rectangle(1, 2, 16, 5).reversed(),))
+    points, thickness = wall_thickness(frame, 0.25)
+    assert thickness.min() == pytest.approx(1)  # left
+    beside = (points[:, 0] > 1) & (points[:, 0] < 17)
+    assert thickness[beside & (points[:, 1] == 10)] == pytest.approx(3)
+    assert thickness[beside & (points[:, 1] == 0)] == pytest.approx(2)
+
+
+def test_slot_in_the_outline_leaves_a_thin_wall_to_the_same_curve():
+    slit = Section(Loop.polygon([[0, 0], [10, 0], [10, 5], [6, 5], [6, 0.1], [5, 0.1], [5, 5], [0, 5]]))
+    assert wall_thickness(slit, 0.5)[1].min() == pytest.approx(0.1)
+
+
+def test_ray_from_inside_ends_on_the_arc():
+    crossing = through(Section(disc(2)), [[0.5, 0.0]], [[0.6, 0.8]])
+    assert crossing.lengths == pytest.approx(-0.3 + np.sqrt(0.09 + 3.75))
+
+
+def test_samples_lie_on_their_piece_and_look_into_the_body():
+    ring = Section(disc(10, 3), (rectangle(-2, -2, 3, 3).reversed(),))
+    samples = boundary_samples(ring, 0.7)
+    assert ring.clearance(samples.points + 0.01 * samples.normals) == pytest.approx(0.01, rel=2e-3)
+
+
+def test_five_cavities_are_quick():
+    cells = tuple(rectangle(2 + 17 * k, 2, 15, 26).reversed() for k in range(5))
+    comb = Section(rectangle(0, 0, 87, 30), cells)
+    wall_thickness(comb, 0.5)
+    start = time.perf_counter()
+    _, thickness = wall_thickness(comb, 0.5)
+    assert time.perf_counter() - start < 0.1
+    assert thickness.min() == pytest.approx(2)
