@@ -8,7 +8,7 @@ import numpy as np
 from compare.evaluation.virtual_experiment import simulate
 from geometry.arrays import BoolArray, FloatArray
 from geometry.cache import finger_mesh
-from geometry.finger.parameters import Parameters
+from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.problem import Problem
@@ -27,16 +27,16 @@ HIDDEN = 0.02
 class Finger:
     """A finger with the displacements of its mesh's nodes under the load, shape (n, 2), mm."""
 
-    parameters: Parameters
+    design: Design
     mesh: TriangleMesh
     displacement: FloatArray
 
     @classmethod
-    def pressed(cls, parameters: Parameters) -> "Finger":
+    def pressed(cls, design: Design) -> "Finger":
         """The finger under the default indenter, at finite strain."""
-        mesh = finger_mesh(parameters, settings=MeshSettings(size=ELEMENT))
+        mesh = finger_mesh(design, settings=MeshSettings(size=ELEMENT))
         solution = simulate(Problem(mesh))
-        return cls(parameters, mesh, solution.displacement(mesh.at_nodes()))
+        return cls(design, mesh, solution.displacement(mesh.at_nodes()))
 
 
 @dataclass(frozen=True)

@@ -103,7 +103,7 @@ def calibrated(camera: Camera, exposure: Exposure, seed: int) -> Camera:
 
 def random_recording(finger: Finger, camera: Camera, rng: np.random.Generator, seed: int) -> Recording:
     """A film of the finger with random pose, light and load."""
-    workspace = default_workspace(finger.parameters)
+    workspace = default_workspace(finger.design)
     workspace = workspace.model_copy(update={"marker_plane": rng.uniform(0, 8)})
     pose = viewing_pose(
         camera,
@@ -113,7 +113,7 @@ def random_recording(finger: Finger, camera: Camera, rng: np.random.Generator, s
         turn=rng.uniform(-10, 10) + rng.choice([0, 180]),
     )
     return Recording(
-        bench=Bench(finger.mesh, finger.parameters, workspace),
+        bench=Bench(finger.mesh, finger.design, workspace),
         displacement=rng.uniform(0.2, 1.2) * finger.displacement,
         camera=camera,
         pose=pose,
@@ -126,7 +126,7 @@ def random_recording(finger: Finger, camera: Camera, rng: np.random.Generator, s
 def scored(recording: Recording, camera: Camera) -> Score:
     """Track a film with a calibrated camera."""
     bench = recording.bench
-    scene = FilmedScene(bench.parameters, bench.workspace, camera)
+    scene = FilmedScene(bench.finger, bench.workspace, camera)
     pictures, truths = zip(*recording.frames(), strict=True)
     return Score.of(track(film_of(pictures), scene), truths)
 

@@ -76,7 +76,7 @@ def fiducials(*numbers: int) -> Hide:
 
 def crossing(film: Recording) -> Callable[[int], Sequence[Shape]]:
     """A cable that is drawn over the finger from base to tip, and so over one marker after the other."""
-    length = film.bench.parameters.height
+    length = film.bench.finger.section.bounds[1, 0]
     return lambda frame: [cable((length * (frame + 0.5) / len(film.motion), 0.0), 1.0, 0.5)]
 
 
@@ -175,11 +175,11 @@ def main() -> Table:
 
 def filmed(case: Case, finger: Finger, number: int) -> Recording:
     """One of the films of a case."""
-    workspace = default_workspace(finger.parameters)
+    workspace = default_workspace(finger.design)
     camera = default_camera(*case.size)
     direction = 60.0 + 137.5 * number
     recording = Recording(
-        bench=Bench(finger.mesh, finger.parameters, workspace, case.paint),
+        bench=Bench(finger.mesh, finger.design, workspace, case.paint),
         displacement=finger.displacement,
         camera=camera,
         pose=viewing_pose(camera, workspace, tilt=case.tilt, direction=direction, turn=case.turn + number),
@@ -198,7 +198,7 @@ def seen(case: Case, recording: Recording, methods: Sequence[DetectionMethod] = 
             first = next(iter(film)).image
         for method in methods:
             scene = FilmedScene(
-                design=recording.bench.parameters,
+                design=recording.bench.finger,
                 workspace=recording.bench.workspace,
                 camera=recording.camera if case.fiducials else None,
                 colour=pick_colour(first, truths[0].pixels[0].tolist()) if case.picked else DARK,

@@ -32,7 +32,7 @@ from compare.runtime.stages import Stages
 from geometry.atomic import write_json
 from geometry.content_hash import content_hash
 from geometry.errors import UserError
-from geometry.finger.design import Design
+from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
 from solvers.adaptation import check_adaptable
@@ -63,7 +63,7 @@ class Job:
         resume: Whether to take over solutions that an earlier run of the same job finished.
     """
 
-    design: Design
+    design: Finger
     solvers: Sequence[Solver]
     spare: Collection[str] = ()
     mesh: MeshSettings = field(default_factory=MeshSettings)

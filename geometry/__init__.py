@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from geometry.errors import ShapeError as ShapeError
     from geometry.errors import UserError as UserError
     from geometry.finger.design import Design as Design
+    from geometry.finger.finger import Finger as Finger
     from geometry.finger.presets import load_design as load_design
     from geometry.finger.presets import parse_overrides as parse_overrides
     from geometry.finger.presets import preset_names as preset_names
-    from geometry.finger.section import Section as Section
     from geometry.finger.section import finger_section as finger_section
     from geometry.finger.section import marker_positions as marker_positions
     from geometry.finger.validation import allowed_range as allowed_range
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from geometry.mesh.settings import MeshSettings as MeshSettings
     from geometry.mesh.triangle_mesh import TriangleMesh as TriangleMesh
     from geometry.observations import Observations as Observations
+    from geometry.section.loop import Loop as Loop
+    from geometry.section.section import Section as Section
 else:
     from geometry.lazy_exports import lazy_exports
 

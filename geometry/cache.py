@@ -11,7 +11,7 @@ from typing import TypeVar
 from geometry.atomic import atomic_path
 from geometry.content_hash import content_hash
 from geometry.errors import UserError
-from geometry.finger.design import Design
+from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.worker import run_task
@@ -29,7 +29,7 @@ _Result = TypeVar("_Result")
 
 
 def finger_mesh(
-    design: Design,
+    finger: Finger,
     *,
     settings: MeshSettings | None = None,
     cache_dir: Path | None = None,
@@ -38,7 +38,7 @@ def finger_mesh(
     """The mesh of a finger, from the cache if it was made before.
 
     Args:
-        design: The finger.
+        finger: The finger.
         settings: Element sizes; the default ones if None.
         cache_dir: Folder of the cache; by default `cache_folder()`.
         timeout_s: Time limit, s.
@@ -49,14 +49,14 @@ def finger_mesh(
     settings = settings or MeshSettings()
     task: dict[str, object] = {
         "kind": "mesh",
-        "what": f"meshing design {design.name!r}",
+        "what": f"meshing design {finger.name!r}",
         "settings": settings.model_dump(),
     }
-    return _cached(design, task, ".npz", TriangleMesh.load, cache_dir, timeout_s)
+    return _cached(finger, task, ".npz", TriangleMesh.load, cache_dir, timeout_s)
 
 
 def cad_files(
-    design: Design,
+    finger: Finger,
     folder: Path,
     *,
     formats: Sequence[str] = CAD_FORMATS,
@@ -66,7 +66,7 @@ def cad_files(
     """Write a finger's CAD files: solid as STEP and STL (body and markers), section as DXF and SVG.
 
     Args:
-        design: The finger.
+        finger: The finger.
         folder: Output folder; made if it does not exist.
         formats: Some of `CAD_FORMATS`.
         cache_dir: Folder of the cache; by default `cache_folder()`.
@@ -83,10 +83,10 @@ def cad_files(
         raise UserError(f"unknown CAD format {unknown[0]!r}; there are {', '.join(CAD_FORMATS)}")
     task: dict[str, object] = {
         "kind": "cad",
-        "what": f"CAD of design {design.name!r}",
+        "what": f"CAD of design {finger.name!r}",
         "formats": sorted(set(formats)),
     }
-    contents = _cached(design, task, ".zip", _unpack, cache_dir, timeout_s)
+    contents = _cached(finger, task, ".zip", _unpack, cache_dir, timeout_s)
     for name, content in contents.items():
         with atomic_path(folder / name) as partial:
             partial.write_bytes(content)
@@ -100,12 +100,12 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "pinn-ray"
 
 
-def cache_key(design: Design, task: dict[str, object]) -> str:
-    """SHA-256 over design, task, package versions and this package's own sources, in hexadecimal."""
+def cache_key(finger: Finger, task: dict[str, object]) -> str:
+    """SHA-256 over finger, task, package versions and this package's own sources, in hexadecimal."""
     sources = sorted(Path(__file__).parent.rglob("*.py"))
     parts = {
         "format": FORMAT,
-        "design": design.digest,
+        "finger": finger.digest,
         "task": {key: value for key, value in task.items() if key != "what"},
         "versions": {package: _version(package) for package in MAKERS},
         "sources": [source.read_text(encoding="utf-8") for source in sources],
@@ -114,7 +114,7 @@ def cache_key(design: Design, task: dict[str, object]) -> str:
 
 
 def _cached(
-    design: Design,
+    finger: Finger,
     task: dict[str, object],
     suffix: str,
     load: Callable[[Path], _Result],
@@ -123,7 +123,7 @@ def _cached(
 ) -> _Result:
     """Load the task's result; make it first if it is missing or cannot be read."""
     folder = cache_dir or cache_folder()
-    entry = folder / f"{task['kind']}-{cache_key(design, task)}{suffix}"
+    entry = folder / f"{task['kind']}-{cache_key(finger, task)}{suffix}"
     if entry.exists():
         try:
             return load(entry)
@@ -136,7 +136,7 @@ def _cached(
     try:
         with atomic_path(entry) as partial:
             partial.touch()
-            run_task({**task, "design": design.model_dump(), "output": str(partial)}, timeout_s)
+            run_task({**task, "finger": finger.definition(), "output": str(partial)}, timeout_s)
             return load(partial)
     except OSError as error:
         raise UserError(

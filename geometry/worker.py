@@ -68,22 +68,22 @@ def perform(task: Mapping[str, Any]) -> None:
     """Run a task in this process.
 
     Args:
-        task: `kind` ("mesh" or "cad"), `design` as a dictionary and `output` as a path; for a mesh also
+        task: `kind` ("mesh" or "cad"), `finger` as its definition and `output` as a path; for a mesh also
             `settings` as a dictionary, for CAD `formats`.
     """
     from geometry.finger.design import Design
 
-    design = Design(**task["design"])
+    finger = Design(**task["finger"])
     output = Path(task["output"])
     if task["kind"] == "mesh":
         from geometry.mesh.mesher import build_mesh
         from geometry.mesh.settings import MeshSettings
 
-        build_mesh(design, MeshSettings(**task["settings"])).save(output)
+        build_mesh(finger, MeshSettings(**task["settings"])).save(output)
     elif task["kind"] == "cad":
         from geometry.cad import write_archive
 
-        write_archive(design, task["formats"], output)
+        write_archive(finger, task["formats"], output)
     else:
         raise UserError(f"unknown task {task['kind']!r}; there are 'mesh' and 'cad'")
 

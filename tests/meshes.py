@@ -3,7 +3,8 @@
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.finger.section import Section, corner_angles, polygon_sides
+from geometry.finger.design import Design
+from geometry.finger.section import cells, corner_angles
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 
@@ -29,29 +30,34 @@ def smallest_angle(mesh: TriangleMesh) -> float:
     return float(np.degrees(np.arccos(cosine.max())))
 
 
-def boundary_lengths(section: Section) -> dict[str, float]:
-    """Length of the named boundaries `base`, `front`, `back` and `contact`, mm."""
-    base, back, front = polygon_sides(section.outer)
-    contact = np.ptp(section.contact[:, 0])
-    return {"base": float(base), "front": float(front), "back": float(back), "contact": float(contact)}
+def boundary_lengths(design: Design) -> dict[str, float]:
+    """Length of `base`, `front`, `back` and `contact` of a finger without tilt, rounding and foot, mm."""
+    back = float(np.hypot(design.base_width, design.height))
+    return {
+        "base": design.base_width,
+        "front": design.height,
+        "back": back,
+        "contact": design.contact_width,
+    }
 
 
-def body_area(section: Section) -> float:
-    """Area of the body, mm^2, fillets included."""
-    return polygon_area(section.outer) - sum(
-        polygon_area(cavity)
-        - sum(corner_area(angle, section.fillet_radius) for angle in corner_angles(cavity))
-        for cavity in section.cavities
+def body_area(design: Design) -> float:
+    """Area of a finger without tilt, rounding and foot, mm^2, fillets included."""
+    return 0.5 * design.base_width * design.height - sum(
+        polygon_area(cell) - sum(corner_area(angle, design.fillet_radius) for angle in corner_angles(cell))
+        for cell in cells(design)
     )
 
 
-def body_perimeter(section: Section) -> float:
-    """Length of the whole boundary, the cavities' included, mm."""
-    total = float(polygon_sides(section.outer).sum())
-    for cavity in section.cavities:
-        turns = np.pi - corner_angles(cavity)
+def body_perimeter(design: Design) -> float:
+    """Length of the whole boundary of such a finger, the cavities' included, mm."""
+    lengths = boundary_lengths(design)
+    total = lengths["base"] + lengths["back"] + lengths["front"]
+    for cell in cells(design):
+        turns = np.pi - corner_angles(cell)
         shortened = 2 * np.tan(turns / 2) - turns
-        total += float(polygon_sides(cavity).sum() - section.fillet_radius * shortened.sum())
+        sides = np.linalg.norm(np.roll(cell, -1, axis=0) - cell, axis=1)
+        total += float(sides.sum() - design.fillet_radius * shortened.sum())
     return total
 
 

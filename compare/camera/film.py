@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from compare.runtime.provenance import file_digest
-from geometry.finger.parameters import Parameters
+from geometry.finger.finger import Finger
 
 if TYPE_CHECKING:  # it imports OpenCV, and `--help` has to be quick
     from vision.tracking.scene import FilmedScene
@@ -29,7 +29,7 @@ class Film:
     colour: str = "dark"
     method: Literal["precise", "hough"] = "precise"
 
-    def scene(self, design: Parameters) -> "FilmedScene":
+    def scene(self, design: Finger) -> "FilmedScene":
         """The filmed scene of a finger.
 
         Raises:

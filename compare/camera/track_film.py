@@ -16,7 +16,7 @@ from compare.figures import Picture
 from compare.runtime.tables import Cell, terminal_table, write_csv
 from geometry.arrays import FloatArray
 from geometry.atomic import write_json
-from geometry.finger.parameters import Parameters
+from geometry.finger.finger import Finger
 from geometry.observations import Observations
 from solvers.solver import Progress
 from vision.frames.frame import Frame, Image
@@ -32,7 +32,7 @@ from vision.tracking.trajectories import Tracking
 
 def track_film(
     film: Film,
-    design: Parameters,
+    design: Finger,
     folder: Path,
     report: Progress,
     *,

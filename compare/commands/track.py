@@ -54,7 +54,7 @@ def track(
             tracking, observations = track_film(
                 film, design, folder, report, video=not without_video, watch=watch
             )
-        provenance = {"design": design.model_dump(), "versions": package_versions(), "machine": machine()}
+        provenance = {"design": design.definition(), "versions": package_versions(), "machine": machine()}
         write_run(folder, provenance | {"seconds": stages.seconds})
     for warning in tracking.warnings:
         say(f"warning: {warning}")

@@ -12,7 +12,7 @@ from compare.crossval.folds import ALL, SCHEMES
 from compare.runtime.provenance import cores
 from compare.runtime.resumable_folder import job_definition
 from geometry.errors import UserError
-from geometry.finger.design import Design
+from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
 from solvers.problem import Load, Material
@@ -97,7 +97,7 @@ class Study:
         processes: Solvers run at a time.
     """
 
-    design: Design
+    design: Finger
     variants: Sequence[SolverVariant]
     out: Path
     mesh: MeshSettings = field(default_factory=lambda: MeshSettings(size=ELEMENT_SIZE))

@@ -137,7 +137,7 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> Path:
         UserError: If the simulation cannot be run or does not reach the full load.
     """
     study = task.study
-    design = study.design.replaced(contact_position=task.case.contact)
+    design = study.design.at_contact(task.case.contact)
     stroke = -task.case.share * float(study.load.displacement[1] or 0.0)
     shared = TriangleMesh.load(study.mesh_file)
     parts = [

@@ -13,7 +13,7 @@ from compare.evaluation.metrics import (
     truth_differences,
 )
 from geometry.errors import UserError
-from geometry.finger.design import Design
+from geometry.finger.finger import Finger
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.adaptation import Adaptation
@@ -43,7 +43,7 @@ class Comparison:
         warnings: Remarks of the marker tracking.
     """
 
-    design: Design
+    design: Finger
     mesh: TriangleMesh
     observations: Observations
     evaluations: Sequence[Evaluation]

@@ -8,8 +8,7 @@ from compare.runtime.stages import Stages
 from compare.runtime.tables import write_csv
 from geometry.cache import finger_mesh
 from geometry.errors import OutsideBodyError, UserError
-from geometry.finger.design import Design
-from geometry.finger.section import finger_section
+from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
@@ -19,7 +18,7 @@ from solvers.solver import Solver
 
 
 def shared_mesh(
-    design: Design,
+    design: Finger,
     settings: MeshSettings,
     stages: Stages,
     *,
@@ -63,7 +62,7 @@ def shared_mesh(
             Problem(mesh, linear, load),
             tolerance,
             degree=int(str(degrees[0])) if degrees else 2,
-            section=finger_section(design),
+            section=design.section,
             progress=progress,
         )
         if not adaptation.reached:

@@ -18,6 +18,7 @@ from compare.figures.mesh_drawing import draw_mesh, mesh_numbers
 from compare.figures.overlay import draw_overlay
 from geometry.errors import UserError
 from geometry.figure import Figure
+from geometry.finger.design import Design
 
 
 class Drawing(NamedTuple):
@@ -152,9 +153,10 @@ def losses(comparison: Comparison) -> Drawing | None:
 
 
 def design(comparison: Comparison) -> Drawing:
-    """The design with its dimensions."""
+    """The finger with its dimensions if it has parameters, else with its axes."""
+    finger = comparison.design
     return Drawing(
-        draw_design(comparison.design),
+        draw_design(finger) if isinstance(finger, Design) else finger.plot(),
         "Design",
         f"The finger “{comparison.design.name}”, to scale, with its dimensions under the paper’s symbols, "
         f"the clamped base, the contact and the markers.",

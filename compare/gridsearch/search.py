@@ -23,7 +23,7 @@ from compare.runtime.resumable_folder import check_resumable_folder, job_definit
 from compare.runtime.stages import Stages
 from geometry.atomic import write_json
 from geometry.cache import finger_mesh
-from geometry.finger.design import Design
+from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
@@ -48,7 +48,7 @@ class GridSearch:
         processes: Runs trained at a time.
     """
 
-    design: Design
+    design: Finger
     mesh: MeshSettings
     material: Material
     load: Load

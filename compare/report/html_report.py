@@ -53,8 +53,8 @@ def render(comparison: Comparison, pictures: Sequence[Picture], provenance: Mapp
         entries=[_entry(evaluation, comparison) for evaluation in comparison.evaluations],
         presets=text.preset_meanings(comparison.settings),
         left_out=left_out_remarks(comparison.left_out),
-        design_rows=text.design_rows(design),
-        paper_rows=[(symbol, value) for _, symbol, value in text.design_rows(design) if symbol],
+        design_rows=design.facts(),
+        paper_rows=[(symbol, value) for _, symbol, value in design.facts() if symbol],
         material_rows=text.material_rows(
             comparison.material,
             {evaluation.label: evaluation.law for evaluation in comparison.evaluations},

@@ -31,7 +31,7 @@ def metrics(comparison: Comparison) -> dict[str, Any]:
     observations = comparison.observations
     return {
         "schema": SCHEMA,
-        "design": comparison.design.model_dump(),
+        "design": comparison.design.definition(),
         "material": comparison.material.model_dump(),
         "load": comparison.load.model_dump(),
         "measurements": {

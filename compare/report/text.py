@@ -8,29 +8,9 @@ from markupsafe import Markup
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.number_format import distance, number, percent
 from geometry.arrays import FloatArray
-from geometry.finger.parameters import Parameters, parameter_info
+from geometry.finger.finger import Finger
 from geometry.observations import Observations
 from solvers.problem import Load, Material
-
-
-def design_rows(design: Parameters) -> list[tuple[str, str, str]]:
-    """The design's parameters as meaning, the paper's symbol, and value with unit."""
-    rows = []
-    for name, described in type(design).model_fields.items():
-        if name in ("name", "contact_position"):
-            continue
-        value = getattr(design, name)
-        meaning = (described.description or name).split(" [")[0].replace("`", "")
-        rows.append(
-            (meaning, str(parameter_info(name, "symbol")), _value(value, str(parameter_info(name, "unit"))))
-        )
-    return [*rows, ("Abscissa of the contact's middle", "", _value(design.contact_abscissa, "mm"))]
-
-
-def _value(value: object, unit: str) -> str:
-    number = f"{value:g}" if isinstance(value, int | float) else str(value)
-    return number + {"": "", "deg": "°"}.get(unit, f" {unit}")
-
 
 FINITE_STRAIN = "finite strain: the strain is Green-Lagrange, the stress Cauchy"
 LAWS = {
@@ -62,7 +42,7 @@ def preset_meanings(settings: Mapping[str, Mapping[str, object]]) -> dict[str, s
     return {name: PRESETS[preset] for name, preset in chosen.items() if preset in PRESETS}
 
 
-def load_sentence(load: Load, design: Parameters) -> str:
+def load_sentence(load: Load, design: Finger) -> str:
     """Sentence on the load."""
     width = f"{design.contact_width:g} mm wide contact"
     where = {

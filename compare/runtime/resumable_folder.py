@@ -9,13 +9,13 @@ from pydantic_core import to_jsonable_python
 
 from compare.runtime.provenance import package_versions, sources_digest
 from geometry.errors import UserError
-from geometry.finger.design import Design
+from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
 from solvers.problem import Load, Material
 
 
 def job_definition(
-    design: Design, mesh: MeshSettings, material: Material, load: Load, modules: Iterable[str]
+    design: Finger, mesh: MeshSettings, material: Material, load: Load, modules: Iterable[str]
 ) -> dict[str, Any]:
     """Everything that the result of a job on a finger depends on.
 
@@ -28,7 +28,7 @@ def job_definition(
     """
     return {
         "schema": 1,
-        "design": design.model_dump(),
+        "design": design.definition(),
         "mesh": mesh.model_dump(),
         "material": material.model_dump(),
         "load": load.model_dump(mode="json"),

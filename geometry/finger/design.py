@@ -1,14 +1,17 @@
-"""The design of a finger: parameters that obey every rule."""
+"""A finger from parameters that obey every rule."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from pydantic import model_validator
 
+from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from geometry.finger.parameters import SYMBOLS, Parameters, title, with_unit
+from geometry.finger.parameters import SYMBOLS, Parameters, parameter_info, title, with_unit
+from geometry.finger.section import finger_section, marker_positions
 from geometry.finger.validation import check
 from geometry.notebook import fact_table
+from geometry.section.section import Section
 
 if TYPE_CHECKING:
     from geometry.figure import Figure
@@ -24,11 +27,41 @@ class Design(Parameters):
         """A checked copy with some parameters changed, by name or symbol."""
         return Design(**{**self.model_dump(), **by_parameter_name(changes)})
 
+    @property
+    def section(self) -> Section:
+        """The section, whose outline has the pieces `base`, `back`, `tip`, `front` and those of a foot."""
+        return finger_section(self)
+
+    @property
+    def markers(self) -> FloatArray:
+        """Centres of the markers, ordered from base to tip, shape (m, 2), mm."""
+        return marker_positions(self)
+
+    def at_contact(self, position: float) -> "Design":
+        """The same finger with the contact's middle at another x, mm."""
+        return self.replaced(contact_position=position)
+
+    def definition(self) -> dict[str, Any]:
+        """Every parameter by name."""
+        return self.model_dump()
+
+    def facts(self) -> list[tuple[str, str, str]]:
+        """Every parameter's meaning, symbol of the paper and value with unit."""
+        rows = []
+        for name, described in type(self).model_fields.items():
+            value = getattr(self, name)
+            if name in ("name", "contact_position") or value is None:
+                continue
+            meaning = (described.description or name).split(" [")[0].replace("`", "")
+            unit = str(parameter_info(name, "unit"))
+            rows.append((meaning, str(parameter_info(name, "symbol")), _in_words(value, unit)))
+        return [*rows, ("Abscissa of the contact's middle", "", _in_words(self.contact_abscissa, "mm"))]
+
     def plot(self) -> "Figure":
         """The section to scale, with its markers and the contact, as a matplotlib figure."""
-        from geometry.finger.picture import plot_design
+        from geometry.finger.picture import plot_finger
 
-        return plot_design(self)
+        return plot_finger(self)
 
     def _repr_html_(self) -> str:
         """The section and the paper's nine parameters, in a notebook."""
@@ -48,6 +81,11 @@ class Design(Parameters):
     def _obey_rules(self) -> "Design":
         check(self)
         return self
+
+
+def _in_words(value: object, unit: str) -> str:
+    number = f"{value:g}" if isinstance(value, int | float) else str(value)
+    return number + {"": "", "deg": "°"}.get(unit, f" {unit}")
 
 
 def by_parameter_name(values: Mapping[str, Any]) -> dict[str, Any]:

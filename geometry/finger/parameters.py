@@ -45,11 +45,13 @@ class Parameters(CheckedModel):
     """Numbers that describe a finger, each within its own bounds; `Design` also checks them together.
 
     Frame: x runs from the base (0) to the tip (`height`); the front (contact) face is y = 0 and the body
-    lies in y <= 0. The base edge runs from (0, 0) to (0, -base_width) and is clamped; the back face is the
-    line from (0, -base_width) to the apex (height, 0). The section is extruded along z from 0 to `depth`.
+    lies in y <= 0. The base line runs from (0, 0) over `base_width`, along -y or tilted toward the tip; the
+    back face is the line from its end to the apex (height, 0). The base line is clamped or, with a foot below
+    it, the foot's underside. The section is extruded along z from 0 to `depth`.
 
-    `height` to `back_thickness` are the paper's nine. The paper does not give base wall, fillets, the
-    contact's width and the markers: those values are this project's.
+    `height` to `back_thickness` are the paper's nine. The paper does not give base wall and tilt, the ribs'
+    places and the line that their slope is measured from, roundings, the foot, the contact's width and the
+    markers: those values are this project's.
     """
 
     name: str = Field(
@@ -66,7 +68,7 @@ class Parameters(CheckedModel):
         60,
         "deg",
         "L_angle",
-        "Slope of the ribs from the front wall's normal, positive toward the tip",
+        "Slope of the ribs from the line of `rib_reference`, positive toward the tip",
     )
     tip_length: float = bounded(20.0, 1, 300, "mm", "L_tip", "Length of the solid tip, along the front face")
     rib_count: int = bounded(4, 0, 60, "", "N", "Number of ribs")
@@ -75,7 +77,31 @@ class Parameters(CheckedModel):
     back_thickness: float = bounded(
         2.0, 0.2, 30, "mm", "t_back", "Thickness of the back wall, normal to the back face"
     )
-    base_thickness: float = bounded(2.0, 0.2, 100, "mm", "", "Thickness of the wall at the clamped base")
+    base_thickness: float = bounded(2.0, 0, 100, "mm", "", "Thickness of the wall inside the base line")
+    base_tilt: float = bounded(
+        0.0, -45, 45, "deg", "", "Tilt of the base line from the front's normal, toward the tip at the back"
+    )
+    rib_reference: Literal["front", "base"] = Field(
+        default="front",
+        description="Line from which `rib_angle` is measured: the front wall's normal, or the base line",
+    )
+    rib_start: float | None = bounded(
+        None,
+        0,
+        500,
+        "mm",
+        "",
+        "Abscissa of the first rib's axis on the front wall's inner face; none: a pitch from the base wall",
+    )
+    rib_pitch: float | None = bounded(
+        None, 0.2, 500, "mm", "", "Distance of the rib axes along the front wall; none spaces them evenly"
+    )
+    tip_radius: float = bounded(0.0, 0, 100, "mm", "", "Radius of the tip's rounding; 0 leaves it sharp")
+    foot_height: float = bounded(0.0, 0, 200, "mm", "", "Height of the foot below the base line; 0: no foot")
+    slot_width: float = bounded(0.0, 0, 200, "mm", "", "Width of the T-slot in the foot; 0: no slot")
+    slot_opening: float = bounded(0.0, 0, 200, "mm", "", "Width of the slot's opening, between the two lips")
+    slot_height: float = bounded(0.0, 0, 200, "mm", "", "Height of the slot's wide part")
+    lip_thickness: float = bounded(0.0, 0, 200, "mm", "", "Thickness of the lips beside the slot's opening")
     fillet_radius: float = bounded(
         0.0, 0, 20, "mm", "", "Radius of the cavities' corners; 0 leaves them sharp"
     )

@@ -2,49 +2,29 @@
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Circle, PathPatch, Polygon
+from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path as Outline
 
-from geometry.arrays import FloatArray
 from geometry.figure import BODY, CONTACT, INK, MEASURED, Figure, body_figure
-from geometry.finger.parameters import Parameters
-from geometry.finger.section import Section, corner_angles, fillet_points, finger_section, marker_positions
+from geometry.finger.finger import Finger
+from geometry.section.section import Section
 
 
-def plot_design(design: Parameters) -> Figure:
+def plot_finger(finger: Finger) -> Figure:
     """The section to scale, with its markers and the contact."""
-    shape = finger_section(design)
-    with body_figure(shape.outer, f"Design “{design.name}”") as (drawn, axes):
+    shape = finger.section
+    with body_figure(shape.bounds, f"Design “{finger.name}”") as (drawn, axes):
         draw_section(axes, shape)
-        axes.plot(design.contact_ends, (0, 0), color=CONTACT, lw=3, solid_capstyle="butt", zorder=3)
-        for place in marker_positions(design):
-            axes.add_patch(Circle(tuple(place), design.marker_radius, fc=MEASURED, zorder=4))
+        front = np.array([shape.front_point(x) for x in np.linspace(*finger.contact_ends, 9)])
+        axes.plot(*front.T, color=CONTACT, lw=3, solid_capstyle="butt", zorder=3)
+        for place in finger.markers:
+            axes.add_patch(Circle(tuple(place), finger.marker_radius, fc=MEASURED, zorder=4))
     return drawn
 
 
 def draw_section(axes: Axes, shape: Section) -> None:
-    """Draw the section, in mm; cavities are white."""
-    axes.add_patch(Polygon(shape.outer, fc=BODY, ec=INK, lw=0.9, zorder=1))
-    for cell in shape.cavities:
-        axes.add_patch(PathPatch(_rounded(cell, shape.fillet_radius), fc="white", ec=INK, lw=0.9, zorder=2))
-
-
-def _rounded(corners: FloatArray, radius: float) -> Outline:
-    """A convex polygon with its corners rounded: cubic curves, within 0.03 % of the radius of the arcs."""
-    if radius == 0:
-        return Outline(np.concatenate([corners, corners[:1]]), closed=True)
-    angles = corner_angles(corners)
-    pull = 4 / 3 * np.tan((np.pi - angles) / 4) * np.tan(angles / 2)
-    vertices = []
-    for which, corner in enumerate(corners):
-        enter, _, leave = fillet_points(corners, which, radius)
-        vertices += [
-            enter,
-            enter + (corner - enter) * pull[which],
-            leave + (corner - leave) * pull[which],
-            leave,
-        ]
-    codes = [Outline.LINETO, Outline.CURVE4, Outline.CURVE4, Outline.CURVE4] * len(corners)
-    return Outline(
-        np.array([*vertices, vertices[0]]), np.array([Outline.MOVETO, *codes[1:], Outline.CLOSEPOLY])
-    )
+    """Draw the section, in mm; cavities are empty."""
+    rings = [loop.flattened()[0] for loop in shape.loops]
+    paths = [Outline(np.concatenate([ring, ring[:1]]), closed=True) for ring in rings]
+    whole = Outline.make_compound_path(*paths)
+    axes.add_patch(PathPatch(whole, fc=BODY, ec=INK, lw=0.9, zorder=1))

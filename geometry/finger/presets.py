@@ -9,6 +9,9 @@ from geometry.errors import UserError
 from geometry.finger.design import Design, by_parameter_name
 from geometry.finger.parameters import SYMBOLS, Parameters, title, unknown_parameter
 
+OPTIONAL = tuple(name for name, field in Parameters.model_fields.items() if field.default is None)
+"""Parameters that may be None."""
+
 FOLDER = Path(__file__).parent.parent / "designs"
 """Folder of the presets, one TOML file each."""
 
@@ -47,7 +50,7 @@ def load_design(name_or_path: str | Path = "default", overrides: Mapping[str, An
 def parse_overrides(settings: Sequence[str]) -> dict[str, Any]:
     """Parse texts such as `rib_count=6` or `N=6` into overrides for `load_design`.
 
-    `contact_position=none` restores the middle of the ribbed part.
+    `none` restores the default of `contact_position`, `rib_start` and `rib_pitch`.
 
     Raises:
         UserError: If a text is no assignment, or names an unknown parameter or one twice.
@@ -62,7 +65,7 @@ def parse_overrides(settings: Sequence[str]) -> dict[str, Any]:
             raise UserError(unknown_parameter(key, Parameters))
         if name in overrides:
             raise UserError(f"{title(name)} is set twice; set it once")
-        overrides[name] = None if name == "contact_position" and value.lower() == "none" else value
+        overrides[name] = None if name in OPTIONAL and value.lower() == "none" else value
     return overrides
 
 

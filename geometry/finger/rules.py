@@ -4,17 +4,21 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from scipy.spatial.distance import pdist
 
 from geometry.finger.parameters import Parameters
 from geometry.finger.section import (
-    back_offset_line,
+    back_line,
+    cavity_ends,
+    cells,
     corner_angles,
-    finger_section,
-    inside_distance,
+    finger_outline,
     marker_positions,
-    polygon_sides,
     rib_pitch,
+    rib_slope,
+    tip_line,
+    tip_tangent,
 )
 
 MIN_CAVITY = 0.5
@@ -30,7 +34,10 @@ MIN_DEPTH_LEFT = 0.2
 """Minimum material below a marker's pocket, mm."""
 
 MIN_STRAIGHT = 1e-3
-"""Minimum straight length between two fillets, mm."""
+"""Minimum straight length between two roundings, mm."""
+
+MIN_WALL = 0.2
+"""Minimum thickness of the base wall and of the walls around a slot, mm."""
 
 
 @dataclass(frozen=True)
@@ -61,18 +68,19 @@ class Rule:
 
 def cavity_length(p: Parameters) -> RuleResult:
     """Base wall and tip leave room for a cavity."""
-    length = p.height - p.tip_length - p.base_thickness
+    start, end = cavity_ends(p)
     return RuleResult(
-        length - MIN_CAVITY,
+        end - start - MIN_CAVITY,
         f"no room for a cavity: height {p.height:g} mm less tip_length {p.tip_length:g} mm and "
-        f"base_thickness {p.base_thickness:g} mm leaves {length:.3g} mm, at least {MIN_CAVITY} mm is needed",
+        f"base_thickness {p.base_thickness:g} mm leaves {end - start:.3g} mm, at least {MIN_CAVITY} mm is "
+        "needed",
     )
 
 
 def cavity_open(p: Parameters) -> RuleResult:
     """Front and back wall stay apart up to the tip block."""
-    slope, intercept = back_offset_line(p, p.back_thickness)
-    opening = -p.front_thickness - slope * (p.height - p.tip_length) - intercept
+    _, _, back, front = cells(p)[-1]
+    opening = float(front[1] - back[1])
     return RuleResult(
         opening - MIN_CAVITY,
         f"walls close the cavity: front_thickness {p.front_thickness:g} mm and back_thickness "
@@ -81,9 +89,52 @@ def cavity_open(p: Parameters) -> RuleResult:
     )
 
 
+def base_wall(p: Parameters) -> RuleResult:
+    """A wall closes the cavity at the base: inside the base line or, with a foot, above its slot."""
+    slot = p.lip_thickness + p.slot_height if p.slot_width > 0 else 0.0
+    wall = p.base_thickness + p.foot_height - slot
+    return RuleResult(
+        wall - MIN_WALL,
+        f"the base is open: base_thickness {p.base_thickness:g} mm and foot_height {p.foot_height:g} mm "
+        f"leave a wall of {wall:.3g} mm between cavity and {'slot' if slot else 'base'}, at least "
+        f"{MIN_WALL} mm is needed",
+    )
+
+
+def slot_fits(p: Parameters) -> RuleResult:
+    """A slot lies in the foot, between lips, and is open."""
+    if p.slot_width == 0:
+        return RuleResult(np.inf, "")
+    margins = {
+        "slot_opening must be above 0 mm": p.slot_opening - MIN_STRAIGHT,
+        "slot_height must be above 0 mm": p.slot_height - MIN_STRAIGHT,
+        f"lip_thickness must be at least {MIN_WALL} mm": p.lip_thickness - MIN_WALL,
+        "slot_opening must be at most slot_width": p.slot_width - p.slot_opening,
+        f"slot_width must leave walls of {MIN_WALL} mm in base_width": (p.base_width - p.slot_width) / 2
+        - MIN_WALL,
+        "lip_thickness and slot_height must be less than foot_height": p.foot_height
+        - p.lip_thickness
+        - p.slot_height,
+    }
+    worst = min(margins, key=margins.__getitem__)
+    return RuleResult(float(margins[worst]), f"the slot does not fit into the foot: {worst}")
+
+
+def tip_rounded(p: Parameters) -> RuleResult:
+    """The tip's rounding stays within the solid tip."""
+    apex = np.array([p.height, 0.0])
+    behind = float(np.linalg.norm(apex - back_line(p, 0.0).meets(tip_line(p))))
+    room = min(p.tip_length, behind) - tip_tangent(p)
+    return RuleResult(
+        room - MIN_STRAIGHT,
+        f"tip_radius too large: {p.tip_radius:g} mm rounds {tip_tangent(p):.4g} mm of front and back face, "
+        f"the solid tip has {min(p.tip_length, behind):.4g} mm",
+    )
+
+
 def ribs_apart(p: Parameters) -> RuleResult:
     """Neighbouring ribs leave a gap."""
-    gap = rib_pitch(p) * np.cos(np.radians(p.rib_angle)) - p.rib_thickness
+    gap = rib_pitch(p) * np.cos(np.radians(rib_slope(p))) - p.rib_thickness
     return RuleResult(
         float(gap) - MIN_CAVITY if p.rib_count > 1 else np.inf,
         f"ribs {'overlap' if gap < 0 else 'are too close'}: {p.rib_count} ribs of {p.rib_thickness:g} mm at "
@@ -104,19 +155,21 @@ def ribs_clear_of_tip(p: Parameters) -> RuleResult:
 def contact_on_front(p: Parameters) -> RuleResult:
     """The contact lies on the front face, clear of base and apex."""
     low, high = p.contact_ends
+    end = p.height - tip_tangent(p) - MIN_CONTACT_MARGIN
     return RuleResult(
-        min(low, p.height - high) - MIN_CONTACT_MARGIN,
+        min(low - MIN_CONTACT_MARGIN, end - high),
         f"contact outside the front face: it reaches from x = {low:.6g} to {high:.6g} mm, the face allows "
-        f"{MIN_CONTACT_MARGIN:g} to {p.height - MIN_CONTACT_MARGIN:g} mm",
+        f"{MIN_CONTACT_MARGIN:g} to {end:.6g} mm",
     )
 
 
 def fillets_fit(p: Parameters) -> RuleResult:
     """Two fillets fit on every side of every cell."""
     room = np.inf
-    for cavity in finger_section(p).cavities if p.fillet_radius > 0 else ():
-        tangents = p.fillet_radius / np.tan(corner_angles(cavity) / 2)
-        room = min(room, float((polygon_sides(cavity) - tangents - np.roll(tangents, -1)).min()))
+    for cell in cells(p) if p.fillet_radius > 0 else ():
+        tangents = p.fillet_radius / np.tan(corner_angles(cell) / 2)
+        sides = np.linalg.norm(np.roll(cell, -1, axis=0) - cell, axis=1)
+        room = min(room, float((sides - tangents - np.roll(tangents, -1)).min()))
     return RuleResult(
         room - MIN_STRAIGHT,
         f"fillets too large: two of fillet_radius {p.fillet_radius:g} mm need {-room:.3g} mm more than the "
@@ -125,12 +178,11 @@ def fillets_fit(p: Parameters) -> RuleResult:
 
 
 def markers_fit(p: Parameters) -> RuleResult:
-    """Every marker lies in the material.
-
-    Markers sit in the middle of a wall or on the tip's bisector, so no cavity is nearer than the outline.
-    """
+    """Every marker lies in the material; the cavities' roundings are left out."""
     centres = marker_positions(p)
-    margins = inside_distance(finger_section(p).outer, centres)
+    body = shapely.Polygon(finger_outline(p).flattened()[0], list(cells(p)))
+    away = shapely.distance(body.boundary, shapely.points(centres))
+    margins = np.where(shapely.contains_xy(body, *centres.T), away, -away)
     worst = int(margins.argmin())
     x, y = centres[worst]
     room = 2 * (margins[worst] - MIN_MARKER_WALL)
@@ -163,12 +215,15 @@ def markers_not_through(p: Parameters) -> RuleResult:
 
 
 WALLS = ("front_thickness", "back_thickness", "tip_length", "base_width")
-RIBS = ("rib_count", "rib_thickness", "rib_angle", "height")
+RIBS = ("rib_count", "rib_thickness", "rib_angle", "rib_pitch", "height")
 RULES: tuple[Rule, ...] = (
-    Rule(cavity_length, ("tip_length", "base_thickness", "height")),
-    Rule(cavity_open, WALLS),
+    Rule(cavity_length, ("tip_length", "base_thickness", "height", "base_tilt")),
+    Rule(cavity_open, (*WALLS, "base_tilt")),
+    Rule(base_wall, ("base_thickness", "foot_height", "slot_height")),
+    Rule(slot_fits, ("slot_width", "slot_opening", "slot_height", "lip_thickness", "foot_height")),
+    Rule(tip_rounded, ("tip_radius", "tip_length")),
     Rule(ribs_apart, RIBS),
-    Rule(ribs_clear_of_base, ("rib_angle", "rib_count", "rib_thickness", "base_width", "height")),
+    Rule(ribs_clear_of_base, (*RIBS, "base_width", "rib_start")),
     Rule(ribs_clear_of_tip, (*RIBS, "tip_length")),
     Rule(contact_on_front, ("contact_position", "contact_width", "height")),
     Rule(fillets_fit, ("fillet_radius", "rib_count")),
@@ -181,7 +236,7 @@ RULES: tuple[Rule, ...] = (
 
 def _cavity_width(p: Parameters, number: int, fault: str) -> RuleResult:
     """Result for the narrower end of the first or last cavity."""
-    base_front, base_back, tip_back, tip_front = finger_section(p).cavities[number]
+    base_front, base_back, tip_back, tip_front = cells(p)[number]
     front, back = tip_front[0] - base_front[0], tip_back[0] - base_back[0]
     wall, width = ("front", front) if front < back else ("back", back)
     return RuleResult(

@@ -1,72 +1,120 @@
-"""The finger's section in closed form: outline, cavities, ribs, fillets and markers; no CAD."""
+"""The finger's section from its parameters, in closed form: walls, ribs, cavities and markers; no CAD."""
 
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import lru_cache
 
 import numpy as np
 
-from geometry.arrays import BoolArray, FloatArray
+from geometry.arrays import FloatArray
 from geometry.finger.parameters import Parameters
+from geometry.section.loop import Loop
+from geometry.section.section import Section
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
-    """Outline and cavities of a finger.
+class Line:
+    """A straight line, or several, through points, shape (..., 2), mm, along a unit vector, shape (2,)."""
 
-    Attributes:
-        outer: Corners (0, 0), (0, -base_width), (height, 0), shape (3, 2), mm; counter-clockwise.
-        cavities: From base to tip with sharp corners, each of shape (4, 2), mm, counter-clockwise: front and
-            back corner nearer the base, back and front corner nearer the tip.
-        ribs: Between the walls' inner faces, corners in the order of `cavities`, each of shape (4, 2), mm.
-        fillet_radius: Radius that rounds every corner of every cell, mm.
-        contact: Both ends of the contact on the front face, shape (2, 2), mm.
-    """
+    point: FloatArray
+    direction: FloatArray
 
-    outer: FloatArray
-    cavities: tuple[FloatArray, ...]
-    ribs: tuple[FloatArray, ...]
-    fillet_radius: float
-    contact: FloatArray
-
-    def contains(self, points: FloatArray) -> BoolArray:
-        """Mask of the points, shape (n, 2), mm, in the body or on its boundary; fillets are ignored."""
-        inside = inside_distance(self.outer, points) >= 0
-        for cavity in self.cavities:
-            inside &= inside_distance(cavity, points) <= 0
-        return inside
+    def meets(self, other: "Line") -> FloatArray:
+        """The points where the lines cross another, shape (..., 2), mm; far away where they are parallel."""
+        across = np.array([-other.direction[1], other.direction[0]])
+        closing = float(self.direction @ across)
+        if abs(closing) < 1e-9:
+            closing = 1e-9
+        share = (other.point - self.point) @ across / closing
+        return np.asarray(self.point + share[..., None] * self.direction, dtype=np.float64)
 
 
+@lru_cache(maxsize=64)
 def finger_section(parameters: Parameters) -> Section:
-    """The section of a finger whose parameters obey the rules."""
-    p = parameters
-    half = p.rib_thickness / (2 * np.cos(np.radians(p.rib_angle)))
-    sides = [_wall_side(p, p.base_thickness)]
-    for foot in rib_feet(p):
-        sides += [_rib_side(p, foot - half), _rib_side(p, foot + half)]
-    sides.append(_wall_side(p, p.height - p.tip_length))
-    quads = [np.array([*left, *right[::-1]]) for left, right in pairwise(sides)]
-    return Section(
-        outer=np.array([[0, 0], [0, -p.base_width], [p.height, 0]], dtype=np.float64),
-        cavities=tuple(quads[::2]),
-        ribs=tuple(quads[1::2]),
-        fillet_radius=p.fillet_radius,
-        contact=np.array([[x, 0] for x in p.contact_ends], dtype=np.float64),
-    )
+    """The section of a finger whose parameters obey the rules.
+
+    The outline has the pieces `base`, `back`, `tip` and `front`, with a foot `foot`.
+    """
+    cavities = tuple(_rounded(cell, parameters.fillet_radius).reversed() for cell in cells(parameters))
+    return Section(finger_outline(parameters), cavities)
+
+
+def front_line(distance: float) -> Line:
+    """The line `distance` mm inside the front face."""
+    return Line(np.array([0.0, -distance]), np.array([1.0, 0.0]))
+
+
+def base_line(parameters: Parameters, distance: float) -> Line:
+    """The line `distance` mm inside the base line, toward the back."""
+    inward, along = _base_frame(parameters)
+    return Line(distance * inward, along)
+
+
+def back_line(parameters: Parameters, distance: float) -> Line:
+    """The line `distance` mm inside the back face, toward the tip."""
+    base, apex = base_corners(parameters)[1], np.array([parameters.height, 0.0])
+    along = (apex - base) / np.linalg.norm(apex - base)
+    return Line(apex + distance * np.array([-along[1], along[0]]), along)
+
+
+def tip_line(parameters: Parameters) -> Line:
+    """The line between cavities and tip, parallel to the base, `tip_length` from the apex along the front."""
+    _, along = _base_frame(parameters)
+    return Line(np.array([parameters.height - parameters.tip_length, 0.0]), along)
+
+
+def base_corners(parameters: Parameters) -> FloatArray:
+    """Front and back end of the base line, shape (2, 2), mm."""
+    _, along = _base_frame(parameters)
+    return np.array([[0.0, 0.0], parameters.base_width * along])
+
+
+def cells(parameters: Parameters) -> tuple[FloatArray, ...]:
+    """Cavities from base to tip with sharp corners, each of shape (4, 2), mm, counter-clockwise.
+
+    Their corners are the front and the back one nearer the base, then the back and the front one nearer the
+    tip.
+    """
+    return _quadrilaterals(parameters)[::2]
+
+
+def ribs(parameters: Parameters) -> tuple[FloatArray, ...]:
+    """Ribs between the walls' inner faces, corners in the order of `cells`, each of shape (4, 2), mm."""
+    return _quadrilaterals(parameters)[1::2]
 
 
 def rib_feet(parameters: Parameters) -> FloatArray:
     """Abscissae of the rib axes on the front wall's inner face, shape (rib_count,), mm.
 
-    Equal pitch over the cavity's length there, which is an assumption: the paper gives no spacing.
+    Without `rib_start` and `rib_pitch`, equal pitch over the cavity's length there, which is an assumption:
+    the paper gives no spacing.
     """
     p = parameters
-    return p.base_thickness + rib_pitch(p) * np.arange(1, p.rib_count + 1)
+    start = cavity_ends(p)[0] + rib_pitch(p) if p.rib_start is None else p.rib_start
+    return np.asarray(start + rib_pitch(p) * np.arange(p.rib_count), dtype=np.float64)
 
 
 def rib_pitch(parameters: Parameters) -> float:
     """Distance of neighbouring rib axes along the front wall, mm."""
     p = parameters
-    return (p.height - p.tip_length - p.base_thickness) / (p.rib_count + 1)
+    if p.rib_pitch is not None:
+        return p.rib_pitch
+    start, end = cavity_ends(p)
+    return (end - start) / (p.rib_count + 1)
+
+
+def cavity_ends(parameters: Parameters) -> tuple[float, float]:
+    """Abscissae between which cavities and ribs lie along the front wall's inner face, mm."""
+    p = parameters
+    inner = front_line(p.front_thickness)
+    sides = base_line(p, p.base_thickness), tip_line(p)
+    start, end = (float(inner.meets(side)[0]) for side in sides)
+    return start, end
+
+
+def rib_slope(parameters: Parameters) -> float:
+    """Angle of the ribs from the front wall's normal, positive toward the tip, degrees."""
+    p = parameters
+    return p.rib_angle + (p.base_tilt if p.rib_reference == "base" else 0.0)
 
 
 def rib_direction(parameters: Parameters) -> FloatArray:
@@ -74,51 +122,45 @@ def rib_direction(parameters: Parameters) -> FloatArray:
 
     A positive angle leans toward the tip: x grows from the front wall to the back wall.
     """
-    angle = np.radians(parameters.rib_angle)
+    angle = np.radians(rib_slope(parameters))
     return np.array([np.sin(angle), -np.cos(angle)])
 
 
 def rib_axes(parameters: Parameters) -> FloatArray:
     """Ends of the rib axes on the front and the back wall's centre line, shape (rib_count, 2, 2), mm."""
     p = parameters
-    direction = rib_direction(p)
-    axes = np.empty((p.rib_count, 2, 2))
-    for axis, foot in zip(axes, rib_feet(p), strict=True):
-        start = np.array([foot, -p.front_thickness])
-        axis[0] = start + direction * (p.front_thickness / 2) / direction[1]
-        axis[1] = _to_back(p, start, direction, p.back_thickness / 2)
-    return axes
+    lines = _rib_lines(p, rib_feet(p))
+    ends = (front_line(p.front_thickness / 2), back_line(p, p.back_thickness / 2))
+    return np.stack([lines.meets(end) for end in ends], axis=1)
 
 
 def marker_positions(parameters: Parameters) -> FloatArray:
     """Centres of the markers, ordered from base to tip, shape (m, 2), mm.
 
-    `front`: `marker_count` of them on the front wall's centre line at x = height k / (marker_count + 1).
-    `joints`: where each rib's axis meets either wall's centre line, and one in the tip on the bisector of the
-    apex, half the tip's length from it: 2 rib_count + 1.
+    `joints`: where each rib's axis meets either wall's centre line, and one in the middle of the solid tip,
+    on the bisector of the apex: 2 rib_count + 1. `front`: `marker_count` of them on the front wall's centre
+    line, evenly along the front face.
 
-    Both layouts are assumptions: the paper shows nine markers, printed with the finger, without positions.
+    The paper shows nine markers, printed with the finger, without positions; its group tracks the eight rib
+    ends and the tip in later code (csiro-robotics/Sim2Real_CFM_Soft_robotic).
     """
     p = parameters
     if p.marker_layout == "front":
-        x = p.height * np.arange(1, p.marker_count + 1) / (p.marker_count + 1)
+        x = (p.height - tip_tangent(p)) * np.arange(1, p.marker_count + 1) / (p.marker_count + 1)
         return np.stack([x, np.full_like(x, -p.front_thickness / 2)], axis=1)
-    half_angle = np.arctan2(p.base_width, p.height) / 2
-    tip = np.array([p.height - p.tip_length / 2, -p.tip_length / 2 * np.tan(half_angle)])
-    points = np.concatenate([rib_axes(p).reshape(-1, 2), tip[None]])
+    points = np.concatenate([rib_axes(p).reshape(-1, 2), _tip_middle(p)[None]])
     return np.asarray(points[np.lexsort((-points[:, 1], points[:, 0]))], dtype=np.float64)
 
 
-def back_offset_line(parameters: Parameters, distance: float) -> tuple[float, float]:
-    """Slope and intercept, mm, of the line y = slope * x + intercept `distance` mm inside the back face."""
-    p = parameters
-    slope = p.base_width / p.height
-    return slope, -p.base_width + distance * float(np.hypot(1, slope))
+def apex_angle(parameters: Parameters) -> float:
+    """Angle between front and back face, radians."""
+    along = back_line(parameters, 0.0).direction
+    return float(np.arctan2(along[1], along[0]))
 
 
-def polygon_sides(corners: FloatArray) -> FloatArray:
-    """Length of every side of a polygon of shape (n, 2), from each corner to the next, shape (n,), mm."""
-    return np.asarray(np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1), dtype=np.float64)
+def tip_tangent(parameters: Parameters) -> float:
+    """Distance along the front and the back face from the apex to where the tip's rounding starts, mm."""
+    return float(parameters.tip_radius / np.tan(apex_angle(parameters) / 2))
 
 
 def corner_angles(corners: FloatArray) -> FloatArray:
@@ -128,55 +170,98 @@ def corner_angles(corners: FloatArray) -> FloatArray:
     return np.asarray(np.arctan2(cross, (ahead * behind).sum(axis=1)), dtype=np.float64)
 
 
-def fillet_points(corners: FloatArray, which: int, radius: float) -> FloatArray:
-    """Start, middle and end of the fillet at corner `which` of a convex polygon, shape (3, 2), mm."""
-    corner, (behind, ahead) = corners[which], _along_sides(corners, which)
-    tangent = radius / np.tan(corner_angles(corners)[which] / 2)
-    centre = fillet_centre(corners, which, radius)
-    middle = centre + radius * (corner - centre) / np.linalg.norm(corner - centre)
-    return np.array([corner + behind * tangent, middle, corner + ahead * tangent])
+def _base_frame(p: Parameters) -> tuple[FloatArray, FloatArray]:
+    """Unit vectors from the base into the body and along it from front to back, each of shape (2,)."""
+    tilt = np.radians(p.base_tilt)
+    return np.array([np.cos(tilt), np.sin(tilt)]), np.array([np.sin(tilt), -np.cos(tilt)])
 
 
-def fillet_centre(corners: FloatArray, which: int, radius: float) -> FloatArray:
-    """Centre of the fillet at corner `which` of a convex polygon, shape (2,), mm."""
-    bisector = _along_sides(corners, which).sum(axis=0)
-    distance = radius / np.sin(corner_angles(corners)[which] / 2)
-    return np.asarray(corners[which] + distance * bisector / np.linalg.norm(bisector), dtype=np.float64)
-
-
-def inside_distance(corners: FloatArray, points: FloatArray) -> FloatArray:
-    """Distance of points (n, 2) inside a convex counter-clockwise polygon, (n,), mm; negative outside.
-
-    Outside, it is the distance to the nearest side's line: never more than the true distance.
-    """
-    ahead = np.roll(corners, -1, axis=0) - corners
-    ahead = ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
-    apart = points[:, None] - corners
-    return np.asarray((ahead[:, 0] * apart[..., 1] - ahead[:, 1] * apart[..., 0]).min(axis=1))
-
-
-def _along_sides(corners: FloatArray, which: int) -> FloatArray:
-    """Unit vectors from a corner to the one before and the one after it, shape (2, 2)."""
-    sides = corners[[which - 1, (which + 1) % len(corners)]] - corners[which]
-    return np.asarray(sides / np.linalg.norm(sides, axis=1, keepdims=True), dtype=np.float64)
-
-
-def _wall_side(p: Parameters, x: float) -> tuple[FloatArray, FloatArray]:
-    """Front and back end of the vertical side of the cavity at `x`."""
-    slope, intercept = back_offset_line(p, p.back_thickness)
-    return np.array([x, -p.front_thickness]), np.array([x, slope * x + intercept])
-
-
-def _rib_side(p: Parameters, x: float) -> tuple[FloatArray, FloatArray]:
-    """Front and back end of the rib's side that starts at `x` on the front wall's inner face."""
-    start = np.array([x, -p.front_thickness])
-    return start, _to_back(p, start, rib_direction(p), p.back_thickness)
-
-
-def _to_back(p: Parameters, start: FloatArray, direction: FloatArray, distance: float) -> FloatArray:
-    """From `start` along `direction` to the line `distance` mm inside the back face."""
-    slope, intercept = back_offset_line(p, distance)
-    closing = max(slope * direction[0] - direction[1], 1e-9)  # zero where a rib is parallel to the back wall
-    return np.asarray(
-        start + direction * (start[1] - slope * start[0] - intercept) / closing, dtype=np.float64
+def _quadrilaterals(p: Parameters) -> tuple[FloatArray, ...]:
+    """Cavities and ribs in turn, from base to tip, each of shape (4, 2), mm."""
+    half = p.rib_thickness / (2 * np.cos(np.radians(rib_slope(p))))
+    sides_of_ribs = _rib_lines(p, (rib_feet(p)[:, None] + (-half, half)).ravel())
+    lines = (base_line(p, p.base_thickness), sides_of_ribs, tip_line(p))
+    walls = (front_line(p.front_thickness), back_line(p, p.back_thickness))
+    sides = np.concatenate(
+        [np.stack([line.meets(wall) for wall in walls], axis=-2).reshape(-1, 2, 2) for line in lines]
     )
+    return tuple(np.concatenate([sides[:-1], sides[1:, ::-1]], axis=1))
+
+
+def _rib_lines(p: Parameters, feet: FloatArray) -> Line:
+    """Lines along the ribs through abscissae, shape (n,), mm, of the front wall's inner face."""
+    return Line(np.stack([feet, np.full_like(feet, -p.front_thickness)], axis=-1), rib_direction(p))
+
+
+def finger_outline(parameters: Parameters) -> Loop:
+    """The outline from the base's front corner, counter-clockwise."""
+    p = parameters
+    points, names = _base_side(p)
+    apex, tangent = np.array([p.height, 0.0]), tip_tangent(p)
+    points.append(base_corners(p)[1])
+    names.append("back")
+    bulges = [0.0] * len(points)
+    if tangent > 0:
+        points += [apex - tangent * back_line(p, 0.0).direction, np.array([p.height - tangent, 0.0])]
+        names += ["tip", "front"]
+        bulges += [float(np.tan((np.pi - apex_angle(p)) / 4)), 0.0]
+    else:
+        points.append(apex)
+        names.append("front")
+        bulges.append(0.0)
+    return Loop(np.array(points), np.array(bulges), tuple(names))
+
+
+def _base_side(p: Parameters) -> tuple[list[FloatArray], list[str]]:
+    """Corners from the base line's front end up to, without, its back end, and the names of their pieces."""
+    front = base_corners(p)[0]
+    if p.foot_height == 0:
+        return [front], ["base"]
+    inward, along = _base_frame(p)
+    ends = [(0.0, p.foot_height), (p.base_width, p.foot_height)]
+    names = ["foot", "base", "foot"]
+    if p.slot_width > 0:
+        edges = [
+            (p.base_width + side * width) / 2 for width in (p.slot_opening, p.slot_width) for side in (-1, 1)
+        ]
+        lip, top = p.foot_height - p.lip_thickness, p.foot_height - p.lip_thickness - p.slot_height
+        slot = [(edges[0], p.foot_height), (edges[0], lip), (edges[2], lip), (edges[2], top)]
+        slot += [(edges[3], top), (edges[3], lip), (edges[1], lip), (edges[1], p.foot_height)]
+        ends = [ends[0], *slot, ends[1]]
+        names = ["foot", "base", *["slot"] * 7, "base", "foot"]
+        return _without_steps([front, *(share * along - out * inward for share, out in ends)], names)
+    return [front, *(share * along - out * inward for share, out in ends)], names
+
+
+def _without_steps(points: list[FloatArray], names: list[str]) -> tuple[list[FloatArray], list[str]]:
+    """The corners without pieces of no length, such as those of a slot as wide as its opening."""
+    kept = [
+        which
+        for which in range(len(points))
+        if which + 1 == len(points) or np.linalg.norm(points[which + 1] - points[which]) > 1e-9
+    ]
+    return [points[which] for which in kept], [names[which] for which in kept]
+
+
+def _tip_middle(p: Parameters) -> FloatArray:
+    """The middle of the solid tip, on the bisector of the apex, shape (2,), mm.
+
+    It is half way, in x, between the tip line's front end and the rounding's extreme point.
+    """
+    half = apex_angle(p) / 2
+    cut = p.tip_radius * (1 / np.sin(half) - 1) * np.cos(half)
+    from_apex = (p.tip_length + cut) / 2
+    return np.array([p.height - from_apex, -from_apex * np.tan(half)])
+
+
+def _rounded(corners: FloatArray, radius: float) -> Loop:
+    """A convex counter-clockwise polygon, shape (n, 2), mm, with its corners rounded."""
+    if radius == 0:
+        return Loop.polygon(corners)
+    angles = corner_angles(corners)
+    behind, ahead = np.roll(corners, 1, axis=0) - corners, np.roll(corners, -1, axis=0) - corners
+    tangent = (radius / np.tan(angles / 2))[:, None]
+    enter = corners + tangent * behind / np.linalg.norm(behind, axis=1, keepdims=True)
+    leave = corners + tangent * ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
+    bulges = np.stack([np.tan((np.pi - angles) / 4), np.zeros_like(angles)], axis=1)
+    return Loop(np.stack([enter, leave], axis=1).reshape(-1, 2), bulges.ravel(), ("",) * (2 * len(corners)))

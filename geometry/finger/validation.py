@@ -9,6 +9,7 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.finger.parameters import Parameters, parameter_info
 from geometry.finger.rules import RULES, Rule
+from geometry.finger.section import rib_feet, rib_pitch
 
 ROUNDING = -1e-9
 """Tolerance of the margins, mm."""
@@ -67,8 +68,7 @@ def allowed_range(
     def good(value: float) -> bool:
         return obeys(parameters.model_copy(update={name: int(value) if whole else float(value)}), rules)
 
-    present = getattr(parameters, name)
-    present = parameters.contact_abscissa if present is None else present
+    present = _present(parameters, name)
     tried = np.arange(low, high + 1) if whole else _trial_values(low, high, present)
     passed = np.array([good(value) for value in tried])
     if not passed.any():
@@ -87,6 +87,18 @@ def allowed_range(
     if last < len(tried) - 1:
         stop = _rounded(good, _edge(good, stop, float(tried[last + 1])), math.floor)
     return (start, stop) if start <= stop and good(start) and good(stop) else None
+
+
+def _present(parameters: Parameters, name: str) -> float:
+    """The parameter's value, or the one that stands for none."""
+    value = getattr(parameters, name)
+    if value is None:
+        value = {
+            "contact_position": parameters.contact_abscissa,
+            "rib_pitch": rib_pitch(parameters),
+            "rib_start": rib_feet(parameters)[0] if parameters.rib_count else 0.0,
+        }[name]
+    return float(value)
 
 
 def _trial_values(low: float, high: float, present: float) -> FloatArray:

@@ -1,114 +1,129 @@
 """Element sizes: fine in walls and ribs, finer at corners and contact if asked, growing into solid parts.
 
-The only module besides `mesher` that imports Gmsh.
+Walls and ribs are found by rays through the material, so that any section will do.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from pathlib import Path
 
 import gmsh
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 
-from geometry.finger.design import Design
-from geometry.finger.section import back_offset_line
+from geometry.arrays import FloatArray
 from geometry.mesh.settings import MeshSettings
+from geometry.section.section import Section
+from geometry.section.thickness import wall_thickness
 
-SAMPLES = 400
-"""Sampling points on each curve for Gmsh's distance to it."""
-
-ON_LINE = 1e-6
-"""Maximum distance of a curve's middle from a line that it lies on, mm."""
-
-
-@dataclass(frozen=True)
-class Refinement:
-    """Elements of `size` within `reach` of some curves or points, all mm."""
-
-    size: float
-    reach: float
-    curves: tuple[int, ...] = ()
-    points: tuple[int, ...] = ()
+THICK = 16
+"""Thickness of a wall, in element sizes, beyond which it is a solid part."""
+CLASS = 1.1
+"""Ratio of neighbouring thicknesses that are told apart."""
+CELLS = 200_000
+"""Largest number of grid points of the size field."""
+ARC = 3.0
+"""Radius of a cavity's arc over the largest element on it."""
 
 
-def refinements(
-    design: Design,
-    settings: MeshSettings,
-    elements_through_thickness: float,
-    corners: Iterable[int],
-    contact: Iterable[int],
-) -> list[Refinement]:
-    """Every refinement of the current Gmsh model.
+def size_field(
+    section: Section, contact: FloatArray, settings: MeshSettings, elements: float
+) -> tuple[FloatArray, FloatArray, float]:
+    """Element sizes on a regular grid around a section.
+
+    The field is the minimum over points of the boundary of their size, growing from the edge of their reach:
+    in walls and ribs, at cavities, at the base and at the contact.
 
     Args:
-        design: The finger.
+        section: The body.
+        contact: Points of the contact, shape (k, 2), mm.
         settings: Element sizes.
-        elements_through_thickness: A wall's thickness over its largest element.
-        corners: Gmsh points at the cavities' corners and at the ends of the base.
-        contact: Gmsh points at the contact's ends and middle.
+        elements: A wall's thickness over its largest element.
+
+    Returns:
+        Sizes, shape (nx, ny), mm; the first grid point, shape (2,), mm; and the grid's spacing, mm.
     """
-    size = settings.size
-    thickness = {
-        "front": design.front_thickness,
-        "back": design.back_thickness,
-        "base": design.base_thickness,
-        "rib": design.rib_thickness,
-    }
-    by_kind = _cavity_curves(design)
-    found = [
-        Refinement(min(size, across / elements_through_thickness), across, curves=by_kind[kind])
-        for kind, across in thickness.items()
-    ]
-    found.append(Refinement(size, 2 * size, curves=by_kind["tip"]))
-    found.append(Refinement(min(size, design.fillet_radius / 3), 0.0, curves=by_kind["arc"]))
-    found.append(Refinement(min(size, settings.contact_size or size), 0.0, points=tuple(contact)))
-    if settings.corner_size is not None:
-        found.append(Refinement(min(size, settings.corner_size), 0.0, points=tuple(corners)))
-    return [entry for entry in found if entry.curves or entry.points]
+    size, largest = settings.size, settings.size * settings.coarsening
+    low, high = section.bounds
+    spacing = max(size, float(np.sqrt(np.prod(high - low + 4 * size) / CELLS)))
+    origin = low - 2 * spacing
+    shape = np.ceil((high - origin) / spacing).astype(int) + 3
+    field = np.full(shape, largest)
+    for points, fine, reach in _fine_parts(section, contact, settings, elements, spacing):
+        near = np.ones(shape, dtype=bool)
+        near[tuple(np.rint((points - origin) / spacing).astype(int).T)] = False
+        away = np.maximum(distance_transform_edt(near, sampling=spacing) - reach, 0)
+        np.minimum(field, fine + settings.growth * away, out=field)
+    return field, origin, spacing
 
 
-def set_sizes(entries: Iterable[Refinement], settings: MeshSettings) -> None:
-    """Set Gmsh's size field: the minimum over all refinements, each growing with the distance."""
-    field = gmsh.model.mesh.field
+def set_sizes(
+    field: tuple[FloatArray, FloatArray, float],
+    points: Iterable[tuple[FloatArray, float]],
+    settings: MeshSettings,
+    folder: Path,
+) -> None:
+    """Set the size field of the current Gmsh model.
+
+    Args:
+        field: That of `size_field`.
+        points: Points, each of shape (k, 2), mm, from which elements of a size, mm, grow.
+        settings: Element sizes.
+        folder: For the file that Gmsh reads.
+    """
+    sizes, origin, spacing = field
+    path = folder / "sizes.bin"
+    with path.open("wb") as file:
+        np.array([*origin, 0.0, spacing, spacing, 1.0]).tofile(file)
+        np.array([*sizes.shape, 1], dtype=np.int32).tofile(file)
+        np.ascontiguousarray(sizes, dtype=np.float64).tofile(file)
+    model = gmsh.model.mesh.field
+    fields = [model.add("Structured")]
+    model.setString(fields[0], "FileName", str(path))
     largest = settings.size * settings.coarsening
-    thresholds = []
-    for entry in entries:
-        distance, threshold = field.add("Distance"), field.add("Threshold")
-        field.setNumbers(distance, "CurvesList", entry.curves)
-        field.setNumbers(distance, "PointsList", entry.points)
-        field.setNumber(distance, "Sampling", SAMPLES)
-        field.setNumber(threshold, "InField", distance)
-        field.setNumber(threshold, "SizeMin", entry.size)
-        field.setNumber(threshold, "SizeMax", largest)
-        field.setNumber(threshold, "DistMin", entry.reach)
-        field.setNumber(threshold, "DistMax", entry.reach + max(largest - entry.size, 1e-9) / settings.growth)
-        thresholds.append(threshold)
-    smallest = field.add("Min")
-    field.setNumbers(smallest, "FieldsList", thresholds)
-    field.setAsBackgroundMesh(smallest)
-    for option in ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints", "MeshSizeFromCurvature"):
-        gmsh.option.setNumber(f"Mesh.{option}", 0)
+    for places, fine in points:
+        tags = [gmsh.model.geo.addPoint(x, y, 0) for x, y in places]
+        gmsh.model.geo.synchronize()
+        distance, threshold = model.add("Distance"), model.add("Threshold")
+        model.setNumbers(distance, "PointsList", tags)
+        for option, value in (
+            ("InField", distance),
+            ("SizeMin", fine),
+            ("SizeMax", largest),
+            ("DistMin", 0.0),
+            ("DistMax", max(largest - fine, 1e-9) / settings.growth),
+        ):
+            model.setNumber(threshold, option, value)
+        fields.append(threshold)
+    smallest = model.add("Min")
+    model.setNumbers(smallest, "FieldsList", fields)
+    model.setAsBackgroundMesh(smallest)
 
 
-def _cavity_curves(design: Design) -> dict[str, tuple[int, ...]]:
-    """The cavities' curves in the current model by the part of the finger behind them."""
-    slope, intercept = back_offset_line(design, design.back_thickness)
-    kinds: dict[str, list[int]] = {
-        kind: [] for kind in ("front", "back", "base", "tip", "rib", "arc", "outer")
-    }
-    for _, curve in gmsh.model.getEntities(1):
-        low, high = gmsh.model.getParametrizationBounds(1, curve)
-        x, y, _ = gmsh.model.getValue(1, curve, [(low[0] + high[0]) / 2])
-        distances = {
-            "outer": min(abs(x), abs(y), abs(y - (x * slope - design.base_width)) / np.hypot(1, slope)),
-            "front": abs(y + design.front_thickness),
-            "back": abs(y - slope * x - intercept) / np.hypot(1, slope),
-            "base": abs(x - design.base_thickness),
-            "tip": abs(x - (design.height - design.tip_length)),
-        }
-        kind = min(distances, key=distances.__getitem__)
-        if distances[kind] > ON_LINE:
-            kind = "rib"
-        if gmsh.model.getType(1, curve) != "Line":
-            kind = "arc"
-        kinds[kind].append(curve)
-    return {kind: tuple(curves) for kind, curves in kinds.items()}
+def _fine_parts(
+    section: Section, contact: FloatArray, settings: MeshSettings, elements: float, spacing: float
+) -> list[tuple[FloatArray, float, float]]:
+    """Points (k, 2), mm, with the element size there and the distance to which it reaches, both mm."""
+    size = settings.size
+    found = [(contact, size, 0.0)]
+    edges = [
+        loop.along(which, _shares(loop.lengths[which], spacing)) for loop, which in section.named("base")
+    ]
+    for cavity in section.cavities:
+        for which, length in enumerate(cavity.lengths):
+            points = cavity.along(which, _shares(length, spacing))
+            edges.append(points)
+            if which not in cavity.straight:
+                found.append((points, min(size, cavity.circle(which)[1] / ARC), 0.0))
+    if edges:
+        found.append((np.concatenate(edges), size, 2 * size))
+    points, thickness = wall_thickness(section, spacing)
+    wall = thickness <= THICK * size
+    points, steps = points[wall], np.floor(np.log(thickness[wall] / size) / np.log(CLASS) + 1e-9)
+    for step in np.unique(steps):
+        across = float(size * CLASS**step)
+        found.append((points[steps == step], min(size, across / elements), across * CLASS))
+    return found
+
+
+def _shares(length: float, spacing: float) -> FloatArray:
+    return np.linspace(0, 1, int(np.ceil(length / spacing)) + 1)

@@ -1,20 +1,20 @@
-"""Mesh the finger with Gmsh, from the section that CadQuery wrote as BREP."""
+"""The mesh of a finger: its section goes to Gmsh directly, without CAD."""
 
 import tempfile
 from pathlib import Path
 
-import gmsh
 import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
-from geometry.cad import section_brep
 from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.finger.section import finger_section, marker_positions
+from geometry.finger.finger import Finger
 from geometry.mesh.boundary import boundary_edges, elements_through_thickness
-from geometry.mesh.element_size import refinements, set_sizes
+from geometry.mesh.element_size import set_sizes, size_field
+from geometry.mesh.gmsh_model import Triangulation, add_section, session, triangulate
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
+from geometry.section.loop import Loop
+from geometry.section.section import Section
 
 MIN_ELEMENTS = 3
 """Least number of elements through the thickness of every wall and rib."""
@@ -23,127 +23,123 @@ TRIES = (3.6, 4.8, 6.4)
 """Thickness over element size: the first that gives `MIN_ELEMENTS` is taken."""
 
 TOLERANCE = 1e-7
-"""Maximum distance of a node from a line or a position that it lies on, mm."""
+"""Maximum distance of a node from a position that it has, mm."""
+
+RE_ENTRANT = np.radians(10)
+"""Least turn of the boundary at a re-entrant corner."""
+
+CONTACT = "contact"
 
 
-def build_mesh(design: Design, settings: MeshSettings) -> TriangleMesh:
+def build_mesh(finger: Finger, settings: MeshSettings) -> TriangleMesh:
     """Mesh the section of a finger.
 
     The contact's ends and middle are nodes of the front face and every marker is a node. Boundary edges have
     the body on their left. The result depends on the arguments and on Gmsh's version only.
 
     Args:
-        design: The finger.
+        finger: The finger.
         settings: Element sizes.
 
     Returns:
-        The mesh with the boundaries `base`, `front`, `back` and `contact`.
+        The mesh with the boundaries `base`, `front`, `contact` and every other name of the outline's pieces.
 
     Raises:
         UserError: If some wall or rib cannot get three elements across.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        brep = section_brep(design, Path(folder) / "section.brep")
-        for elements in TRIES:
-            points, triangles = _triangulate(design, settings, brep, elements)
-            mesh = _named(design, points, triangles)
-            if (least := elements_through_thickness(mesh)) >= MIN_ELEMENTS:
-                return mesh
+    for elements in TRIES:
+        mesh = _named(finger, _triangulation(finger, settings, elements))
+        if (least := elements_through_thickness(mesh)) >= MIN_ELEMENTS:
+            return mesh
     raise UserError(
         f"the mesh has only {least} elements through the thinnest wall or rib, {MIN_ELEMENTS} are "
         f"needed; lower the mesh size below {settings.size:g} mm"
     )
 
 
-def _triangulate(
-    design: Design, settings: MeshSettings, brep: Path, elements: float
-) -> tuple[FloatArray, IntArray]:
-    """Run Gmsh once: points (n, 2), mm, and counter-clockwise triangles (t, 3)."""
-    gmsh.initialize(argv=[], readConfigFiles=False, interruptible=False)
-    try:
-        for option, value in (
-            ("General.Terminal", 0),
-            ("General.NumThreads", 1),
-            ("Mesh.Algorithm", 6),
-            ("Mesh.RandomSeed", 1),
-            ("Mesh.Smoothing", 3),
-        ):
-            gmsh.option.setNumber(option, value)
-        faces = gmsh.model.occ.importShapes(str(brep))
-        contact = [gmsh.model.occ.addPoint(x, 0, 0) for x in _contact_abscissae(design)]
-        markers = [gmsh.model.occ.addPoint(x, y, 0) for x, y in marker_positions(design)]
-        gmsh.model.occ.fragment(faces, [(0, tag) for tag in contact + markers])
-        gmsh.model.occ.synchronize()
-        shape = finger_section(design)
-        corners = _points_at(np.concatenate([shape.outer[:2], *shape.cavities]))
-        ends = _points_at(np.array([[x, 0.0] for x in _contact_abscissae(design)]))
-        set_sizes(refinements(design, settings, elements, corners, ends), settings)
-        gmsh.model.mesh.generate(2)
-        tags, coordinates, _ = gmsh.model.mesh.getNodes()
-        _, connectivity = gmsh.model.mesh.getElementsByType(2)
-    except Exception as error:
-        # Gmsh raises bare Exception with its last message.
-        raise UserError(
-            f"Gmsh could not mesh design {design.name!r}: {error}; try another mesh size"
-        ) from error
-    finally:
-        gmsh.finalize()
-    number = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
-    triangles = connectivity.reshape(-1, 3)
-    used = np.unique(triangles)
-    number[used] = np.arange(len(used))
-    position = np.argsort(tags)[np.searchsorted(np.sort(tags), used)]
-    points = coordinates.reshape(-1, 3)[position, :2].copy()
-    triangles = number[triangles]
+def _triangulation(finger: Finger, settings: MeshSettings, elements: float) -> Triangulation:
+    section, contact = finger.section, _contact_points(finger)
+    grown = [(contact, min(settings.contact_size, settings.size))] if settings.contact_size else []
+    if settings.corner_size is not None:
+        grown.append((_corners(section), min(settings.corner_size, settings.size)))
+    field = size_field(section, contact, settings, elements)
+    with tempfile.TemporaryDirectory() as folder, session():
+        try:
+            curves = add_section((_with_contact(finger), *section.cavities), finger.markers)
+            set_sizes(field, grown, settings, Path(folder))
+            return triangulate(curves)
+        except Exception as error:
+            # Gmsh raises bare Exception with its last message.
+            raise UserError(
+                f"Gmsh could not mesh design {finger.name!r}: {error}; try another mesh size"
+            ) from error
+
+
+def _with_contact(finger: Finger) -> Loop:
+    """The outline with corners at the contact's ends and middle, and its pieces between them named so."""
+    (low, high), loop = finger.contact_ends, finger.section.outline
+    for x in (low, finger.contact_abscissa, high):
+        which, fraction = Section(loop).front_place(x)
+        if TOLERANCE < fraction * loop.lengths[which] < loop.lengths[which] - TOLERANCE:
+            loop = loop.split(which, [fraction])
+    for which in loop.pieces("front"):
+        ends = np.sort(loop.ends[which, :, 0])
+        if ends[0] > low - TOLERANCE and ends[1] < high + TOLERANCE:
+            loop = loop.named(which, CONTACT)
+    return loop
+
+
+def _contact_points(finger: Finger) -> FloatArray:
+    """Ends and middle of the contact, shape (3, 2), mm."""
+    low, high = finger.contact_ends
+    return np.array([finger.section.front_point(x) for x in (low, finger.contact_abscissa, high)])
+
+
+def _corners(section: Section) -> FloatArray:
+    """Re-entrant corners and the ends of the base, shape (k, 2), mm."""
+    found = [loop.ends[which] for loop, which in section.named("base")]
+    for loop in section.loops:
+        along = loop.ends[:, 1] - loop.ends[:, 0]
+        angle, half = np.arctan2(along[:, 1], along[:, 0]), 2 * np.arctan(loop.bulges)
+        turn = (angle - half) - np.roll(angle + half, 1)
+        turn = (turn + np.pi) % (2 * np.pi) - np.pi
+        found.append(loop.points[turn < -RE_ENTRANT])
+    return np.concatenate(found)
+
+
+def _named(finger: Finger, found: Triangulation) -> TriangleMesh:
+    """The mesh with its boundaries, markers and contact."""
+    triangles, points = found.triangles.copy(), found.points.copy()
     clockwise = signed_areas(points, triangles) < 0
     triangles[clockwise] = triangles[clockwise][:, [0, 2, 1]]
-    return points, triangles
-
-
-def _named(design: Design, points: FloatArray, triangles: IntArray) -> TriangleMesh:
-    """The mesh with its boundaries, markers and contact found by their coordinates."""
-    points[np.abs(points) < TOLERANCE] = 0.0
     edges = boundary_edges(triangles)
-    x, y = points[:, 0], points[:, 1]
-    low, high = design.contact_ends
-    slope = design.base_width / design.height
-    front = np.abs(y) < TOLERANCE
-    on = {
-        "base": np.abs(x) < TOLERANCE,
-        "front": front,
-        "back": np.abs(y - slope * x + design.base_width) < TOLERANCE * np.hypot(1, slope),
-        "contact": front & (x > low - TOLERANCE) & (x < high + TOLERANCE),
+    keys = _keys(edges, len(points))
+    names = {name: list(nodes) for name, nodes in found.edges.items() if name}
+    names["front"] = [*names.get("front", []), *names[CONTACT]]
+    boundaries = {
+        name: edges[np.isin(keys, _keys(np.array(nodes), len(points)))] for name, nodes in names.items()
     }
-    boundaries = {name: edges[nodes[edges].all(axis=1)] for name, nodes in on.items()}
-    middle = np.array([[design.contact_abscissa, 0.0]])
+    middle = finger.section.front_point(finger.contact_abscissa)[None]
+    contact_node = int(_nodes_at(points, middle, "middle of the contact")[0])
     return TriangleMesh(
         points=points,
         triangles=triangles,
         boundaries=boundaries,
-        marker_nodes=_nodes_at(points, marker_positions(design), "marker"),
-        contact_node=int(_nodes_at(points, middle, "middle of the contact")[0]),
+        marker_nodes=_nodes_at(points, finger.markers, "marker"),
+        contact_node=contact_node,
     )
+
+
+def _keys(edges: IntArray, count: int) -> IntArray:
+    """One number for each edge, shape (k, 2), of a mesh of `count` nodes, whichever way it runs."""
+    ordered = np.sort(edges, axis=1)
+    return np.asarray(ordered[:, 0] * count + ordered[:, 1], dtype=np.int64)
 
 
 def _nodes_at(points: FloatArray, wanted: FloatArray, what: str) -> IntArray:
     """The nodes at positions (m, 2), mm, moved there to the last digit."""
     nodes = np.array([((points - position) ** 2).sum(axis=1).argmin() for position in wanted], dtype=np.int64)
-    if np.abs(points[nodes] - wanted).max() > TOLERANCE:
+    if np.abs(points[nodes] - wanted).max(initial=0) > TOLERANCE:
         raise UserError(f"the mesh has no node at a {what}; this is a fault of the mesher, please report it")
     points[nodes] = wanted
     return nodes
-
-
-def _contact_abscissae(design: Design) -> tuple[float, float, float]:
-    low, high = design.contact_ends
-    return low, design.contact_abscissa, high
-
-
-def _points_at(wanted: FloatArray) -> list[int]:
-    """Tags of the current Gmsh model's points at positions (m, 2), mm, as far as they exist."""
-    found = []
-    for _, tag in gmsh.model.getEntities(0):
-        x, y, _ = gmsh.model.getValue(0, tag, [])
-        if (np.hypot(wanted[:, 0] - x, wanted[:, 1] - y) < TOLERANCE).any():
-            found.append(tag)
-    return found

@@ -9,17 +9,15 @@ Int. J. Numer. Meth. Engng 20 (1984) 745-756; the bound is that of I. G. Rosenbe
 on the angles of triangles constructed by bisecting the longest side, Math. Comp. 29 (1975) 390-395.
 """
 
-from itertools import product
-
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
-from geometry.finger.section import Section, fillet_centre
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.section.section import Section
 
 ON_ARC = 1e-6
-"""Maximum distance of a node from a fillet that it lies on, mm."""
+"""Maximum distance of a node from an arc that it lies on, mm."""
 
 
 def refined(mesh: TriangleMesh, marked: BoolArray, section: Section | None = None) -> TriangleMesh:
@@ -30,7 +28,7 @@ def refined(mesh: TriangleMesh, marked: BoolArray, section: Section | None = Non
     Args:
         mesh: The mesh.
         marked: Mask of shape (t,).
-        section: The section onto whose fillets new boundary nodes are moved; None leaves them on the chord.
+        section: The section onto whose arcs new boundary nodes are moved; None leaves them on the chord.
     """
     count, lengths = len(mesh.points), np.linalg.norm(np.diff(mesh.points[mesh.edges], axis=1)[:, 0], axis=1)
     rank = np.empty(len(lengths), dtype=np.int64)
@@ -82,17 +80,19 @@ def _cut_edges(mesh: TriangleMesh, edges: IntArray, middle: IntArray) -> IntArra
 
 
 def _middles(mesh: TriangleMesh, cut: BoolArray, section: Section | None) -> FloatArray:
-    """Middles of the edges to be cut, shape (k, 2), mm, moved onto the fillets' arcs."""
+    """Middles of the edges to be cut, shape (k, 2), mm, moved onto the section's arcs."""
     ends = mesh.points[mesh.edges[cut]]
     middles = np.asarray(ends.mean(axis=1))
-    if section is None or section.fillet_radius == 0:
+    if section is None:
         return middles
-    radius, outside = section.fillet_radius, np.zeros(len(mesh.edges), dtype=bool)
+    outside = np.zeros(len(mesh.edges), dtype=bool)
     outside[mesh.edge_numbers(boundary_edges(mesh.triangles))] = True
-    for cavity, corner in product(section.cavities, range(4)):
-        centre = fillet_centre(cavity, corner, radius)
-        off = np.abs(np.linalg.norm(ends - centre, axis=2) - radius)
-        chord = outside[cut] & (off < ON_ARC).all(axis=1)
-        ray = middles[chord] - centre
-        middles[chord] = centre + radius * ray / np.linalg.norm(ray, axis=1, keepdims=True)
+    for loop in section.loops:
+        for which in np.setdiff1d(np.arange(len(loop.points)), loop.straight):
+            centre, radius = loop.circle(int(which))
+            off = np.abs(np.linalg.norm(ends - centre, axis=2) - radius)
+            chord = np.flatnonzero(outside[cut] & (off < ON_ARC).all(axis=1))
+            chord = chord[loop.beside_arc(int(which), middles[chord])]
+            ray = middles[chord] - centre
+            middles[chord] = centre + radius * ray / np.linalg.norm(ray, axis=1, keepdims=True)
     return middles

@@ -86,7 +86,7 @@ class Loop:
         for which in np.flatnonzero(np.abs(self.bulges) > STRAIGHT):
             centre, radius = self.circle(int(which))
             around = centre + radius * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]], dtype=np.float64)
-            extremes.append(around[self._on_arc(int(which), around)])
+            extremes.append(around[self.beside_arc(int(which), around)])
         points = np.concatenate(extremes)
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
@@ -164,12 +164,12 @@ class Loop:
         """Numbers of the pieces with a name."""
         return (which for which, own in enumerate(self.names) if own == name)
 
-    def _on_arc(self, which: int, points: FloatArray) -> BoolArray:
-        """Mask of the points (k, 2) of an arc's circle that lie on the arc: beyond its chord."""
+    def beside_arc(self, which: int, points: FloatArray) -> BoolArray:
+        """Mask of the points (k, 2), mm, beyond the chord of arc `which`, on the side of the arc."""
         start, end = self.ends[which]
         along, away = end - start, points - start
         right = along[1] * away[:, 0] - along[0] * away[:, 1]
-        return np.asarray(np.sign(self.bulges[which]) * right >= 0)
+        return np.asarray(np.sign(self.bulges[which]) * right >= -1e-9 * float(along @ along))
 
 
 def _segment(bulges: FloatArray) -> FloatArray:

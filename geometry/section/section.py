@@ -107,7 +107,7 @@ class Section:
             UserError: If the front has no such abscissa.
         """
         which, fraction = self.front_place(x)
-        return np.asarray(self.outline.along(which, fraction)[0])
+        return np.array([x, self.outline.along(which, fraction)[0, 1]])
 
     def transformed(self, matrix: ArrayLike, shift: ArrayLike = (0.0, 0.0)) -> Self:
         """The section under x -> matrix x + shift; the matrix is a scaled rotation or reflection."""

@@ -13,8 +13,8 @@ from math import log
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
-from geometry.finger.section import Section
 from geometry.mesh.refinement import refined
+from geometry.section.section import Section
 from solvers.adaptation import Adaptation, RefinementRound, check_adaptable
 from solvers.fem.error_estimate import ErrorEstimator
 from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium

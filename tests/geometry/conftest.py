@@ -18,7 +18,8 @@ CASES: dict[str, Design] = {
     "contact near the base": Design(contact_position=3, contact_width=5),
     "contact on the tip": Design(contact_position=84, contact_width=1),
     "longer, six ribs": Design(N=6, H=110),
-} | {f"preset {name}": load_design(name) for name in preset_names()}
+} | {f"preset {name}": load_design(name) for name in preset_names() if name != "csiro"}
+"""Wedges with the right angle at the front, whose closed forms tests know."""
 
 
 @cache

@@ -92,12 +92,12 @@ def test_time_limit_ends_the_worker_with_advice(tmp_path: Path) -> None:
 def test_refusal_in_the_worker_comes_back_as_its_own_line(tmp_path: Path) -> None:
     task = {"kind": "mesh", "what": "meshing", "settings": {}, "output": str(tmp_path / "m.npz")}
     with pytest.raises(UserError, match="ribs") as refused:
-        run_task({**task, "design": {"rib_count": 50}}, 60)
+        run_task({**task, "finger": {"rib_count": 50}}, 60)
     assert "\n" not in str(refused.value)
 
 
 def test_crash_in_the_worker_gives_one_line(tmp_path: Path) -> None:
-    task = {"kind": "mesh", "what": "meshing", "settings": {}, "design": {}}
+    task = {"kind": "mesh", "what": "meshing", "settings": {}, "finger": {}}
     with pytest.raises(UserError, match=r"meshing failed \(exit code 1\)") as refused:
         run_task({**task, "output": str(tmp_path / "missing" / "m.npz")}, 60)
     assert "\n" not in str(refused.value)

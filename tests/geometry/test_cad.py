@@ -1,24 +1,22 @@
 """CAD against the closed forms, and its files against an independent reader where there is one."""
 
-import re
 from pathlib import Path
 
 import ezdxf
 import numpy as np
 import pytest
 
-from geometry import Design, UserError, cad, cad_files, finger_section, marker_positions
-from geometry.finger.svg import section_svg
+from geometry import Design, UserError, cad, cad_files, marker_positions
 from tests.meshes import body_area, body_perimeter
 
 
 def test_face_has_the_area_and_the_holes_of_the_closed_form(design: Design) -> None:
-    face, section = cad.section_face(design), finger_section(design)
+    face = cad.section_face(design)
     assert face.isValid()
-    assert face.Area() == pytest.approx(body_area(section), rel=1e-9)
+    assert face.Area() == pytest.approx(body_area(design), rel=1e-9)
     assert len(face.innerWires()) == design.rib_count + 1
     perimeter = sum(wire.Length() for wire in [face.outerWire(), *face.innerWires()])
-    assert perimeter == pytest.approx(body_perimeter(section), rel=1e-9)
+    assert perimeter == pytest.approx(body_perimeter(design), rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -34,7 +32,7 @@ def test_body_and_markers_together_are_the_extruded_section(design: Design) -> N
     volumes = np.array([part.Volume() for part in parts])
     heights = np.array([part.Center().z for part in parts])
     assert all(part.isValid() for part in parts)
-    assert volumes.sum() == pytest.approx(body_area(finger_section(design)) * design.depth, rel=1e-9)
+    assert volumes.sum() == pytest.approx(body_area(design) * design.depth, rel=1e-9)
     assert (volumes * heights).sum() / volumes.sum() == pytest.approx(design.depth / 2, rel=1e-9)
     disc = np.pi / 4 * design.marker_diameter**2 * design.marker_height
     np.testing.assert_allclose(volumes[1:], disc, rtol=1e-9)
@@ -69,9 +67,7 @@ def test_step_holds_body_and_markers_as_named_parts(written: dict[str, Path]) ->
 
     solids = cq.importers.importStep(str(written["finger.step"])).solids().vals()
     assert len(solids) == 10
-    assert sum(solid.Volume() for solid in solids) == pytest.approx(
-        body_area(finger_section(Design())) * 20, rel=1e-9
-    )
+    assert sum(solid.Volume() for solid in solids) == pytest.approx(body_area(Design()) * 20, rel=1e-9)
     text = written["finger.step"].read_text()
     assert all(f"'{name}'" in text for name in ("body", "marker-1", "marker-9"))
 
@@ -91,9 +87,7 @@ def stl_volume(path: Path) -> float:
 def test_stl_files_enclose_the_volumes(written: dict[str, Path]) -> None:
     discs = 9 * np.pi / 4 * 1.6**2 * 0.6
     assert stl_volume(written["finger-markers.stl"]) == pytest.approx(discs, rel=0.01)  # facets of circles
-    assert stl_volume(written["finger-body.stl"]) == pytest.approx(
-        body_area(finger_section(Design())) * 20 - discs, rel=1e-4
-    )
+    assert stl_volume(written["finger-body.stl"]) == pytest.approx(body_area(Design()) * 20 - discs, rel=1e-4)
 
 
 def test_dxf_has_a_layer_for_the_outline_and_one_for_the_markers(written: dict[str, Path]) -> None:
@@ -102,7 +96,7 @@ def test_dxf_has_a_layer_for_the_outline_and_one_for_the_markers(written: dict[s
     circles = [entity for entity in entities if entity.dxf.layer == "markers"]
     assert len(lines) == 3 + 4 * 5
     length = sum((entity.dxf.end - entity.dxf.start).magnitude for entity in lines)
-    assert length == pytest.approx(body_perimeter(finger_section(Design())), rel=1e-9)
+    assert length == pytest.approx(body_perimeter(Design()), rel=1e-9)
     centres = sorted((circle.dxf.center.x, circle.dxf.center.y) for circle in circles)
     np.testing.assert_allclose(centres, marker_positions(Design()), atol=1e-9)
     assert {circle.dxf.radius for circle in circles} == {0.8}
@@ -113,25 +107,6 @@ def test_svg_is_in_true_scale(written: dict[str, Path]) -> None:
     assert 'width="94mm" height="34mm"' in text
     assert text.count("<circle") == 9
     assert text.count(" Z") == 1 + 5
-
-
-def test_svg_arcs_cut_the_corners_of_the_cells() -> None:
-    design = Design(fillet_radius=1.0)
-    path = re.search(r'<path d="([^"]+)"', section_svg(design))
-    assert path is not None
-    area = 0.0
-    for ring in path[1].split("Z")[:-1]:
-        points = np.array(re.findall(r"(-?[\d.]+),(-?[\d.]+)", ring), dtype=float)
-        following = np.roll(points, -1, axis=0)
-        ring_area = 0.5 * (points[:, 0] * following[:, 1] - points[:, 1] * following[:, 0]).sum()
-        for chord, sweep in zip(
-            (following - points)[::2], re.findall(r"A 1 1 0 0 (\d) ", ring), strict=False
-        ):
-            half = np.arcsin(np.hypot(*chord) / 2)
-            segment = half - np.sin(2 * half) / 2  # between a unit circle's arc and its chord
-            ring_area += segment if sweep == "1" else -segment
-        area = area - ring_area if area else ring_area
-    assert area == pytest.approx(body_area(finger_section(design)), rel=1e-6)
 
 
 def test_unknown_format_is_refused(tmp_path: Path) -> None:

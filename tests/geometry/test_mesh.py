@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from shapely.geometry import Point, Polygon
 
-from geometry import Design, OutsideBodyError, ShapeError, TriangleMesh, UserError, finger_section
+from geometry import Design, OutsideBodyError, ShapeError, TriangleMesh, UserError
+from geometry.finger.section import cells
 from tests.meshes import permuted
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -120,8 +121,7 @@ def test_every_node_is_found(mesh: TriangleMesh) -> None:
 
 def test_points_are_inside_exactly_where_the_section_is() -> None:
     mesh = build_default()
-    section = finger_section(Design())
-    body = Polygon(section.outer, holes=section.cavities)
+    body = Polygon([(0, 0), (0, -30), (90, 0)], holes=cells(Design()))
     rng = np.random.default_rng(6)
     points = rng.uniform([-5, -35], [95, 5], size=(1500, 2))
     for point in points:

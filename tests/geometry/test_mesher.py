@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from geometry import Design, MeshSettings, TriangleMesh, UserError, elements_through_thickness, finger_section
+from geometry import Design, MeshSettings, TriangleMesh, UserError, elements_through_thickness
 from geometry import marker_positions as positions_of
-from geometry.finger.section import corner_angles
+from geometry.finger.section import cells, corner_angles
 from geometry.mesh.boundary import boundary_edges, boundary_loops
 from geometry.mesh.mesher import build_mesh
 from tests.meshes import body_area, boundary_lengths, corner_area
@@ -23,12 +23,12 @@ def polygon_of_loop(mesh: TriangleMesh, loop: np.ndarray) -> float:
 def test_area_is_that_of_the_section(design: Design, mesh: TriangleMesh) -> None:
     # Chords cut a little off the rounded corners of the cavities; straight edges leave nothing out.
     tolerance = 2e-3 if design.fillet_radius else 1e-12
-    assert mesh.areas.sum() == pytest.approx(body_area(finger_section(design)), rel=tolerance)
+    assert mesh.areas.sum() == pytest.approx(body_area(design), rel=tolerance)
 
 
 def test_named_boundaries_have_their_lengths(design: Design, mesh: TriangleMesh) -> None:
     assert {name: mesh.boundary_length(name) for name in mesh.boundaries} == pytest.approx(
-        boundary_lengths(finger_section(design)), rel=1e-12
+        boundary_lengths(design), rel=1e-12
     )
 
 
@@ -63,7 +63,7 @@ def test_euler_characteristic_counts_the_ribs(design: Design, mesh: TriangleMesh
 def test_cells_have_their_areas(design: Design, mesh: TriangleMesh) -> None:
     """Less the corners that a fillet fills; its arcs are chords in the mesh, which costs some per mille."""
     expected = []
-    for corners in finger_section(design).cavities:
+    for corners in cells(design):
         x, y = corners.T
         sharp = 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
         filled = sum(corner_area(angle, design.fillet_radius) for angle in corner_angles(corners))
@@ -193,8 +193,7 @@ def random_design(seed: int) -> Design:
 def test_random_admissible_design_meshes(seed: int) -> None:
     design = random_design(seed)
     mesh = build_mesh(design, MeshSettings(size=2, coarsening=2))
-    section = finger_section(design)
-    assert mesh.areas.sum() == pytest.approx(body_area(section), rel=5e-3 if design.fillet_radius else 1e-11)
+    assert mesh.areas.sum() == pytest.approx(body_area(design), rel=5e-3 if design.fillet_radius else 1e-11)
     assert len(boundary_loops(mesh)) == design.rib_count + 2
     assert elements_through_thickness(mesh) >= 3
     assert mesh.boundary_length("contact") == pytest.approx(design.contact_width)

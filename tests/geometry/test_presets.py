@@ -81,7 +81,7 @@ def test_inadmissible_override_gives_one_line(settings: list[str], texts: list[s
 
 
 def test_unknown_preset_lists_those_there_are() -> None:
-    with pytest.raises(UserError, match=r"no design 'fat'; the presets are default, many-ribs"):
+    with pytest.raises(UserError, match=r"no design 'fat'; the presets are default, csiro, many-ribs"):
         load_design("fat")
 
 

@@ -8,7 +8,7 @@ import pytest
 from geometry import Design, TriangleMesh, finger_section
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.refinement import refined
-from tests.meshes import body_area, smallest_angle
+from tests.meshes import smallest_angle
 
 
 def some(mesh: TriangleMesh, share: float, seed: int = 0) -> np.ndarray:
@@ -100,6 +100,6 @@ def test_new_nodes_on_fillets_are_on_their_arcs(design: Design, mesh: TriangleMe
     for _ in range(2):
         everything = np.ones(len(meshes[-1].triangles), dtype=bool)
         meshes.append(refined(meshes[-1], everything, section))
-    off = [mesh.areas.sum() - body_area(section) for mesh in meshes]
+    off = [mesh.areas.sum() - section.area for mesh in meshes]
     assert off[0] / off[1] == pytest.approx(4, rel=0.1)
     assert off[1] / off[2] == pytest.approx(4, rel=0.1)

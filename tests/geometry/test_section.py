@@ -7,17 +7,18 @@ import pytest
 from shapely.geometry import LineString, Point, Polygon
 
 from geometry import Design, finger_section, marker_positions
-from geometry.finger.section import rib_axes
+from geometry.finger.section import cells, rib_axes, ribs
 from tests.meshes import body_area, body_perimeter, boundary_lengths, corner_area, polygon_area
+
+THICKNESS = {"front": "front_thickness", "back": "back_thickness", "base": "base_thickness"}
 
 
 def as_shapely(design: Design) -> Polygon:
     """The body, with fillets by shapely's own offsetting."""
-    section = finger_section(design)
-    body = Polygon(section.outer)
-    for corners in section.cavities:
+    body = Polygon([(0, 0), (0, -design.base_width), (design.height, 0)])
+    for corners in cells(design):
         cell = Polygon(corners)
-        radius = section.fillet_radius
+        radius = design.fillet_radius
         if radius:
             cell = cell.buffer(-radius, join_style="mitre").buffer(radius, quad_segs=4000)
         body = body.difference(cell)
@@ -26,35 +27,36 @@ def as_shapely(design: Design) -> Polygon:
 
 def test_area_and_perimeter_agree_with_shapely(design: Design) -> None:
     section, body = finger_section(design), as_shapely(design)
-    assert body_area(section) == pytest.approx(body.area, rel=1e-7)
-    assert body_perimeter(section) == pytest.approx(body.length, rel=1e-7)
+    assert section.area == pytest.approx(body.area, rel=1e-7)
+    assert section.area == pytest.approx(body_area(design), rel=1e-12)
+    perimeter = sum(loop.lengths.sum() for loop in section.loops)
+    assert perimeter == pytest.approx(body.length, rel=1e-7)
+    assert perimeter == pytest.approx(body_perimeter(design), rel=1e-12)
 
 
 def test_section_has_one_cell_more_than_ribs_and_none_touches_another(design: Design) -> None:
-    section = finger_section(design)
-    assert len(section.cavities) == len(section.ribs) + 1 == design.rib_count + 1
-    cells = [Polygon(corners) for corners in section.cavities]
-    outer = Polygon(section.outer)
-    assert all(cell.is_valid and polygon_area(np.array(cell.exterior.coords[:-1])) > 0 for cell in cells)
-    assert all(outer.contains(cell) for cell in cells)
-    assert all(first.distance(second) > 0 for first, second in pairwise(cells))
+    found = [Polygon(corners) for corners in cells(design)]
+    assert len(found) == len(ribs(design)) + 1 == design.rib_count + 1
+    outer = Polygon(design.section.outline.points)
+    assert all(cell.is_valid and polygon_area(np.array(cell.exterior.coords[:-1])) > 0 for cell in found)
+    assert all(outer.contains(cell) for cell in found)
+    assert all(first.distance(second) > 0 for first, second in pairwise(found))
 
 
 def test_walls_have_their_thickness_normal_to_their_faces(design: Design) -> None:
-    section = finger_section(design)
-    base, apex = (LineString(section.outer[[0, 1]]), LineString(section.outer[[1, 2]]))
-    front = LineString(section.outer[[2, 0]])
-    cells = [Polygon(corners) for corners in section.cavities]
-    assert min(cell.distance(front) for cell in cells) == pytest.approx(design.front_thickness, rel=1e-12)
-    assert min(cell.distance(apex) for cell in cells) == pytest.approx(design.back_thickness, rel=1e-12)
-    assert min(cell.distance(base) for cell in cells) == pytest.approx(design.base_thickness, rel=1e-12)
-    for first, second in pairwise(cells):
+    faces = {
+        name: LineString(loop.ends[which]) for name in THICKNESS for loop, which in design.section.named(name)
+    }
+    found = [Polygon(corners) for corners in cells(design)]
+    for name, parameter in THICKNESS.items():
+        nearest = min(cell.distance(faces[name]) for cell in found)
+        assert nearest == pytest.approx(getattr(design, parameter), rel=1e-12)
+    for first, second in pairwise(found):
         assert first.distance(second) == pytest.approx(design.rib_thickness, rel=1e-9)
 
 
 def test_cavity_ends_where_the_tip_block_begins(design: Design) -> None:
-    section = finger_section(design)
-    assert max(corners[:, 0].max() for corners in section.cavities) == pytest.approx(
+    assert max(corners[:, 0].max() for corners in cells(design)) == pytest.approx(
         design.height - design.tip_length
     )
 
@@ -75,12 +77,12 @@ def test_ribs_slope_by_their_angle(angle: float, leans: int) -> None:
 
 
 def test_ribs_are_evenly_spaced_along_the_front_wall() -> None:
-    feet = [corners[[0, 3], 0].mean() for corners in finger_section(Design()).ribs]
+    feet = [corners[[0, 3], 0].mean() for corners in ribs(Design())]
     np.testing.assert_allclose(feet, 2 + 68 / 5 * np.arange(1, 5), rtol=1e-14)
 
 
 def test_boundary_lengths_of_the_papers_finger() -> None:
-    lengths = boundary_lengths(finger_section(Design()))
+    lengths = boundary_lengths(Design())
     assert lengths == pytest.approx({"base": 30, "front": 90, "back": np.hypot(90, 30), "contact": 2})
 
 

@@ -4,9 +4,8 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.finger.design import Design
-from geometry.finger.section import marker_positions
 
-MARKERS = {layout: marker_positions(Design(marker_layout=layout)) for layout in ("front", "joints")}
+MARKERS = {layout: Design(marker_layout=layout).markers for layout in ("front", "joints")}
 
 # Displacements by `fem-nonlinear` with elements of 1.5 mm, pressed in by 12 mm at x = 35 and at x = 60 mm.
 PRESSED = {

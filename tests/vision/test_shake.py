@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from geometry.finger.section import marker_positions
 from tests.vision.films import CAMERA, DESIGN, WORKSPACE, bent, frames_of, images
 from vision.calibration.camera import Pose
 from vision.discs.disc_detector import DiscDetections
@@ -14,7 +13,7 @@ from vision.tracking.camera_motion import find_camera_motion
 from vision.tracking.scene import FilmedScene
 from vision.tracking.tracker import track
 
-MARKERS = marker_positions(DESIGN)
+MARKERS = DESIGN.markers
 SCENE = FilmedScene(design=DESIGN, workspace=WORKSPACE, camera=CAMERA)
 NOISE = 0.01
 POSE = viewing_pose(CAMERA, WORKSPACE, tilt=5)

@@ -8,7 +8,6 @@ import pytest
 
 from geometry.errors import UserError
 from geometry.finger.design import Design
-from geometry.finger.section import marker_positions
 from tests.vision.films import CAMERA, DESIGN, WORKSPACE, bent, frames_of, images, recording
 from vision.calibration.camera import Camera
 from vision.rig.motion import Motion
@@ -17,7 +16,7 @@ from vision.tracking.scene import FilmedScene
 from vision.tracking.tracker import track
 from vision.tracking.workspace import Workspace
 
-MARKERS = marker_positions(DESIGN)
+MARKERS = DESIGN.markers
 TRUE = bent(MARKERS)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import ShapeError
-from geometry.finger.parameters import Parameters
+from geometry.finger.finger import Finger
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.triangle_mesh import TriangleMesh
@@ -42,13 +42,13 @@ class Bench:
 
     Attributes:
         mesh: Of the finger, whose nodes are moved.
-        parameters: Of the finger.
+        finger: The finger.
         workspace: Around it.
         paint: Of the markers, one of `PAINTS`.
     """
 
     mesh: TriangleMesh
-    parameters: Parameters
+    finger: Finger
     workspace: Workspace
     paint: str = "dark"
 
@@ -70,13 +70,11 @@ class Bench:
         moved = self.mesh.points + _checked(displacement, self.mesh)
         plane = self.workspace.marker_plane
         fiducials = [circle(point, self.workspace.fiducial_diameter / 2) for point in self.workspace.points]
-        depth, beyond = CLAMP_SIZE
-        clamp = rectangle((-depth, -self.parameters.base_width - beyond), (0.0, beyond))
         return Scene(
             BENCH,
             [
                 *(Shape(closed(border), PAINTS["dark"]) for border in fiducials),
-                Shape(clamp, CLAMP, plane),
+                Shape(self._clamp, CLAMP, plane),
                 Shape(self._indenter(moved), INDENTER, plane),
                 Shape(moved[self._border], FINGER, plane),
                 *self.discs(displacement),
@@ -88,10 +86,23 @@ class Bench:
         """Edges of a blade on the contact, shape (n, 2, 2)."""
         foot = moved[np.unique(self.mesh.boundary("contact"))]
         middle, width = foot.mean(axis=0), np.ptp(foot[:, 0])
-        blade = np.array(BLADE) * self.parameters.height
+        blade = np.array(BLADE) * np.ptp(self.finger.section.bounds[:, 0])
         right = np.concatenate([[(0.0, -OVERLAP)], blade]) + middle + (width / 2, 0.0)
         left = 2 * middle[0] - right[::-1, 0]
         return closed(np.concatenate([right, np.column_stack([left, right[::-1, 1]])]))
+
+    @cached_property
+    def _clamp(self) -> FloatArray:
+        """Edges of a block behind the base and beyond its ends, shape (4, 2, 2)."""
+        ends = self.mesh.points[self.mesh.boundary("base")]
+        along = (ends[:, 1] - ends[:, 0]).sum(axis=0)
+        along = along / np.linalg.norm(along)
+        outward = np.array([along[1], -along[0]])
+        places = ends.reshape(-1, 2) @ np.column_stack([along, outward])
+        (first, inner), (last, _) = places.min(axis=0), places.max(axis=0)
+        depth, beyond = CLAMP_SIZE
+        block = rectangle((first - beyond, inner), (last + beyond, inner + depth))
+        return np.asarray(block @ np.array([along, outward]))
 
     @cached_property
     def _border(self) -> IntArray:
@@ -99,7 +110,7 @@ class Bench:
 
     @cached_property
     def _marker_borders(self) -> LocatedPoints:
-        radius = self.parameters.marker_radius
+        radius = self.finger.marker_radius
         return self.mesh.locate(np.concatenate([circle(centre, radius) for centre in self.mesh.markers]))
 
 

@@ -84,7 +84,7 @@ def cables(
     @cache
     def at(load: float) -> tuple[Shape, ...]:
         centres = bench.markers(load * displacement)
-        radius = bench.parameters.marker_radius
+        radius = bench.finger.marker_radius
         return tuple(
             cable(centres[number - 1, :2], radius, share, z=bench.workspace.marker_plane, paint=paint)
             for number, share in shares.items()

@@ -94,7 +94,7 @@ class Recording:
             visible=np.ones(len(moved), dtype=bool),
             source=source,
             simulated=True,
-            marker_radius=self.bench.parameters.marker_radius,
+            marker_radius=self.bench.finger.marker_radius,
         )
 
     def _middles(self, displacement: FloatArray) -> FloatArray:

@@ -72,7 +72,7 @@ def record(
     save_camera(folder / "camera.json", recording.camera)
     bench = recording.bench
     write_json(folder / "workspace.json", bench.workspace.model_dump(mode="json"))
-    sheet = workspace_svg(bench.workspace, bench.parameters)
+    sheet = workspace_svg(bench.workspace, bench.finger)
     (folder / "fiducials.svg").write_text(sheet, encoding="utf-8")
     write_json(folder / "truth.json", _settings(recording))
 
@@ -118,7 +118,7 @@ def _writer(recording: Recording, place: Path, stack: ExitStack) -> Callable[[Im
 def _settings(recording: Recording) -> dict[str, object]:
     """Settings of the frames that are in no other file."""
     return {
-        "design": recording.bench.parameters.model_dump(),
+        "design": recording.bench.finger.definition(),
         "mesh_sha256": recording.bench.mesh.digest,
         "paint": recording.bench.paint,
         "pose": {

@@ -6,7 +6,6 @@ import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
-from geometry.finger.section import marker_positions
 from vision.discs.colour import DARK
 from vision.discs.disc_detector import DiscDetections, detect_discs, detect_discs_near
 from vision.frames.frame import Image
@@ -67,7 +66,7 @@ class FrameTracker:
     def __init__(self, scene: FilmedScene, image: Image, *, live: bool = False) -> None:
         self._scene, self._period, self._number = scene, LIVE_PERIOD if live else 1, 0
         self.plane, self._fiducials = scene.first_plane(image)
-        self._rest = self._places = marker_positions(scene.design)
+        self._rest = self._places = scene.design.markers
         self._step = np.zeros_like(self._rest)
         self._steps = step_covariances(self._rest)
         self._size, self._contrast = 1.0, np.nan

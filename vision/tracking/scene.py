@@ -6,8 +6,7 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from geometry.finger.parameters import Parameters
-from geometry.finger.section import marker_positions
+from geometry.finger.finger import Finger
 from vision.calibration.camera import Camera
 from vision.discs.colour import DARK, Colour
 from vision.discs.disc_detector import DetectionMethod, DiscDetections, detect_discs
@@ -43,7 +42,7 @@ class FilmedScene:
         markers_only: Whether the markers alone may give the plane if the fiducials cannot be identified.
     """
 
-    design: Parameters
+    design: Finger
     workspace: Workspace
     camera: Camera | None = None
     colour: Colour = DARK
@@ -64,7 +63,7 @@ class FilmedScene:
     def plane_from_markers(self, markers: DiscDetections) -> MarkerPlane:
         """The plane without fiducials, from the markers at rest, shape (m, ...), nan for hidden ones."""
         seen = np.isfinite(markers.radii)
-        return similarity_plane(marker_positions(self.design)[seen], *markers.where(seen)[:2])
+        return similarity_plane(self.design.markers[seen], *markers.where(seen)[:2])
 
     def first_plane(self, image: Image) -> tuple[MarkerPlane, DiscDetections]:
         """The markers' plane in the first frame, and the fiducials, all nan if the markers gave it.
@@ -79,10 +78,9 @@ class FilmedScene:
             if not self.markers_only:
                 raise
         design = self.design
-        detections = self._discs(image, self.colour, design.height, design.marker_diameter)
-        numbers = match_layout(
-            detections.centres, detections.radii, marker_positions(design), design.marker_diameter
-        )
+        length = float(np.ptp(design.section.bounds[:, 0]))
+        detections = self._discs(image, self.colour, length, design.marker_diameter)
+        numbers = match_layout(detections.centres, detections.radii, design.markers, design.marker_diameter)
         absent = np.full(len(self.workspace.fiducials), -1)
         return self.plane_from_markers(detections.numbered(numbers)), detections.numbered(absent)
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.errors import UserError
-from geometry.finger.section import marker_positions
 from vision.discs.disc_detector import FLOOR, DiscDetections
 from vision.frames.frame import Frame, Frames
 from vision.tracking.camera_motion import CameraMotion, find_camera_motion
@@ -64,7 +63,7 @@ def track(
     if tracker is None:
         raise UserError(f"{frames.name} has no frame")
     pixels = np.stack([frame.markers.centres for frame in detections])
-    markers = marker_positions(scene.design)
+    markers = scene.design.markers
     rest = find_rest_intervals(
         tracker.plane.circles(pixels, scene.design.marker_radius),
         noise=FLOOR[scene.method] / tracker.plane.scales(markers).mean(),

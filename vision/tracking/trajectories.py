@@ -6,8 +6,7 @@ import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
-from geometry.finger.parameters import Parameters
-from geometry.finger.section import finger_section
+from geometry.finger.finger import Finger
 from geometry.observations import Observations
 from vision.discs.disc_detector import DetectionMethod, DiscDetections
 from vision.tracking.marker_plane import MarkerPlane
@@ -31,7 +30,7 @@ class Tracking:
         warnings: For the user, one line each.
     """
 
-    design: Parameters
+    design: Finger
     expected: FloatArray
     times: FloatArray
     pixels: FloatArray
@@ -90,7 +89,7 @@ class Tracking:
             points[seen] = initial[seen]
         displacements[seen] = (final - initial)[seen]
         deviations[seen] = np.sqrt(np.diag(self.displacement_covariance)).reshape(-1, 2)
-        if (outside := ~finger_section(self.design).contains(points)).any():
+        if (outside := ~self.design.section.contains(points)).any():
             number = int(outside.argmax())
             x, y = points[number]
             wanted_x, wanted_y = self.expected[number]

@@ -14,8 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from geometry.finger.parameters import Parameters
-from geometry.finger.section import finger_section
+from geometry.finger.finger import Finger
 
 MARGIN = 12.0
 """Distance of the fiducials from the finger's bounding box before loading."""
@@ -67,12 +66,12 @@ class Workspace(BaseModel):
         return np.array(self.fiducials, dtype=np.float64)
 
 
-def default_workspace(parameters: Parameters) -> Workspace:
+def default_workspace(finger: Finger) -> Workspace:
     """Seven fiducials around a finger: four in front of it, with room for the indenter, three behind."""
-    p = parameters
-    left, right = -MARGIN, p.height + MARGIN
-    front = product((left, 0.15 * p.height, 0.7 * p.height, right), (MARGIN,))
-    back = product((left, 0.45 * p.height, right), (-p.base_width - MARGIN,))
+    (start, below), (end, above) = finger.section.bounds
+    left, right, length = start - MARGIN, end + MARGIN, end - start
+    front = product((left, start + 0.15 * length, start + 0.7 * length, right), (above + MARGIN,))
+    back = product((left, start + 0.45 * length, right), (below - MARGIN,))
     return Workspace(fiducials=(*front, *back))
 
 
@@ -95,7 +94,7 @@ def load_workspace(path: Path) -> Workspace:
         raise UserError(f"{path}: {error}") from None
 
 
-def workspace_svg(workspace: Workspace, parameters: Parameters) -> str:
+def workspace_svg(workspace: Workspace, finger: Finger) -> str:
     """SVG of the fiducials, the finger's outline between them, and a ruler; one user unit is 1 mm, y up."""
     radius = workspace.fiducial_diameter / 2
     left, bottom = workspace.points.min(axis=0) - radius - SHEET_MARGIN
@@ -104,13 +103,13 @@ def workspace_svg(workspace: Workspace, parameters: Parameters) -> str:
     discs = "\n".join(
         f'    <circle cx="{x:.6g}" cy="{y:.6g}" r="{radius:.6g}"/>' for x, y in workspace.points
     )
-    outline = " ".join(f"{x:.6f},{y:.6f}" for x, y in finger_section(parameters).outer)
+    outline = " ".join(f"{x:.6f},{y:.6f}" for x, y in finger.section.outline.flattened()[0])
     middle = (left + right) / 2
     start, end, base = middle - RULER / 2, middle + RULER / 2, bottom + 4
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <svg xmlns="http://www.w3.org/2000/svg" width="{width:.6g}mm" height="{height:.6g}mm"
      viewBox="{left:.6g} {-top:.6g} {width:.6g} {height:.6g}">
-  <title>fiducials of {parameters.name}</title>
+  <title>fiducials of {finger.name}</title>
   <g transform="scale(1 -1)">
   <g id="fiducials" fill="black">
 {discs}
