@@ -1,28 +1,32 @@
 """The child process for CAD and meshing, so that a hang or a crash can be ended and reported.
 
-`python -m geometry.worker` reads one task as JSON from standard input and answers with one line of JSON.
+`python -m geometry.worker` reads tasks as lines of JSON from standard input and answers each with one. It
+stays for the next task, because starting it takes longer than a mesh.
 """
 
+import atexit
 import json
 import os
+import selectors
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from geometry.errors import UserError
 
 FOREIGN_PREFIXES = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "I_MPI_", "MPI_", "HYDRA_", "MPIEXEC_")
 """Environment variables that would make the child a member of the parent's MPI run."""
 
-EXIT_REFUSED = 2
 EXTRA_SECONDS = 5
 
 
 def run_task(task: Mapping[str, Any], timeout_s: float) -> None:
-    """Run a task in a child process and wait for it.
+    """Run a task in this process's worker and wait for it.
 
     Args:
         task: Argument of `perform`, with `what` as its description in messages.
@@ -31,29 +35,74 @@ def run_task(task: Mapping[str, Any], timeout_s: float) -> None:
     Raises:
         UserError: One line, if the task fails or takes too long.
     """
-    process = subprocess.Popen(
-        [sys.executable, "-m", "geometry.worker"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=child_environment(os.environ),
-    )
+    worker = _worker(os.getpid())
     try:
-        answer, errors = process.communicate(json.dumps({**task, "timeout_s": timeout_s}), timeout=timeout_s)
-    except BaseException as error:  # a time-out, or Ctrl-C: leave no process behind
-        process.kill()
-        process.communicate()
-        if isinstance(error, subprocess.TimeoutExpired):
-            raise UserError(
-                f"{task['what']} was ended after {timeout_s:g} s; use larger elements, or allow more time"
-            ) from None
+        error = worker.answer({**task, "timeout_s": timeout_s}, timeout_s)
+    except BaseException:  # a time-out, a crash, or Ctrl-C: leave no process behind
+        worker.stop()
+        _worker.cache_clear()
         raise
-    if process.returncode == EXIT_REFUSED:
-        raise UserError(json.loads(answer)["error"])
-    if process.returncode != 0:
-        last = errors.strip().splitlines()[-1:] or ["it left no message"]
-        raise UserError(f"{task['what']} failed (exit code {process.returncode}): {last[0]}")
+    if error:
+        raise UserError(error)
+
+
+class Worker:
+    """A child process that runs tasks one after another."""
+
+    def __init__(self) -> None:
+        self._errors: IO[str] = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")  # noqa: SIM115
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "geometry.worker"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._errors,
+            text=True,
+            env=child_environment(os.environ),
+        )
+
+    def answer(self, task: Mapping[str, Any], timeout_s: float) -> str:
+        """Run a task: empty if it was done, else the reason why it was refused.
+
+        Raises:
+            UserError: If it takes too long or the process ends.
+        """
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        try:
+            self._process.stdin.write(json.dumps(task) + "\n")
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            raise self._ended(task) from None
+        with selectors.DefaultSelector() as ready:
+            ready.register(self._process.stdout, selectors.EVENT_READ)
+            if not ready.select(timeout_s):
+                raise UserError(
+                    f"{task['what']} was ended after {timeout_s:g} s; use larger elements, or allow more time"
+                )
+        if not (line := self._process.stdout.readline()):
+            raise self._ended(task)
+        return str(json.loads(line)["error"])
+
+    def stop(self) -> None:
+        """End the process, whatever it does."""
+        atexit.unregister(self.stop)
+        self._process.kill()
+        self._process.communicate()
+        self._errors.close()
+
+    def _ended(self, task: Mapping[str, Any]) -> UserError:
+        code = self._process.wait()
+        self._errors.seek(0)
+        last = self._errors.read().strip().splitlines()[-1:] or ["it left no message"]
+        return UserError(f"{task['what']} failed (exit code {code}): {last[0]}")
+
+
+@cache
+def _worker(parent: int) -> Worker:
+    """The worker of the process with this number; a forked process gets its own."""
+    worker = Worker()
+    atexit.register(worker.stop)
+    return worker
 
 
 def child_environment(environment: Mapping[str, str]) -> dict[str, str]:
@@ -89,15 +138,19 @@ def perform(task: Mapping[str, Any]) -> None:
 
 
 def main() -> int:
-    """Read a task, run it, and answer."""
-    task = json.load(sys.stdin)
-    if hasattr(signal, "alarm"):  # ends this process if the parent was killed and Gmsh hangs
-        signal.alarm(int(task["timeout_s"]) + EXTRA_SECONDS)
-    try:
-        perform(task)
-    except UserError as error:
-        json.dump({"error": str(error)}, sys.stdout)
-        return EXIT_REFUSED
+    """Read tasks, run them, and answer, until there are no more."""
+    for line in sys.stdin:
+        task = json.loads(line)
+        if hasattr(signal, "alarm"):  # ends this process if the parent was killed and Gmsh hangs
+            signal.alarm(int(task["timeout_s"]) + EXTRA_SECONDS)
+        try:
+            perform(task)
+            error = ""
+        except UserError as refusal:
+            error = str(refusal)
+        if hasattr(signal, "alarm"):
+            signal.alarm(0)
+        print(json.dumps({"error": error}), flush=True)
     return 0
 
 
