@@ -27,10 +27,10 @@ from compare.runtime.output_folder import (
     take_training,
     write_run,
 )
-from compare.runtime.provenance import file_digest, package_versions, sources_digest
+from compare.runtime.provenance import package_versions, sources_digest
 from compare.runtime.stages import Stages
 from geometry.atomic import write_json
-from geometry.content_hash import content_hash
+from geometry.content_hash import content_hash, file_digest
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings

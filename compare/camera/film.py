@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from compare.runtime.provenance import file_digest
+from geometry.content_hash import file_digest
 from geometry.finger.finger import Finger
 
 if TYPE_CHECKING:  # it imports OpenCV, and `--help` has to be quick

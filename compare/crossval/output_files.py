@@ -11,9 +11,9 @@ from compare.crossval.scores import FIELD_NAMES
 from compare.crossval.tables import grids, write_tables
 from compare.evaluation.number_format import percent
 from compare.runtime.html import template_environment
-from compare.runtime.provenance import file_digest
 from compare.runtime.tables import write_csv
 from geometry.atomic import write_json, write_text
+from geometry.content_hash import file_digest
 from solvers.assimilation.misfit import assimilates
 
 HELD_OUT, FIELDS, SWEEP = "held_out.png", "fields.png", "l_curve.png"

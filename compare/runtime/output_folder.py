@@ -13,8 +13,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from compare.runtime.provenance import file_digest
 from geometry.atomic import write_json
+from geometry.content_hash import file_digest
 from geometry.errors import UserError
 
 RUN_FILE = "run.json"

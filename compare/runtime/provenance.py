@@ -67,9 +67,3 @@ def sources_digest(modules: Iterable[str]) -> str:
         for source in sources:
             sha.update(os.fsencode(source.relative_to(path.parent)) + b"\0" + source.read_bytes())
     return sha.hexdigest()
-
-
-def file_digest(path: Path) -> str:
-    """SHA-256 of a file, in hexadecimal."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from compare.runtime.provenance import PACKAGES, file_digest, machine, package_versions, sources_digest
+from compare.runtime.provenance import PACKAGES, machine, package_versions, sources_digest
+from geometry.content_hash import file_digest
 
 
 @pytest.fixture

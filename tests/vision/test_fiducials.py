@@ -5,14 +5,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from geometry.errors import UserError
-from geometry.finger.parameters import Parameters
+from geometry.finger.design import Design
 from tests.vision.fingers import MARKERS
 from vision.calibration.camera import Camera, Pose
 from vision.tracking.fiducial_matching import identify_fiducials
 from vision.tracking.workspace import Workspace, default_workspace
 
 CAMERA = Camera(1280, 720, 1200.0, 1200.0, 640.0, 360.0)
-WORKSPACE = default_workspace(Parameters())
+WORKSPACE = default_workspace(Design())
 MIDDLE = np.array([45.0, -12.0, 0.0])
 
 

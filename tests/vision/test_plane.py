@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.finger.parameters import Parameters
+from geometry.finger.design import Design
 from tests.vision.chessboards import projected
 from tests.vision.fingers import MARKERS, PRESSED
 from tests.vision.test_fiducials import pose_of
@@ -17,7 +17,7 @@ from vision.tracking.scene import FilmedScene
 from vision.tracking.workspace import default_workspace
 
 CAMERA = Camera(1280, 720, 1200.0, 1195.0, 652.0, 349.0, distortion=(-0.12, 0.05, 1e-3, -5e-4, 0.0))
-FIDUCIALS = default_workspace(Parameters()).points
+FIDUCIALS = default_workspace(Design()).points
 BEFORE = MARKERS["front"]
 AFTER = BEFORE + np.array(PRESSED["front"])[0]
 POSE = pose_of(10, (4, -3), 145)
@@ -169,7 +169,7 @@ def test_a_lens_moves_the_middles_of_discs_which_is_undone():
 
 
 def test_the_plane_of_fiducials_is_that_of_their_discs():
-    scene = FilmedScene(Parameters(), default_workspace(Parameters()), CAMERA)
+    scene = FilmedScene(Design(), default_workspace(Design()), CAMERA)
     discs = DiscDetections(pictured(FIDUCIALS, 2.0, CAMERA), noise(7), np.full(7, 16.0), np.full(7, 180.0))
     plane = scene.plane(discs)
     assert plane.residual < 1e-4

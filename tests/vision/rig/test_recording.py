@@ -62,7 +62,7 @@ def test_the_truth_goes_from_rest_to_the_whole_displacement(bench):
     np.testing.assert_array_equal(start[:, :2], bench.mesh.markers)
     observations = recording.observations("a test")
     moved = observations.displacements
-    assert observations.marker_radius == recording.bench.parameters.marker_radius
+    assert observations.marker_radius == recording.bench.finger.marker_radius
     np.testing.assert_allclose((end - start)[:, :2], moved, atol=1e-12)
     np.testing.assert_allclose(truths[2].world, start + truths[2].load * (end - start), atol=1e-12)
     np.testing.assert_array_equal(truths[-1].pixels, CAMERA.project(end, POSE))
