@@ -1,0 +1,214 @@
+"""A finger from a drawing."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from geometry.arrays import FloatArray, frozen_array
+from geometry.content_hash import content_hash
+from geometry.drawing.checks import thinnest_wall
+from geometry.drawing.placement import Placement
+from geometry.errors import UserError
+from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.notebook import fact_table, png_image
+from geometry.section.loop import Loop
+from geometry.section.section import Section
+
+if TYPE_CHECKING:
+    from geometry.figure import Figure
+
+KIND = "drawing"
+"""Value of `kind` in the definition."""
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnFinger:
+    """A finger whose section was drawn.
+
+    Attributes:
+        name: What files and reports call it; no part of the geometry.
+        section: In the finger's frame, with its pieces `base`, `front` and, where there is one, `back`.
+        markers: Centres, ordered from base to tip, shape (m, 2), mm.
+        contact_abscissa: X of the contact's middle, mm.
+        contact_width: Extent of the contact along x, mm.
+        depth: Depth of the extrusion, mm.
+        marker_diameter: Diameter of a marker's disc, mm.
+        marker_height: How deep a marker is inlaid into the side face, mm.
+        file: Name of the drawing's file.
+        sha256: Hash of its content, in hexadecimal.
+        note: How it was read, in words.
+        placement: From the file's frame, in mm, into the finger's.
+        sources: `given`, `drawn` or `proposed` for `clamp`, `contact`, `contact_width`, `markers`,
+            `marker_diameter`, `marker_height` and `depth`.
+        mesh: The file's own triangle mesh, in the finger's frame, or None.
+
+    Raises:
+        UserError: If the contact is not on the front face or a marker is not in the body.
+    """
+
+    name: str
+    section: Section
+    markers: FloatArray
+    contact_abscissa: float
+    contact_width: float
+    depth: float
+    marker_diameter: float
+    marker_height: float
+    file: str
+    sha256: str
+    note: str
+    placement: Placement
+    sources: Mapping[str, str] = field(default_factory=dict)
+    mesh: TriangleMesh | None = None
+
+    def __post_init__(self) -> None:
+        markers = frozen_array(self.markers, dtype=np.float64, shape=(None, 2), name="markers")
+        object.__setattr__(self, "markers", markers)
+        object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
+        for x in self.contact_ends:
+            self.section.front_place(x)
+
+    @property
+    def marker_layout(self) -> str:
+        """Where the markers come from: `given`, `drawn` or `proposed`."""
+        return self.sources.get("markers", "given")
+
+    @property
+    def marker_radius(self) -> float:
+        """Radius of a marker's disc, mm: a marker's displacement is the mean over this disc."""
+        return self.marker_diameter / 2
+
+    @property
+    def contact_ends(self) -> tuple[float, float]:
+        """X of both ends of the contact, mm."""
+        half = self.contact_width / 2
+        return self.contact_abscissa - half, self.contact_abscissa + half
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 over the geometry, in hexadecimal; equal for equal fingers, whatever their files."""
+        return content_hash(
+            {
+                "section": self.section.digest,
+                "markers": self.markers,
+                "numbers": [
+                    *(self.contact_abscissa, self.contact_width, self.depth),
+                    *(self.marker_diameter, self.marker_height),
+                ],
+                "mesh": self.mesh.digest if self.mesh else None,
+            }
+        )
+
+    def at_contact(self, position: float) -> Self:
+        """The same finger with the contact's middle at another x, mm.
+
+        The file's own mesh has the contact at its place and is left behind: the section is meshed.
+
+        Raises:
+            UserError: If the contact is not on the front face there.
+        """
+        if position == self.contact_abscissa:
+            return self
+        sources = {**self.sources, "contact": "given"}
+        return replace(self, contact_abscissa=float(position), sources=sources, mesh=None)
+
+    def definition(self) -> dict[str, Any]:
+        """Everything that defines the finger, for JSON; `from_definition` reads it back."""
+        numbers = {
+            key: getattr(self, key)
+            for key in (
+                *("name", "contact_abscissa", "contact_width", "depth", "marker_diameter", "marker_height"),
+                *("file", "sha256", "note"),
+            )
+        }
+        return {
+            "kind": KIND,
+            **numbers,
+            "section": [_loop_definition(loop) for loop in self.section.loops],
+            "markers": self.markers.tolist(),
+            "placement": self.placement.definition(),
+            "sources": dict(self.sources),
+            "mesh": _mesh_definition(self.mesh) if self.mesh else None,
+        }
+
+    @classmethod
+    def from_definition(cls, definition: Mapping[str, Any]) -> Self:
+        """The finger of a `definition`.
+
+        Raises:
+            UserError: If it is none of a drawn finger.
+        """
+        values = dict(definition)
+        if values.pop("kind", None) != KIND:
+            raise UserError("this is no definition of a finger from a drawing")
+        outline, *cavities = (Loop(**_loop_values(loop)) for loop in values.pop("section"))
+        mesh = values.pop("mesh")
+        return cls(
+            section=Section(outline, tuple(cavities)),
+            placement=Placement(**values.pop("placement")),
+            mesh=TriangleMesh(**mesh) if mesh else None,
+            **values,
+        )
+
+    def facts(self) -> list[tuple[str, str, str]]:
+        """Rows of the report: meaning, an empty symbol, and value with unit."""
+        low, high = self.section.bounds
+        thickness, where = thinnest_wall(self.section)
+        clamp = sum(loop.lengths[which] for loop, which in self.section.named("base"))
+        contact = self.section.front_point(self.contact_abscissa)
+        wall = f"{thickness:.4g} mm at ({where[0]:.4g}, {where[1]:.4g})" if np.isfinite(thickness) else "none"
+        rows = {
+            "Drawing": f"{self.file} ({self.note})",
+            "SHA-256 of the drawing": self.sha256,
+            "Placement": str(self.placement),
+            "Area": f"{self.section.area:.6g} mm2",
+            "Extent": f"{high[0] - low[0]:.5g} mm by {high[1] - low[1]:.5g} mm",
+            "Cavities": f"{len(self.section.cavities)}",
+            "Thinnest wall": wall,
+            "Depth": f"{self.depth:.6g} mm{self._source('depth')}",
+            "Clamped length": f"{clamp:.5g} mm{self._source('clamp')}",
+            "Contact's middle": f"({contact[0]:.5g}, {contact[1] + 0.0:.5g}) mm{self._source('contact')}",
+            "Contact's width": f"{self.contact_width:.5g} mm{self._source('contact_width')}",
+            "Markers": f"{len(self.markers)}{self._source('markers')}",
+            "Marker diameter": f"{self.marker_diameter:.4g} mm{self._source('marker_diameter')}",
+        }
+        if self.mesh:
+            rows["Mesh"] = f"{len(self.mesh.triangles)} triangles of the file, as they are"
+        return [(meaning, "", value) for meaning, value in rows.items()]
+
+    def plot(self) -> "Figure":
+        """The section with clamp, contact and numbered markers in the file's axes, as a matplotlib figure."""
+        from geometry.drawing.picture import plot_drawing
+
+        return plot_drawing(self)
+
+    def _source(self, key: str) -> str:
+        source = self.sources.get(key)
+        return f", {source}" if source else ""
+
+    def _repr_html_(self) -> str:
+        """The section and the facts, in a notebook."""
+        facts = {meaning: value for meaning, _, value in self.facts()}
+        return fact_table(f"Finger “{self.name}”", facts, png_image(self.plot()._repr_png_()))
+
+
+def _loop_definition(loop: Loop) -> dict[str, Any]:
+    return {"points": loop.points.tolist(), "bulges": loop.bulges.tolist(), "names": list(loop.names)}
+
+
+def _loop_values(definition: Mapping[str, Any]) -> dict[str, Any]:
+    return {**definition, "names": tuple(definition["names"])}
+
+
+def _mesh_definition(mesh: TriangleMesh) -> dict[str, Any]:
+    return {
+        "points": mesh.points.tolist(),
+        "triangles": mesh.triangles.tolist(),
+        "boundaries": {name: edges.tolist() for name, edges in mesh.boundaries.items()},
+        "marker_nodes": mesh.marker_nodes.tolist(),
+        "contact_node": mesh.contact_node,
+    }

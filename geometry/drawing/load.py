@@ -1,0 +1,268 @@
+"""Reads a drawing, settles its clamp, contact and markers, and places it in the finger's frame."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.drawing import proposal
+from geometry.drawing.chain import straightened
+from geometry.drawing.checks import body, check_contact, check_markers
+from geometry.drawing.description import Description, load_description
+from geometry.drawing.drawing import LABELS, Drawing, label_of
+from geometry.drawing.drawn_finger import DrawnFinger
+from geometry.drawing.outline import renamed, with_part
+from geometry.drawing.placement import placed
+from geometry.drawing.ready_mesh import ready_mesh
+from geometry.errors import UserError
+from geometry.section.loop import Loop
+from geometry.section.section import Section
+
+SUFFIXES = (".step", ".stp", ".dxf", ".svg", ".msh")
+
+DEPTH = 20.0
+"""Proposed depth where neither drawing nor description has one, mm."""
+
+MARKER_HEIGHT = 0.6
+"""Proposed depth of the markers' inlay, mm."""
+
+
+class Contact(NamedTuple):
+    """The contact in the drawing's frame.
+
+    Attributes:
+        middle: Shape (2,), mm.
+        ends: Both ends where the drawing has them, shape (2, 2), mm, or None.
+        source: `given`, `drawn` or `proposed`.
+    """
+
+    middle: FloatArray
+    ends: FloatArray | None
+    source: str
+
+
+def load_drawing(path: str | Path, description: Description | None = None) -> DrawnFinger:
+    """The finger of a STEP, DXF, SVG or MSH file.
+
+    Args:
+        path: The drawing.
+        description: Clamp, contact and markers; None means those in the TOML file of the same name beside the
+            drawing, if there is one. What neither it nor the drawing has is proposed.
+
+    Raises:
+        UserError: In one line, if the drawing cannot be read, is no sound section, or the description does
+            not fit it.
+    """
+    path = Path(path)
+    beside = path.with_suffix(".toml")
+    if description is None:
+        description = load_description(beside if beside.is_file() else None)
+    drawing = read_drawing(path, description.units, description.plane)
+    try:
+        return finger_of(drawing, description)
+    except UserError as error:
+        raise UserError(f"{path.name}: {error}") from None
+
+
+def read_drawing(path: Path, units: str | None = None, plane: str | None = None) -> Drawing:
+    """The curves of a STEP, DXF, SVG or MSH file.
+
+    Args:
+        path: The file.
+        units: Unit of its coordinates; None means the file's own, or mm.
+        plane: Plane in which a solid is cut, such as `z = 6`.
+
+    Raises:
+        UserError: If there is no such file, its format is unknown, or it cannot be read.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise UserError(f"cannot read {path.name} as a drawing; there are {', '.join(SUFFIXES)}")
+    if not path.is_file():
+        raise UserError(f"there is no drawing {path}")
+    if plane is not None and suffix not in (".step", ".stp"):
+        raise UserError(f"{path.name} is plane already; a plane cuts solids of STEP files only")
+    if suffix in (".step", ".stp"):
+        from geometry.drawing.step import read_step
+
+        return read_step(path, units, plane)
+    if suffix == ".dxf":
+        from geometry.drawing.dxf import read_dxf
+
+        return read_dxf(path, units)
+    if suffix == ".svg":
+        from geometry.drawing.svg import read_svg
+
+        return read_svg(path, units)
+    from geometry.drawing.msh import read_msh
+
+    return read_msh(path, units)
+
+
+def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
+    """The finger of a drawing with a description.
+
+    Raises:
+        UserError: If the drawing is no sound section, or the description does not fit it.
+    """
+    labelled = body(drawing.loops)
+    outline, clamp_source = _clamped(labelled.outline, description, drawing.unit)
+    cavities = tuple(straightened(renamed(loop, [""] * len(loop.points))) for loop in labelled.cavities)
+    section = Section(outline, cavities)
+    contact = _contact(drawing, labelled.outline, section, description)
+    which, fraction = check_contact(outline, contact.middle)
+    points, diameter, marker_sources = _markers(drawing, section, description)
+    section, placement = placed(section, which, fraction)
+    if contact.ends is None:
+        x = float(placement(outline.along(which, fraction))[0, 0])
+        width, width_source = _first(
+            given=_scaled(description.contact_width, drawing.unit),
+            proposed=proposal.contact_width(section.outline),
+        )
+    else:
+        ends = placement(contact.ends)[:, 0]
+        x, width, width_source = float(ends.mean()), float(np.ptp(ends)), contact.source
+    depth, depth_source = _first(
+        given=_scaled(description.depth, drawing.unit), drawn=drawing.depth, proposed=DEPTH
+    )
+    height, height_source = _first(
+        given=_scaled(description.marker_height, drawing.unit),
+        drawn=drawing.marker_height,
+        proposed=MARKER_HEIGHT,
+    )
+    markers = placement(points)
+    markers = markers[np.lexsort((-markers[:, 1], markers[:, 0]))]
+    mesh = ready_mesh(drawing.mesh, placement, section, markers, x) if drawing.mesh else None
+    return DrawnFinger(
+        name=description.name or _name(drawing.file),
+        section=section,
+        markers=mesh.markers if mesh else markers,
+        contact_abscissa=x,
+        contact_width=width,
+        depth=depth,
+        marker_diameter=diameter,
+        marker_height=height,
+        file=drawing.file,
+        sha256=drawing.sha256,
+        note=drawing.note,
+        placement=placement,
+        sources={
+            "clamp": clamp_source,
+            "contact": contact.source,
+            "contact_width": width_source,
+            **marker_sources,
+            "marker_height": height_source,
+            "depth": depth_source,
+        },
+        mesh=mesh,
+    )
+
+
+def _clamped(outline: Loop, description: Description, unit: float) -> tuple[Loop, str]:
+    """The outline with its clamp as the pieces `base` and no other name, and the clamp's source.
+
+    Raises:
+        UserError: If the clamp is not on the outline, or holds all or nothing of it.
+    """
+    given = description.clamp
+    if isinstance(given, tuple):
+        outline = straightened(renamed(outline, [""] * len(outline.points)))
+        for pair in given:
+            outline = with_part(outline, [unit * np.array(point) for point in pair], "base")
+        source = "given"
+    else:
+        label = label_of(given) if given else "base"
+        held = [name == label or LABELS.get(name) == label for name in outline.names]
+        outline = straightened(renamed(outline, ("base" if each else "" for each in held)))
+        source = "given" if given else "drawn"
+        if not any(held) and given:
+            raise UserError(
+                f"nothing is clamped: no piece of the outline is called {given!r}; give two points of it"
+            )
+        if not any(held):
+            outline, source = straightened(proposal.with_clamp(outline)), "proposed"
+    if all(name == "base" for name in outline.names):
+        raise UserError("the whole outline is clamped; leave a part free")
+    return outline, source
+
+
+def _contact(drawing: Drawing, labelled: Loop, section: Section, description: Description) -> Contact:
+    """Raises a `UserError` if no piece of the outline has the given label."""
+    given = description.contact
+    if isinstance(given, tuple):
+        return Contact(drawing.unit * np.array(given), None, "given")
+    label = label_of(given) if given else "contact"
+    pieces = list(labelled.pieces(label))
+    if pieces:
+        middle, ends = _run(labelled, pieces)
+        return Contact(middle, ends, "given" if given else "drawn")
+    if drawing.contact is not None and label == "contact":
+        return Contact(drawing.contact, None, "given" if given else "drawn")
+    if given:
+        raise UserError(
+            f"no contact: no piece of the outline is called {given!r}; give contact as a point of it"
+        )
+    return Contact(proposal.contact_point(section), None, "proposed")
+
+
+def _run(loop: Loop, pieces: list[int]) -> tuple[FloatArray, FloatArray]:
+    """Middle (2,) and ends (2, 2) of a run of pieces."""
+    count = len(loop.points)
+    first = next((which for which in pieces if (which - 1) % count not in pieces), pieces[0])
+    run = [first]
+    while (run[-1] + 1) % count in pieces and len(run) < len(pieces):
+        run.append((run[-1] + 1) % count)
+    if len(run) < len(pieces):
+        raise UserError("the contact is in several parts; call one connected part of the outline contact")
+    ends = np.cumsum(loop.lengths[run])
+    step = int(np.searchsorted(ends, ends[-1] / 2))
+    fraction = 1 - (ends[step] - ends[-1] / 2) / loop.lengths[run[step]]
+    return loop.along(run[step], fraction)[0], np.stack([loop.ends[run[0], 0], loop.ends[run[-1], 1]])
+
+
+def _markers(
+    drawing: Drawing, section: Section, description: Description
+) -> tuple[FloatArray, float, Mapping[str, str]]:
+    """Centres (m, 2) and diameter of the markers, mm, and the sources of both.
+
+    Raises:
+        UserError: If a marker is not in the body, or the file has no markers though the description says so.
+    """
+    given = description.markers
+    if isinstance(given, str) and (label_of(given) != "markers" or not len(drawing.markers)):
+        raise UserError(f"the file has no markers called {given!r}; give their centres or their number")
+    if isinstance(given, tuple):
+        points, source = drawing.unit * np.array(given), "given"
+    elif isinstance(given, int):
+        points, source = proposal.marker_places(section, given), "proposed"
+    elif len(drawing.markers):
+        points, source = drawing.markers, "drawn"
+    else:
+        points, source = proposal.marker_places(section, proposal.MARKERS), "proposed"
+    check_markers(section, points, 0.0)
+    diameter, diameter_source = _first(
+        given=_scaled(description.marker_diameter, drawing.unit),
+        drawn=drawing.marker_diameter if source == "drawn" else None,
+        proposed=proposal.marker_diameter(section, points),
+    )
+    check_markers(section, points, diameter)
+    return points, diameter, {"markers": source, "marker_diameter": diameter_source}
+
+
+def _first(**choices: float | None) -> tuple[float, str]:
+    """The first number there is, with its source."""
+    return next((value, source) for source, value in choices.items() if value is not None)
+
+
+def _scaled(length: float | None, unit: float) -> float | None:
+    return None if length is None else length * unit
+
+
+def _name(file: str) -> str:
+    """The file's name without its suffix, as a finger may be called."""
+    stem = "".join(
+        each if each.isascii() and (each.isalnum() or each in "._-") else "-" for each in Path(file).stem
+    )
+    return stem.lstrip("._-")[:64] or "drawing"

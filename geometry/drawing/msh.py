@@ -1,0 +1,264 @@
+"""Reads a Gmsh mesh: a plane triangle mesh as it is, or the section of an extruded body's mesh."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gmsh
+import numpy as np
+
+from geometry.arrays import FloatArray, IntArray
+from geometry.drawing.chain import closed_loops, straightened
+from geometry.drawing.drawing import LABELS, UNITS, Drawing, MeshInFile, label_of, sha256_of
+from geometry.drawing.frames import axes_across, plane_text
+from geometry.drawing.pieces import line
+from geometry.errors import UserError
+
+CORNERS = {2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 7: 5, 9: 3, 10: 4, 11: 4, 12: 8, 13: 6, 14: 5, 16: 4, 17: 8, 18: 6}
+"""Number of corners by Gmsh's types of elements, of first and second order."""
+
+FACES = {
+    4: [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]],
+    5: [[0, 1, 2, 3], [0, 1, 3], [0, 1, 4], [1, 2, 4]],
+    6: [[0, 1, 2], [3, 4, 5], [0, 1, 4, 3], [1, 2, 5, 4], [0, 2, 5, 3]],
+    8: [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]],
+}
+"""Faces of tetrahedra, pyramids, prisms and hexahedra, by the number of corners."""
+
+FLAT = 1e-4
+"""Largest distance of a corner from the straight line that replaces it, and from a plane, mm."""
+
+
+SAME = 0.01
+"""Largest relative difference of an extruded body's two ends, and of its volume: curved sides have facets."""
+
+ALONG = 0.999
+"""Least cosine of the angle between an end face's normals and the extrusion."""
+
+
+class RawMesh(NamedTuple):
+    """Nodes and elements of a file.
+
+    Attributes:
+        points: Shape (n, 3), in the file's unit.
+        cells: Corners of the elements of the highest dimension by their number, each of shape (k, corners).
+        dimension: That dimension, 2 or 3.
+        edges: Edges of the physical curves by name, each of shape (k, 2).
+        nodes: Nodes of the physical points by name.
+    """
+
+    points: FloatArray
+    cells: Mapping[int, IntArray]
+    dimension: int
+    edges: Mapping[str, IntArray]
+    nodes: Mapping[str, IntArray]
+
+
+def read_msh(path: Path, units: str | None = None) -> Drawing:
+    """The section of a Gmsh mesh.
+
+    A plane mesh gives its boundary, with the physical groups as labels; a triangle mesh with the groups
+    `base` (or `clamp`) and `contact` is kept as it is. The mesh of an extruded body gives the boundary of its
+    end face; sides in one line are joined.
+
+    Args:
+        path: The file.
+        units: Unit of its coordinates; None means mm.
+
+    Raises:
+        UserError: If it cannot be read, or is neither plane nor of an extruded body.
+    """
+    digest, unit = sha256_of(path), UNITS[units or "mm"]
+    raw = _raw(path)
+    raw = raw._replace(points=raw.points * unit)
+    try:
+        if raw.dimension == 2:
+            return _plane_mesh(raw, path.name, digest, unit)
+        return _extruded_mesh(raw, path.name, digest, unit)
+    except UserError as error:
+        raise UserError(f"{path.name}: {error}") from None
+
+
+def _plane_mesh(raw: RawMesh, file: str, digest: str, unit: float) -> Drawing:
+    extent = np.ptp(raw.points, axis=0)
+    across = int(extent.argmin())
+    if extent[across] > FLAT:
+        raise UserError("its surface is not plane; give a mesh of a plane section or of a solid")
+    axes = axes_across(np.eye(3)[across])
+    points = raw.points @ axes.T
+    named = {tuple(sorted(edge)): name for name, edges in raw.edges.items() for edge in edges.tolist()}
+    sides = [edge for count, cells in raw.cells.items() for edge in _sides(cells, count)]
+    pieces = [line(points[first], points[last], named.get((first, last), "")) for first, last in _once(sides)]
+    loops = tuple(straightened(loop, FLAT) for loop in closed_loops(pieces))
+    markers = raw.nodes.get("markers", np.empty(0, dtype=np.int64))
+    contact = raw.nodes.get("contact", np.empty(0, dtype=np.int64))
+    ready = None
+    if set(raw.cells) == {3} and {"base", "contact"} <= set(raw.edges):
+        used, triangles = np.unique(raw.cells[3], return_inverse=True)
+        number = np.full(len(points), -1)
+        number[used] = np.arange(len(used))
+        ready = MeshInFile(
+            points=points[used],
+            triangles=triangles.reshape(-1, 3),
+            edges={name: number[edges] for name, edges in raw.edges.items()},
+            marker_nodes=number[markers],
+        )
+    return Drawing(
+        file=file,
+        sha256=digest,
+        loops=loops,
+        unit=unit,
+        note="MSH, triangles as they are" if ready else "MSH, boundary of a plane mesh",
+        markers=points[markers],
+        contact=points[contact[0]] if len(contact) else None,
+        mesh=ready,
+    )
+
+
+def _extruded_mesh(raw: RawMesh, file: str, digest: str, unit: float) -> Drawing:
+    faces = _once([face for count, cells in raw.cells.items() for face in _faces(cells, count)])
+    normals, areas = _normals(raw.points, faces)
+    volume = _volume(raw)
+    for normal in _main_directions(normals, areas):
+        slope, heights = np.abs(normals @ normal), raw.points @ normal
+        low, high = float(heights.min()), float(heights.max())
+        caps = [
+            [
+                number
+                for number, face in enumerate(faces)
+                if slope[number] > ALONG and np.abs(heights[list(face)] - end).max() < FLAT
+            ]
+            for end in (low, high)
+        ]
+        area = float(areas[caps[0]].sum())
+        same = abs(areas[caps[1]].sum() - area) <= SAME * area
+        if not (area and same and abs(area * (high - low) - volume) <= SAME * volume):
+            continue
+        points = raw.points @ axes_across(normal).T
+        sides = [side for which in caps[0] for side in _sides(np.array([faces[which]]), len(faces[which]))]
+        pieces = [line(points[first], points[last], "") for first, last in _once(sides)]
+        return Drawing(
+            file=file,
+            sha256=digest,
+            loops=tuple(straightened(loop, FLAT) for loop in closed_loops(pieces)),
+            unit=unit,
+            note=f"MSH, extruded by {high - low:.6g} mm, at {plane_text(normal, low)}",
+            depth=high - low,
+        )
+    raise UserError("its body is not extruded; give a mesh of the plane section")
+
+
+def _main_directions(normals: FloatArray, areas: FloatArray) -> list[FloatArray]:
+    """Directions that many faces share, by falling area; of equal ones, z before y before x."""
+    rounded = normals * np.sign(np.take_along_axis(normals, np.abs(normals).argmax(axis=1)[:, None], axis=1))
+    _, first, group = np.unique(np.round(rounded, 4), axis=0, return_index=True, return_inverse=True)
+    shares = np.bincount(group.ravel(), weights=areas)
+    order = np.argsort(-shares)[:12]
+    return [rounded[first[which]] for which in order]
+
+
+def _normals(points: FloatArray, faces: Sequence[tuple[int, ...]]) -> tuple[FloatArray, FloatArray]:
+    """Unit normals (f, 3) and areas (f,) of triangles and quadrilaterals."""
+    corners = points[np.array([[*face, face[-1]][:4] for face in faces])]
+    cross = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])  # of the diagonals
+    length = np.linalg.norm(cross, axis=1)
+    return cross / np.where(length > 0, length, 1)[:, None], length / 2
+
+
+def _volume(raw: RawMesh) -> float:
+    """Volume of the solid elements, mm^3, each taken as convex."""
+    volume = 0.0
+    for count, cells in raw.cells.items():
+        middle = raw.points[cells].mean(axis=1)
+        for face in FACES[count]:
+            for second, third in pairwise(face[1:]):
+                corners = [raw.points[cells[:, which]] - middle for which in (face[0], second, third)]
+                volume += float(np.abs(np.linalg.det(np.stack(corners, axis=1))).sum()) / 6
+    return volume
+
+
+def _faces(cells: IntArray, corners: int) -> Iterator[tuple[int, ...]]:
+    for face in FACES[corners]:
+        yield from map(tuple, cells[:, face].tolist())
+
+
+def _sides(cells: IntArray, corners: int) -> Iterator[tuple[int, ...]]:
+    for which in range(corners):
+        yield from map(tuple, cells[:, [which, (which + 1) % corners]].tolist())
+
+
+def _once(parts: Sequence[tuple[int, ...]]) -> list[tuple[int, ...]]:
+    """Edges or faces that belong to one element only, edges with their nodes sorted."""
+    times: dict[tuple[int, ...], int] = {}
+    first: dict[tuple[int, ...], tuple[int, ...]] = {}
+    for part in parts:
+        key = tuple(sorted(part))
+        times[key] = times.get(key, 0) + 1
+        first.setdefault(key, part)
+    return [key if len(key) == 2 else first[key] for key, count in times.items() if count == 1]
+
+
+def _raw(path: Path) -> RawMesh:
+    with _opened(path) as mesh:
+        tags, coordinates, _ = mesh.getNodes()
+        number = np.full(int(tags.max(initial=0)) + 1, -1)
+        number[tags.astype(np.int64)] = np.arange(len(tags))
+        by_dimension: dict[int, dict[int, list[IntArray]]] = {2: {}, 3: {}}
+        for dimension in (2, 3):
+            for kind in mesh.getElementTypes(dimension):
+                if kind not in CORNERS:
+                    name = mesh.getElementProperties(kind)[0]
+                    raise UserError(f"{path.name} holds elements of type {name}, which cannot be read")
+                _, nodes = mesh.getElementsByType(kind)
+                whole = int(mesh.getElementProperties(kind)[3])
+                cells = number[nodes.astype(np.int64).reshape(-1, whole)[:, : CORNERS[kind]]]
+                by_dimension[dimension].setdefault(CORNERS[kind], []).append(cells)
+        dimension = 3 if by_dimension[3] else 2
+        if not by_dimension[dimension]:
+            raise UserError(f"{path.name} holds no triangles, quadrilaterals or solid elements")
+        return RawMesh(
+            points=coordinates.reshape(-1, 3),
+            cells={count: np.concatenate(parts) for count, parts in by_dimension[dimension].items()},
+            dimension=dimension,
+            edges={name: number[nodes.reshape(-1, 2)] for name, nodes in _groups(1)},
+            nodes={name: number[nodes.ravel()] for name, nodes in _groups(0)},
+        )
+
+
+def _groups(dimension: int) -> Iterator[tuple[str, IntArray]]:
+    """Known physical groups of curves or points: name and node tags of the elements' corners."""
+    found: dict[str, list[IntArray]] = {}
+    for _, tag in gmsh.model.getPhysicalGroups(dimension):
+        label = label_of(gmsh.model.getPhysicalName(dimension, tag))
+        for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, tag):
+            for kind, nodes in zip(*gmsh.model.mesh.getElements(dimension, entity)[::2], strict=True):
+                whole = int(gmsh.model.mesh.getElementProperties(kind)[3])
+                corners = nodes.astype(np.int64).reshape(-1, whole)[:, : dimension + 1]
+                found.setdefault(LABELS.get(label, label), []).append(corners)
+    return ((name, np.concatenate(parts)) for name, parts in found.items())
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """Gmsh's mesh of a file, in a model of its own.
+
+    Raises:
+        UserError: If Gmsh cannot read it.
+    """
+    started = not gmsh.isInitialized()
+    if started:
+        gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    try:
+        gmsh.model.add("drawing")
+        try:
+            gmsh.merge(str(path))
+        except Exception as error:  # Gmsh raises no narrower class
+            raise UserError(f"cannot read {path.name} as a Gmsh mesh: {error}") from None
+        yield gmsh.model.mesh
+        gmsh.model.remove()
+    finally:
+        if started:
+            gmsh.finalize()

@@ -1,0 +1,67 @@
+"""A drawn finger as a picture in the axes of its file: what is held, touched and marked."""
+
+import numpy as np
+from matplotlib.patches import Circle, PathPatch
+from matplotlib.path import Path as Outline
+
+from geometry.arrays import FloatArray
+from geometry.drawing.drawn_finger import DrawnFinger
+from geometry.figure import BODY, CONTACT, INK, MEASURED, Figure, body_figure
+from geometry.section.loop import Loop
+from geometry.section.section import Section
+from geometry.section.thickness import inner_normals
+
+SMOOTH = 0.01
+"""Largest distance of the drawn polygon from an arc, mm."""
+
+HATCHES = 40
+"""Hatches along the longer side of the picture."""
+
+
+def plot_drawing(finger: DrawnFinger) -> Figure:
+    """The section in the file's axes, mm: the clamp hatched, an arrow at the contact, numbered markers."""
+    place = finger.placement.inverse
+    section = place.section(finger.section)
+    extent = float(np.ptp(section.bounds, axis=0).max())
+    contact = finger.section.front_point(finger.contact_abscissa)
+    tip, tail = place(np.stack([contact, contact + np.array([0.0, 0.09 * extent])]))
+    hatched = section.bounds + 0.03 * extent * np.array([[-1], [1]])
+    shown = np.concatenate([hatched, tip[None], tail[None]])
+    with body_figure(shown, f"Drawing “{finger.name}”") as (drawn, axes):
+        axes.add_patch(PathPatch(_path(section), fc=BODY, ec=INK, lw=0.7, zorder=1))
+        for loop, which in section.named("base"):
+            axes.plot(*loop.along(which, np.linspace(0, 1, 60)).T, color=INK, lw=2.2, zorder=3)
+            axes.plot(*_hatches(loop, which, extent / HATCHES), color=INK, lw=0.6, zorder=2)
+        front = np.linspace(*finger.contact_ends, 30)
+        touched = place(np.array([finger.section.front_point(x) for x in front]))
+        axes.plot(*touched.T, color=CONTACT, lw=2.5, solid_capstyle="butt", zorder=4)
+        axes.annotate("", tip, tail, arrowprops={"arrowstyle": "-|>", "color": CONTACT, "lw": 1.4}, zorder=5)
+        for number, centre in enumerate(place(finger.markers), start=1):
+            axes.add_patch(Circle(tuple(centre), finger.marker_radius, fc=MEASURED, ec="none", zorder=4))
+            axes.annotate(
+                str(number),
+                centre,
+                xytext=(3, 3),
+                textcoords="offset points",
+                fontsize=6,
+                color=MEASURED,
+                zorder=6,
+            )
+    return drawn
+
+
+def _path(section: Section) -> Outline:
+    rings = [loop.flattened(SMOOTH)[0] for loop in section.loops]
+    return Outline.make_compound_path(
+        *(Outline(np.concatenate([ring, ring[:1]]), closed=True) for ring in rings)
+    )
+
+
+def _hatches(loop: Loop, which: int, step: float) -> FloatArray:
+    """Short strokes on the outer side of a piece, as coordinates (2, k) with gaps."""
+    count = max(int(loop.lengths[which] / step), 2)
+    share = (np.arange(count) + 0.5) / count
+    start, outward = loop.along(which, share), -inner_normals(loop, which, share)
+    turned = outward @ np.array([[1.0, 0.6], [-0.6, 1.0]])
+    strokes = np.stack([start, start + 0.9 * step * turned, np.full_like(start, np.nan)], axis=1)
+    return np.asarray(strokes.reshape(-1, 2).T)

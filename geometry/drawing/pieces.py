@@ -1,0 +1,114 @@
+"""Pieces of curves as readers find them: lines and arcs, with other curves replaced by arcs."""
+
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from geometry.arrays import FloatArray
+
+DEVIATION = 1e-3
+"""Largest distance of the arcs from the ellipse or spline for which they stand, mm."""
+
+PROBES = np.linspace(0, 1, 17)[1:-1]
+DEEPEST = 24
+"""Most halvings of a curve."""
+
+Curve = Callable[[FloatArray], FloatArray]
+"""Points (n, 2) of a curve at parameters (n,)."""
+
+
+class Piece(NamedTuple):
+    """A line or an arc.
+
+    Attributes:
+        start: First end, shape (2,).
+        end: Last end, shape (2,).
+        bulge: Tangent of a quarter of the arc's angle, positive to the left; zero for a line.
+        label: Name of the layer, group, part or physical group; empty without one.
+    """
+
+    start: FloatArray
+    end: FloatArray
+    bulge: float
+    label: str
+
+    def scaled(self, factor: float) -> "Piece":
+        """The piece with every length times a factor."""
+        return Piece(factor * self.start, factor * self.end, self.bulge, self.label)
+
+
+def line(start: ArrayLike, end: ArrayLike, label: str) -> Piece:
+    """A straight piece."""
+    return Piece(np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64), 0.0, label)
+
+
+def arc_through(start: ArrayLike, middle: ArrayLike, end: ArrayLike, label: str) -> Piece:
+    """The arc with two ends through a point at half of its length."""
+    first, half, last = (np.asarray(point, dtype=np.float64) for point in (start, middle, end))
+    return Piece(first, last, _bulge(first, half, last), label)
+
+
+def circle(centre: ArrayLike, radius: float, label: str) -> list[Piece]:
+    """A full circle as two arcs, counter-clockwise."""
+    middle = np.asarray(centre, dtype=np.float64)
+    along = np.array([radius, 0.0])
+    right, left = middle + along, middle - along
+    return [Piece(right, left, 1.0, label), Piece(left, right, 1.0, label)]
+
+
+def arcs_along(curve: Curve, first: float, last: float, label: str, unit: float = 1.0) -> Iterator[Piece]:
+    """Arcs through three points of a curve each, halved until none is more than `DEVIATION` off.
+
+    Args:
+        curve: The curve.
+        first: Parameter of its start.
+        last: Parameter of its end.
+        label: Label of the pieces.
+        unit: Length of one unit of the curve, mm.
+    """
+    ends = curve(np.array([first, last]))
+    closed = bool(np.linalg.norm(ends[1] - ends[0]) < 1e-9 * max(1.0, float(np.abs(ends).max())))
+    cuts = np.linspace(first, last, 5 if closed else 2)
+    for start, end in pairwise(cuts.tolist()):
+        yield from _halved(curve, start, end, label, 0.8 * DEVIATION / unit, 0)
+
+
+def _halved(
+    curve: Curve, first: float, last: float, label: str, deviation: float, level: int
+) -> Iterator[Piece]:
+    start, middle, end = curve(np.array([first, 0.5 * (first + last), last]))
+    bulge = _bulge(start, middle, end)
+    if abs(bulge) < 1 and _deviation(start, end, bulge, curve(first + PROBES * (last - first))) <= deviation:
+        yield Piece(start, end, bulge, label)
+    elif level == DEEPEST:
+        yield line(start, end, label)
+    else:
+        half = 0.5 * (first + last)
+        yield from _halved(curve, first, half, label, deviation, level + 1)
+        yield from _halved(curve, half, last, label, deviation, level + 1)
+
+
+def _bulge(start: FloatArray, middle: FloatArray, end: FloatArray) -> float:
+    """Bulge of the arc from `start` to `end` through `middle`: by the angle at which it sees the chord."""
+    to_start, to_end = start - middle, end - middle
+    cross = float(to_start[0] * to_end[1] - to_start[1] * to_end[0])
+    half = np.arctan2(-cross, -float(to_start @ to_end))  # half the arc's angle: zero for a straight line
+    return float(np.tan(half / 2)) if cross else 0.0
+
+
+def _deviation(start: FloatArray, end: FloatArray, bulge: float, points: FloatArray) -> float:
+    """Largest distance of points (n, 2) from the circle or line of an arc."""
+    chord = end - start
+    length = float(np.linalg.norm(chord))
+    if length == 0:
+        return float(np.linalg.norm(points - start, axis=1).max())
+    left = np.array([-chord[1], chord[0]]) / length
+    away = points - 0.5 * (start + end)
+    if abs(bulge) < 1e-9:
+        return float(np.abs(away @ left).max())
+    height = (1 - bulge**2) / (4 * bulge) * length
+    radius = (1 + bulge**2) / (4 * abs(bulge)) * length
+    return float(np.abs(np.linalg.norm(away - height * left, axis=1) - radius).max())

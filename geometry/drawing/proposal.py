@@ -1,0 +1,218 @@
+"""Proposes a clamp, a contact and markers where a drawing has none; the same drawing gets the same ones.
+
+Clamp: the flat end. Straight pieces on the convex hull that face along the outline's principal axis, within
+45 degrees, are ends; of those that are at least 0.8 as wide as the widest the one in most pieces (two feet
+beside a slot), then the widest, then the one at smaller x. A body without one is held at the sixth of its
+outline around its lowest point.
+Contact: on the longest straight piece of the hull that looks sideways from the clamp, where those within 1 %
+count as equal and the upper one is taken; halfway between its end at the clamp and the last cavity beneath
+it, or its own end. A body without such a piece is touched at its point farthest from the clamp.
+Markers: evenly along the longest unclamped run of the outline, front, tip and back, each as deep in as leaves
+most material around it, at most 2 mm.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.drawing.outline import renamed
+from geometry.section.loop import Loop
+from geometry.section.section import Section
+from geometry.section.thickness import boundary_samples, inner_normals
+
+MARKERS = 9
+MARKER_DIAMETER = 1.6
+"""Largest diameter of a proposed marker, mm."""
+
+MARKER_SHARE = 0.8
+"""Largest diameter of a proposed marker as a share of the wall's thickness."""
+
+DEEPEST = 2.0
+"""Largest depth of a proposed marker's centre below the outline, mm."""
+
+CONTACT_WIDTH = 2.0
+"""Largest length of a proposed contact, mm."""
+
+SIDEWAYS = np.cos(np.radians(45))
+ON_HULL = 1e-3
+"""Largest distance of a piece from the hull on which it lies, mm."""
+
+
+class End(NamedTuple):
+    """A flat end of a body.
+
+    Attributes:
+        pieces: Numbers of its pieces in the outline.
+        normal: Outer unit normal, shape (2,).
+        width: Distance of its outermost corners, mm.
+        x: Of its middle, mm.
+    """
+
+    pieces: tuple[int, ...]
+    normal: FloatArray
+    width: float
+    x: float
+
+
+def with_clamp(outline: Loop) -> Loop:
+    """The outline with a proposed clamp as its pieces `base`."""
+    axis = _principal_axis(outline)
+    ends = [end for end in _flat_sides(outline) if abs(end.normal @ axis) >= SIDEWAYS]
+    extent = float(np.ptp(outline.points @ np.array([-axis[1], axis[0]])))
+    ends = [end for end in ends if end.width >= 0.2 * extent]
+    if not ends:
+        return _with_lowest_part(outline)
+    widest = max(end.width for end in ends)
+    best = max(
+        (end for end in ends if end.width >= 0.8 * widest),
+        key=lambda end: (len(end.pieces), round(end.width * abs(float(end.normal @ axis)), 6), -end.x),
+    )
+    return renamed(
+        outline, ("base" if number in best.pieces else name for number, name in enumerate(outline.names))
+    )
+
+
+def contact_point(section: Section) -> FloatArray:
+    """A proposed middle of the contact, shape (2,), mm, on a section with a clamp."""
+    outline = section.outline
+    middle, normal = _clamp_frame(outline)
+    sides = [
+        end.pieces[0]
+        for end in _flat_sides(outline)
+        if abs(end.normal @ normal) <= SIDEWAYS and len(end.pieces) == 1
+    ]
+    free = [which for which in sides if outline.names[which] != "base"]
+    extent = float(np.ptp(section.bounds, axis=0).max())
+    free = [which for which in free if outline.lengths[which] >= 0.3 * extent]
+    if not free:
+        samples = boundary_samples(Section(outline), extent / 200).points
+        far = np.linalg.norm(samples - middle, axis=1)
+        return np.asarray(samples[int(np.round(far, 6).argmax())])
+    scores = {which: _sideways_length(outline, which, normal) for which in free}
+    best = [which for which in free if scores[which] >= 0.99 * max(scores.values())]
+    chosen = max(best, key=lambda which: round(float(-inner_normals(outline, which, 0.5)[0, 1]), 6))
+    return _mid_span(section, chosen, middle)
+
+
+def marker_places(section: Section, count: int) -> FloatArray:
+    """Proposed centres of markers, shape (count, 2), mm, in a section with a clamp."""
+    outline = section.outline
+    run = max(_free_runs(outline), key=lambda run: float(outline.lengths[run].sum()))
+    ends = np.cumsum(outline.lengths[run])
+    places = []
+    for along in ends[-1] * np.arange(1, count + 1) / (count + 1):
+        step = int(np.searchsorted(ends, along))
+        fraction = 1 - (ends[step] - along) / outline.lengths[run[step]]
+        point, normal = outline.along(run[step], fraction)[0], inner_normals(outline, run[step], fraction)[0]
+        inward = point + np.linspace(0, DEEPEST, 81)[1:, None] * normal
+        places.append(inward[int(np.round(section.clearance(inward), 6).argmax())])
+    return np.array(places)
+
+
+def marker_diameter(section: Section, places: FloatArray) -> float:
+    """A proposed diameter of markers with centres (m, 2) in the body, mm; in steps of 0.01 mm above that."""
+    largest = min(MARKER_DIAMETER, MARKER_SHARE * 2 * float(section.clearance(places).min()))
+    return float(np.floor(100 * largest + 1e-6) / 100 or largest)
+
+
+def contact_width(outline: Loop) -> float:
+    """A proposed extent of the contact, mm, on an outline with a front."""
+    front = np.concatenate([outline.ends[which][:, 0] for which in outline.pieces("front")])
+    return min(CONTACT_WIDTH, float(np.ptp(front)) / 5)
+
+
+def _principal_axis(outline: Loop) -> FloatArray:
+    points = boundary_samples(Section(outline), float(outline.lengths.sum()) / 1000).points
+    values, vectors = np.linalg.eigh(np.cov(points.T))
+    return np.array([1.0, 0.0]) if values[0] > 0.9 * values[1] else np.asarray(vectors[:, 1])
+
+
+def _flat_sides(outline: Loop) -> Iterator[End]:
+    """Sides of the convex hull on which straight pieces lie."""
+    corners, _ = outline.flattened(1e-4)
+    left = {
+        which: -inner_normals(outline, which, 0.5)[0]
+        for which in outline.straight.tolist()
+        if _on_hull(outline, which, corners)
+    }
+    while left:
+        first, normal = next(iter(left.items()))
+        offset = outline.points[first] @ normal
+        group = [
+            which
+            for which in left
+            if left[which] @ normal > 1 - 1e-6 and abs(outline.points[which] @ normal - offset) < 10 * ON_HULL
+        ]
+        ends = outline.ends[group].reshape(-1, 2)
+        along = ends @ np.array([-normal[1], normal[0]])
+        yield End(tuple(group), normal, float(np.ptp(along)), float(ends[:, 0].mean()))
+        left = {which: other for which, other in left.items() if which not in group}
+
+
+def _on_hull(outline: Loop, which: int, corners: FloatArray) -> bool:
+    normal = -inner_normals(outline, which, 0.5)[0]
+    return bool((corners @ normal).max() <= (outline.ends[which] @ normal).min() + ON_HULL)
+
+
+def _with_lowest_part(outline: Loop) -> Loop:
+    total = float(outline.lengths.sum())
+    samples = boundary_samples(Section(outline), total / 1200)
+    lowest = int(np.round(samples.points[:, 1], 6).argmin())
+    ends = np.cumsum(outline.lengths)
+    which = int(samples.pieces[lowest])
+    middle = ends[which] - outline.lengths[which] * (1 - samples.fractions[lowest])
+    for along in sorted([(middle - total / 12) % total, (middle + total / 12) % total], reverse=True):
+        piece = int(np.searchsorted(ends, along))
+        fraction = 1 - (ends[piece] - along) / outline.lengths[piece]
+        if 1e-9 < fraction < 1 - 1e-9:
+            outline = outline.split(piece, [fraction])
+    ends = np.cumsum(outline.lengths)
+    away = (ends - outline.lengths / 2 - middle + total / 2) % total - total / 2
+    return renamed(
+        outline,
+        ("base" if abs(far) < total / 12 else name for far, name in zip(away, outline.names, strict=True)),
+    )
+
+
+def _clamp_frame(outline: Loop) -> tuple[FloatArray, FloatArray]:
+    """Middle of the clamp and its mean outer normal."""
+    base = list(outline.pieces("base"))
+    weights = outline.lengths[base]
+    middles = np.concatenate([outline.along(which, 0.5) for which in base])
+    normals = np.concatenate([-inner_normals(outline, which, 0.5) for which in base])
+    normal = weights @ normals
+    return weights @ middles / weights.sum(), normal / max(float(np.linalg.norm(normal)), 1e-12)
+
+
+def _sideways_length(outline: Loop, which: int, normal: FloatArray) -> float:
+    side = inner_normals(outline, which, 0.5)[0]
+    return float(outline.lengths[which] * (1 - (side @ normal) ** 2))
+
+
+def _mid_span(section: Section, which: int, clamp: FloatArray) -> FloatArray:
+    """Halfway from a piece's end at the clamp to the last cavity beneath it, or to its other end."""
+    near, far = sorted(section.outline.ends[which], key=lambda end: float(np.linalg.norm(end - clamp)))
+    length = float(np.linalg.norm(far - near))
+    along = (far - near) / length
+    reach = [float(((cavity.flattened()[0] - near) @ along).max()) for cavity in section.cavities]
+    reach = [min(each, length) for each in reach if each > 0]
+    return np.asarray(near + along * 0.5 * max(reach, default=length))
+
+
+def _free_runs(outline: Loop) -> list[list[int]]:
+    """Runs of pieces between clamped ones, in the outline's direction."""
+    count = len(outline.points)
+    starts = [
+        which
+        for which in range(count)
+        if outline.names[which] != "base" and outline.names[which - 1] == "base"
+    ]
+    runs = []
+    for start in starts:
+        run = [start]
+        while outline.names[(run[-1] + 1) % count] != "base":
+            run.append((run[-1] + 1) % count)
+        runs.append(run)
+    return runs

@@ -1,0 +1,253 @@
+"""Reads the section of a STEP file: the cap of an extruded solid, or the cut of a solid with a plane.
+
+With `geometry.cad` the only module that imports CadQuery.
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import cadquery as cq
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.drawing.chain import closed_loops
+from geometry.drawing.drawing import UNITS, Drawing, sha256_of
+from geometry.drawing.frames import axes_across, plane_of, plane_text
+from geometry.drawing.pieces import Piece, arc_through, arcs_along, circle, line
+from geometry.errors import UserError
+
+MARKER = re.compile(r"marker[-_ ]?\d+$", re.IGNORECASE)
+"""Names of the parts that are markers."""
+
+PARALLEL = 1e-6
+"""Largest sine of the angle of two parallel directions."""
+
+
+class Cut(NamedTuple):
+    """A plane section of a solid.
+
+    Attributes:
+        faces: Its planar faces.
+        normal: Unit normal of the plane, shape (3,).
+        offset: Distance of the plane from the origin along the normal, mm.
+        depth: Depth of the extrusion along the normal, mm; None for a solid that is not extruded.
+    """
+
+    faces: Sequence[cq.Face]
+    normal: FloatArray
+    offset: float
+    depth: float | None
+
+
+def read_step(path: Path, units: str | None = None, plane: str | None = None) -> Drawing:
+    """The section of the one solid of a STEP file, with the markers that are parts called `marker-1`, ...
+
+    Args:
+        path: The file.
+        units: What the file's mm really are; None means mm.
+        plane: Plane of the cut, such as `z = 6`; None means across an extruded solid.
+
+    Raises:
+        UserError: If it cannot be read, holds several bodies, or a solid is not extruded and no plane given.
+    """
+    digest = sha256_of(path)
+    bodies, markers = _parts(path)
+    if len(bodies) != 1:
+        found = ", ".join(f"{name or 'without name'} ({solid.Volume():.4g} mm3)" for name, solid in bodies)
+        raise UserError(
+            f"{path.name} holds {len(bodies)} solids besides markers{': ' + found if found else ''}; keep "
+            "one, and call the others marker-1, marker-2, ... if they are markers"
+        )
+    solid = bodies[0][1]
+    unit = UNITS[units or "mm"]
+    try:
+        cut = _cut_at(solid, *plane_of(plane)) if plane else _across(solid)
+    except UserError as error:
+        raise UserError(f"{path.name}: {error}") from None
+    axes = axes_across(cut.normal)
+    pieces = [
+        piece.scaled(unit)
+        for face in cut.faces
+        for wire in face.Wires()
+        for edge in wire.Edges()
+        for piece in _pieces(edge, axes, unit)
+    ]
+    try:
+        loops = closed_loops(pieces)
+    except UserError as error:
+        raise UserError(f"{path.name}: {error}") from None
+    centres, diameters, heights = _discs(markers, axes, cut.normal)
+    how = f"extruded by {cut.depth * unit:.6g} mm" if cut.depth else "cut"
+    return Drawing(
+        file=path.name,
+        sha256=digest,
+        loops=loops,
+        unit=unit,
+        note=f"STEP, {how}, at {plane_text(cut.normal, cut.offset)}",
+        markers=centres * unit,
+        marker_diameter=float(np.mean(diameters)) * unit if markers else None,
+        marker_height=float(np.mean(heights)) * unit if markers else None,
+        depth=cut.depth * unit if cut.depth else None,
+    )
+
+
+def _parts(path: Path) -> tuple[list[tuple[str, cq.Solid]], list[cq.Solid]]:
+    """Solids with their names, and those that are markers.
+
+    Raises:
+        UserError: If the file cannot be read.
+    """
+    try:
+        named = [(name.rsplit("/", 1)[-1], shape) for shape, name, _, _ in cq.Assembly.importStep(str(path))]
+    except ValueError:  # a single part is no assembly
+        try:
+            found = cq.importers.importStep(str(path)).vals()
+            named = [("", shape) for shape in found if isinstance(shape, cq.Shape)]
+        except ValueError as error:
+            raise UserError(f"cannot read {path.name} as STEP: {error}") from None
+    solids = [(name, solid) for name, shape in named for solid in shape.Solids()]
+    if not solids:
+        raise UserError(f"cannot read {path.name} as STEP: it holds no solid; export the body as a solid")
+    bodies = [(name, solid) for name, solid in solids if not MARKER.match(name)]
+    return bodies, [solid for name, solid in solids if MARKER.match(name)]
+
+
+def _across(solid: cq.Solid) -> Cut:
+    """The section of an extruded solid: of a box, across z, else across the smallest of its sides.
+
+    Pockets that do not reach half the depth, as for markers, are left out.
+
+    Raises:
+        UserError: If the solid is not extruded.
+    """
+    normals = _directions(solid)
+    fitting = [normal for normal in normals if _is_extruded(solid, normal)]
+    for normal in sorted(fitting, key=lambda normal: -abs(normal[2])):
+        low, high = _extent(solid, normal)
+        middle = _cut_at(solid, normal, 0.5 * (low + high))
+        area = sum(face.Area() for face in middle.faces)
+        for offset in (low, high):  # a cap has the edges of the file
+            cap = [face for face in _flat_faces(solid, normal) if abs(_offset(face, normal) - offset) < 1e-6]
+            if abs(sum(face.Area() for face in cap) - area) < 1e-7 * area:
+                return Cut(cap, normal, offset, high - low)
+        if area * (high - low) > 0.5 * solid.Volume():
+            return Cut(middle.faces, normal, 0.5 * (low + high), high - low)
+    raise UserError('the solid is not extruded; give the plane of the section, such as plane = "z = 6"')
+
+
+def _directions(solid: cq.Solid) -> list[FloatArray]:
+    """Normals of the planar faces, each direction once."""
+    found: list[FloatArray] = []
+    for face in solid.Faces():
+        if face.geomType() == "PLANE":
+            normal = _array(face.normalAt())
+            normal = normal * np.sign(normal[np.abs(normal).argmax()])
+            if all(np.linalg.norm(np.cross(normal, other)) > PARALLEL for other in found):
+                found.append(normal)
+    return found
+
+
+def _is_extruded(solid: cq.Solid, normal: FloatArray) -> bool:
+    """Whether every face is parallel to a direction or a plane across it."""
+    for face in solid.Faces():
+        if face.geomType() == "PLANE":
+            slopes = [abs(float(_array(face.normalAt()) @ normal))]
+        else:
+            low_u, high_u, low_v, high_v = face._uvBounds()
+            u, v = (
+                grid.ravel()
+                for grid in np.meshgrid(np.linspace(low_u, high_u, 5), np.linspace(low_v, high_v, 5))
+            )
+            slopes = [abs(float(_array(each) @ normal)) for each in face.normals(u, v)[0]]
+        if not (max(slopes) < PARALLEL or min(slopes) > 1 - PARALLEL):
+            return False
+    return True
+
+
+def _cut_at(solid: cq.Solid, normal: FloatArray, offset: float) -> Cut:
+    """The cut of a solid with a plane; with its depth, where the solid is extruded across the plane.
+
+    Raises:
+        UserError: If the plane misses the solid.
+    """
+    low, high = _extent(solid, normal)
+    if not low < offset < high:
+        raise UserError(
+            f"the plane {plane_text(normal, offset)} misses the solid, which reaches from {low:.6g} to "
+            f"{high:.6g} mm along that direction"
+        )
+    size = 4 * solid.BoundingBox().DiagonalLength + abs(offset)
+    plane = cq.Face.makePlane(size, size, cq.Vector(*(normal * offset)), cq.Vector(*normal))
+    box = solid.BoundingBox()
+    middle = np.array([0.5 * (box.xmin + box.xmax), 0.5 * (box.ymin + box.ymax), 0.5 * (box.zmin + box.zmax)])
+    shift = middle - normal * (middle @ normal)
+    faces = plane.moved(cq.Location(cq.Vector(*shift))).intersect(solid).Faces()
+    return Cut(faces, normal, offset, high - low if _is_extruded(solid, normal) else None)
+
+
+def _flat_faces(solid: cq.Solid, normal: FloatArray) -> list[cq.Face]:
+    return [
+        face
+        for face in solid.Faces()
+        if face.geomType() == "PLANE" and np.linalg.norm(np.cross(_array(face.normalAt()), normal)) < PARALLEL
+    ]
+
+
+def _offset(face: cq.Face, normal: FloatArray) -> float:
+    return float(_array(face.Center()) @ normal)
+
+
+def _extent(solid: cq.Solid, normal: FloatArray) -> tuple[float, float]:
+    """Where the solid begins and ends along a direction, mm."""
+    flat = [_offset(face, normal) for face in _flat_faces(solid, normal)]
+    box = _turned(solid, normal).BoundingBox(1e-4)
+    low, high = float(box.zmin), float(box.zmax)
+    near = (
+        [offset for offset in flat if offset - low < 1e-3],
+        [offset for offset in flat if high - offset < 1e-3],
+    )
+    return min(near[0], default=low), max(near[1], default=high)
+
+
+def _turned(solid: cq.Solid, normal: FloatArray) -> cq.Shape:
+    """The solid in a frame whose z axis is `normal`."""
+    plane = cq.Plane(origin=(0, 0, 0), xDir=tuple(axes_across(normal)[0]), normal=tuple(normal))
+    return solid.moved(cq.Location(plane).inverse)
+
+
+def _pieces(edge: cq.Edge, axes: FloatArray, unit: float) -> Iterator[Piece]:
+    """An edge in the plane spanned by two axes (2, 3), mm of the file."""
+    first, last = edge._bounds()
+
+    def on_edge(parameters: FloatArray) -> FloatArray:
+        return np.array([_array(edge.positionAt(float(t), mode="parameter")) for t in parameters]) @ axes.T
+
+    start, middle, end = on_edge(np.array([first, 0.5 * (first + last), last]))
+    if edge.geomType() == "LINE":
+        yield line(start, end, "")
+    elif edge.geomType() == "CIRCLE":
+        if edge.IsClosed():
+            yield from circle(axes @ _array(edge.arcCenter()), edge.radius(), "")
+        else:
+            yield arc_through(start, middle, end, "")
+    else:
+        yield from arcs_along(on_edge, first, last, "", unit)
+
+
+def _discs(
+    markers: Sequence[cq.Solid], axes: FloatArray, normal: FloatArray
+) -> tuple[FloatArray, list[float], list[float]]:
+    """Centres (m, 2), diameters and heights of markers, as of cylinders of their volume and height."""
+    centres = [axes @ _array(marker.Center()) for marker in markers]
+    heights = [high - low for low, high in (_extent(marker, normal) for marker in markers)]
+    diameters = [
+        float(np.sqrt(4 * marker.Volume() / (np.pi * height)))
+        for marker, height in zip(markers, heights, strict=True)
+    ]
+    return np.array(centres).reshape(-1, 2), diameters, heights
+
+
+def _array(vector: cq.Vector) -> FloatArray:
+    return np.array(vector.toTuple(), dtype=np.float64)
