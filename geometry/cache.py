@@ -1,6 +1,7 @@
 """Cache of meshes and CAD files, keyed by a hash of everything they depend on."""
 
 import importlib.metadata
+import json
 import os
 import warnings
 import zipfile
@@ -9,7 +10,9 @@ from pathlib import Path
 from typing import TypeVar
 
 from geometry.atomic import atomic_path
-from geometry.content_hash import content_hash
+from geometry.content_hash import content_hash, file_digest
+from geometry.drawing.description import Description
+from geometry.drawing.drawn_finger import DrawnFinger
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
@@ -22,7 +25,7 @@ FORMAT = 1
 TIMEOUT_S = 300.0
 CAD_FORMATS = ("step", "stl", "dxf", "svg")
 
-MAKERS = ("cadquery", "cadquery-ocp", "gmsh", "numpy")
+MAKERS = ("cadquery", "cadquery-ocp", "ezdxf", "gmsh", "numpy", "svgelements")
 """Packages on whose versions the results depend."""
 
 _Result = TypeVar("_Result")
@@ -36,6 +39,8 @@ def finger_mesh(
     timeout_s: float = TIMEOUT_S,
 ) -> TriangleMesh:
     """The mesh of a finger, from the cache if it was made before.
+
+    A finger from a file with a mesh has that mesh, unless element sizes are asked for.
 
     Args:
         finger: The finger.
@@ -52,7 +57,40 @@ def finger_mesh(
         "what": f"meshing design {finger.name!r}",
         "settings": settings.model_dump(),
     }
-    return _cached(finger, task, ".npz", TriangleMesh.load, cache_dir, timeout_s)
+    if isinstance(finger, DrawnFinger) and finger.mesh is not None and settings == MeshSettings():
+        return finger.mesh
+    task["finger"] = finger.definition()
+    return _cached(finger.digest, task, ".npz", TriangleMesh.load, cache_dir, timeout_s)
+
+
+def drawn_finger(
+    file: Path,
+    description: Description,
+    *,
+    cache_dir: Path | None = None,
+    timeout_s: float = TIMEOUT_S,
+) -> DrawnFinger:
+    """The finger of a drawing, from the cache if the same file was read before.
+
+    Args:
+        file: STEP, DXF, SVG or MSH.
+        description: Clamp, contact and markers; what it leaves out is the drawing's own or proposed.
+        cache_dir: Folder of the cache; by default `cache_folder()`.
+        timeout_s: Time limit, s.
+
+    Raises:
+        UserError: If the drawing cannot be read, is no sound section, or the description does not fit it.
+    """
+    if not file.is_file():
+        raise UserError(f"there is no drawing {file}")
+    task: dict[str, object] = {
+        "kind": "drawing",
+        "what": f"reading {file.name}",
+        "file": str(file),
+        "name": file.name,
+        "description": description.model_dump(mode="json"),
+    }
+    return _cached(file_digest(file), task, ".json", _read_drawn, cache_dir, timeout_s)
 
 
 def cad_files(
@@ -86,7 +124,8 @@ def cad_files(
         "what": f"CAD of design {finger.name!r}",
         "formats": sorted(set(formats)),
     }
-    contents = _cached(finger, task, ".zip", _unpack, cache_dir, timeout_s)
+    task["finger"] = finger.definition()
+    contents = _cached(finger.digest, task, ".zip", _unpack, cache_dir, timeout_s)
     for name, content in contents.items():
         with atomic_path(folder / name) as partial:
             partial.write_bytes(content)
@@ -100,13 +139,13 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "pinn-ray"
 
 
-def cache_key(finger: Finger, task: dict[str, object]) -> str:
-    """SHA-256 over finger, task, package versions and this package's own sources, in hexadecimal."""
+def cache_key(digest: str, task: dict[str, object]) -> str:
+    """SHA-256 over a finger's or file's digest, task, package versions and this package's own sources."""
     sources = sorted(Path(__file__).parent.rglob("*.py"))
     parts = {
         "format": FORMAT,
-        "finger": finger.digest,
-        "task": {key: value for key, value in task.items() if key != "what"},
+        "content": digest,
+        "task": {key: value for key, value in task.items() if key not in ("what", "finger", "file")},
         "versions": {package: _version(package) for package in MAKERS},
         "sources": [source.read_text(encoding="utf-8") for source in sources],
     }
@@ -114,7 +153,7 @@ def cache_key(finger: Finger, task: dict[str, object]) -> str:
 
 
 def _cached(
-    finger: Finger,
+    digest: str,
     task: dict[str, object],
     suffix: str,
     load: Callable[[Path], _Result],
@@ -123,7 +162,7 @@ def _cached(
 ) -> _Result:
     """Load the task's result; make it first if it is missing or cannot be read."""
     folder = cache_dir or cache_folder()
-    entry = folder / f"{task['kind']}-{cache_key(finger, task)}{suffix}"
+    entry = folder / f"{task['kind']}-{cache_key(digest, task)}{suffix}"
     if entry.exists():
         try:
             return load(entry)
@@ -136,13 +175,17 @@ def _cached(
     try:
         with atomic_path(entry) as partial:
             partial.touch()
-            run_task({**task, "finger": finger.definition(), "output": str(partial)}, timeout_s)
+            run_task({**task, "output": str(partial)}, timeout_s)
             return load(partial)
     except OSError as error:
         raise UserError(
             f"cannot write to the cache folder {folder} ({error.strerror}); "
             "set PINNRAY_CACHE to a folder that can be written"
         ) from None
+
+
+def _read_drawn(path: Path) -> DrawnFinger:
+    return DrawnFinger.from_definition(json.loads(path.read_text(encoding="utf-8")))
 
 
 def _unpack(path: Path) -> dict[str, bytes]:

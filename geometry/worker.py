@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from geometry.errors import UserError
+from geometry.finger.finger import Finger
 
 FOREIGN_PREFIXES = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "I_MPI_", "MPI_", "HYDRA_", "MPIEXEC_")
 """Environment variables that would make the child a member of the parent's MPI run."""
@@ -117,13 +118,18 @@ def perform(task: Mapping[str, Any]) -> None:
     """Run a task in this process.
 
     Args:
-        task: `kind` ("mesh" or "cad"), `finger` as its definition and `output` as a path; for a mesh also
-            `settings` as a dictionary, for CAD `formats`.
+        task: `kind` and `output` as a path; for a "mesh" also `finger` as its definition and `settings` as a
+            dictionary, for "cad" `finger` and `formats`, for a "drawing" its `file` and `description`.
     """
-    from geometry.finger.design import Design
-
-    finger = Design(**task["finger"])
     output = Path(task["output"])
+    if task["kind"] == "drawing":
+        from geometry.drawing.description import Description
+        from geometry.drawing.load import load_drawing
+
+        drawn = load_drawing(task["file"], Description(**task["description"]))
+        output.write_text(json.dumps(drawn.definition()), encoding="utf-8")
+        return
+    finger = _finger(task["finger"])
     if task["kind"] == "mesh":
         from geometry.mesh.mesher import build_mesh
         from geometry.mesh.settings import MeshSettings
@@ -134,7 +140,18 @@ def perform(task: Mapping[str, Any]) -> None:
 
         write_archive(finger, task["formats"], output)
     else:
-        raise UserError(f"unknown task {task['kind']!r}; there are 'mesh' and 'cad'")
+        raise UserError(f"unknown task {task['kind']!r}; there are 'mesh', 'cad' and 'drawing'")
+
+
+def _finger(definition: Mapping[str, Any]) -> Finger:
+    """The finger of a definition, with parameters or from a drawing."""
+    if "section" in definition:
+        from geometry.drawing.drawn_finger import DrawnFinger
+
+        return DrawnFinger.from_definition(definition)
+    from geometry.finger.design import Design
+
+    return Design(**definition)
 
 
 def main() -> int:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from compare.crossval.result import CrossvalResult as CrossvalResult
+    from geometry.drawing.drawn_finger import DrawnFinger as DrawnFinger
     from geometry.errors import UserError as UserError
     from geometry.finger.design import Design as Design
     from geometry.finger.presets import load_design as load_design
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from pinnray.comparison import Comparison as Comparison
     from pinnray.functions import compare as compare
     from pinnray.functions import crossval as crossval
+    from pinnray.functions import load_drawing as load_drawing
     from pinnray.functions import mesh as mesh
     from pinnray.functions import solve as solve
     from pinnray.functions import solver as solver

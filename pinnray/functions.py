@@ -7,9 +7,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
-from geometry.cache import finger_mesh
+from geometry.cache import drawn_finger, finger_mesh
+from geometry.drawing.description import Description, load_description
+from geometry.drawing.drawn_finger import DrawnFinger
 from geometry.errors import UserError
-from geometry.finger.design import Design
+from geometry.finger.finger import Finger
 from geometry.finger.presets import load_design
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
@@ -26,17 +28,39 @@ if TYPE_CHECKING:
     from compare.crossval.result import CrossvalResult
 
 
-def mesh(design: str | Path | Design = "default", **settings: Any) -> TriangleMesh:
+DRAWINGS = (".step", ".stp", ".dxf", ".svg", ".msh")
+"""Suffixes of files that are drawings."""
+
+
+def mesh(design: str | Path | Finger = "default", **settings: Any) -> TriangleMesh:
     """The mesh of a finger, from the cache if it was made before.
 
     Args:
-        design: A design, the name of a preset, or the path of a TOML file.
+        design: A finger, the name of a preset, or the path of a TOML file or of a drawing.
         settings: Of `geometry.mesh.settings.MeshSettings`, such as `size=0.5`, mm.
 
     Raises:
         UserError: If the design or a setting is not admissible.
     """
     return finger_mesh(_design(design), settings=MeshSettings(**settings))
+
+
+def load_drawing(file: str | Path, **description: Any) -> DrawnFinger:
+    """The finger of a STEP, DXF or SVG drawing or of a Gmsh mesh.
+
+    Args:
+        file: The drawing. A TOML file of the same name beside it may hold its description.
+        description: Lines of the description that are new or other: `clamp`, `contact`, `markers`, `depth`,
+            `units` and so on, as in `geometry.drawing.description.Description`.
+
+    Raises:
+        UserError: If the drawing cannot be read, is no sound section, or the description does not fit it.
+    """
+    file = Path(file)
+    beside = file.with_suffix(".toml")
+    known = load_description(beside if beside.is_file() else None)
+    given = Description(**{**known.model_dump(exclude_none=True), **description})
+    return drawn_finger(file, given)
 
 
 def solver(name: str, **settings: Any) -> Solver:
@@ -52,7 +76,7 @@ def solver(name: str, **settings: Any) -> Solver:
 
 
 def solve(
-    problem: str | Path | Design | Problem,
+    problem: str | Path | Finger | Problem,
     solver: str | Solver = "fem",
     *,
     size: float | None = None,
@@ -87,7 +111,7 @@ def solve(
 
 
 def compare(
-    design: str | Path | Design = "default",
+    design: str | Path | Finger = "default",
     solvers: str | Sequence[str | Solver] | None = None,
     *,
     measurements: "str | Path | Observations | pd.DataFrame | None" = None,
@@ -103,7 +127,7 @@ def compare(
     """Solve one finger with several solvers and compare them at the markers and on the shared mesh.
 
     Args:
-        design: A design, the name of a preset, or the path of a TOML file.
+        design: A finger, the name of a preset, or the path of a TOML file or of a drawing.
         solvers: Solvers or their names; those of the complete table that support the problem if None.
         measurements: Marker displacements: a data frame or CSV file (x_mm, y_mm, u_mm, v_mm), or a video to
             track without a camera file; simulated by a finite-strain run if None.
@@ -147,7 +171,7 @@ def compare(
 
 def track(
     source: str | Path,
-    design: str | Path | Design = "default",
+    design: str | Path | Finger = "default",
     *,
     camera: str | Path | None = None,
     workspace: str | Path | None = None,
@@ -187,7 +211,7 @@ def track(
 
 
 def crossval(
-    design: str | Path | Design = "default",
+    design: str | Path | Finger = "default",
     solvers: str | Sequence[str | Solver] = ("fem", "fem-asm", "gp"),
     *,
     out: str | Path,
@@ -234,15 +258,17 @@ def crossval(
         return cross_validate(job, stages)
 
 
-def _design(design: str | Path | Design) -> Design:
-    return design if isinstance(design, Design) else load_design(design)
+def _design(design: str | Path | Finger) -> Finger:
+    if not isinstance(design, str | Path):
+        return design
+    return load_drawing(design) if Path(design).suffix.lower() in DRAWINGS else load_design(design)
 
 
 def _solver(given: str | Solver) -> Solver:
     return solver(given) if isinstance(given, str) else given
 
 
-def _observations(given: "str | Path | Observations | pd.DataFrame", design: Design) -> Observations:
+def _observations(given: "str | Path | Observations | pd.DataFrame", design: Finger) -> Observations:
     """Observations from whatever holds them: a data frame, a CSV file, or a film."""
     from vision.measurements import read_measurements
 

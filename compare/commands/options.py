@@ -1,6 +1,8 @@
 """Options that several commands share, and the objects that they describe."""
 
+import json
 import re
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import cos, inf, radians, sin
@@ -12,8 +14,11 @@ from pydantic import ValidationError
 
 from compare.commands.preset_jobs import job_defaults
 from compare.runtime.provenance import cores
+from geometry.cache import drawn_finger
+from geometry.drawing.description import load_description
 from geometry.errors import UserError
 from geometry.finger.design import Design
+from geometry.finger.finger import Finger
 from geometry.finger.presets import load_design, parse_overrides
 from geometry.mesh.settings import MeshSettings
 from solvers.elasticity import LawName
@@ -43,28 +48,69 @@ class FingerOptions:
     """The finger and its mesh.
 
     Attributes:
-        design: Preset (default, slender, ...) or .toml file.
-        set: Change a parameter, such as rib_count=6 or N=6; may be repeated.
+        design: Preset (default, csiro, slender, ...) or .toml file.
+        section: A drawing instead of a design: a .step, .dxf or .svg file, or a .msh mesh. A .toml file of
+            the same name beside it may say where it is clamped, touched and marked.
+        clamp: Clamped part of the drawing's outline, such as "[[0, 0], [0, -30]]" or a label of the file;
+            default: the file's own, else proposed.
+        contact: Point of the outline where the indenter touches, such as "[35, 0]", or a label.
+        markers: Centres of the markers, such as "[[10, -1], [20, -1]]", their number, or a label.
+        set: Change a parameter, such as rib_count=6 or N=6, or a line on the drawing, such as depth=12; may
+            be repeated.
         mesh_size: Element size in walls and ribs, mm, default 0.25; up to 4 times larger in the tip.
     """
 
     design: str = "default"
+    section: Path | None = None
+    clamp: str | None = None
+    contact: str | None = None
+    markers: str | None = None
     set: Repeated = ()
     mesh_size: float | None = None
 
-    def read(self, preset: str | None = None) -> tuple[Design, MeshSettings]:
-        """The design and the mesh settings; a preset of the solvers may have its own mesh settings."""
-        changes = parse_overrides(self.set)
-        design = load_design(self.design, changes)
-        if changes and "name" not in changes:  # so that it has its own output folder
-            design = design.replaced(name=_changed_name(design, changes))
+    def read(self, preset: str | None = None) -> tuple[Finger, MeshSettings]:
+        """The finger and the mesh settings; a preset of the solvers may have its own mesh settings."""
         settings = job_defaults(preset).mesh.model_dump()
         if self.mesh_size is not None:
             settings["size"] = self.mesh_size
         try:
-            return design, MeshSettings(**settings)
+            mesh = MeshSettings(**settings)
         except UserError as error:
             raise UserError(f"--mesh-{error}") from None
+        return (self._designed() if self.section is None else self._drawn(self.section)), mesh
+
+    def _designed(self) -> Design:
+        for option in ("clamp", "contact", "markers"):
+            if getattr(self, option) is not None:
+                raise UserError(f"--{option} belongs to a drawing; give it by --section FILE")
+        changes = parse_overrides(self.set)
+        design = load_design(self.design, changes)
+        if changes and "name" not in changes:  # so that it has its own output folder
+            design = design.replaced(name=_changed_name(design, changes))
+        return design
+
+    def _drawn(self, file: Path) -> Finger:
+        if self.design != "default":
+            raise UserError(f"--section {file} and --design {self.design}: give one of them")
+        lines = [
+            f"{option} = {toml_value(text)}"
+            for option in ("clamp", "contact", "markers")
+            if (text := getattr(self, option)) is not None
+        ]
+        for setting in self.set:
+            key, _, value = setting.partition("=")
+            lines.append(f"{key.strip()} = {toml_value(value.strip())}" if value else setting)
+        beside = file.with_suffix(".toml")
+        return drawn_finger(file, load_description(beside if beside.is_file() else None, lines))
+
+
+def toml_value(text: str) -> str:
+    """The text as a value of TOML: a number, list or quoted text as it is, any other in quotes."""
+    try:
+        tomllib.loads(f"value = {text}")
+    except tomllib.TOMLDecodeError:
+        return json.dumps(text)
+    return text
 
 
 def _changed_name(design: Design, changes: Mapping[str, object]) -> str:

@@ -1,5 +1,6 @@
 """A finger from a drawing."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -212,3 +213,24 @@ def _mesh_definition(mesh: TriangleMesh) -> dict[str, Any]:
         "marker_nodes": mesh.marker_nodes.tolist(),
         "contact_node": mesh.contact_node,
     }
+
+
+def description_lines(finger: DrawnFinger) -> str:
+    """Clamp, contact and markers of a finger as the lines of a description, in the file's frame and mm."""
+    place = finger.placement.inverse
+    clamp = [place(loop.ends[which]) for loop, which in finger.section.named("base")]
+    contact = place(finger.section.front_point(finger.contact_abscissa))
+    where = {
+        "clamp": [pair.tolist() for pair in clamp],
+        "contact": contact.tolist(),
+        "contact_width": finger.contact_width,
+        "markers": place(finger.markers).tolist(),
+        "marker_diameter": finger.marker_diameter,
+        "marker_height": finger.marker_height,
+        "depth": finger.depth,
+    }
+    lines = [f"# {finger.file}: where it is clamped, touched and marked; mm, in the file's frame."]
+    for key, value in where.items():
+        source = finger.sources.get(key)
+        lines.append(f"{key} = {json.dumps(value)}" + (f"  # {source}" if source else ""))
+    return "\n".join([*lines, 'units = "mm"', ""])

@@ -73,7 +73,7 @@ def test_damaged_entry_is_rebuilt_with_a_warning(folder: Path, damage, monkeypat
 def test_key_follows_everything_the_mesh_depends_on(monkeypatch: pytest.MonkeyPatch) -> None:
     def key(design: Design | None = None, **settings: float) -> str:
         return cache_key(
-            design or Design(), {"kind": "mesh", "settings": MeshSettings(**settings).model_dump()}
+            (design or Design()).digest, {"kind": "mesh", "settings": MeshSettings(**settings).model_dump()}
         )
 
     keys = {key(), key(Design(rib_angle=19)), key(size=0.3), key(corner_size=0.1)}
