@@ -1,7 +1,6 @@
 """Cache of meshes and CAD files, keyed by a hash of everything they depend on."""
 
 import importlib.metadata
-import json
 import os
 import warnings
 import zipfile
@@ -90,7 +89,7 @@ def drawn_finger(
         "name": file.name,
         "description": description.model_dump(mode="json"),
     }
-    return _cached(file_digest(file), task, ".json", _read_drawn, cache_dir, timeout_s)
+    return _cached(file_digest(file), task, ".json", DrawnFinger.load, cache_dir, timeout_s)
 
 
 def cad_files(
@@ -182,10 +181,6 @@ def _cached(
             f"cannot write to the cache folder {folder} ({error.strerror}); "
             "set PINNRAY_CACHE to a folder that can be written"
         ) from None
-
-
-def _read_drawn(path: Path) -> DrawnFinger:
-    return DrawnFinger.from_definition(json.loads(path.read_text(encoding="utf-8")))
 
 
 def _unpack(path: Path) -> dict[str, bytes]:

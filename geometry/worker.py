@@ -126,8 +126,7 @@ def perform(task: Mapping[str, Any]) -> None:
         from geometry.drawing.description import Description
         from geometry.drawing.load import load_drawing
 
-        drawn = load_drawing(task["file"], Description(**task["description"]))
-        output.write_text(json.dumps(drawn.definition()), encoding="utf-8")
+        load_drawing(task["file"], Description(**task["description"])).save(output)
         return
     finger = _finger(task["finger"])
     if task["kind"] == "mesh":

@@ -4,6 +4,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -118,7 +119,7 @@ class DrawnFinger:
         return replace(self, contact_abscissa=float(position), sources=sources, mesh=None)
 
     def definition(self) -> dict[str, Any]:
-        """Everything that defines the finger, for JSON; `from_definition` reads it back."""
+        """Everything that defines the finger, for JSON; of the file's own mesh only the digest."""
         numbers = {
             key: getattr(self, key)
             for key in (
@@ -133,12 +134,22 @@ class DrawnFinger:
             "markers": self.markers.tolist(),
             "placement": self.placement.definition(),
             "sources": dict(self.sources),
-            "mesh": _mesh_definition(self.mesh) if self.mesh else None,
+            "mesh": self.mesh.digest if self.mesh else None,
         }
+
+    def save(self, path: Path) -> None:
+        """Write the definition and the file's own mesh as JSON."""
+        mesh = _mesh_definition(self.mesh) if self.mesh else None
+        path.write_text(json.dumps({**self.definition(), "mesh": mesh}), encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Read a finger that `save` wrote."""
+        return cls.from_definition(json.loads(path.read_text(encoding="utf-8")))
 
     @classmethod
     def from_definition(cls, definition: Mapping[str, Any]) -> Self:
-        """The finger of a `definition`.
+        """The finger of a `definition`, without the file's own mesh, or with it if the arrays are there.
 
         Raises:
             UserError: If it is none of a drawn finger.
@@ -151,7 +162,7 @@ class DrawnFinger:
         return cls(
             section=Section(outline, tuple(cavities)),
             placement=Placement(**values.pop("placement")),
-            mesh=TriangleMesh(**mesh) if mesh else None,
+            mesh=TriangleMesh(**mesh) if isinstance(mesh, Mapping) else None,
             **values,
         )
 
