@@ -6,7 +6,9 @@ import ezdxf
 import numpy as np
 import pytest
 
-from geometry import Design, UserError, cad, cad_files, marker_positions
+from geometry import Design, MeshSettings, UserError, cad, cad_files, load_design, marker_positions
+from geometry.mesh.boundary import boundary_edges
+from geometry.mesh.mesher import build_mesh
 from tests.meshes import body_area, body_perimeter
 
 
@@ -107,6 +109,21 @@ def test_svg_is_in_true_scale(written: dict[str, Path]) -> None:
     assert 'width="94mm" height="34mm"' in text
     assert text.count("<circle") == 9
     assert text.count(" Z") == 1 + 5
+
+
+@pytest.mark.parametrize(
+    "design", [Design(fillet_radius=1.0), load_design("csiro")], ids=["fillets", "csiro"]
+)
+def test_the_mesh_has_its_boundary_on_the_cad_face(design: Design) -> None:
+    """Gmsh gets the section without CAD: both are the same geometry."""
+    import cadquery as cq
+
+    mesh = build_mesh(design, MeshSettings(size=2.0))
+    face = cad.section_face(design)
+    assert face.Area() == pytest.approx(design.section.area, rel=1e-12)
+    wires = cq.Compound.makeCompound([face.outerWire(), *face.innerWires()])
+    nodes = mesh.points[np.unique(boundary_edges(mesh.triangles))]
+    assert max(wires.distance(cq.Vertex.makeVertex(x, y, 0)) for x, y in nodes) < 1e-9
 
 
 def test_unknown_format_is_refused(tmp_path: Path) -> None:
