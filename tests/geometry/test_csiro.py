@@ -1,4 +1,4 @@
-"""The preset `csiro` against the volume mesh of the printed finger, whose section the drawings' reader takes."""
+"""The preset `csiro` against the section of the printed finger's volume mesh."""
 
 from pathlib import Path
 
