@@ -124,7 +124,11 @@ def _chained(loose: Sequence[Piece]) -> tuple[Loop, ...]:
 
 
 def _joined(pieces: Sequence[Piece]) -> tuple[list[Piece], IntArray, FloatArray]:
-    """Pieces with length, the nodes at their ends (p, 2), and the nodes' places (n, 2)."""
+    """Pieces with length, the nodes at their ends (p, 2), and the nodes' places (n, 2).
+
+    Raises:
+        UserError: If a curve is no larger than `JOIN`.
+    """
     ends = np.array([[piece.start, piece.end] for piece in pieces]).reshape(-1, 2)
     pairs = cKDTree(ends).query_pairs(JOIN, output_type="ndarray")
     links = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(ends), len(ends)))
@@ -132,6 +136,11 @@ def _joined(pieces: Sequence[Piece]) -> tuple[list[Piece], IntArray, FloatArray]
     _, first = np.unique(node, return_index=True)
     nodes = node.reshape(-1, 2).astype(np.int64)
     long = nodes[:, 0] != nodes[:, 1]
+    lost = np.setdiff1d(nodes[~long], nodes[long])
+    if len(lost):
+        raise UserError(
+            f"what is drawn at {place(ends[first][lost[0]])} is smaller than {JOIN:g} mm; delete it"
+        )
     return [piece for piece, kept in zip(pieces, long, strict=True) if kept], nodes[long], ends[first]
 
 

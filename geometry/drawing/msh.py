@@ -15,6 +15,7 @@ from geometry.drawing.drawing import LABELS, UNITS, Drawing, MeshInFile, label_o
 from geometry.drawing.frames import axes_across, plane_text
 from geometry.drawing.pieces import line
 from geometry.errors import UserError
+from geometry.mesh.gmsh_model import session
 
 CORNERS = {2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 7: 5, 9: 3, 10: 4, 11: 4, 12: 8, 13: 6, 14: 5, 16: 4, 17: 8, 18: 6}
 """Number of corners by Gmsh's types of elements, of first and second order."""
@@ -88,7 +89,8 @@ def _plane_mesh(raw: RawMesh, file: str, digest: str, unit: float) -> Drawing:
         raise UserError("its surface is not plane; give a mesh of a plane section or of a solid")
     axes = axes_across(np.eye(3)[across])
     points = raw.points @ axes.T
-    named = {tuple(sorted(edge)): name for name, edges in raw.edges.items() for edge in edges.tolist()}
+    groups = sorted(raw.edges, key=lambda name: name in ("base", "contact"))  # these win over `front`
+    named = {tuple(sorted(edge)): name for name in groups for edge in raw.edges[name].tolist()}
     sides = [edge for count, cells in raw.cells.items() for edge in _sides(cells, count)]
     pieces = [line(points[first], points[last], named.get((first, last), "")) for first, last in _once(sides)]
     loops = tuple(straightened(loop, FLAT) for loop in closed_loops(pieces))
@@ -242,23 +244,14 @@ def _groups(dimension: int) -> Iterator[tuple[str, IntArray]]:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    """Gmsh's mesh of a file, in a model of its own.
+    """Gmsh's mesh of a file.
 
     Raises:
         UserError: If Gmsh cannot read it.
     """
-    started = not gmsh.isInitialized()
-    if started:
-        gmsh.initialize(interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    try:
-        gmsh.model.add("drawing")
+    with session():
         try:
             gmsh.merge(str(path))
         except Exception as error:  # Gmsh raises no narrower class
             raise UserError(f"cannot read {path.name} as a Gmsh mesh: {error}") from None
         yield gmsh.model.mesh
-        gmsh.model.remove()
-    finally:
-        if started:
-            gmsh.finalize()

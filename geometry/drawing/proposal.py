@@ -163,7 +163,8 @@ def _with_lowest_part(outline: Loop) -> Loop:
     ends = np.cumsum(outline.lengths)
     which = int(samples.pieces[lowest])
     middle = ends[which] - outline.lengths[which] * (1 - samples.fractions[lowest])
-    for along in sorted([(middle - total / 12) % total, (middle + total / 12) % total], reverse=True):
+    for along in ((middle - total / 12) % total, (middle + total / 12) % total):
+        ends = np.cumsum(outline.lengths)
         piece = int(np.searchsorted(ends, along))
         fraction = 1 - (ends[piece] - along) / outline.lengths[piece]
         if 1e-9 < fraction < 1 - 1e-9:

@@ -7,6 +7,7 @@ from geometry.arrays import BoolArray, FloatArray, IntArray
 from geometry.drawing.drawing import MeshInFile
 from geometry.drawing.placement import Placement
 from geometry.errors import UserError
+from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.section.section import Section
 
@@ -35,7 +36,7 @@ def ready_mesh(
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     clockwise = first[:, 0] * second[:, 1] < first[:, 1] * second[:, 0]
     triangles[clockwise] = triangles[clockwise][:, [0, 2, 1]]
-    rim = _rim(triangles)
+    rim = boundary_edges(triangles)
     named = {name: _directed(edges, rim, name) for name, edges in found.edges.items() if name in _NAMES}
     boundaries = {
         name: rim[_on_pieces(points[rim].mean(axis=1), section, name)] for name in _NAMES if name != "contact"
@@ -57,13 +58,6 @@ def ready_mesh(
 
 
 _NAMES = ("base", "front", "back", "contact")
-
-
-def _rim(triangles: IntArray) -> IntArray:
-    """Edges of one triangle only, (k, 2), with the body on the left."""
-    edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    _, first, times = np.unique(_keys(edges), return_index=True, return_counts=True)
-    return np.asarray(edges[np.sort(first[times == 1])])
 
 
 def _keys(edges: IntArray) -> IntArray:

@@ -1,0 +1,120 @@
+"""Messages for drawings and descriptions that are no finger: one line each."""
+
+import numpy as np
+import pytest
+
+from geometry import UserError
+from geometry.drawing.description import Description, load_description
+from geometry.drawing.load import load_drawing
+from tests.geometry.drawing.files import BEAM, FINRAY, rectangle, write_dxf, write_svg
+
+HOLE = rectangle(40, -7, 10, 4)
+BOWTIE = [(0, 0), (100, -10), (100, 0), (0, -10)]
+DUMBBELL = [(0, 0), (0, -10), (50, -0.02), (100, -10), (100, 0)]
+
+
+@pytest.mark.parametrize(
+    ("curves", "description", "message"),
+    [
+        # what is drawn
+        ([[*BEAM, (0.5, 0)]], {"_open": True}, "is open at .*: a gap of 0.5 mm"),
+        ([BOWTIE], {}, r"crosses or touches itself at \(50, -5\)"),
+        ([BEAM, rectangle(40, 20, 5, 5)], {}, "a body of its own outside the outline"),
+        ([BEAM, rectangle(40, -12, 5, 6)], {}, r"the cavity at \(4[05], .*crosses the outline at"),
+        ([BEAM, rectangle(40, -10, 5, 6)], {}, r"the cavity at .* touches the outline at"),
+        ([BEAM, HOLE, rectangle(45, -6, 10, 2)], {}, "crosses the cavity at"),
+        ([BEAM, HOLE, rectangle(50, -6, 10, 2)], {}, "touches the cavity at"),
+        ([BEAM, HOLE, rectangle(42, -6, 2, 2)], {}, "is inside the cavity at"),
+        ([BEAM, HOLE, HOLE], {}, "is drawn twice"),
+        ([BEAM, BEAM], {}, "is drawn twice"),
+        ([DUMBBELL], {"clamp": [[0, 0], [0, -10]]}, r"the wall at \(.*\) is 0.0\d* mm thin"),
+        ([BEAM, rectangle(40, -5, 1e-5, 1e-5)], {}, "is smaller than 0.001 mm; delete"),
+        # units
+        ([[(x / 1e5, y / 1e5) for x, y in BEAM]], {}, "metres for millimetres"),
+        ([BEAM], {"units": "m"}, "give units"),
+        # the clamp
+        ([BEAM], {"clamp": "jaw"}, "nothing is clamped: no piece of the outline is called 'jaw'"),
+        ([BEAM], {"clamp": [[0, 0], [0, 0]]}, "has no length"),
+        ([BEAM], {"clamp": [[-3, 0], [0, -10]]}, r"base at \(-3, 0\) is 3 mm off the outline; its nearest"),
+        # the contact
+        ([BEAM], {"contact": "tip"}, "no contact: no piece of the outline is called 'tip'"),
+        ([BEAM], {"contact": [40, 2]}, r"contact at \(40, 2\) is 2 mm off .* nearest point is \(40, 0\)"),
+        ([BEAM], {"contact": [0, -5]}, "is on the clamp"),
+        ([BEAM], {"contact": [100, 0]}, "is on a corner"),
+        ([BEAM], {"contact": [99.5, 0], "contact_width": 4}, "x = 101.5 mm is not on the front face"),
+        # the markers
+        ([BEAM, HOLE], {"markers": [[45, -5]]}, r"marker 1 at \(45, -5\) is outside the body"),
+        ([BEAM], {"markers": [[20, -5], [50, 3]]}, "marker 2 at .* is outside the body"),
+        ([BEAM], {"markers": [[20, -0.5]], "marker_diameter": 2}, "less than its radius of 1 mm"),
+        ([BEAM], {"markers": [[20, -5], [20, -5]]}, "markers 1 and 2 are both at"),
+        ([BEAM], {"markers": "dots"}, "has no markers called 'dots'"),
+    ],
+)
+def test_message(tmp_path, curves, description, message):
+    settings = dict(description)
+    path = write_dxf(tmp_path / "bad.dxf", curves, closed=not settings.pop("_open", False))
+    with pytest.raises(UserError, match=message) as error:
+        load_drawing(path, Description(**settings))
+    assert str(error.value).startswith("bad.dxf: ")
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (["contact = 35"], "contact = 35 is no point"),
+        (["clamp = [1, 2]"], "is no pair of points; write clamp"),
+        (["clamp = [[[0, 0], [1, 0], [2, 0]]]"], "is no pair of points"),
+        (["markers = 0"], "outside its range, 1 to 200"),
+        (["markers = [[1, 2, 3]]"], "are no points"),
+        (["depth = -1"], "depth = -1 is outside its range"),
+        (['units = "furlong"'], "units = 'furlong'"),
+        (["contakt = [1, 2]"], "unknown parameter 'contakt'; did you mean contact"),
+        (["contact [1, 2]"], "cannot read 'contact"),
+    ],
+)
+def test_description_message(lines, message):
+    with pytest.raises(UserError, match=message) as error:
+        load_description(None, lines)
+    assert "\n" not in str(error.value)
+
+
+def test_description_file(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text("contact = [1, 2]\nclamp = [[0, 0], [0, 1]]")
+    found = load_description(path, ["contact = [3, 4]", "markers = 4"])
+    assert (found.contact, found.markers) == ((3, 4), 4)
+    assert found.clamp == (((0, 0), (0, 1)),)
+    path.write_text("contact = ")
+    with pytest.raises(UserError, match="cannot read the description"):
+        load_description(path)
+    with pytest.raises(UserError, match="cannot read the description"):
+        load_description(tmp_path / "none.toml")
+
+
+def test_a_marker_must_be_round(tmp_path):
+    path = write_svg(
+        tmp_path / "a.svg", '<rect width="50" height="9"/><g id="markers"><rect width="1" height="1"/></g>'
+    )
+    with pytest.raises(UserError, match="is no circle"):
+        load_drawing(path)
+
+
+def test_markers_have_one_diameter(tmp_path):
+    circles = '<circle cx="9" cy="4" r="1"/><circle cx="19" cy="4" r="2"/>'
+    path = write_svg(tmp_path / "a.svg", f'<rect width="50" height="9"/><g id="markers">{circles}</g>')
+    with pytest.raises(UserError, match="have diameters from 2 to 4 mm"):
+        load_drawing(path)
+
+
+def test_plane_must_be_a_plane():
+    with pytest.raises(UserError, match=r'cannot read the plane .*"z = 6"'):
+        load_drawing(FINRAY / "Finray_8.stp", Description(plane="middle"))
+
+
+def test_everything_clamped(tmp_path):
+    path = write_dxf(tmp_path / "a.dxf", [BEAM])
+    corners = np.array(BEAM)
+    pairs = [[a.tolist(), b.tolist()] for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+    with pytest.raises(UserError, match="whole outline is clamped"):
+        load_drawing(path, Description(clamp=pairs))

@@ -1,0 +1,235 @@
+"""Fingers from drawings: proposals, placement, description, and meshes of them."""
+
+import json
+
+import ezdxf
+import numpy as np
+import pytest
+
+from geometry import Design, MeshSettings, UserError, load_design
+from geometry.cad import write_dxf as export_dxf
+from geometry.cad import write_step as export_step
+from geometry.cad import write_svg as export_svg
+from geometry.drawing.checks import thinnest_wall
+from geometry.drawing.description import Description, load_description
+from geometry.drawing.drawn_finger import DrawnFinger
+from geometry.drawing.load import load_drawing
+from geometry.drawing.pieces import circle
+from geometry.mesh.mesher import build_mesh
+from tests.geometry.drawing.files import BEAM, CSIRO, FINRAY, rectangle, write_beam_mesh, write_dxf
+
+FILES = [*sorted(FINRAY.glob("*.stp")), CSIRO]
+IDS = [path.stem for path in FILES]
+
+
+def ring_file(path, outer=20.0, inner=15.0):
+    document = ezdxf.new(units=4)
+    document.modelspace().add_circle((3, 4), outer)
+    document.modelspace().add_circle((3, 4), inner)
+    document.saveas(path)
+    return path
+
+
+def clamped_length(finger):
+    return sum(loop.lengths[which] for loop, which in finger.section.named("base"))
+
+
+@pytest.mark.parametrize("export", [export_step, export_dxf, export_svg])
+def test_a_design_comes_back_in_its_own_frame(tmp_path, export):
+    design = Design()
+    finger = load_drawing(export(design, tmp_path)[0])
+    assert str(finger.placement) == "none"
+    assert finger.section.area == pytest.approx(design.section.area, rel=1e-9)
+    np.testing.assert_allclose(np.sort(finger.section.outline.points, axis=0), [[0, -30], [0, 0], [90, 0]])
+    assert finger.contact_abscissa == pytest.approx(design.contact_abscissa)
+    assert finger.contact_width == design.contact_width
+    np.testing.assert_allclose(finger.markers, design.markers, atol=1e-9)
+    assert clamped_length(finger) == pytest.approx(30)
+
+
+@pytest.mark.parametrize("path", FILES, ids=IDS)
+def test_frame(path):
+    finger = load_drawing(path)
+    outline = finger.section.outline
+    assert finger.section.front_point(finger.contact_abscissa)[1] == pytest.approx(0, abs=1e-9)
+    base = np.concatenate([outline.ends[which] for which in outline.pieces("base")])
+    top = base[np.isclose(base[:, 0], 0, atol=1e-9)]
+    assert len(top)
+    front = np.concatenate([outline.ends[which] for which in outline.pieces("front")])
+    assert (np.diff(outline.ends[list(outline.pieces("front")), :, 0], axis=1) < 0).all()
+    assert front[:, 0].min() - 1e-9 <= finger.contact_ends[0] < finger.contact_ends[1] <= front[:, 0].max()
+    assert finger.section.bounds[1, 0] > 0.8 * np.ptp(finger.section.bounds[:, 0])  # the base is at the left
+
+
+@pytest.mark.parametrize(
+    ("path", "clamp", "contact", "diameter"),
+    [
+        (FILES[0], 10.0, (30.3, 0.0), 1.6),  # both feet; the middle of 7.8 to 52.8
+        (FILES[1], 10.0, (30.3, 0.0), 1.6),  # the feet, not the equally wide tip
+        (FILES[2], 10.0, (30.484, 0.0), 0.47),  # walls of 0.6 mm
+        (CSIRO, 19.0, (23.077, 5.337), 1.6),  # the bottoms of two hooks
+    ],
+    ids=IDS,
+)
+def test_proposals(path, clamp, contact, diameter):
+    finger = load_drawing(path)
+    assert set(finger.sources.values()) == {"proposed", "drawn"}
+    assert clamped_length(finger) == pytest.approx(clamp, abs=1e-3)
+    placed = finger.placement.inverse([[finger.contact_abscissa, 0]])[0]
+    assert placed == pytest.approx(contact, abs=1e-3)
+    assert finger.marker_diameter == diameter
+    assert len(finger.markers) == 9
+    assert (finger.section.clearance(finger.markers) >= finger.marker_radius).all()
+    assert 3 <= (finger.markers[:, 1] > -3).sum() <= 6  # on the front and elsewhere
+    assert load_drawing(path).digest == finger.digest  # the same every time
+
+
+@pytest.mark.parametrize("turn", [0, 37, 90, 180, 271])
+@pytest.mark.parametrize("mirror", [1, -1])
+def test_the_frame_does_not_depend_on_the_file_s(tmp_path, turn, mirror):
+    """A wedge drawn anywhere, with clamp and contact given there, is the same finger."""
+    angle = np.radians(turn)
+    matrix = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]) @ np.diag(
+        [1, mirror]
+    )
+
+    def there(points):
+        return (np.asarray(points, dtype=float) @ matrix.T + [12, -7]).tolist()
+
+    path = write_dxf(
+        tmp_path / "wedge.dxf", [there([(0, 0), (0, -30), (90, 0)]), there(rectangle(5, -20, 10, 15))]
+    )
+    description = Description(
+        clamp=there([(0, 0), (0, -30)]), contact=there([(35, 0)])[0], markers=there([(40, -3), (20, -2)])
+    )
+    finger = load_drawing(path, description)
+    assert finger.contact_abscissa == pytest.approx(35)
+    assert finger.markers == pytest.approx(np.array([[20, -2], [40, -3]]))
+    assert finger.section.outline.points[list(finger.section.outline.pieces("front"))] == pytest.approx(
+        np.array([[90, 0]])
+    )
+    assert finger.placement.inverse(finger.markers) == pytest.approx(np.array(there([(20, -2), (40, -3)])))
+    assert finger.sources["clamp"] == finger.sources["contact"] == finger.sources["markers"] == "given"
+
+
+def test_ring(tmp_path):
+    finger = load_drawing(ring_file(tmp_path / "ring.dxf"))
+    outline = finger.section.outline
+    assert clamped_length(finger) == pytest.approx(2 * np.pi * 20 / 6, rel=1e-2)  # the lowest sixth
+    front = np.concatenate([outline.ends[which] for which in outline.pieces("front")])
+    reach = 2 * 20 * np.sin(np.radians(60))
+    assert np.ptp(front[:, 0]) == pytest.approx(reach, rel=1e-6)
+    assert finger.section.front_point(finger.contact_abscissa)[1] == pytest.approx(0, abs=1e-9)
+    assert thinnest_wall(finger.section)[0] == pytest.approx(5)
+    assert (finger.markers[:, 1] < -10).any()  # around it, not only near the contact
+    moved = finger.at_contact(finger.contact_abscissa + 5)
+    assert moved.section.front_point(moved.contact_abscissa)[1] == pytest.approx(np.sqrt(375) - 20, abs=0.02)
+    assert moved.digest != finger.digest
+    with pytest.raises(UserError, match="not on the front face"):
+        finger.at_contact(finger.contact_abscissa + 30)
+
+
+def test_labels_of_the_file_beat_proposals_and_the_description_beats_both(tmp_path):
+    document = ezdxf.new(units=4)
+    layers = ("0", "0", "clamp", "0")  # the right end
+    for start, end, layer in zip(BEAM, BEAM[1:] + BEAM[:1], layers, strict=True):
+        document.modelspace().add_line(start, end, dxfattribs={"layer": layer})
+    document.modelspace().add_line((40, -10), (44, -10), dxfattribs={"layer": "contact"})
+    for x in (10, 30, 50):
+        document.modelspace().add_point((x, -4), dxfattribs={"layer": "markers"})
+    path = tmp_path / "beam.dxf"
+    document.saveas(path)
+    drawn = load_drawing(path)
+    assert drawn.contact_abscissa == pytest.approx(58)  # from the right end
+    assert drawn.contact_width == pytest.approx(4)
+    assert drawn.markers == pytest.approx(np.array([[50, -6], [70, -6], [90, -6]]))
+    assert not drawn.placement.mirrored  # half a turn
+    (tmp_path / "beam.toml").write_text('clamp = [[0, 0], [0, -10]]\ndepth = 7\nname = "held-left"')
+    given = load_drawing(path)
+    assert given.contact_abscissa == pytest.approx(42)
+    assert (given.name, given.depth) == ("held-left", 7)
+    assert given.sources["clamp"] == "given"
+    assert given.sources["contact"] == "drawn"
+
+
+def test_units_apply_to_the_description(tmp_path):
+    path = write_dxf(tmp_path / "beam.dxf", [[(x / 1000, y / 1000) for x, y in BEAM]])
+    lines = ['units = "m"', "contact = [0.04, 0]", "depth = 0.01", "markers = 5", "contact_width = 0.003"]
+    finger = load_drawing(path, load_description(None, lines))
+    assert finger.section.area == pytest.approx(1000)
+    assert (finger.contact_abscissa, finger.contact_width, finger.depth) == pytest.approx((40, 3, 10))
+    assert len(finger.markers) == 5
+
+
+def test_mesh_with_groups_is_taken_as_it_is(tmp_path):
+    groups = ("base", "contact", "front", "markers")
+    finger = load_drawing(write_beam_mesh(tmp_path / "beam.msh", groups=groups))
+    mesh = finger.mesh
+    assert mesh is not None
+    assert mesh.areas.sum() == pytest.approx(1000)
+    assert {name: round(mesh.boundary_length(name), 6) for name in mesh.boundaries} == {
+        "base": 10,
+        "front": 100,
+        "back": 100,
+        "contact": 4,
+    }
+    assert mesh.markers == pytest.approx(np.array([[50, -5]]))
+    assert mesh.points[mesh.contact_node] == pytest.approx([42, 0])
+    assert (finger.contact_abscissa, finger.contact_width) == pytest.approx((42, 4))
+    again = DrawnFinger.from_definition(json.loads(json.dumps(finger.definition())))
+    assert again.mesh is not None
+    assert again.digest == finger.digest
+    assert finger.at_contact(30).mesh is None
+
+
+def test_markers_of_a_ready_mesh_are_its_nodes(tmp_path):
+    finger = load_drawing(write_beam_mesh(tmp_path / "beam.msh", groups=("base", "contact")))
+    assert finger.mesh is not None
+    np.testing.assert_array_equal(finger.mesh.markers, finger.markers)
+
+
+@pytest.mark.parametrize("path", FILES, ids=IDS)
+def test_definition_is_read_back(path):
+    finger = load_drawing(path)
+    again = DrawnFinger.from_definition(json.loads(json.dumps(finger.definition())))
+    assert again.definition() == finger.definition()
+    assert again.digest == finger.digest
+    assert again.facts() == finger.facts()
+    assert finger.plot().axes
+    with pytest.raises(UserError, match="no definition"):
+        DrawnFinger.from_definition(Design().definition())
+
+
+def test_facts_say_where_values_come_from():
+    facts = {meaning: value for meaning, _, value in load_drawing(FILES[0]).facts()}
+    assert facts["Drawing"] == "Finray_8.stp (STEP, extruded by 12 mm, at z = 0)"
+    assert facts["Placement"] == "mirrored in x, shifted by (52.8, 0) mm"
+    assert facts["Depth"] == "12 mm, drawn"
+    assert facts["Clamped length"] == "10 mm, proposed"
+    assert len(facts["SHA-256 of the drawing"]) == 64
+
+
+@pytest.mark.parametrize("path", [FILES[0], CSIRO], ids=["Finray_8", "csiro"])
+def test_drawn_fingers_are_meshed(path):
+    finger = load_drawing(path)
+    mesh = build_mesh(finger, MeshSettings(size=1.5, coarsening=2))
+    assert mesh.areas.sum() == pytest.approx(finger.section.area, rel=1e-3)
+    assert mesh.boundary_length("base") == pytest.approx(clamped_length(finger), rel=1e-6)
+    np.testing.assert_allclose(mesh.markers, finger.markers, atol=1e-9)
+
+
+def test_ring_is_meshed(tmp_path):
+    finger = load_drawing(ring_file(tmp_path / "ring.dxf"))
+    mesh = build_mesh(finger, MeshSettings(size=1.5, coarsening=2))
+    assert mesh.areas.sum() == pytest.approx(np.pi * (400 - 225), rel=1e-2)
+
+
+def test_drawn_and_parametric_csiro_agree():
+    """The preset was measured on the same mesh by others."""
+    drawn, preset = load_drawing(CSIRO), load_design("csiro")
+    assert drawn.section.area == pytest.approx(preset.section.area, rel=5e-3)
+
+
+def test_circle_pieces_close():
+    first, second = circle([1, 2], 3, "")
+    assert first.end == pytest.approx(second.start)

@@ -1,0 +1,208 @@
+"""Every reader against areas that come from elsewhere, and the designs' own exports."""
+
+from pathlib import Path
+
+import cadquery as cq
+import ezdxf
+import numpy as np
+import pytest
+
+from geometry import Design, UserError, load_design
+from geometry.cad import write_dxf as export_dxf
+from geometry.cad import write_step as export_step
+from geometry.cad import write_svg as export_svg
+from geometry.drawing.checks import body
+from geometry.drawing.drawing import Drawing
+from geometry.drawing.load import read_drawing
+from tests.geometry.drawing.files import (
+    BEAM,
+    CSIRO,
+    FINRAY,
+    rectangle,
+    write_beam_mesh,
+    write_dxf,
+    write_svg,
+)
+
+DESIGNS = {
+    "default": Design(),
+    "fillets and joints": Design(fillet_radius=1.0, marker_layout="joints"),
+    "csiro": load_design("csiro"),  # arcs in the outline, a foot
+}
+
+
+def area(drawing: Drawing) -> float:
+    return body(drawing.loops).area
+
+
+@pytest.mark.parametrize("name", [path.name for path in sorted(FINRAY.glob("*.stp"))])
+def test_step_section_has_the_area_of_the_cap(name):
+    drawing = read_drawing(FINRAY / name)
+    solid = cq.importers.importStep(str(FINRAY / name)).solids().val()
+    assert drawing.depth == pytest.approx(12, abs=1e-9)
+    assert area(drawing) == pytest.approx(solid.Volume() / 12, rel=1e-9)
+    assert read_drawing(FINRAY / name, plane="z = 5").depth == pytest.approx(12, abs=1e-9)
+    assert area(read_drawing(FINRAY / name, plane="z = 5")) == pytest.approx(solid.Volume() / 12, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("axis", "angle"),
+    [((1, 0, 0), 90), ((0, 1, 0), 90), ((1, 2, 3), 33)],  # along y, along x, along no axis
+)
+def test_a_turned_solid_has_the_same_section(tmp_path, axis, angle):
+    solid = cq.importers.importStep(str(FINRAY / "Finray_8.stp")).solids().val()
+    path = tmp_path / "turned.step"
+    cq.exporters.export(cq.Workplane(solid.rotate((0, 0, 0), axis, angle).translate((5, 6, 7))), str(path))
+    drawing = read_drawing(path)
+    assert drawing.depth == pytest.approx(12, abs=1e-6)
+    assert area(drawing) == pytest.approx(solid.Volume() / 12, rel=1e-8)
+
+
+def test_a_solid_that_is_not_extruded_is_cut(tmp_path):
+    path = tmp_path / "cone.step"
+    cq.exporters.export(cq.Workplane(cq.Solid.makeCone(10, 5, 20)), str(path))
+    with pytest.raises(UserError, match="not extruded; give the plane"):
+        read_drawing(path)
+    drawing = read_drawing(path, plane="z = 4")
+    assert drawing.depth is None
+    assert area(drawing) == pytest.approx(np.pi * 81, rel=1e-9)
+
+
+def test_several_solids_are_listed(tmp_path):
+    path = tmp_path / "two.step"
+    two = cq.Assembly().add(cq.Solid.makeBox(1, 2, 3), name="jaw").add(cq.Solid.makeBox(3, 3, 9), name="bolt")
+    two.export(str(path))
+    with pytest.raises(UserError, match=r"holds 2 solids .*jaw \(6 mm3\), bolt \(81 mm3\)"):
+        read_drawing(path)
+
+
+@pytest.mark.parametrize("design", DESIGNS.values(), ids=DESIGNS)
+@pytest.mark.parametrize("export", [export_step, export_dxf, export_svg])
+def test_exports_are_read_back(tmp_path, design, export):
+    drawing = read_drawing(export(design, tmp_path)[0])
+    assert area(drawing) == pytest.approx(design.section.area, rel=1e-9)
+    assert len(drawing.loops) == len(design.section.loops)
+    order = np.lexsort((-drawing.markers[:, 1], drawing.markers[:, 0]))
+    np.testing.assert_allclose(drawing.markers[order], design.markers, atol=1e-9)
+    assert drawing.marker_diameter == pytest.approx(design.marker_diameter, rel=1e-9)
+    if export is export_step:
+        assert drawing.depth == pytest.approx(design.depth, rel=1e-9)
+        assert drawing.marker_height == pytest.approx(design.marker_height, rel=1e-6)
+
+
+def test_mesh_of_an_extruded_body_gives_its_section():
+    drawing = read_drawing(CSIRO)
+    section = body(drawing.loops)
+    assert drawing.depth == pytest.approx(20.0, abs=1e-6)
+    assert section.area == pytest.approx(680.5, abs=0.1)  # measured by others
+    assert section.area * 20 == pytest.approx(mesh_volume(CSIRO), rel=1e-3)
+    assert len(section.cavities) == 5  # four ribs
+    assert all(len(cavity.points) == 4 for cavity in section.cavities)
+
+
+def mesh_volume(path: Path) -> float:
+    """Sum over the tetrahedra, read without Gmsh."""
+    lines = path.read_text().split("\n")
+    start = lines.index("$Nodes") + 3
+    count = int(lines[start - 1].split()[3])
+    points = np.array([line.split() for line in lines[start + count : start + 2 * count]], dtype=float)
+    cells = np.array([line.split() for line in lines[lines.index("$Elements") + 3 : -2]], dtype=int)[:, 1:]
+    corners = points[cells - 1]
+    return float(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum() / 6)
+
+
+def test_plane_mesh_is_kept_with_its_groups(tmp_path):
+    drawing = read_drawing(write_beam_mesh(tmp_path / "beam.msh", groups=("base", "contact", "markers")))
+    assert drawing.mesh is not None
+    assert set(drawing.mesh.edges) == {"base", "contact"}
+    assert drawing.markers.tolist() == [[5, 50]]
+    assert area(drawing) == pytest.approx(1000)
+    assert read_drawing(write_beam_mesh(tmp_path / "bare.msh", groups=())).mesh is None
+
+
+def test_dxf_curves_and_units(tmp_path):
+    document = ezdxf.new(units=6)  # m
+    space = document.modelspace()
+    space.add_ellipse((0, 0), major_axis=(0.03, 0), ratio=0.5)
+    space.add_spline(fit_points=[(0.01, 0), (0, 0.005), (-0.01, 0), (0, -0.005), (0.01, 0)])
+    space.add_text("a title")
+    path = tmp_path / "curves.dxf"
+    document.saveas(path)
+    drawing = read_drawing(path)
+    assert drawing.unit == 1000
+    assert drawing.loops[0].area == pytest.approx(np.pi * 30 * 15, rel=1e-4)
+    spline = next(entity for entity in space if entity.dxftype() == "SPLINE")
+    polygon = np.array([(point.x, point.y) for point in spline.flattening(1e-9)]) * 1000
+    x, y = polygon.T
+    shoelace = 0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1)).sum()
+    assert drawing.loops[1].area == pytest.approx(shoelace, rel=1e-4)
+    assert read_drawing(path, units="in").unit == 25.4
+
+
+def test_dxf_blocks_mirrored_arcs_and_hidden_layers(tmp_path):
+    document = ezdxf.new(units=4)
+    block = document.blocks.new("half")
+    block.add_line((10, 0), (-10, 0))
+    block.add_arc((0, 0), 10, 0, 180)
+    document.modelspace().add_blockref("half", (5, 5), dxfattribs={"xscale": -1})
+    document.layers.add("hidden").off()
+    document.modelspace().add_circle((0, 0), 1, dxfattribs={"layer": "hidden"})
+    document.modelspace().add_point((5, 15), dxfattribs={"layer": "Contact"})
+    path = tmp_path / "half.dxf"
+    document.saveas(path)
+    drawing = read_drawing(path)
+    assert [abs(loop.area) for loop in drawing.loops] == pytest.approx([50 * np.pi])
+    assert drawing.contact == pytest.approx([5, 15])
+    assert drawing.loops[0].bounds == pytest.approx(np.array([[-5, 5], [15, 15]]))
+
+
+def test_svg_transformations_units_and_names(tmp_path):
+    svg = """<g id="outline" transform="translate(10 20) scale(2)">
+      <path d="M0 0 h30 v10 a5 5 0 0 1 -5 5 h-25 z"/><ellipse cx="10" cy="5" rx="4" ry="2"/></g>
+      <g id="markers"><circle cx="12" cy="22" r="0.5"/></g>"""
+    path = write_svg(tmp_path / "a.svg", svg, 'width="10cm" height="6cm" viewBox="-3 -4 50 30"')
+    drawing = read_drawing(path)
+    outer = 30 * 15 - (25 - 25 * np.pi / 4)  # a quarter disc off one corner
+    sizes = sorted(abs(loop.area) / 16 for loop in drawing.loops)  # 2 mm in a unit, twice as large
+    assert sizes == pytest.approx([8 * np.pi, outer], rel=1e-4)
+    assert drawing.markers == pytest.approx(np.array([[24, -44]]))
+    assert drawing.marker_diameter == pytest.approx(2)
+    assert read_drawing(path, units="mm").markers == pytest.approx(np.array([[12, -22]]))
+
+
+def test_layers_name_pieces(tmp_path):
+    document = ezdxf.new(units=4)
+    for start, end, layer in zip(BEAM, BEAM[1:] + BEAM[:1], ("Clamp", "0", "0", "0"), strict=True):
+        document.modelspace().add_line(start, end, dxfattribs={"layer": layer})
+    document.modelspace().add_line((40, 0), (44, 0), dxfattribs={"layer": "contact"})
+    path = tmp_path / "beam.dxf"
+    document.saveas(path)
+    names = body(read_drawing(path).loops).outline.names
+    assert sorted(names) == ["0", "0", "0", "0", "clamp", "contact"]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.stl", "", "cannot read a.stl as a drawing; there are .step, .stp, .dxf, .svg, .msh"),
+        ("a.dxf", "no drawing", "cannot read a.dxf as DXF"),
+        ("a.svg", "<svg", "cannot read a.svg as SVG"),
+        ("a.step", "ISO", "cannot read a.step as STEP"),
+        ("a.msh", "$Mesh", "cannot read a.msh as a Gmsh mesh|holds no triangles"),
+    ],
+)
+def test_unreadable_files(tmp_path, name, content, message):
+    (tmp_path / name).write_text(content)
+    with pytest.raises(UserError, match=message) as error:
+        read_drawing(tmp_path / name)
+    assert "\n" not in str(error.value)
+    with pytest.raises(UserError, match=r"there is no drawing|as a drawing"):
+        read_drawing(tmp_path / "missing" / name)
+
+
+def test_a_plane_cuts_solids_only(tmp_path):
+    path = write_dxf(tmp_path / "a.dxf", [rectangle(0, 0, 10, 10)])
+    with pytest.raises(UserError, match="plane already"):
+        read_drawing(path, plane="z = 1")
+    with pytest.raises(UserError, match="misses the solid, which reaches from 0 to 12 mm"):
+        read_drawing(FINRAY / "Finray_8.stp", plane="z = 20")
