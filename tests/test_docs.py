@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pytest
 from pydantic import BaseModel
 
@@ -385,7 +386,7 @@ def test_the_measurements_in_the_guide_can_be_read(tmp_path):
     observations = read_measurements(path, marker_radius=0.8)
     assert observations.label == "measured"
     assert list(observations.visible) == [True, True, False]
-    assert observations.points.tolist() == marker_positions(load_design())[:3].tolist()
+    np.testing.assert_allclose(observations.points, marker_positions(load_design())[:3], atol=0.005)
 
 
 def test_the_guide_has_every_exit_code():

@@ -110,7 +110,7 @@ class Parameters(CheckedModel):
     )
     contact_width: float = bounded(2.0, 0.1, 100, "mm", "", "Length of front face that the indenter touches")
     marker_layout: Literal["front", "joints"] = Field(
-        default="front",
+        default="joints",
         description="Markers on the centre line of the front wall, or at the rib-wall joints and in the tip",
     )
     marker_count: int = bounded(9, 1, 60, "", "", "Number of markers of the layout `front`")

@@ -8,7 +8,7 @@ from tests.compare.drawn_pages import page_of
 
 DESIGNS = {
     **{name: load_design(name) for name in preset_names()},
-    "joints": Design(marker_layout="joints", rib_angle=-15, fillet_radius=1.2),
+    "front markers": Design(marker_layout="front", rib_angle=-15, fillet_radius=1.2),
     "without ribs": Design(rib_count=0),
     "one rib": Design(rib_count=1, rib_angle=0, tip_length=40),
 }

@@ -14,7 +14,7 @@ CASES: dict[str, Design] = {
     "leaning to the base": Design(rib_angle=-15),  # the other sense of the slope
     "fillets": Design(fillet_radius=1.0),  # arcs in the outline
     "thin ribs": Design(rib_thickness=0.5),  # thinner than the mesh size
-    "joint markers": Design(marker_layout="joints"),
+    "front markers": Design(marker_layout="front"),
     "contact near the base": Design(contact_position=3, contact_width=5),
     "contact on the tip": Design(contact_position=84, contact_width=1),
     "longer, six ribs": Design(N=6, H=110),

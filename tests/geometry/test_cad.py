@@ -25,7 +25,7 @@ def test_face_has_the_area_and_the_holes_of_the_closed_form(design: Design) -> N
     "design",
     [
         Design(),  # sharp corners
-        Design(fillet_radius=1.0, depth=12, marker_layout="joints", marker_height=2),
+        Design(fillet_radius=1.0, depth=12, marker_layout="front", marker_height=2),
     ],
 )
 def test_body_and_markers_together_are_the_extruded_section(design: Design) -> None:

@@ -26,10 +26,10 @@ BAD_DESIGNS = [
     ({"contact_position": 0.2}, "contact_position", "contact outside the front face"),
     ({"contact_width": 90}, "contact_width", "contact outside the front face"),
     ({"marker_diameter": 2}, "marker_diameter", "does not fit"),
-    ({"marker_count": 40}, "marker_count", "does not fit"),  # the last one falls out at the apex
+    ({"marker_layout": "front", "marker_count": 40}, "marker_count", "does not fit"),  # the last falls out
     ({"front_thickness": 1.5}, "front_thickness", "does not fit"),
-    ({"marker_layout": "joints", "back_thickness": 1}, "back_thickness", "does not fit"),
-    ({"marker_layout": "joints", "rib_count": 40, "rib_thickness": 0.2}, "rib_count", "markers overlap"),
+    ({"back_thickness": 1}, "back_thickness", "does not fit"),
+    ({"rib_count": 40, "rib_thickness": 0.2}, "rib_count", "markers overlap"),
     ({"marker_height": 25}, "marker_height", "goes through the finger"),
     ({"fillet_radius": 4}, "fillet_radius", "fillets too large"),
     ({"depth": 1, "marker_height": 1}, "depth", "goes through the finger"),
@@ -138,7 +138,7 @@ def test_symbols_are_aliases() -> None:
 def test_digest_follows_the_geometry_and_not_the_name() -> None:
     assert Design(name="a").digest == Design(name="b").digest
     assert Design(contact_position=35).digest == Design().digest  # the same place, said explicitly
-    changed = {"height": 91, "rib_count": 5, "marker_layout": "joints", "contact_width": 3, "depth": 21}
+    changed = {"height": 91, "rib_count": 5, "marker_layout": "front", "contact_width": 3, "depth": 21}
     digests = {Design(**{name: value}).digest for name, value in changed.items()} | {Design().digest}
     assert len(digests) == len(changed) + 1
 

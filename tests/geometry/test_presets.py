@@ -27,10 +27,10 @@ def test_presets_differ() -> None:
 
 
 def test_overrides_by_name_and_by_symbol() -> None:
-    overrides = parse_overrides(["rib_count=6", "H = 110", "contact_position=none", "marker_layout=joints"])
+    overrides = parse_overrides(["rib_count=6", "H = 110", "contact_position=none", "marker_layout=front"])
     design = load_design("default", overrides)
     assert (design.rib_count, design.height, design.contact_position) == (6, 110.0, None)
-    assert design.marker_layout == "joints"
+    assert design.marker_layout == "front"
 
 
 def test_override_replaces_what_a_file_says_by_the_other_name(tmp_path: Path) -> None:

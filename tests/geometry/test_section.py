@@ -91,14 +91,14 @@ def test_fillet_of_a_right_angle_leaves_a_square_less_a_quarter_circle() -> None
 
 
 def test_front_markers_are_evenly_spaced_on_the_centre_line() -> None:
-    markers = marker_positions(Design())
+    markers = marker_positions(Design(marker_layout="front"))
     np.testing.assert_allclose(markers[:, 0], np.arange(9, 90, 9))
     np.testing.assert_allclose(markers[:, 1], -1)
 
 
 @pytest.mark.parametrize("angle", [20, -15])  # the back joint of a rib lies nearer the tip, nearer the base
 def test_joint_markers_lie_on_centre_lines_in_order_and_the_last_on_the_bisector(angle: float) -> None:
-    markers = marker_positions(Design(marker_layout="joints", rib_angle=angle))
+    markers = marker_positions(Design(rib_angle=angle))
     assert markers.shape == (9, 2)
     assert (np.diff(markers[:, 0]) > 0).all()
     back = LineString([(0, -30), (90, 0)])

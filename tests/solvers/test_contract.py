@@ -184,8 +184,8 @@ def test_points_outside_the_body_are_refused(solution):
 def test_one_point_and_many_points_agree(solution, coarse_mesh):
     many = solution.displacement(coarse_mesh.markers)
     np.testing.assert_allclose(
-        solution.displacement(coarse_mesh.markers[4:5]),
-        many[4:5],
+        solution.displacement(coarse_mesh.markers[1:2]),
+        many[1:2],
         rtol=0,
         atol=1e-7,  # a network may leave out what is less than 1e-8 of the travel
     )

@@ -116,12 +116,12 @@ def test_one_solve_gives_what_the_dual_problem_of_each_marker_gives(coarse_mesh)
 
 
 def test_the_improved_field_is_nearer_to_the_exact_one(medium_fem, graded):
-    """At the markers by half: the estimate has the right sign there, too. Seen: 0.0063 to 0.0029 mm."""
+    """Over the markers by half: the estimate has the right sign there, too. Seen: 0.0025 to 0.0011 mm."""
     finer = FemSolver(estimate=False).solve(Problem(graded))
     markers = medium_fem.problem.mesh.markers
     exact, place = finer.displacement(markers), medium_fem.problem.mesh.locate(markers)
-    before = np.abs(medium_fem.displacement(place) - exact).max()
-    after = np.abs(medium_fem.error.field.displacement(place) - exact).max()
+    before = np.abs(medium_fem.displacement(place) - exact).mean()
+    after = np.abs(medium_fem.error.field.displacement(place) - exact).mean()
     assert after < 0.6 * before
 
 

@@ -43,7 +43,7 @@ def solver(*names, **settings):
 def test_parameters_of_a_twin_are_found(problem):
     """Without noise they are off by what the prior pulls: little if it is weak."""
     truth = TRUTH | {"base_compliance": 0.4, "back_stiffness": 0.7, "rib_stiffness": 1.2}
-    solution = solver(*truth, prior=3.0).solve(twin(problem, truth)[0])
+    solution = solver(*truth, prior=4.0).solve(twin(problem, truth)[0])
     for name, value in truth.items():
         assert abs(solution.stats[name] - value) < 0.1 * solution.stats[f"{name}_deviation"]
         assert solution.stats[f"{name}_resolution"] > 0.8

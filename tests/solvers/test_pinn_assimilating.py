@@ -144,8 +144,9 @@ def test_it_is_near_the_exact_minimiser_of_finite_elements(problem, solver, weig
 
 
 def test_the_curve_is_that_of_finite_elements(problem):
-    """Energy and misfits for all weights that matter, within what the few units cost."""
-    ours, exact = l_curve(PINN_ASM, problem), FemAsmSolver().solve(problem).history
+    """Energy and misfits for all weights that matter, within what the few units cost at the ribs' ends."""
+    ours = l_curve(PinnAsmSolver(**QUICK | {"corner_spacing": 0.15}), problem)
+    exact = FemAsmSolver().solve(problem).history
     assert ours.keys() == exact.keys()
     matter = (ours["weight_factor"] > 1e-8) & (ours["weight_factor"] < 1)
     for name in ours:

@@ -30,13 +30,13 @@ def bent(points: FloatArray) -> FloatArray:
 
 
 @cache
-def recording(*, hidden: int | None = None, tilt: float = 5.0) -> Recording:
+def recording(*, design: Design = DESIGN, hidden: int | None = None, tilt: float = 5.0) -> Recording:
     """Three frames at rest and three bent, with a jump between; a cable before one marker, if asked for."""
-    mesh = finger_mesh(DESIGN, settings=MeshSettings(size=1.0))
+    mesh = finger_mesh(design, settings=MeshSettings(size=1.0))
     where = None if hidden is None else (mesh.markers + bent(mesh.markers))[hidden]
     cover = [] if where is None else [cable(where, DESIGN.marker_radius, 1.2)]
     return Recording(
-        bench=Bench(mesh, DESIGN, WORKSPACE),
+        bench=Bench(mesh, design, WORKSPACE),
         displacement=bent(mesh.points),
         camera=CAMERA,
         pose=viewing_pose(CAMERA, WORKSPACE, tilt=tilt),
@@ -47,9 +47,9 @@ def recording(*, hidden: int | None = None, tilt: float = 5.0) -> Recording:
 
 
 @cache
-def images(*, hidden: int | None = None, tilt: float = 5.0) -> tuple[Image, ...]:
+def images(*, design: Design = DESIGN, hidden: int | None = None, tilt: float = 5.0) -> tuple[Image, ...]:
     """The frames of `recording`."""
-    return tuple(image for image, _ in recording(hidden=hidden, tilt=tilt).frames())
+    return tuple(image for image, _ in recording(design=design, hidden=hidden, tilt=tilt).frames())
 
 
 def frames_of(pictures: Sequence[Image]) -> Frames:

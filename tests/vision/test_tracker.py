@@ -27,9 +27,9 @@ def tracked(pictures, **changes):
     )
 
 
-def error_of(observations):
+def error_of(observations, true=TRUE):
     """Mean over the markers of the sum of the absolute errors, mm."""
-    return np.abs(observations.displacements - TRUE)[observations.visible].sum(axis=1).mean()
+    return np.abs(observations.displacements - true)[observations.visible].sum(axis=1).mean()
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +81,8 @@ def test_markers_that_were_lost_are_found_in_the_next_frame_that_shows_them():
     blurred = [cv2.blur(image, (200, 200)) for image in images()[:3]]
     tracking = tracked([*images()[:3], *blurred, *images()[3:]])
     assert np.isnan(tracking.pixels[3:6]).all()
-    assert np.isfinite(tracking.pixels[6:]).all()
+    assert np.isfinite(tracking.pixels[6, :8]).all()
+    assert np.isfinite(tracking.pixels[7:]).all()  # that in the tip, 21 mm from the next one, a frame later
     assert error_of(tracking.observations("rig")) < 0.01
 
 
@@ -89,7 +90,7 @@ def test_a_marker_that_jumps_partly_behind_a_cable_is_found():
     film = recording()
     film = replace(
         film,
-        motion=Motion(rest=1, moving=0, held=1),
+        motion=Motion(rest=1, moving=0, held=2),
         occluders=cables(film.bench, film.displacement, film.motion, {5: 0.35}),
     )
     observations = tracked([image for image, _ in film.frames()]).observations("rig")
@@ -207,21 +208,27 @@ def test_two_pictures_are_enough():
     assert error_of(observations) < 0.015
 
 
-def without_fiducials(turns=0):
-    return [np.rot90(painted_over(image, fiducials()), turns) for image in images()]
+def without_fiducials(turns=0, design=DESIGN):
+    return [np.rot90(painted_over(image, fiducials()), turns) for image in images(design=design)]
 
 
 @pytest.mark.parametrize("turns", [0, 1, 2, 3])
-def test_without_fiducials_the_markers_give_the_plane_and_their_motion_the_way_up(turns):
-    tracking = tracked(without_fiducials(turns), camera=None, markers_only=True)
+@pytest.mark.parametrize("layout", ["joints", "front"])
+def test_without_fiducials_the_markers_give_the_plane_and_their_motion_the_way_up(layout, turns):
+    """Markers at the joints show the way up themselves; a row looks the same from both ends."""
+    design = Design(marker_layout=layout)
+    true = bent(marker_positions(design))
+    tracking = tracked(without_fiducials(turns, design), camera=None, markers_only=True, design=design)
     observations = tracking.observations("rig")
     assert observations.visible.sum() >= 7  # a jump of 10 mm is harder to follow from the wrong end
-    assert error_of(observations) < 0.3  # the lens and a tilt of 5 degrees are not undone
+    assert error_of(observations, true) < 0.3  # the lens and a tilt of 5 degrees are not undone
     seen = observations.visible
-    missed = (observations.displacements - TRUE)[seen] / observations.standard_deviations[seen]
+    missed = (observations.displacements - true)[seen] / observations.standard_deviations[seen]
     assert np.sqrt(np.mean(missed**2)) < 3
     assert f"{tracking.plane.residual:.3f} mm (rms) off" in tracking.warnings[0]
-    assert ("the finger points at 180 degrees" in " ".join(tracking.warnings)) == (turns == 2)
+    assert ("the finger points at 180 degrees" in " ".join(tracking.warnings)) == (
+        layout == "front" and turns == 2
+    )
 
 
 def test_without_fiducials_and_markers_there_is_one_line():
