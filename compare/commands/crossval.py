@@ -28,6 +28,7 @@ def crossval(
     *,
     solvers: str = "fem,fem-nonlinear,fem-asm,fem-id,gp,statfem",
     schemes: str = "one-out,tip-out,random,load-out",
+    layouts: str | None = None,
     seeds: int = 5,
     noise: float = 0.005,
     measurements: Path | None = None,
@@ -44,6 +45,8 @@ def crossval(
         solvers: Names of solvers, separated by commas. One that can choose the weight of the markers runs in
             three variants (linear law).
         schemes: Hold-out schemes, separated by commas.
+        layouts: Marker layouts at which the same truth is sampled, separated by commas; default: the
+            design's own.
         seeds: Number of noise draws.
         noise: Standard deviation of a simulated marker's displacement, mm.
         measurements: CSV file of marker displacements; default: simulated.
@@ -69,6 +72,7 @@ def crossval(
         load=load,
         variants=read_variants(options, solvers, material),
         schemes=comma_list(schemes),
+        layouts=comma_list(layouts) if layouts else (),
         seeds=seeds,
         noise=noise,
         measurements=read_measurements(file, marker_radius=design.marker_radius) if file else None,
@@ -91,7 +95,7 @@ def crossval(
             print(study.out / name)
     for name, message in result.failed.items():
         say(f"error: {name} failed, and is tried again by the same command: {message}")
-    converged = all(score.converged == 1 for each in result.scores.values() for score in each.values())
+    converged = all(score.converged == 1 for score in result.scores)
     return 0 if converged and not result.failed else NOT_CONVERGED
 
 

@@ -17,7 +17,7 @@ from compare.crossval.scores import (
     of_scheme,
     score,
 )
-from compare.crossval.study import Study
+from compare.crossval.study import SolverVariant, Study
 from compare.crossval.true_fields import FINER
 from compare.runtime.tables import Cell
 from geometry.observations import Observations
@@ -31,11 +31,10 @@ BASELINES = ("fem", "gp")
 
 
 @dataclass(frozen=True, eq=False)
-class CrossvalResult:
-    """A finished study.
+class LayoutResult:
+    """The scores of all solvers with the markers of one layout.
 
     Attributes:
-        study: The study.
         source: One sentence on the source of the markers' displacements.
         markers: Number of markers.
         folds: The folds of every solver.
@@ -44,24 +43,12 @@ class CrossvalResult:
         failed: Error messages of the solvers that have no score.
     """
 
-    study: Study
     source: str
     markers: int
     folds: Sequence[Fold]
     scores: Mapping[str, Mapping[str, Score]]
     differences: Mapping[str, Mapping[str, Mapping[str, Mapping[str, Difference]]]]
     failed: Mapping[str, str]
-
-    @property
-    def schemes(self) -> list[str]:
-        """The schemes of the folds, in the order of `SCHEMES`."""
-        present = {fold.scheme for fold in self.folds}
-        return [scheme for scheme in SCHEMES if scheme in present]
-
-    @property
-    def has_fields(self) -> bool:
-        """True if fields were compared with a truth."""
-        return any(score.fields for each in self.scores.values() for score in each.values())
 
     def difference(self, label: str, baseline: str, scheme: str, what: str) -> Difference | None:
         """One of the `differences`; None if there is no such one."""
@@ -70,7 +57,6 @@ class CrossvalResult:
     @classmethod
     def of(
         cls,
-        study: Study,
         observations: Observations,
         folds: Sequence[Fold],
         results: Mapping[str, SeedResults],
@@ -97,7 +83,6 @@ class CrossvalResult:
             for label, each in by_scheme.items()
         }
         return cls(
-            study=study,
             source=observations.source,
             markers=len(observations.points),
             folds=folds,
@@ -109,17 +94,8 @@ class CrossvalResult:
             failed=failed,
         )
 
-    def table(self) -> "pd.DataFrame":
-        """The columns of `held_out.csv` by solver and scheme; NaN where there is no number."""
-        import pandas as pd
-
-        rows = [
-            {name: nan if cell == "" else cell for name, cell in row.items()} for row in self.held_out_rows()
-        ]
-        return pd.DataFrame(rows).set_index(["solver", "scheme"])
-
     def held_out_rows(self) -> list[dict[str, Cell]]:
-        """The rows of `held_out.csv`: errors at given and held-out markers by solver and scheme."""
+        """Errors at given and held-out markers by solver and scheme."""
         rows: list[dict[str, Cell]] = []
         for label, scores in self.scores.items():
             for scheme, found in scores.items():
@@ -133,7 +109,7 @@ class CrossvalResult:
         return rows
 
     def field_rows(self) -> list[dict[str, Cell]]:
-        """The rows of `fields.csv`: relative L2 distances from the truth by solver, scheme and field."""
+        """Relative L2 distances from the truth by solver, scheme and field."""
         return [
             {"solver": label, "scheme": scheme, "field": name}
             | _interval_cells("rel_l2", "", interval)
@@ -151,18 +127,14 @@ class CrossvalResult:
             row[f"from_{baseline}"] = found.verdict if found else ""
         return row
 
-    def content(self) -> dict[str, Any]:
-        """The part of `crossval.json` that holds the result."""
+    def content(self, variants: Sequence[SolverVariant]) -> dict[str, Any]:
+        """The entry of `crossval.json` for this layout."""
         return {
             "measurements": {"description": self.source, "markers": self.markers},
-            "seeds": self.study.seeds,
-            "level": LEVEL,
-            "truth": f"elements of {FINER:g} times the size" if self.study.measurements is None else None,
             "folds": [
                 {"scheme": fold.scheme, "name": fold.name, "held": fold.held, "condition": fold.load_case}
                 for fold in self.folds
             ],
-            "schemes": {scheme: SCHEMES[scheme] for scheme in self.schemes},
             "solvers": {
                 variant.label: {
                     "solver": variant.solver,
@@ -174,10 +146,90 @@ class CrossvalResult:
                         for baseline, by_scheme in self.differences[variant.label].items()
                     },
                 }
-                for variant in self.study.variants
+                for variant in variants
                 if variant.label in self.scores
             },
             "failed": dict(self.failed),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class CrossvalResult:
+    """A finished study.
+
+    Attributes:
+        study: The study.
+        layouts: The scores by layout of the markers; of `MEASURED` alone if the markers were measured.
+    """
+
+    study: Study
+    layouts: Mapping[str, LayoutResult]
+
+    @property
+    def schemes(self) -> list[str]:
+        """The schemes of the folds, in the order of `SCHEMES`."""
+        present = {fold.scheme for each in self.layouts.values() for fold in each.folds}
+        return [scheme for scheme in SCHEMES if scheme in present]
+
+    @property
+    def source(self) -> str:
+        """One sentence on the source of the markers' displacements, the same for every layout."""
+        return next(iter(self.layouts.values())).source
+
+    @property
+    def scores(self) -> list[Score]:
+        """All scores, of every layout, solver and scheme."""
+        return [
+            score
+            for each in self.layouts.values()
+            for by_scheme in each.scores.values()
+            for score in by_scheme.values()
+        ]
+
+    @property
+    def has_fields(self) -> bool:
+        """True if fields were compared with a truth."""
+        return any(score.fields for score in self.scores)
+
+    @property
+    def failed(self) -> dict[str, str]:
+        """Error messages of the solvers that have no score, by solver (and layout, if there are several)."""
+        return {
+            label if len(self.layouts) == 1 else f"{label}, {layout}": message
+            for layout, each in self.layouts.items()
+            for label, message in each.failed.items()
+        }
+
+    def table(self) -> "pd.DataFrame":
+        """The columns of `held_out.csv` by layout, solver and scheme; NaN where there is no number."""
+        import pandas as pd
+
+        rows = [
+            {name: nan if cell == "" else cell for name, cell in row.items()} for row in self.held_out_rows()
+        ]
+        return pd.DataFrame(rows).set_index(["layout", "solver", "scheme"])
+
+    def held_out_rows(self) -> list[dict[str, Cell]]:
+        """The rows of `held_out.csv`: errors at given and held-out markers by layout, solver and scheme."""
+        return [
+            {"layout": layout, **row} for layout, each in self.layouts.items() for row in each.held_out_rows()
+        ]
+
+    def field_rows(self) -> list[dict[str, Cell]]:
+        """The rows of `fields.csv`: distances from the truth by layout, solver, scheme and field."""
+        return [
+            {"layout": layout, **row} for layout, each in self.layouts.items() for row in each.field_rows()
+        ]
+
+    def content(self) -> dict[str, Any]:
+        """The part of `crossval.json` that holds the result."""
+        return {
+            "schema": 2,
+            "seeds": self.study.seeds,
+            "level": LEVEL,
+            "truth": f"elements of {FINER:g} times the size" if self.study.measurements is None else None,
+            "schemes": {scheme: SCHEMES[scheme] for scheme in self.schemes},
+            "layouts": {layout: each.content(self.study.variants) for layout, each in self.layouts.items()},
         }
 
 

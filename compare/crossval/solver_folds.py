@@ -28,6 +28,7 @@ class SolverTask:
 
     Attributes:
         study: The study.
+        layout: Name of the markers' layout.
         variant: The solver.
         load_cases: The loads, the full one first.
         truths: File of the true fields at each load; empty with measured markers.
@@ -36,6 +37,7 @@ class SolverTask:
     """
 
     study: Study
+    layout: str
     variant: SolverVariant
     load_cases: Sequence[LoadCase]
     truths: Sequence[Path]
@@ -45,7 +47,7 @@ class SolverTask:
     @property
     def folder(self) -> Path:
         """Folder of finished folds."""
-        return self.study.out / "runs" / self.variant.label.replace(" ", "_")
+        return self.study.out / "runs" / self.layout / self.variant.label.replace(" ", "_")
 
 
 @dataclass(frozen=True)

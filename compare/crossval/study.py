@@ -11,7 +11,9 @@ import numpy as np
 from compare.crossval.folds import ALL, SCHEMES
 from compare.runtime.provenance import cores
 from compare.runtime.resumable_folder import job_definition
+from geometry.arrays import FloatArray
 from geometry.errors import UserError
+from geometry.finger.design import Design
 from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
@@ -24,6 +26,12 @@ ELEMENT_SIZE = 0.5
 
 The discretisation error of `fem` at the markers is then 0.01 mm, a hundredth of its model error.
 """
+
+FEWEST = 3
+"""Fewest markers: some to hold out and some to give."""
+
+MEASURED = "measured"
+"""Name in place of a layout where the markers were measured."""
 
 WEIGHT_CHOICES = ("left-out", "evidence")
 """Rules by which a solver can choose the weight of the markers, beside the paper's fixed weight."""
@@ -90,6 +98,7 @@ class Study:
         mesh: Element sizes of the mesh that solvers share.
         material: The elastic constants; each solver takes the law that it has.
         load: The prescribed displacement of the contact.
+        layouts: Marker layouts at which the same truth is sampled; empty for the design's own.
         schemes: Keys of `SCHEMES` other than `ALL`.
         seeds: Number of draws of the noise, and of the solvers' random numbers.
         noise: Standard deviation of a simulated marker's displacement, mm.
@@ -103,6 +112,7 @@ class Study:
     mesh: MeshSettings = field(default_factory=lambda: MeshSettings(size=ELEMENT_SIZE))
     material: Material = field(default_factory=Material)
     load: Load = field(default_factory=Load)
+    layouts: Sequence[str] = ()
     schemes: Sequence[str] = tuple(scheme for scheme in SCHEMES if scheme != ALL)
     seeds: int = 5
     noise: float = 0.005
@@ -114,8 +124,27 @@ class Study:
         """File of the shared mesh."""
         return self.out / "mesh.npz"
 
+    @property
+    def markers(self) -> dict[str, FloatArray]:
+        """Centres of the markers by layout, each of shape (m, 2), mm, the first layout's first.
+
+        Raises:
+            UserError: If the finger does not have such a layout.
+        """
+        layouts = self.layouts or (self.design.marker_layout,)
+        return {layout: self._laid_out(layout).markers for layout in layouts}
+
     def check(self) -> None:
         """Raise a `UserError` for what cannot be done, before anything is computed."""
+        if self.layouts and self.measurements:
+            raise UserError("--layouts: measured markers are where they are; leave out --layouts")
+        if len(set(self.layouts)) < len(self.layouts):
+            raise UserError(f"--layouts: a layout is named twice: {', '.join(self.layouts)}")
+        if too_few := next((name for name, points in self.markers.items() if len(points) < FEWEST), None):
+            raise UserError(
+                f"cross-validation needs {FEWEST} markers, not the {len(self.markers[too_few])} of the "
+                f"layout {too_few!r}"
+            )
         labels = [variant.label for variant in self.variants]
         if not labels:
             raise UserError("no solver was asked for; name at least one")
@@ -136,6 +165,17 @@ class Study:
             with_law(self.material, solver)
         if self.measurements is None and self.load.displacement[1] is None:
             raise UserError("the virtual experiment presses on the finger: prescribe v")
+
+    def _laid_out(self, layout: str) -> Finger:
+        """The finger with the markers of a layout."""
+        if layout == self.design.marker_layout:
+            return self.design
+        if not isinstance(self.design, Design):
+            raise UserError(
+                f"--layouts: {self.design.name} has no layout {layout!r}; its markers are those of its "
+                f"drawing, {self.design.marker_layout!r}"
+            )
+        return self.design.replaced(marker_layout=layout)
 
     def definition(self, measured: Observations | None) -> dict[str, Any]:
         """Everything that finished folds depend on but the solvers' settings, which are kept with them."""
@@ -159,11 +199,11 @@ def visible_markers(observations: Observations) -> Observations:
     """The visible markers from base to tip.
 
     Raises:
-        UserError: If there are fewer than three: some to hold out and some to give.
+        UserError: If there are fewer than `FEWEST`.
     """
     visible = observations.visible
-    if (count := int(visible.sum())) < 3:
-        raise UserError(f"cross-validation needs 3 markers that were seen, not {count}")
+    if (count := int(visible.sum())) < FEWEST:
+        raise UserError(f"cross-validation needs {FEWEST} markers that were seen, not {count}")
     order = np.flatnonzero(visible)[observations.points[visible, 0].argsort(kind="stable")]
     return replace(
         observations,

@@ -1,6 +1,6 @@
 """A cross-validation as tables for the terminal, the report and CSV files."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.table import Table
 
 from compare.crossval.folds import ALL, SCHEMES, SeedResults
-from compare.crossval.result import BASELINES, CrossvalResult
+from compare.crossval.result import BASELINES, CrossvalResult, LayoutResult
 from compare.crossval.scores import FIELDS, LEVEL, Difference, Interval
 from compare.evaluation.number_format import NONE, percent, significant
 from compare.runtime.tables import Cell, terminal_table, write_csv
@@ -45,11 +45,23 @@ class Grid:
 def grids(result: CrossvalResult) -> list[Grid]:
     """One table of the markers for each scheme, and one of the fields."""
     held = [scheme for scheme in result.schemes if scheme != ALL]
+    headings = [
+        "solver",
+        "given\nsum",
+        "held\nout u",
+        "v",
+        "sum",
+        "±",
+        "rss",
+        "vs\nfem",
+        "vs\ngp",
+        "with-\nin",
+    ]
     markers = [
         Grid(
             f"{scheme}: {SCHEMES[scheme]}; mm",
-            ["solver", "given\nsum", "held\nout u", "v", "sum", "±", "rss", "vs\nfem", "vs\ngp", "with-\nin"],
-            [_marker_row(result, label, scheme) for label in result.scores],
+            headings,
+            _by_layout(result, _marker_row, [scheme]),
             CAPTION if scheme == held[-1] else "",
         )
         for scheme in held
@@ -66,12 +78,28 @@ def tables(result: CrossvalResult) -> list[Table]:
     ]
 
 
-def write_tables(out: Path, result: CrossvalResult, results: Mapping[str, SeedResults]) -> None:
+def write_tables(out: Path, result: CrossvalResult, results: Mapping[str, Mapping[str, SeedResults]]) -> None:
     """Write the CSV files: markers and fields by scheme, and every error of every fold."""
     write_csv(out / "held_out.csv", result.held_out_rows())
     if result.has_fields:
         write_csv(out / "fields.csv", result.field_rows())
-    write_csv(out / "folds.csv", list(_fold_rows(results)))
+    rows = [{"layout": layout, **row} for layout, each in results.items() for row in _fold_rows(each)]
+    write_csv(out / "folds.csv", rows)
+
+
+def _by_layout(
+    result: CrossvalResult,
+    row: Callable[[LayoutResult, str, str], list[str]],
+    schemes: Sequence[str],
+) -> list[list[str]]:
+    """The rows of all solvers in all schemes, those of each layout below its name if there are several."""
+    rows: list[list[str]] = []
+    for layout, each in result.layouts.items():
+        own = [row(each, label, scheme) for scheme in schemes for label in each.scores]
+        if len(result.layouts) > 1:
+            rows.append([f"markers: {layout}", *[""] * (len(own[0]) - 1)])
+        rows += own
+    return rows
 
 
 def _fold_rows(results: Mapping[str, SeedResults]) -> Iterable[dict[str, Cell]]:
@@ -91,7 +119,7 @@ def _fold_rows(results: Mapping[str, SeedResults]) -> Iterable[dict[str, Cell]]:
                     }
 
 
-def _marker_row(result: CrossvalResult, label: str, scheme: str) -> list[str]:
+def _marker_row(result: LayoutResult, label: str, scheme: str) -> list[str]:
     score = result.scores[label][scheme]
     held, total = score.held_out, score.held_out.get("mae_sum")
     return [
@@ -107,22 +135,23 @@ def _marker_row(result: CrossvalResult, label: str, scheme: str) -> list[str]:
 
 def _field_grid(result: CrossvalResult) -> Grid:
     """Relative L2 distances from the truth, a row for each scheme and solver."""
-    rows = []
-    for scheme in result.schemes:
-        for label, scores in result.scores.items():
-            *values, last = [percent(scores[scheme].fields[name].mean, 2, sign=False) for name in FIELDS]
-            verdicts = [_verdict(result.difference(label, "fem", scheme, name)) for name in FIELDS[:-1]]
-            pairs = [text for pair in zip(values, verdicts, strict=True) for text in pair]
-            rows.append([scheme, label, *pairs, last])
-    headings = ["held out", "solver", "displ.", "vs\nfem", "strain", "vs\nfem", "v.\nMises", "vs\nfem"]
+    headings = ["solver", "held out", "displ.", "vs\nfem", "strain", "vs\nfem", "v.\nMises", "vs\nfem"]
     return Grid(
         "Relative L2 distance from the truth over the body, %",
         [*headings, "truth's\nlaw"],
-        rows,
+        _by_layout(result, _field_row, result.schemes),
         f"{ALL}: {SCHEMES[ALL]}. Strain: of the solver's own law, Green-Lagrange for finite strain. Truth's "
         "law: the von Mises stress that the neo-Hookean law gives for the solver's displacement gradient. "
         "vs fem: better or worse, by a bootstrap over folds and seeds; ≈: not told apart.",
     )
+
+
+def _field_row(result: LayoutResult, label: str, scheme: str) -> list[str]:
+    fields = result.scores[label][scheme].fields
+    *values, last = [percent(fields[name].mean, 2, sign=False) for name in FIELDS]
+    verdicts = [_verdict(result.difference(label, "fem", scheme, name)) for name in FIELDS[:-1]]
+    pairs = [text for pair in zip(values, verdicts, strict=True) for text in pair]
+    return [label, scheme, *pairs, last]
 
 
 def _verdict(difference: Difference | None) -> str:

@@ -130,8 +130,11 @@ class TruthTask:
     case: LoadCase
 
 
-def simulate_truth(task: TruthTask, progress: Progress = silent) -> Path:
-    """Simulate the true field, unless the cache has it, and return its file in the cache.
+def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Path]:
+    """Simulate the true field, unless the cache has it, and sample it with the markers of every layout.
+
+    Returns:
+        Files in the cache by layout.
 
     Raises:
         UserError: If the simulation cannot be run or does not reach the full load.
@@ -140,6 +143,7 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> Path:
     design = study.design.at_contact(task.case.contact)
     stroke = -task.case.share * float(study.load.displacement[1] or 0.0)
     shared = TriangleMesh.load(study.mesh_file)
+    markers = study.markers
     parts = [
         design.digest,
         study.mesh.model_dump(),
@@ -150,13 +154,19 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> Path:
         package_versions(),
         sources_digest([*SOURCES, __name__, "compare.evaluation.virtual_experiment"]),
     ]
-    file = cache_folder() / f"truth-{content_hash(parts)}.npz"
-    if file.exists():
+    files = {
+        layout: cache_folder() / f"truth-{content_hash([*parts, points.tolist()])}.npz"
+        for layout, points in markers.items()
+    }
+    missing = [layout for layout, file in files.items() if not file.exists()]
+    if not missing:
         progress(1.0, "from the cache")
-        return file
+        return files
     finer = study.mesh.model_copy(update={"size": FINER * study.mesh.size})
     mesh = finger_mesh(design, settings=finer)
     problem = Problem(mesh, study.material, Load(displacement=(0.0, -stroke)))
-    sampler = FieldSampler.of(shared, shared.markers, design.marker_radius)
-    sampler.of_solution(simulate(problem, progress), shared).save(file)
-    return file
+    solution = simulate(problem, progress)
+    for layout in missing:
+        sampler = FieldSampler.of(shared, markers[layout], design.marker_radius)
+        sampler.of_solution(solution, shared).save(files[layout])
+    return files

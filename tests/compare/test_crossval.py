@@ -13,7 +13,7 @@ import pytest
 from scipy.stats import t
 
 from compare.cli import main
-from compare.crossval.charts import draw_fields, draw_held_out, draw_weight_sweep
+from compare.crossval.charts import draw_fields, draw_held_out, draw_weight_sweeps
 from compare.crossval.cross_validation import cross_validate
 from compare.crossval.folds import (
     ALL,
@@ -31,7 +31,7 @@ from compare.crossval.folds import (
 )
 from compare.crossval.scores import Difference, Interval, difference, of_scheme, score
 from compare.crossval.solver_folds import SolverTask, run_folds
-from compare.crossval.study import SolverVariant, Study, solver_variants
+from compare.crossval.study import MEASURED, SolverVariant, Study, solver_variants
 from compare.crossval.true_fields import FieldSampler
 from compare.crossval.weight_sweep import sweep_weights
 from geometry.errors import UserError
@@ -84,6 +84,7 @@ def task(
     half = replace(observations, displacements=0.5 * observations.displacements)
     return SolverTask(
         study=Study(design=Design(), variants=[], out=tmp_path),
+        layout="joints",
         variant=variant("gp"),
         load_cases=[
             LoadCase("full", Load(), 1.0, 35.0),
@@ -327,36 +328,70 @@ def test_the_command_writes_what_the_guide_says_and_goes_on(tmp_path, capsys, in
     said = " ".join(capsys.readouterr().out.split())
     assert "tip-out: the third of the markers nearest the tip held out together; mm" in said
     content = json.loads((tmp_path / "out" / "crossval.json").read_text())
-    assert list(content["solvers"]) == ["fem", "gp", "fem-asm"]
-    assert content["solvers"]["fem"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["low"] is None
-    before = content["solvers"]["gp"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["mean"]
-    assert "simulated by fem-nonlinear" in content["measurements"]["description"]
+    (joints,) = content["layouts"].values()
+    assert list(joints["solvers"]) == ["fem", "gp", "fem-asm"]
+    assert joints["solvers"]["fem"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["low"] is None
+    before = joints["solvers"]["gp"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["mean"]
+    assert "simulated by fem-nonlinear" in joints["measurements"]["description"]
     predictions, stresses = content["answers"].values()
     assert any(re.match("fem-asm against gp: .* in tip-out", sentence) for sentence in predictions)
     assert any("von Mises stress" in sentence for sentence in stresses)
 
     assert run(f"{line} --seeds 2", tmp_path / "out") == 0
     content = json.loads((tmp_path / "out" / "crossval.json").read_text())
-    against = content["solvers"]["fem-asm"]["against"]["fem"]["tip-out"]
+    solvers = content["layouts"]["joints"]["solvers"]
+    against = solvers["fem-asm"]["against"]["fem"]["tip-out"]
     assert against["mae_sum"]["verdict"] == "better"
     assert against["von_mises"]["verdict"] == "worse"
     predictions, _ = content["answers"].values()
     verdicts = {
         f"{label} against {baseline}": schemes["tip-out"]["mae_sum"]["verdict"]
         for label in ("gp", "fem-asm")
-        for baseline, schemes in content["solvers"][label]["against"].items()
+        for baseline, schemes in solvers[label]["against"].items()
     }
     assert predictions == [f"{pair}: {verdict} in tip-out." for pair, verdict in verdicts.items()]
-    assert set(verdicts.values()) > {"better"}
+    assert "better" in verdicts.values()
     with (tmp_path / "out" / "held_out.csv").open() as file:
         rows = {(row["solver"], row["scheme"]): row for row in csv.DictReader(file)}
-    mean = content["solvers"]["gp"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["mean"]
+    mean = solvers["gp"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["mean"]
     assert float(rows["gp", "tip-out"]["held_out_mae_sum_mm"]) == mean
     assert mean != before
     assert rows["fem", "all"]["in_sample_mae_sum_mm"] == ""
 
     assert run(f"{line} --seeds 1 --noise 0.02", tmp_path / "out") == 2
     assert "holds a cross-validation with other settings (noise_mm)" in capsys.readouterr().err
+
+
+def test_layouts_sample_one_truth_and_stay_apart(tmp_path, capsys, in_line):
+    """`fem` has one field, so its distance from the truth is the same; its errors at markers are not."""
+    line = "--solvers fem,gp --schemes one-out --seeds 1"
+    assert run(f"{line} --layouts front,joints", tmp_path / "out") == 0
+    said = capsys.readouterr().out
+    assert "markers: front" in said
+    assert "markers: joints" in said
+    with (tmp_path / "out" / "held_out.csv").open() as file:
+        rows = {
+            tuple(row[key] for key in ("layout", "solver", "scheme")): row for row in csv.DictReader(file)
+        }
+    assert list(rows)[::4] == [("front", "fem", "all"), ("joints", "fem", "all")]
+    layouts = json.loads((tmp_path / "out" / "crossval.json").read_text())["layouts"]
+    errors, fields = (
+        [float(layouts[name]["solvers"]["fem"]["schemes"][ONE][kind][what]["mean"]) for name in layouts]
+        for kind, what in (("held_out", "mae_v"), ("fields", "displacement"))
+    )
+    assert fields[0] == pytest.approx(fields[1], rel=1e-9)
+    assert errors == pytest.approx(
+        [0.43, 0.53], abs=0.02
+    )  # where the front wall alone is seen, and all of it
+    report = (tmp_path / "out" / "report.html").read_text()
+    assert "Do these verdicts depend on the layout of the markers?" in report
+
+    # One layout alone reuses its folds, and has what it had beside the other.
+    kept = (tmp_path / "out" / "runs" / "front" / "gp" / "seed-0.json").stat().st_mtime_ns
+    assert run(f"{line} --layouts front", tmp_path / "out") == 0
+    assert (tmp_path / "out" / "runs" / "front" / "gp" / "seed-0.json").stat().st_mtime_ns == kept
+    alone = json.loads((tmp_path / "out" / "crossval.json").read_text())["layouts"]
+    assert alone == {"front": layouts["front"]}
 
 
 def test_measured_markers_have_no_truth(tmp_path, capsys, in_line, observations):
@@ -373,8 +408,9 @@ def test_measured_markers_have_no_truth(tmp_path, capsys, in_line, observations)
     assert "fields.csv" not in printed.out
     content = json.loads((tmp_path / "out" / "crossval.json").read_text())
     assert list(content["schemes"]) == ["all", "one-out"]
-    assert len(content["solvers"]["gp"]["schemes"]["one-out"]["per_marker"]) == 8
-    assert content["solvers"]["gp"]["schemes"]["one-out"]["fields"] == {}
+    (gp,) = (layout["solvers"]["gp"]["schemes"]["one-out"] for layout in content["layouts"].values())
+    assert len(gp["per_marker"]) == 8
+    assert gp["fields"] == {}
     assert not (tmp_path / "out" / "fields.csv").exists()
     assert not (tmp_path / "out" / "fields.png").exists()
 
@@ -391,8 +427,8 @@ def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, 
     )
     result = cross_validate(study)
     assert capsys.readouterr() == ("", "")
-    row = result.table().loc["gp", ONE]
-    assert row["held_out_mae_sum_mm"] == result.scores["gp"][ONE].held_out["mae_sum"].mean
+    row = result.table().loc[MEASURED, "gp", ONE]
+    assert row["held_out_mae_sum_mm"] == result.layouts[MEASURED].scores["gp"][ONE].held_out["mae_sum"].mean
     assert np.isnan(row["from_fem_mean_mm"])  # fem is not in the study
     with pytest.raises(UserError, match="there is no scheme 'two-out'"):
         cross_validate(replace(study, schemes=["two-out"]))
@@ -407,6 +443,9 @@ def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, 
         ("--load patch --solvers fem,gp", "load-out presses elsewhere on the same mesh"),
         ("--solvers fem,fem", "a solver is named twice: fem, fem"),
         ("--measurements nowhere.csv", "there is no file nowhere.csv"),
+        ("--layouts front,back", "marker_layout = 'back': input should be 'front' or 'joints'"),
+        ("--layouts front,front", "--layouts: a layout is named twice: front, front"),
+        ("--layouts joints --set rib_count=0 --set name=plain", "needs 3 markers, not the 1 of the layout"),
     ],
 )
 def test_bad_input_is_one_line(tmp_path, capsys, line, said):
@@ -436,15 +475,17 @@ def test_a_solver_that_chooses_its_weights_is_there_in_three_ways():
 
 def test_pictures_show_every_solver():
     values = {f"solver {number}": [0.1 * number + 0.01, 1.0, 2.0] for number in range(9)}
-    held_out = draw_held_out(errors=values, simulated=True)
     fields = {"displacement": 0.2, "strain": 0.3, "von_mises": 2.0}
     one = score([[outcome_of(ONE, (0,), [[1.0, 1.0]], fields=fields)]])
     scores = {label: {ALL: one, ONE: one} for label in values}
-    distances = draw_fields(scores=scores, schemes=[ALL, ONE])
     columns = ("factor", "in_sample_mm", "left_out_mm", *fields)
-    page = page_of(draw_weight_sweep(sweep={name: [1e-6, 1e-3, 1.0] for name in columns}))
-    assert (page.cut_off(), page.overlaps()) == ([], [])
-    for drawn in (held_out, distances):
-        page = page_of(drawn)
-        assert page.cut_off() == []
-        assert all(label in page.text for label in values)
+    sweep = {name: [1e-6, 1e-3, 1.0] for name in columns}
+    for layouts in (["joints"], ["front", "joints"]):
+        held_out = draw_held_out(errors=dict.fromkeys(layouts, values), simulated=True)
+        distances = draw_fields(scores=dict.fromkeys(layouts, scores), schemes=[ALL, ONE])
+        page = page_of(draw_weight_sweeps(sweeps=dict.fromkeys(layouts, sweep)))
+        assert (page.cut_off(), page.overlaps()) == ([], [])
+        for drawn in (held_out, distances):
+            page = page_of(drawn)
+            assert page.cut_off() == []
+            assert all(label in page.text for label in values)

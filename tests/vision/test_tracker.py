@@ -217,7 +217,7 @@ def without_fiducials(turns=0, design=DESIGN):
 def test_without_fiducials_the_markers_give_the_plane_and_their_motion_the_way_up(layout, turns):
     """Markers at the joints show the way up themselves; a row looks the same from both ends."""
     design = Design(marker_layout=layout)
-    true = bent(marker_positions(design))
+    true = bent(design.markers)
     tracking = tracked(without_fiducials(turns, design), camera=None, markers_only=True, design=design)
     observations = tracking.observations("rig")
     assert observations.visible.sum() >= 7  # a jump of 10 mm is harder to follow from the wrong end
