@@ -1,4 +1,9 @@
-"""Parts that the pictures of the body share: pixels, outline, clamped base, scale bar, colour bar."""
+"""Parts that the pictures of the body share: pixels, outline, clamped base, scale bar, colour bar.
+
+A panel has a strip below the body for a note and a scale bar, so that neither lies on a body of any shape.
+"""
+
+from collections.abc import Iterable
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -6,7 +11,6 @@ from matplotlib.collections import LineCollection
 
 from compare.figures.canvas import Canvas, Extent, Pixels
 from compare.figures.colours import Scale
-from compare.figures.style import HALO
 from geometry.arrays import FloatArray, IntArray
 from geometry.figure import INK, MUTED
 from geometry.mesh.boundary import boundary_edges
@@ -16,9 +20,39 @@ PIXELS = 1800
 """Pixels across a picture of the body; a printed panel has fewer, which smooths its edges."""
 
 
-def field_extent(mesh: TriangleMesh) -> Extent:
-    """The extent of a panel of a field: the undeformed body with a margin, mm."""
-    return Extent.around(mesh.points, margin=0.012 * float(np.ptp(mesh.points[:, 0])))
+STRIP = 0.2
+"""Height of the strip below the body, inches."""
+
+TALLEST, SHORTEST = 3.0, 0.7
+"""Limits of the height of a panel above its strip, inches: a tall body is drawn narrower than the panel."""
+
+
+def panel_extent(
+    points: FloatArray, width: float, *, margin: float, tallest: float = TALLEST, shortest: float = 0.0
+) -> Extent:
+    """The extent of a panel that shows points of shape (n, 2), mm, and has its strip below them.
+
+    Args:
+        points: What must be visible.
+        width: Of the panel, inches.
+        margin: Around the points, mm.
+        tallest: Largest height above the strip, inches.
+        shortest: Smallest height above the strip, inches.
+    """
+    tight = Extent.around(points, margin=margin)
+    across = max(tight.width, tight.height * width / tallest)
+    inch = across / width
+    beside = (across - tight.width) / 2
+    above = max(shortest * inch - tight.height, 0.0) / 2
+    return Extent(
+        tight.left - beside, tight.right + beside, tight.bottom - above - STRIP * inch, tight.top + above
+    )
+
+
+def field_extent(mesh: TriangleMesh, width: float) -> Extent:
+    """The extent of a panel of a field, `width` inches wide: the undeformed body with a margin, mm."""
+    margin = 0.012 * float(np.ptp(mesh.points, axis=0).max())
+    return panel_extent(mesh.points, width, margin=margin, shortest=SHORTEST)
 
 
 def prepare(axes: Axes, extent: Extent) -> None:
@@ -50,8 +84,13 @@ def panel(
     show(axes, canvas, colours)
     outline(axes, boundary_edges(mesh.triangles), mesh.points, width=0.35)
     axes.set_title(title, size=8.5, pad=2, weight="bold" if bold else "normal")
-    # In the corner below the tip, which no finger fills, above the scale bar.
-    axes.text(0.99, 0.33, note, ha="right", size=7, color=MUTED, transform=axes.transAxes)
+    write_note(axes, canvas.extent, note)
+
+
+def write_note(axes: Axes, extent: Extent, note: str) -> None:
+    """A note at the left of the strip below the body."""
+    place = (extent.left + 0.01 * extent.width, extent.bottom)
+    axes.annotate(note, place, xytext=(0, 3), textcoords="offset points", size=7, color=MUTED)
 
 
 def outline(
@@ -70,45 +109,55 @@ def outline(
     axes.add_collection(lines, autolim=False)
 
 
-def clamp(axes: Axes, base: FloatArray, *, size: float = 1.6) -> None:
-    """Hatch the clamped base.
+def base_lines(mesh: TriangleMesh) -> list[FloatArray]:
+    """The connected parts of the clamped base, each the points of a line, (k, 2), mm, body on its left."""
+    follows = dict(mesh.boundary("base").tolist())
+    starts = sorted(set(follows) - set(follows.values())) or sorted(follows)[:1]
+    lines = []
+    for node in starts:
+        nodes = [node]
+        while nodes[-1] in follows and follows[nodes[-1]] not in nodes:
+            nodes.append(follows[nodes[-1]])
+        lines.append(mesh.points[nodes])
+    return lines
+
+
+def clamp(axes: Axes, lines: Iterable[FloatArray], *, size: float) -> None:
+    """Hatch the clamped base on its outer side, behind the body.
 
     Args:
         axes: Where to draw.
-        base: Nodes of the base, shape (k, 2), mm.
-        size: Length of the hatching, mm.
+        lines: Its parts, each the points of a line, shape (k, 2), mm, with the body on its left.
+        size: Distance of the strokes, mm.
     """
-    x, low, high = float(base[:, 0].min()), float(base[:, 1].min()), float(base[:, 1].max())
-    starts = np.linspace(low + size, high, max(int((high - low) / size), 2))
-    strokes = [((x, y), (x - size, y - size)) for y in starts]
-    axes.add_collection(LineCollection(strokes, colors=INK, linewidths=0.5, zorder=2), autolim=False)
-    axes.plot([x, x], [low, high], color=INK, linewidth=1.1, zorder=3, solid_capstyle="butt")
+    for line in lines:
+        steps = np.diff(line, axis=0)
+        reached = np.append(0.0, np.linalg.norm(steps, axis=1).cumsum())
+        count = max(int(reached[-1] / size), 2)
+        where = reached[-1] * np.arange(count) / count
+        starts = np.stack([np.interp(where, reached, values) for values in line.T], axis=1)
+        along = steps[np.searchsorted(reached, where, side="right") - 1]
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        ends = starts + size * (along + along[:, ::-1] * (1, -1))
+        strokes = LineCollection(
+            list(np.stack([starts, ends], axis=1)), colors=INK, linewidths=0.5, zorder=0.5
+        )
+        axes.add_collection(strokes, autolim=False)
+        axes.plot(*line.T, color=INK, linewidth=1.1, zorder=3, solid_capstyle="butt")
 
 
-def scale_bar(axes: Axes, extent: Extent, *, corner: str = "lower right") -> None:
-    """A bar of a round length, about an eighth of the picture, in a corner.
+def hatch_size(points: FloatArray) -> float:
+    """Distance of the strokes at the base of a body with points of shape (n, 2), mm."""
+    return 0.0175 * float(np.ptp(points, axis=0).max())
 
-    Args:
-        axes: Where to draw.
-        extent: What the axes show, mm.
-        corner: `lower right` or `lower left`.
-    """
+
+def scale_bar(axes: Axes, extent: Extent) -> None:
+    """A bar of a round length, about an eighth of the picture, at the right of the strip below the body."""
     length = round_length(extent.width / 8)
-    inset = 0.02 * extent.width
-    left = extent.right - inset - length if corner == "lower right" else extent.left + inset
-    y = extent.bottom + inset
-    ends = ([left, left + length], [y, y])
-    axes.plot(*ends, color=INK, lw=1.6, solid_capstyle="butt", path_effects=HALO, zorder=6)
+    right, y = extent.right - 0.01 * extent.width, extent.bottom + 0.005 * extent.width
+    axes.plot([right - length, right], [y, y], color=INK, lw=1.6, solid_capstyle="butt", zorder=6)
     axes.annotate(
-        f"{length:g} mm",
-        (left + length, y),
-        xytext=(0, 2.5),
-        textcoords="offset points",
-        ha="right",
-        va="bottom",
-        size=7.5,
-        path_effects=HALO,
-        zorder=6,
+        f"{length:g} mm", (right, y), xytext=(0, 2.5), textcoords="offset points", ha="right", size=7.5
     )
 
 

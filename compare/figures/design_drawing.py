@@ -1,88 +1,209 @@
-"""The design with the paper's nine parameters, the clamped base, the contact and the markers."""
+"""The finger with its dimensions, the clamped base, the contact and the markers."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import singledispatch
 
 import numpy as np
+import shapely
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from compare.figures import body
 from compare.figures.canvas import Extent
-from compare.figures.dimensions import Draughtsman
+from compare.figures.dimensions import CENTRE_LINE, Draughtsman, upright
 from compare.figures.style import arrow, axes_at, heading
+from geometry.arrays import FloatArray
 from geometry.figure import CONTACT, MEASURED, WIDTH, Figure, figure
 from geometry.finger.design import Design
+from geometry.finger.finger import Finger
 from geometry.finger.picture import draw_section
-from geometry.finger.section import apex_angle, back_line, cells, rib_direction, rib_pitch, ribs
+from geometry.finger.section import (
+    apex_angle,
+    back_line,
+    base_corners,
+    base_line,
+    cells,
+    rib_direction,
+    ribs,
+    tip_tangent,
+)
+from geometry.section.section import Section
+from geometry.section.thickness import inner_normals
 
 POINT = 8.5 / 72 / WIDTH
 """Height of the type as a share of the drawing's width."""
 LEFT, RIGHT, ABOVE, BELOW = 5.2, 1.6, 7.2, 3.2
-"""Room around the body for dimensions, in heights of the type."""
-HEAD, FOOT = 0.28, 0.42
+"""Room around a finger with parameters for its dimensions, in heights of the type."""
+AROUND = (3.0, 5.0, 6.0, 3.4)
+"""The same around any other finger: left, right, above and below."""
+TALLEST = 5.2
+"""Largest height of the drawing, inches."""
+HEAD, LINE = 0.28, 0.16
+"""Heights in inches: heading, a line of the legend."""
+NUMBERED = 60
+"""Largest number of markers that are numbered."""
+DIRECTIONS = 24
+"""Number of places around a marker that are tried for its number."""
+GAPS = (0.75, 1.4)
+"""Tried distances of a number from its marker, in heights of the type."""
+ENOUGH = 0.5
+"""Distance of a number's middle from all else beyond which more is not better, in heights of the type."""
 
 
-def draw_design(design: Design) -> Figure:
-    """Draw the section of a finger, to scale, with a dimension for each of the paper's nine parameters."""
-    em = design.height * POINT / (1 - (LEFT + RIGHT) * POINT)
-    (left, bottom), (right, _) = design.section.bounds
-    extent = Extent(left - LEFT * em, right + RIGHT * em, bottom - BELOW * em, ABOVE * em)
-    height = WIDTH * extent.height / extent.width
-    with figure(HEAD + height + FOOT) as drawn:
-        heading(drawn, f"Design “{design.name}”")
+@singledispatch
+def draw_design(finger: Finger) -> Figure:
+    """Draw the section of a finger, to scale, with its dimensions, clamp, contact and numbered markers.
+
+    A `Design` has a dimension for each of the paper's nine parameters, any other finger its overall ones.
+    """
+    bounds = finger.section.bounds
+    (left, bottom), (right, top) = bounds
+    x, y = finger.section.front_point(finger.contact_abscissa).round(3) + 0.0
+    notes = [f"contact’s middle at ({x:.4g}, {y:.4g}) mm", f"depth {finger.depth:.4g} mm"]
+    with _sheet(finger, bounds, AROUND, notes) as (drawn, pen):
+        em = pen.em
+        pen.between((left, top), (right, top), (0, 4.2 * em), f"{right - left:.4g} mm")
+        pen.between((right, bottom), (right, top), (2.4 * em, 0), f"{top - bottom:.4g} mm")
+    return drawn
+
+
+@draw_design.register
+def _(design: Design) -> Figure:
+    corners = np.concatenate([design.section.bounds, base_corners(design), [(design.height, 0.0)]])
+    bounds = np.stack([corners.min(axis=0), corners.max(axis=0)])
+    ribs_and_depth = [
+        rf"$N$ = {design.rib_count} ribs",
+        rf"$W$ = {design.depth:.4g} mm (depth, out of the plane)",
+    ]
+    room = (LEFT, RIGHT, ABOVE, BELOW)
+    with _sheet(design, bounds, room, [*ribs_and_depth, *_further(design)]) as (drawn, pen):
+        _lengths(pen, design)
+        _thicknesses(pen, design)
+        if design.rib_count:
+            _ribs(pen, design)
+    return drawn
+
+
+@contextmanager
+def _sheet(
+    finger: Finger, bounds: FloatArray, room: Sequence[float], notes: Sequence[str]
+) -> Iterator[tuple[Figure, Draughtsman]]:
+    """A drawing of a finger that is given its dimensions in the block, and then numbers and a legend.
+
+    Args:
+        finger: The finger.
+        bounds: Smallest and largest x and y of what is to be seen, shape (2, 2), mm.
+        room: Around it on the left, the right, above and below, in heights of the type.
+        notes: Further lines of the legend.
+    """
+    labels = [f"{len(finger.markers)} markers ({finger.marker_layout})"]
+    labels += [f"contact, {finger.contact_width:.4g} mm wide", *notes]
+    extent, em = _page(bounds, room)
+    height, foot = WIDTH * extent.height / extent.width, LINE * -(-len(labels) // 2) + 0.1
+    with figure(HEAD + height + foot) as drawn:
+        heading(drawn, f"Design “{finger.name}”")
         axes = axes_at(drawn, (0, HEAD, WIDTH, height))
         body.prepare(axes, extent)
-        shape = design.section
-        draw_section(axes, shape)
-        base = np.concatenate([loop.ends[which] for loop, which in shape.named("base")])
-        body.clamp(axes, base, size=0.8 * em)
+        draw_section(axes, finger.section)
         pen = Draughtsman(axes, em)
-        pen.text((-1.7 * em, -design.base_width / 2), "clamped", va="center", rotation=90)
-        _lengths(pen, design)
-        axes.plot(design.contact_ends, (0, 0), color=CONTACT, linewidth=3, solid_capstyle="butt", zorder=5)
-        x, style = design.contact_abscissa, "-|>,head_width=0.25,head_length=0.5"
-        arrow(axes, (x, 2.8 * em), (x, 0), style=style, colour=CONTACT, width=1.8, gap=2)
-        _ribs(pen, design)
-        _markers(pen, design)
-        markers = f"{len(design.markers)} markers, layout “{design.marker_layout}”"
+        _clamp(pen, finger.section)
+        _contact(pen, finger)
+        yield drawn, pen
+        _markers(pen, finger)
+        handles = [
+            Line2D([], [], ls="", marker="o", ms=4, color=MEASURED),
+            Line2D([], [], color=CONTACT, lw=3),
+            *(Line2D([], [], ls="") for _ in notes),
+        ]
         drawn.legend(
-            handles=[
-                Line2D([], [], ls="", marker="o", ms=4, color=MEASURED, label=markers),
-                Line2D([], [], color=CONTACT, lw=3, label=f"contact, {design.contact_width:g} mm wide"),
-                Line2D([], [], ls="", label=rf"$N$ = {design.rib_count} ribs"),
-                Line2D([], [], ls="", label=rf"$W$ = {design.depth:g} mm (depth, out of the plane)"),
-            ],
-            loc="lower center", ncols=2, columnspacing=2.5, handletextpad=0.6, borderaxespad=0.3,
+            handles, labels, loc="lower center", ncols=2, columnspacing=2.5, handletextpad=0.6,
+            borderaxespad=0.3,
         )  # fmt: skip
-    return drawn
+
+
+def _page(bounds: FloatArray, room: Sequence[float]) -> tuple[Extent, float]:
+    """The extent of a drawing, mm, and the height of its type, mm, that leave the room around the bounds."""
+    left, right, above, below = room
+    (width, height), (middle, _) = bounds[1] - bounds[0], bounds.mean(axis=0)
+    across = max(width / (1 - (left + right) * POINT), height / (TALLEST / WIDTH - (above + below) * POINT))
+    em = float(across * POINT)
+    start = middle - (across + (left - right) * em) / 2
+    return Extent(start, start + across, bounds[0, 1] - below * em, bounds[1, 1] + above * em), em
+
+
+def _clamp(pen: Draughtsman, section: Section) -> None:
+    """The clamped base with hatches, and a word beside it."""
+    lines = [loop.along(which, np.linspace(0, 1, 65)) for loop, which in section.named("base")]
+    body.clamp(pen.axes, lines, size=0.8 * pen.em)
+    ways = np.array([line[-1] - line[0] for line in lines])
+    alike = np.linalg.norm(ways.sum(axis=0)) > 0.5 * np.linalg.norm(ways, axis=1).sum()
+    longest = int(np.linalg.norm(ways, axis=1).argmax())
+    way, points = (ways.sum(axis=0), np.concatenate(lines)) if alike else (ways[longest], lines[longest])
+    along = way / np.linalg.norm(way)
+    frame = np.stack([along, along[::-1] * (1, -1)])
+    places = points @ frame.T
+    middle = np.array([places[:, 0].min() + places[:, 0].max(), 2 * places[:, 1].max() + 3.4 * pen.em]) / 2
+    pen.text(middle @ frame, "clamped", va="center", rotation=upright(along), rotation_mode="anchor")
+
+
+def _contact(pen: Draughtsman, finger: Finger) -> None:
+    """The touched part of the front, and an arrow along the normal in its middle."""
+    section = finger.section
+    touched = np.array([section.front_point(x) for x in np.linspace(*finger.contact_ends, 33)])
+    pen.axes.plot(*touched.T, color=CONTACT, linewidth=3, solid_capstyle="butt", zorder=5)
+    which, fraction = section.front_place(finger.contact_abscissa)
+    middle, inward = touched[16], inner_normals(section.outline, which, fraction)[0]
+    style = "-|>,head_width=0.25,head_length=0.5"
+    arrow(pen.axes, middle - 2.8 * pen.em * inward, middle, style=style, colour=CONTACT, width=1.8, gap=2)
 
 
 def _lengths(pen: Draughtsman, design: Design) -> None:
     d, em = design, pen.em
     first, second = np.array([0, 4.2 * em]), np.array([0, 6.2 * em])
-    pen.between((0, 0), (d.contact_abscissa, 0), first, f"contact at {d.contact_abscissa:g} mm")
-    pen.between(
-        (d.height - d.tip_length, 0), (d.height, 0), first, rf"$L_\mathrm{{tip}}$ = {d.tip_length:g} mm"
-    )
-    pen.between((0, 0), (d.height, 0), second, rf"$H$ = {d.height:g} mm")
-    pen.between((0, -d.base_width), (0, 0), (-3.8 * em, 0), rf"$L$ = {d.base_width:g} mm")
+    contact, tip = d.contact_abscissa, d.height - d.tip_length
+    pen.between((0, 0), (contact, 0), first, f"contact at {contact:.4g} mm")
+    pen.between((tip, 0), (d.height, 0), first, rf"$L_\mathrm{{tip}}$ = {d.tip_length:.4g} mm")
+    pen.between((0, 0), (d.height, 0), second, rf"$H$ = {d.height:.4g} mm")
+    below = base_line(d, -d.foot_height)
+    start, end = below.point, below.point + d.base_width * below.direction
+    pen.between(end, start, -3.8 * em * base_line(d, 1.0).point, rf"$L$ = {d.base_width:.4g} mm")
+    if d.tip_radius:
+        apex, rounded = np.array([d.height, 0.0]), tip_tangent(d)
+        for direction in (back_line(d, 0.0).direction, (1.0, 0.0)):
+            pen.line(apex - rounded * np.asarray(direction), apex, style=CENTRE_LINE)
 
 
-def _ribs(pen: Draughtsman, design: Design) -> None:
+def _further(design: Design) -> list[str]:
+    """Lines of the legend for parameters that the paper does not have."""
+    d, lines = design, []
+    if d.base_tilt:
+        lines.append(f"base tilted by {d.base_tilt:.4g}°".replace("-", "−"))
+    if d.tip_radius:
+        lines.append(f"tip rounded by {d.tip_radius:.4g} mm")
+    if d.foot_height:
+        slot = f", T-slot {d.slot_width:.4g} mm wide" if d.slot_width else ""
+        lines.append(f"foot {d.foot_height:.4g} mm high{slot}")
+    return lines
+
+
+def _thicknesses(pen: Draughtsman, design: Design) -> None:
+    """Thicknesses of the front and the back wall."""
     d, em = design, pen.em
     x = _free_abscissa(design, em)
-    text = rf"$t_\mathrm{{flex}}$ = {d.front_thickness:g} mm"
+    text = rf"$t_\mathrm{{flex}}$ = {d.front_thickness:.4g} mm"
     pen.thickness((x, 0), (x, -d.front_thickness), (x, 1.5 * em), text, side="center")
     back = back_line(d, 0.0).direction
     outward = np.array([back[1], -back[0]])
     inner = cells(d)[-1][1:3].mean(axis=0)
     face = inner + outward * d.back_thickness
-    pen.thickness(
-        face,
-        inner,
-        face + outward * 2.6 * em + (0.8 * em, 0),
-        rf"$t_\mathrm{{back}}$ = {d.back_thickness:g} mm",
-    )
-    if not d.rib_count:
-        return
+    text = rf"$t_\mathrm{{back}}$ = {d.back_thickness:.4g} mm"
+    pen.thickness(face, inner, face + outward * 2.6 * em + (0.8 * em, 0), text)
+
+
+def _ribs(pen: Draughtsman, design: Design) -> None:
+    """Thickness of a rib in the middle, and the first one's angle from the line of reference."""
+    d, em = design, pen.em
     direction = rib_direction(d)
     rib = ribs(d)[d.rib_count // 2]
     along = 0.6
@@ -91,15 +212,16 @@ def _ribs(pen: Draughtsman, design: Design) -> None:
     half = normal * d.rib_thickness / 2
     elbow = centre + half + 1.3 * em * normal
     below = np.array([elbow[0], _back_height(d, elbow[0]) - 2.4 * em])
-    pen.thickness(centre + half, centre - half, below, rf"$t_\mathrm{{rib}}$ = {d.rib_thickness:g} mm")
+    text = rf"$t_\mathrm{{rib}}$ = {d.rib_thickness:.4g} mm"
+    pen.thickness(centre + half, centre - half, below, text)
     foot = ribs(d)[0][[0, 3]].mean(axis=0)
     reach = float(np.linalg.norm(ribs(d)[0][[1, 2]].mean(axis=0) - foot)) + d.back_thickness + 1.2 * em
-    text = rf"$L_\mathrm{{angle}}$ = {d.rib_angle:g}°".replace("-", "−")
-    pen.angle(foot, (0.0, -1.0), direction, reach, text, side="right" if d.rib_count == 1 else "center")
-    if rib_pitch(d) > 5 * em:
-        for number, corners in enumerate(ribs(d), start=1):
-            where = 0.68 * corners[[0, 3]].mean(axis=0) + 0.32 * corners[[1, 2]].mean(axis=0)
-            pen.text(where, str(number), size=6.5, va="center")
+    text = rf"$L_\mathrm{{angle}}$ = {d.rib_angle:.4g}°".replace("-", "−")
+    base = d.rib_reference == "base"
+    text += " from the base" if base else ""
+    first = base_line(d, 0.0).direction if base else (0.0, -1.0)
+    side = "left" if base else "right" if d.rib_count == 1 else "center"
+    pen.angle(foot, first, direction, reach, text, side=side)
 
 
 def _free_abscissa(design: Design, em: float) -> float:
@@ -120,11 +242,25 @@ def _back_height(design: Design, x: float) -> float:
     return float((x - design.height) * np.tan(apex_angle(design)))
 
 
-def _markers(pen: Draughtsman, design: Design) -> None:
-    points = design.markers
-    for number, (x, y) in enumerate(points, start=1):
-        pen.axes.add_patch(Circle((x, y), design.marker_radius, fc=MEASURED, ec="white", lw=0.4, zorder=4))
-        inward = -1 if y > _back_height(design, x) / 2 else 1
-        gap = design.marker_radius + 0.75 * pen.em
-        if len(points) <= 20:
-            pen.text((x, y + inward * gap), str(number), size=6.5, va="center", color=MEASURED)
+def _markers(pen: Draughtsman, finger: Finger) -> None:
+    """The markers and their numbers, each where the most room is left by outline, dimensions and others."""
+    em, radius = pen.em, finger.marker_radius
+    for place in finger.markers:
+        pen.axes.add_patch(Circle(tuple(place), radius, fc=MEASURED, ec="white", lw=0.4, zorder=4))
+    if len(finger.markers) > NUMBERED:
+        return
+    drawn, numbers = [finger.section.polygon.boundary, *pen.drawn()], [shapely.Point()]
+    turns = np.pi * (np.arange(DIRECTIONS) / DIRECTIONS * 2 - 0.5)
+    turns = turns[np.argsort(-np.abs(np.sin(turns)).round(9), kind="stable")]  # below and above come first
+    directions = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    steps = np.concatenate([(radius + gap * em) * directions for gap in GAPS])
+    others = shapely.buffer(shapely.points(finger.markers), radius)
+    for number, place in enumerate(finger.markers):
+        places, text = place + steps, str(number + 1)
+        half = 0.25 * em * len(text)
+        taken = shapely.union_all([*drawn, *np.delete(others, number)])
+        room = shapely.distance(shapely.points(places), taken)
+        room = np.fmin(room, shapely.distance(shapely.points(places), shapely.union_all(numbers)) - half)
+        found = places[int(np.minimum(room, ENOUGH * em).round(6).argmax())]
+        pen.text(found, text, size=6.5, va="center", color=MEASURED)
+        numbers.append(shapely.Point(found).buffer(half))

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
-from matplotlib.patches import Arc
-from matplotlib.text import Text
+from matplotlib.text import Annotation, Text
 
 from compare.figures.style import HALO, arrow
 from geometry.arrays import FloatArray
@@ -15,6 +15,15 @@ from geometry.figure import INK
 
 Point = Sequence[float] | FloatArray
 LINE = 0.6
+CENTRE_LINE = (0, (6, 2, 1, 2))
+"""Dashes and dots of a line that is no edge."""
+
+
+def upright(along: FloatArray) -> float:
+    """Turn of a text along a direction, shape (2,), that reads from below or from the right, degrees."""
+    angle = float(np.degrees(np.arctan2(along[1], along[0])))
+    turned = (angle + 90) % 180 - 90
+    return 90.0 if turned == -90 else turned
 
 
 @dataclass(frozen=True)
@@ -43,12 +52,10 @@ class Draughtsman:
         beyond = shift * (1 + 0.4 * self.em / length)
         tail, head = np.asarray(start) + shift, np.asarray(end) + shift
         for point in (start, end):
-            self._line(np.asarray(point) + shift * (0.3 * self.em / length), point + beyond)
+            self.line(np.asarray(point) + shift * (0.3 * self.em / length), point + beyond)
         self._arrow(tail, head, "<|-|>")
-        along = head - tail
-        angle = float(np.degrees(np.arctan2(along[1], along[0])))
-        upright = (angle + 90) % 180 - 90
-        label = self.text((tail + head) / 2, text, rotation=90 if upright == -90 else upright, va="center")
+        turn = upright(head - tail)
+        label = self.text((tail + head) / 2, text, rotation=turn, va="center", rotation_mode="anchor")
         label.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 1.2})
 
     def thickness(self, outer: Point, inner: Point, elbow: Point, text: str, *, side: str = "left") -> None:
@@ -65,7 +72,7 @@ class Draughtsman:
         normal = (near - far) / np.linalg.norm(near - far)
         self._arrow(near + 1.3 * self.em * normal, near, "-|>")
         self._arrow(far - 1.3 * self.em * normal, far, "-|>")
-        self._line(near + 1.3 * self.em * normal, elbow)
+        self.line(near + 1.3 * self.em * normal, elbow)
         gap = {"left": 0.25, "right": -0.25, "center": 0.0}[side] * self.em
         up = elbow[1] > near[1]
         vertical = ("bottom" if up else "top") if side == "center" else "center"
@@ -86,13 +93,11 @@ class Draughtsman:
         """
         centre = np.asarray(corner, dtype=np.float64)
         for direction in (first, second):
-            self._line(
-                centre, centre + np.asarray(direction) * (radius + 0.8 * self.em), style=(0, (6, 2, 1, 2))
-            )
-        low, high = sorted(float(np.degrees(np.arctan2(d[1], d[0]))) for d in (first, second))
-        self.axes.add_patch(
-            Arc(tuple(centre), 2 * radius, 2 * radius, theta1=low, theta2=high, color=INK, lw=LINE, zorder=5)
-        )
+            self.line(centre, centre + np.asarray(direction) * (radius + 0.8 * self.em), style=CENTRE_LINE)
+        start, end = (float(np.arctan2(direction[1], direction[0])) for direction in (first, second))
+        turns = np.linspace(start, end, 65)
+        arc = centre[:, None] + radius * np.stack([np.cos(turns), np.sin(turns)])
+        self.axes.plot(*arc, color=INK, linewidth=LINE, zorder=5)
         middle = np.asarray(first) + np.asarray(second)
         self.text(
             centre + middle / np.linalg.norm(middle) * (radius + 1.2 * self.em), text, va="top", ha=side
@@ -103,10 +108,21 @@ class Draughtsman:
         settings: dict[str, Any] = {"ha": "center", "color": INK, "zorder": 7, "path_effects": HALO} | options
         return self.axes.text(float(where[0]), float(where[1]), text, **settings)
 
-    def _line(self, start: Point, end: Point, style: Any = "-") -> None:
+    def line(self, start: Point, end: Point, style: Any = "-") -> None:
+        """A thin line between two points, mm."""
         self.axes.plot(
             [start[0], end[0]], [start[1], end[1]], color=INK, linewidth=LINE, linestyle=style, zorder=5
         )
+
+    def drawn(self) -> list[shapely.Geometry]:
+        """Lines, arrows and texts so far, the texts as discs, mm."""
+        found: list[shapely.Geometry] = [shapely.LineString(line.get_xydata()) for line in self.axes.lines]
+        for text in self.axes.texts:
+            if isinstance(text, Annotation) and text.arrow_patch is not None:
+                found.append(shapely.LineString([text.xyann, text.xy]))
+            else:
+                found.append(shapely.Point(text.get_position()).buffer(0.7 * self.em))
+        return found
 
     def _arrow(self, tail: Point, head: Point, style: str) -> None:
         arrow(self.axes, tail, head, style=f"{style},head_width=0.12,head_length=0.3", width=LINE)

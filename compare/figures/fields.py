@@ -107,7 +107,7 @@ def draw_field(comparison: Comparison, quantity: Quantity) -> Figure:
     ordered = [reference, *(each for each in comparison.evaluations if each is not reference)]
     columns = 1 if len(ordered) == 1 else 2
     width = (WIDTH - MARGIN * (columns + 1)) / columns
-    extent = body.field_extent(mesh)
+    extent = body.field_extent(mesh, width)
     height = width * extent.height / extent.width
     scale = field_scale(quantity, mesh, reference)
     differences = difference_scale(quantity, mesh, ordered, reference)
@@ -173,7 +173,7 @@ def draw_excess(comparison: Comparison) -> Figure | None:
     columns = min(len(entries), 2)
     rows = -(-len(entries) // columns)
     width = (WIDTH - MARGIN * (columns + 1)) / columns
-    extent = body.field_extent(mesh)
+    extent = body.field_extent(mesh, width)
     height = width * extent.height / extent.width
     scale = excess_scale(mesh, [certificate.density for _, certificate in entries])
     total = HEAD + rows * (PANEL_TITLE + height) + FOOT

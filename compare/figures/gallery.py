@@ -18,7 +18,6 @@ from compare.figures.mesh_drawing import draw_mesh, mesh_numbers
 from compare.figures.overlay import draw_overlay
 from geometry.errors import UserError
 from geometry.figure import Figure
-from geometry.finger.design import Design
 
 
 class Drawing(NamedTuple):
@@ -62,9 +61,9 @@ def marker_errors(comparison: Comparison) -> Drawing:
         "Errors at the markers",
         f"Absolute difference between each solver’s displacement and the {observations.label} one, "
         f"for both components, on one scale, which a solver that did not converge may exceed; markers "
-        f"are numbered from base to tip. Full bars: at a marker that the solver was not given, predicted "
-        f"from all others if it was given those. Hollow bars: training errors.{unseen} {_given(comparison)}"
-        f"{_simulated(comparison)}",
+        f"are numbered as in the drawing of the design. Full bars: at a marker that the solver was "
+        f"not given, predicted from all others if it was given those. Hollow bars: training errors."
+        f"{unseen} {_given(comparison)}{_simulated(comparison)}",
     )
 
 
@@ -153,13 +152,14 @@ def losses(comparison: Comparison) -> Drawing | None:
 
 
 def design(comparison: Comparison) -> Drawing:
-    """The finger with its dimensions if it has parameters, else with its axes."""
+    """The finger with its dimensions."""
     finger = comparison.design
+    symbols = " under the paper’s symbols" if any(symbol for _, symbol, _ in finger.facts()) else ""
     return Drawing(
-        draw_design(finger) if isinstance(finger, Design) else finger.plot(),
+        draw_design(finger),
         "Design",
-        f"The finger “{comparison.design.name}”, to scale, with its dimensions under the paper’s symbols, "
-        f"the clamped base, the contact and the markers.",
+        f"The finger “{finger.name}”, to scale, with its dimensions{symbols}, the clamped base (hatched), "
+        f"the contact (orange) and the numbered markers.",
     )
 
 

@@ -49,7 +49,7 @@ def draw_marker_errors(comparison: Comparison) -> Figure:
                 if column == 0:
                     axes.set_title(evaluation.label_at_markers, size=8.5, pad=2, weight="bold")
                 if row == len(evaluations) - 1:
-                    axes.set_xlabel("marker (1 is nearest the base)")
+                    axes.set_xlabel("marker, by its number in the drawing")
                 else:
                     axes.tick_params(labelbottom=False)
     return drawn

@@ -1,4 +1,4 @@
-"""A picture of the mesh: the whole, and close-ups where it is finest and where a rib meets a wall."""
+"""A picture of the mesh: the whole, and close-ups at the contact and at a re-entrant corner."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -7,7 +7,7 @@ from matplotlib.patches import Rectangle
 
 from compare.figures import body
 from compare.figures.canvas import Extent
-from compare.figures.style import axes_at, heading
+from compare.figures.style import HALO, axes_at, heading
 from geometry.arrays import FloatArray
 from geometry.figure import CONTACT, INK, MEASURED, WIDTH, Figure, figure
 from geometry.mesh.boundary import boundary_edges
@@ -15,6 +15,8 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 
 MARGIN = 0.1
 HEAD, INSET_TITLE = 0.48, 0.24
+TALLEST = 4.2
+"""Largest height of the whole mesh, inches."""
 LINE = "#3d5a80"
 
 
@@ -40,11 +42,11 @@ def quality(mesh: TriangleMesh) -> FloatArray:
     return np.asarray((b + c - a) * (c + a - b) * (a + b - c) / (a * b * c))
 
 
-def inner_corner(mesh: TriangleMesh, near: float) -> FloatArray:
-    """The re-entrant corner of a cavity with the abscissa nearest to `near`, shape (2,), mm.
+def corner_near(mesh: TriangleMesh, point: FloatArray) -> tuple[str, FloatArray]:
+    """Name and place, shape (2,), mm, of the re-entrant corner nearest to a point.
 
-    Re-entrant means that the body fills more than a straight angle around the node; where there is none, any
-    node of the boundary will do.
+    Re-entrant means that the body fills more than 200 degrees around the node. Where there is none, it is the
+    nearest end of the base, or of one of its parts.
     """
     corners = mesh.points[mesh.triangles]
     angle = np.zeros(len(mesh.points))
@@ -53,50 +55,30 @@ def inner_corner(mesh: TriangleMesh, near: float) -> FloatArray:
         cross = ahead[:, 0] * behind[:, 1] - ahead[:, 1] * behind[:, 0]
         np.add.at(angle, mesh.triangles[:, i], np.arctan2(cross, (ahead * behind).sum(axis=1)))
     boundary = np.unique(boundary_edges(mesh.triangles))
-    sharp = boundary[angle[boundary] > np.radians(200)]
-    candidates = mesh.points[sharp if len(sharp) else boundary]
-    return np.asarray(candidates[np.abs(candidates[:, 0] - near).argmin()])
+    sharp = mesh.points[boundary[angle[boundary] > np.radians(200)]]
+    name = "inner corner" if len(sharp) else "end of the base"
+    places = sharp if len(sharp) else np.concatenate([line[[0, -1]] for line in body.base_lines(mesh)])
+    return name, np.asarray(places[np.linalg.norm(places - point, axis=1).argmin()])
 
 
 def draw_mesh(mesh: TriangleMesh) -> Figure:
-    """Draw the whole mesh and two close-ups: the contact, and a joint of a rib and a wall."""
-    whole = Extent.around(mesh.points, margin=0.02 * float(np.ptp(mesh.points[:, 0])))
+    """Draw the whole mesh and two close-ups: the contact, and a re-entrant corner or an end of the base."""
     width = WIDTH - 2 * MARGIN
+    size = float(np.ptp(mesh.points, axis=0).max())
+    whole = body.panel_extent(mesh.points, width, margin=0.025 * size, tallest=TALLEST)
     height = width * whole.height / whole.width
     inset_width, inset_height = (WIDTH - 3 * MARGIN) / 2, 1.5
-    contact = mesh.points[np.unique(mesh.boundary("contact"))]
-    span = max(2.6 * float(np.ptp(contact[:, 0])), 0.055 * whole.width)
-    middle = contact.mean(axis=0)
-    joint = inner_corner(mesh, float(middle[0]) + 2 * span)
-    ratio = inset_height / inset_width
-    windows = [
-        ("A: contact", _window(middle - (0, 0.33 * span * ratio), span, ratio)),
-        ("B: inner corner", _window(joint, 1.4 * span, ratio)),
-    ]
+    windows = _close_ups(mesh, inset_height / inset_width)
     numbers = mesh_numbers(mesh)
     note = f"{numbers['size']}; edges {numbers['edges']}; quality: {numbers['quality']}"
     with figure(HEAD + height + INSET_TITLE + inset_height + MARGIN) as drawn:
         heading(drawn, "Mesh, shared by every solver", note)
         axes = axes_at(drawn, (MARGIN, HEAD, width, height))
         _draw(axes, mesh, whole, 0.12)
-        body.clamp(axes, mesh.points[mesh.boundary("base").ravel()])
+        body.clamp(axes, body.base_lines(mesh), size=body.hatch_size(mesh.points))
         body.scale_bar(axes, whole)
-        for number, (title, window) in enumerate(windows):
-            corner = (window.left, window.bottom)
-            axes.add_patch(
-                Rectangle(corner, window.width, window.height, fill=False, ec=MEASURED, lw=0.9, zorder=5)
-            )
-            crowded = window.right > whole.right - 0.04 * whole.width
-            axes.annotate(
-                title[0],
-                (window.left if crowded else window.right, window.bottom),
-                xytext=(-2 if crowded else 2, 0),
-                textcoords="offset points",
-                ha="right" if crowded else "left",
-                color=MEASURED,
-                weight="bold",
-                zorder=6,
-            )
+        for number, (letter, (title, window)) in enumerate(zip("AB", windows.items(), strict=True)):
+            _frame(axes, whole, window, letter)
             left = MARGIN + number * (inset_width + MARGIN)
             inset = axes_at(drawn, (left, HEAD + height + INSET_TITLE, inset_width, inset_height))
             _draw(inset, mesh, window, 0.4)
@@ -104,9 +86,45 @@ def draw_mesh(mesh: TriangleMesh) -> Figure:
             inset.tick_params(bottom=False, left=False, labelbottom=False, labelleft=False)
             for spine in inset.spines.values():
                 spine.set(visible=True, color=MEASURED, linewidth=0.9)
-            inset.set_title(title, size=8, pad=3)
-            body.scale_bar(inset, window)
+            inset.set_title(f"{letter}: {title}, {window.width:.2g} mm across", size=8, pad=3)
     return drawn
+
+
+def _close_ups(mesh: TriangleMesh, ratio: float) -> dict[str, Extent]:
+    """The windows of the close-ups, `ratio` times as high as wide, by their titles."""
+    contact = mesh.points[np.unique(mesh.boundary("contact"))]
+    span = max(2.6 * float(np.ptp(contact[:, 0])), 0.055 * float(np.ptp(mesh.points, axis=0).max()))
+    middle = contact.mean(axis=0)
+    name, joint = corner_near(mesh, middle + np.array([2 * span, 0]))
+    return {
+        "contact": _window(middle - (0, 0.33 * span * ratio), span, ratio),
+        name: _window(_inward(mesh, joint, 1.4 * span, ratio), 1.4 * span, ratio),
+    }
+
+
+def _inward(mesh: TriangleMesh, middle: FloatArray, width: float, ratio: float) -> FloatArray:
+    """The middle of a window, moved so that at most a third of it lies beyond the body's bounds."""
+    room = np.array([width, width * ratio]) / 6
+    low, high = mesh.points.min(axis=0) + room, mesh.points.max(axis=0) - room
+    return np.where(low < high, np.clip(middle, low, high), (low + high) / 2)
+
+
+def _frame(axes: Axes, whole: Extent, window: Extent, letter: str) -> None:
+    """A frame around a window, with its letter beside it."""
+    corner = (window.left, window.bottom)
+    axes.add_patch(Rectangle(corner, window.width, window.height, fill=False, ec=MEASURED, lw=0.9, zorder=5))
+    crowded = window.right > whole.right - 0.04 * whole.width
+    axes.annotate(
+        letter,
+        (window.left if crowded else window.right, window.bottom),
+        xytext=(-2 if crowded else 2, 0),
+        textcoords="offset points",
+        ha="right" if crowded else "left",
+        color=MEASURED,
+        weight="bold",
+        path_effects=HALO,
+        zorder=6,
+    )
 
 
 def _window(middle: FloatArray, width: float, ratio: float) -> Extent:

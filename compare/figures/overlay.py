@@ -21,15 +21,21 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 MARGIN = 0.12
 HEAD, PANEL_TITLE, FOOT = 0.55, 0.27, 0.48
 """Heights in inches: heading and legend; the name above a panel; the colour bar."""
+TALLEST = 4.0
+"""Largest height of a panel, inches."""
+TALL = 0.7
+"""Height over length from which a body has its panels in two columns."""
 
 
 def draw_overlay(comparison: Comparison) -> Figure:
     """Draw every solver's deformed finger, one panel each, at true scale."""
     mesh, evaluations = comparison.mesh, comparison.evaluations
-    extent = overlay_extent(comparison)
-    columns = 1 if len(evaluations) <= 3 else 2
+    across, up = np.ptp(mesh.points, axis=0)
+    columns = 1 if len(evaluations) <= 3 and up < TALL * across else 2
+    columns = min(columns, len(evaluations))
     rows = -(-len(evaluations) // columns)
     width = (WIDTH - MARGIN * (columns + 1)) / columns
+    extent = overlay_extent(comparison, width)
     height = width * extent.height / extent.width
     high = max(float(_magnitude(mesh, evaluation).max()) for evaluation in evaluations)
     scale = Scale(0.0, high or 1.0, mpl.colormaps["viridis"])
@@ -58,10 +64,12 @@ def draw_overlay(comparison: Comparison) -> Figure:
     return drawn
 
 
-def overlay_extent(comparison: Comparison) -> Extent:
-    """The extent of a panel: the body before and after in every converged solution, and all markers, mm."""
+def overlay_extent(comparison: Comparison, width: float) -> Extent:
+    """The extent of a panel, `width` inches wide, mm.
+
+    It shows the body before and after in every converged solution, and all markers.
+    """
     mesh, observations = comparison.mesh, comparison.observations
-    span = float(np.ptp(mesh.points[:, 0]))
     seen = observations.visible
     clouds = [mesh.points, observations.points[seen] + observations.displacements[seen]]
     clouds += [
@@ -69,8 +77,8 @@ def overlay_extent(comparison: Comparison) -> Extent:
         for evaluation in comparison.evaluations
         if evaluation.converged
     ]
-    tight = Extent.around(*clouds, margin=0.03 * span)
-    return tight._replace(bottom=tight.bottom - 0.02 * span)
+    margin = 0.03 * float(np.ptp(mesh.points, axis=0).max())
+    return body.panel_extent(np.concatenate(clouds), width, margin=margin, tallest=TALLEST)
 
 
 def _magnitude(mesh: TriangleMesh, evaluation: Evaluation) -> FloatArray:
@@ -86,7 +94,7 @@ def _panel(axes: Axes, canvas: Canvas, scale: Scale, comparison: Comparison, eva
     body.outline(axes, edges, mesh.points, colour="#9a9a9a", width=0.6, zorder=0)
     body.show(axes, canvas, scale.paint(_magnitude(mesh, evaluation)), deformed)
     body.outline(axes, edges, deformed, width=0.4)
-    body.clamp(axes, mesh.points[mesh.boundary("base").ravel()])
+    body.clamp(axes, body.base_lines(mesh), size=body.hatch_size(mesh.points))
     seen = observations.visible
     observed = observations.points[seen] + observations.displacements[seen]
     computed = observations.points + evaluation.marker_displacement
@@ -97,7 +105,7 @@ def _panel(axes: Axes, canvas: Canvas, scale: Scale, comparison: Comparison, eva
     errors = marker_errors(evaluation, observations)
     axes.set_title(evaluation.label_at_markers, size=9, pad=3, weight="bold")
     note = f"MAE{', given' * evaluation.in_sample}  u {errors.mae_u:.3f} mm,  v {errors.mae_v:.3f} mm"
-    axes.text(0.01, 0.01, note, size=7.5, color=MUTED, transform=axes.transAxes)
+    body.write_note(axes, canvas.extent, note)
 
 
 def _motion(axes: Axes, comparison: Comparison, evaluation: Evaluation) -> None:
@@ -108,8 +116,11 @@ def _motion(axes: Axes, comparison: Comparison, evaluation: Evaluation) -> None:
         start = mesh.points[nodes].mean(axis=0)
         arrow(axes, start, start + evaluation.node_displacement[nodes].mean(axis=0))
         return
-    middle = np.ptp(mesh.points[nodes, 0]) / 2 + mesh.points[nodes, 0].min()
-    start = np.array([middle if load.position is None else load.position, 0.0])
+    x = (mesh.points[nodes, 0].min() + mesh.points[nodes, 0].max()) / 2
+    front = mesh.points[np.unique(mesh.boundary("front"))]
+    front = front[front[:, 0].argsort()]
+    x = x if load.position is None else load.position
+    start = np.array([x, np.interp(x, *front.T)])
     end = start + load.values
     centre = (end[0], end[1] + load.radius)  # it can lie outside the picture
     axes.add_patch(Circle(centre, load.radius, fill=False, color=MUTED, lw=0.8, zorder=3))

@@ -54,7 +54,15 @@ def render(comparison: Comparison, pictures: Sequence[Picture], provenance: Mapp
         presets=text.preset_meanings(comparison.settings),
         left_out=left_out_remarks(comparison.left_out),
         design_rows=design.facts(),
-        paper_rows=[(symbol, value) for _, symbol, value in design.facts() if symbol],
+        headline=text.headline(design),
+        has_symbols=any(symbol for _, symbol, _ in design.facts()),
+        support=text.support_sentence(design),
+        regions={
+            name
+            for evaluation in comparison.evaluations
+            if evaluation.certificate
+            for name in evaluation.certificate.regions
+        },
         material_rows=text.material_rows(
             comparison.material,
             {evaluation.label: evaluation.law for evaluation in comparison.evaluations},

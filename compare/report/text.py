@@ -50,7 +50,7 @@ def load_sentence(load: Load, design: Finger) -> str:
         "point": "The displacement of one point, the contact’s middle, is prescribed",
         "patch": f"Every point of the {width} has the prescribed displacement",
         "cylinder": f"A rigid cylinder of radius {load.radius or 0:g} mm presses without friction where it "
-        "touches the front face, and moves by the prescribed displacement",
+        "touches the front, and moves by the prescribed displacement",
     }[load.kind]
     parts = [
         f"{name} is free"
@@ -60,8 +60,25 @@ def load_sentence(load: Load, design: Finger) -> str:
     ]
     moved = ", ".join(parts).replace(" ", "\N{NO-BREAK SPACE}").replace(",\N{NO-BREAK SPACE}", ", ")
     middle = design.contact_abscissa if load.position is None else load.position
-    about = f"{'from' if load.kind == 'cylinder' else 'about'} x = {middle:g} mm on the front face"
+    about = f"{'from' if load.kind == 'cylinder' else 'about'} x = {middle:g} mm on the front"
     return f"{where}: {moved}, {about} (load “{load.kind}”)."
+
+
+def headline(design: Finger) -> list[tuple[str, str]]:
+    """The finger in a line: symbols of the paper with values, or else values alone."""
+    if paper := [(symbol, value) for _, symbol, value in design.facts() if symbol]:
+        return paper
+    (width, height), count = np.ptp(design.section.bounds, axis=0), len(design.section.cavities)
+    cavities = "no cavity" if count == 0 else "1 cavity" if count == 1 else f"{count} cavities"
+    return [("", f"{width:.4g} mm by {height:.4g} mm"), ("", f"depth {design.depth:.4g} mm"), ("", cavities)]
+
+
+def support_sentence(design: Finger) -> str:
+    """Sentence on the clamped base."""
+    pieces = list(design.section.named("base"))
+    length = sum(float(loop.lengths[which]) for loop, which in pieces)
+    parts = "" if len(pieces) == 1 else f" in {len(pieces)} pieces"
+    return f"The base is clamped ({length:.4g} mm{parts}); all else is free of traction."
 
 
 def source_sentence(observations: Observations) -> str:

@@ -60,10 +60,10 @@ def mesh() -> TriangleMesh:
         points=np.stack([x.ravel(), y.ravel()], axis=1),
         triangles=np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]),
         boundaries={
-            "base": np.stack([number[:-1, 0], number[1:, 0]], axis=1),
-            "front": np.stack([top[:-1], top[1:]], axis=1),
+            "base": np.stack([number[1:, 0], number[:-1, 0]], axis=1),
+            "front": np.stack([top[1:], top[:-1]], axis=1),
             "back": np.stack([number[0, :-1], number[0, 1:]], axis=1),
-            "contact": np.stack([top[10:14], top[11:15]], axis=1),
+            "contact": np.stack([top[11:15], top[10:14]], axis=1),
         },
         marker_nodes=number[6, [4, 12, 20]],
         contact_node=int(top[12]),

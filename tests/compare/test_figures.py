@@ -176,7 +176,7 @@ def test_a_field_of_half_the_size_has_the_colour_of_half_the_scale(
 def test_the_overlay_shows_the_whole_of_every_solution_that_converged(
     mesh: TriangleMesh, pinn: Evaluation, failed: Evaluation, compared: Callable[..., Comparison]
 ) -> None:
-    extent = overlay_extent(compared(pinn, failed))
+    extent = overlay_extent(compared(pinn, failed), 5.0)
     lowest = (mesh.points + pinn.node_displacement)[:, 1].min()
     assert extent.bottom < lowest
     assert extent.bottom > (mesh.points + failed.node_displacement)[:, 1].min()

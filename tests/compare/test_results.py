@@ -23,7 +23,7 @@ CERTIFICATE = {
     **dict.fromkeys(("energy_norm_error", "weak_residual", "imbalance", "missed", "base"), Real),
     "misses_energy": bool,
     "load": list,
-    "regions": {"corners": REGION, "contact": REGION, "walls": REGION},
+    "regions": {"corners": REGION, "contact": REGION, "rest": REGION},
 }
 DIFFERENCES = {
     "rel_l2_displacement": Real,
