@@ -21,6 +21,7 @@ BENCHMARKS = {
     "stress": "tracker_stress",
     "live": "live_tracking",
     "localisation": "localisation",
+    "readings": "readings",
 }
 """Names and modules; the modules' docstrings have descriptions and times."""
 
