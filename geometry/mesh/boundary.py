@@ -2,7 +2,7 @@
 
 import numpy as np
 from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import connected_components, depth_first_order
 from scipy.spatial import cKDTree
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
@@ -10,8 +10,16 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 
 CORNER_ANGLE = np.radians(10.0)
 """Minimum turn of the boundary at a corner."""
+ARC_ANGLE = np.radians(60.0)
+"""Maximum turn at a point of an arc."""
 FACING = -0.9
-"""Maximum cosine of the angle between the normals of two edges that face each other."""
+"""Maximum cosine of the angle between the normals of two edges that face each other across a gap."""
+PARALLEL = -np.cos(np.radians(15.0))
+"""Maximum cosine for two edges of one closed boundary on both sides of a wall; sides of a taper are none."""
+CURVED = 1e-6
+"""Deviation of a face from the line through its ends, relative to its length, from which on it is curved."""
+LIKE = 0.5
+"""Least turn of the neighbours of a point of an arc, relative to its own."""
 
 
 def boundary_edges(triangles: IntArray) -> IntArray:
@@ -28,8 +36,11 @@ def boundary_loops(mesh: TriangleMesh) -> list[IntArray]:
     local = local.reshape(-1, 2)
     graph = coo_matrix((np.ones(len(local)), (local[:, 0], local[:, 1])), shape=(len(nodes), len(nodes)))
     count, label = connected_components(graph, directed=False)
-    loops = [nodes[label == which] for which in range(count)]
-    return sorted(loops, key=lambda loop: float(mesh.points[loop, 0].min()))
+    start, end = (mesh.points[edges[:, side]] for side in range(2))
+    area = np.bincount(label[local[:, 0]], weights=_cross(start, end))
+    loops = [(which != area.argmax(), nodes[label == which]) for which in range(count)]
+    loops.sort(key=lambda entry: (entry[0], float(mesh.points[entry[1], 0].min())))
+    return [loop for _, loop in loops]
 
 
 def mean_thickness(mesh: TriangleMesh) -> float:
@@ -42,8 +53,10 @@ def mean_thickness(mesh: TriangleMesh) -> float:
 def boundary_widths(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
     """Boundary points (b, 2), mm, and the width there, (b,), mm.
 
-    The width is the distance to the nearest other closed boundary, across the wall, or the width of the
-    cavity beside it if that is less; infinite where there is neither.
+    The width is the least of three distances: to the nearest other closed boundary, across the wall; to an
+    edge of the same closed boundary that faces it through the body, as beside a notch; and to one that faces
+    it outside, across a narrow cavity or slot. The last two are looked for within the mean thickness. It is
+    infinite where there is none.
     """
     loops = boundary_loops(mesh)
     edges = mesh.points[boundary_edges(mesh.triangles)]
@@ -55,24 +68,34 @@ def boundary_widths(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
         own = loop_of == number
         if not own.all():
             widths[own], _ = cKDTree(edges[~own, 0]).query(middles[own])
-        widths[own] = np.minimum(widths[own], _open_distance(edges[own]))
-    return middles, widths
+    return middles, np.minimum(widths, _facing_distance(edges, loop_of, mean_thickness(mesh)))
 
 
-def _open_distance(edges: FloatArray) -> FloatArray:
-    """Distance from each edge (k, 2, 2) of a closed boundary to one that faces it outside, (k,), mm."""
+def _facing_distance(edges: FloatArray, loop_of: IntArray, reach: float) -> FloatArray:
+    """Distance from the middle of each edge (k, 2, 2) to one of its loop that faces it, (k,), mm.
+
+    Both through the body and outside; infinite beyond `reach`, mm.
+    """
     start, along = edges[:, 0], edges[:, 1] - edges[:, 0]
     middles, normals = edges.mean(axis=1), np.column_stack([along[:, 1], -along[:, 0]])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    offset = start[None] - middles[:, None]
-    # middle + t normal = start + s along, for every pair of a middle and an edge
-    determinant = _cross(normals[:, None], along[None])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = _cross(offset, along[None]) / determinant
-        s = _cross(offset, normals[:, None]) / determinant
-    facing = normals @ normals.T < FACING
-    hit = facing & (s >= 0) & (s <= 1) & (t > 1e-9) & np.isfinite(t)
-    return np.asarray(np.where(hit, t, np.inf).min(axis=1))
+    lengths = np.linalg.norm(along, axis=1)
+    normals /= lengths[:, None]
+    tree = cKDTree(middles)
+    pairs = tree.query_pairs(reach + 0.5 * float(lengths.max()), output_type="ndarray")
+    one, other = np.concatenate([pairs, pairs[:, ::-1]]).T
+    cosine = (normals[one] * normals[other]).sum(axis=1)
+    kept = (loop_of[one] == loop_of[other]) & (cosine < FACING)
+    one, other, cosine = one[kept], other[kept], cosine[kept]
+    # middle + t normal = start + s along
+    offset = start[other] - middles[one]
+    determinant = _cross(normals[one], along[other])
+    t = _cross(offset, along[other]) / determinant
+    s = _cross(offset, normals[one]) / determinant
+    through_body = (t < -1e-9) & (cosine < PARALLEL)
+    hit = (s >= 0) & (s <= 1) & ((t > 1e-9) | through_body)
+    found = np.full(len(edges), np.inf)
+    np.minimum.at(found, one[hit], np.abs(t[hit]))
+    return np.where(found <= reach, found, np.inf)
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -85,10 +108,11 @@ def singular_points(mesh: TriangleMesh) -> FloatArray:
     return np.concatenate([sharp, round_])
 
 
-def re_entrant_points(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray, float]:
-    """Re-entrant corners and the base's ends (s, 2), points of re-entrant arcs (a, 2), their radius, all mm.
+def re_entrant_points(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Re-entrant corners and ends of the base's pieces (s, 2), points of re-entrant arcs (a, 2), their radii.
 
-    The radius is the median over the arcs, NaN where there are none.
+    All in mm, the radii of shape (a,). A point of an arc is one whose neighbour turns too. Arcs in finer
+    steps than `CORNER_ANGLE` count where their radius is below the mean thickness.
     """
     edges = boundary_edges(mesh.triangles)
     follows = dict(edges.tolist())
@@ -96,16 +120,18 @@ def re_entrant_points(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray, float
     nodes = np.array(list(follows))
     after, before = (np.array([step[node] for node in nodes]) for step in (follows, comes_before))
     into, out = mesh.points[nodes] - mesh.points[before], mesh.points[after] - mesh.points[nodes]
-    turn = np.arctan2(_cross(into, out), (into * out).sum(axis=1))
     # The body is on the left of its boundary: a right turn opens it beyond a straight angle.
-    bent = turn < -CORNER_ANGLE
-    is_bent = dict(zip(nodes.tolist(), bent.tolist(), strict=True))
-    arc = bent & np.array([is_bent[a] or is_bent[b] for a, b in zip(after, before, strict=True)])
+    turn = -np.arctan2(_cross(into, out), (into * out).sum(axis=1))
+    row = dict(zip(nodes.tolist(), range(len(nodes)), strict=True))
+    beside = np.array([[row[a], row[b]] for a, b in zip(after.tolist(), before.tolist(), strict=True)])
     lengths = 0.5 * (np.linalg.norm(into, axis=1) + np.linalg.norm(out, axis=1))
-    radius = float(np.median(lengths[arc] / -turn[arc])) if arc.any() else float("nan")
+    bent = turn > CORNER_ANGLE
+    arc = bent & (turn < ARC_ANGLE) & bent[beside].any(axis=1)
+    radii = lengths / np.where(turn > 0, turn, np.nan)
+    tight = ~bent & (radii < mean_thickness(mesh)) & (turn[beside].min(axis=1) > LIKE * turn)
     base, times = np.unique(mesh.boundary("base"), return_counts=True)
     sharp = np.concatenate([mesh.points[nodes[bent & ~arc]], mesh.points[base[times == 1]]])
-    return sharp, mesh.points[nodes[arc]], radius
+    return sharp, mesh.points[nodes[arc | tight]], radii[arc | tight]
 
 
 def walls_and_ribs(mesh: TriangleMesh) -> dict[str, BoolArray]:
@@ -115,11 +141,12 @@ def walls_and_ribs(mesh: TriangleMesh) -> dict[str, BoolArray]:
     the base and the one that reaches farthest are base and tip, the others are ribs.
 
     Returns:
-        Masks of shape (t,), without any triangle where the finger has no such part.
+        Masks of shape (t,), without any triangle where the finger has no such part, as without cavities or
+        without a boundary called `back`.
     """
     inner = [mesh.points[loop] for loop in boundary_loops(mesh)[1:]]
     none = np.zeros(len(mesh.triangles), dtype=bool)
-    if not inner:
+    if not inner or "back" not in mesh.boundaries:
         return {"front": none, "back": none, "rib": none}
     cavities = np.concatenate(inner)
     centroids = mesh.at_centroids().points
@@ -163,9 +190,39 @@ def elements_through_thickness(mesh: TriangleMesh) -> int:
 
 
 def _distance(mesh: TriangleMesh, face: str, points: FloatArray) -> FloatArray:
-    """Distance from the straight line through a face, shape (n,), mm."""
+    """Distance from the straight line through a face, shape (n,), mm; from its nodes where it is curved."""
     nodes = mesh.points[mesh.boundary(face).ravel()]
     start, end = nodes[nodes[:, 0].argmin()], nodes[nodes[:, 0].argmax()]
     along = (end - start) / np.linalg.norm(end - start)
-    away = points - start
-    return np.asarray(np.abs(along[0] * away[:, 1] - along[1] * away[:, 0]))
+    if np.abs(_cross(along, nodes - start)).max() > CURVED * np.linalg.norm(end - start):
+        return np.asarray(cKDTree(nodes).query(points)[0])
+    return np.asarray(np.abs(_cross(along, points - start)))
+
+
+def evenly_spaced_points(mesh: TriangleMesh, name: str, count: int) -> FloatArray:
+    """Points at equal distances along all pieces of a named boundary, both ends included, (count, 2), mm."""
+    places, corners, travelled = [], [], 0.0
+    for path in _paths(mesh.boundary(name)):
+        points = mesh.points[path]
+        steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        places.append(travelled + np.append(0.0, steps.cumsum()))
+        corners.append(points)
+        travelled = places[-1][-1]
+    along, points = np.concatenate(places), np.concatenate(corners)
+    wanted = np.linspace(0.0, travelled, count)
+    return np.column_stack([np.interp(wanted, along, points[:, axis]) for axis in range(2)])
+
+
+def _paths(edges: IntArray) -> list[IntArray]:
+    """The nodes along every connected piece of edges (k, 2); a closed piece ends where it starts."""
+    nodes, local, degree = np.unique(edges, return_inverse=True, return_counts=True)
+    one, other = local.reshape(-1, 2).T
+    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(len(nodes), len(nodes))).tocsr()
+    pieces, label = connected_components(graph, directed=False)
+    paths = []
+    for piece in range(pieces):
+        here = np.flatnonzero(label == piece)
+        ends = here[degree[here] == 1]
+        order, _ = depth_first_order(graph, (ends if len(ends) else here)[0], directed=False)
+        paths.append(nodes[order if len(ends) else np.append(order, order[0])])
+    return paths

@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from geometry.arrays import FloatArray
+from geometry.mesh.boundary import evenly_spaced_points
 from geometry.mesh.point_location import LocatedPoints
 from geometry.observations import Observations
 from solvers.assimilation.misfit import (
@@ -127,9 +128,7 @@ class GaussianProcessSolver:
         """Points at rest, shape (b, 2), mm."""
         if not self.clamp:
             return np.zeros((0, 2))
-        points = problem.mesh.points[problem.mesh.boundary("base").ravel()]
-        low, high = points[points[:, 1].argmin()], points[points[:, 1].argmax()]
-        return np.asarray(np.linspace(low, high, BASE_POINTS))
+        return evenly_spaced_points(problem.mesh, "base", BASE_POINTS)
 
 
 @dataclass(frozen=True, eq=False)

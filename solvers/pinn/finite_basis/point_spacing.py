@@ -12,24 +12,33 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.pinn.finite_basis.load_conditions import contact_end_points
 from solvers.problem import Problem, contact_ends, contact_nodes
 
+NARROW = 0.6
+"""Spacing in places of less than half the largest width, relative to that by their width.
+
+Windows beside a narrow slit reach across it, where the displacement jumps: with 1 the error of `pinn-std` on
+a bar with a slit of a twenty-fifth of its height was measured to be 0.7 %, with 0.6 it was 0.1 %.
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class PointSpacing:
     """Distance between neighbouring points: that at the nearest boundary, less near singularities.
 
-    At distance d from a singularity with spacing s it is at most s + growth * d.
+    At distance d from a singularity with spacing s it is at most s + growth * d. Places of less than half the
+    largest width count as singularities too, so that the spacing has no large jumps: a wide window over many
+    narrow ones would overlap them all.
 
     Attributes:
         boundary: Points of the boundary, shape (b, 2), mm.
         walls: The spacing there, shape (b,), mm.
         singularities: Points, shape (s, 2), mm, where the strain is singular or nearly so, and the spacing
-            there, mm, one entry a kind.
+            there, (s,), mm, one entry a kind.
         growth: Growth of the spacing per distance from a singularity.
     """
 
     boundary: FloatArray
     walls: FloatArray
-    singularities: tuple[tuple[FloatArray, float], ...]
+    singularities: tuple[tuple[FloatArray, FloatArray], ...]
     growth: float
 
     @classmethod
@@ -46,31 +55,40 @@ class PointSpacing:
         mesh = problem.mesh
         mean = mean_thickness(mesh)
         boundary, widths = boundary_widths(mesh)
-        sharp, round_, radius = re_entrant_points(mesh)
+        sharp, round_, radii = re_entrant_points(mesh)
         if problem.load.kind == "patch":
             sharp = np.concatenate([sharp, contact_end_points(problem)])
         left, right = contact_ends(problem)
-        kinds = [
-            (sharp, corner * mean),
-            (mesh.points[contact_nodes(problem)], wall * (right - left)),
-        ]
-        if len(round_):
-            kinds.append((round_, max(wall * radius, corner * mean)))
-        return cls(boundary, wall * np.minimum(widths, mean), tuple(kinds), growth)
+        walls = wall * np.minimum(widths, mean)
+        contact = mesh.points[contact_nodes(problem)]
+        kinds = (
+            (sharp, np.full(len(sharp), corner * mean)),
+            (contact, np.full(len(contact), wall * (right - left))),
+            (round_, np.maximum(wall * radii, corner * mean)),
+            *_by_octaves(boundary, walls),
+        )
+        present = tuple((points, spacing) for points, spacing in kinds if len(points))
+        return cls(boundary, np.maximum(walls, 0.5 * walls.max()), present, growth)
 
     def at(self, points: FloatArray) -> FloatArray:
         """The spacing at points (n, 2), mm: (n,), mm."""
         _, nearest = cKDTree(self.boundary).query(points)
         found = self.walls[nearest]
         for singular, spacing in self.singularities:
-            distance, _ = cKDTree(singular).query(points)
-            found = np.minimum(found, spacing + self.growth * distance)
+            distance, which = cKDTree(singular).query(points)
+            found = np.minimum(found, spacing[which] + self.growth * distance)
         return np.asarray(found)
 
     def distance(self, points: FloatArray) -> FloatArray:
         """Distance of points (n, 2), mm, from the nearest singularity: (n,), mm."""
         distance, _ = cKDTree(np.concatenate([singular for singular, _ in self.singularities])).query(points)
         return np.asarray(distance)
+
+
+def _by_octaves(points: FloatArray, spacing: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+    """Points (n, 2) of less than half the largest spacing (n,) with theirs, those of one octave together."""
+    octave = np.floor(-np.log2(spacing / spacing.max())).astype(int)
+    return [(points[octave == k], NARROW * spacing[octave == k]) for k in range(1, int(octave.max()) + 1)]
 
 
 def graded_triangles(mesh: TriangleMesh, spacing: PointSpacing, share: float) -> FloatArray:

@@ -5,6 +5,7 @@ from typing import Literal
 import numpy as np
 
 from geometry.arrays import FloatArray
+from geometry.mesh.boundary import evenly_spaced_points
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 
@@ -28,10 +29,8 @@ def collocation_points(
 
 
 def base_points(mesh: TriangleMesh, count: int) -> FloatArray:
-    """Evenly spaced points of the straight base, both ends included, shape (count, 2), mm."""
-    nodes, times = np.unique(mesh.boundary("base"), return_counts=True)
-    start, end = mesh.points[nodes[times == 1]]
-    return np.asarray(np.linspace(start, end, count))
+    """Evenly spaced points of the base, along all its pieces, shape (count, 2), mm."""
+    return evenly_spaced_points(mesh, "base", count)
 
 
 def _uniform_points(mesh: TriangleMesh, count: int, seed: int) -> FloatArray:
