@@ -88,11 +88,12 @@ class FingerNetwork:
 
     def state(self, parameters: torch.Tensor, shift: torch.Tensor, points: torch.Tensor) -> torch.Tensor:
         """Displacement and its derivatives along x and y at points (n, 2): shape (2, 3, n)."""
-        factor, slope = (part[:, 0] for part in HardConstraint.of(self.problem.mesh, BASE_LENGTH).at(points))
+        constraint = HardConstraint.of(self.problem.mesh, BASE_LENGTH)
+        factor, *slopes = (part[:, 0] for part in constraint.at(points))
         streams = self._streams(parameters, points)
         value = streams[:, 0] + shift[:, None]
         return torch.stack(
-            [factor * value, factor * streams[:, 1] + slope * value, factor * streams[:, 2]], dim=1
+            [factor * value, *(factor * streams[:, 1 + k] + slopes[k] * value for k in range(2))], dim=1
         )
 
     def residuals(

@@ -51,13 +51,13 @@ class RandomGates:
         gate = torch.tanh(torch.einsum("k,knu->nu", signs, hidden) - 1.35 * STEEPNESS * 2 * np.tanh(1.0))
         neuron = torch.tanh(points @ self.neurons[:2] + self.neurons[2])
         mixed = neuron * (1 - 2 * gate)
-        factor, slope = self.factor.at(points)
+        factor, *slopes = self.factor.at(points)
         found = [mixed * factor]
         for axis in range(2):
             opening = torch.einsum("k,knu,ku->nu", signs, 1 - hidden**2, self.strips[:, axis])
             along = (1 - neuron**2) * self.neurons[axis] * (1 - 2 * gate)
             along -= 2 * neuron * (1 - gate**2) * opening
-            found.append(along * factor + (mixed * slope if axis == 0 else 0))
+            found.append(along * factor + mixed * slopes[axis])
         return found[0], found[1], found[2]
 
 

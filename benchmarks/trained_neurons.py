@@ -89,7 +89,7 @@ def _field_and_gradient(
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Displacement (n, 2) and its gradient (n, 2, 2), written plainly for automatic differentiation."""
     share, slopes = field.basis.windows.values_and_gradients(points, near)
-    factor, factor_x = field.basis.constraint.at(points)
+    factor, *of_factor = field.basis.constraint.at(points)
     weights = neurons[:, :, near]
     neuron = torch.tanh(torch.einsum("nx,xmw->nmw", points, weights[:2]) + weights[2])
     output = field.output[near]
@@ -99,5 +99,5 @@ def _field_and_gradient(
     for axis in range(2):
         inner = torch.einsum("nmw,mw,wim->nwi", 1 - neuron**2, weights[axis], output[:, :, 1:])
         along = torch.einsum("nw,nwi->ni", slopes[axis], encoder) + torch.einsum("nw,nwi->ni", share, inner)
-        columns.append(factor * along + (factor_x * value if axis == 0 else 0))
+        columns.append(factor * along + of_factor[axis] * value)
     return factor * value, torch.stack(columns, dim=-1)

@@ -89,9 +89,10 @@ class FiniteBasis:
     def gradients(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
         """Derivatives of `values` with respect to x and y, 1/mm, by windows: (2, n, w, m + 1)."""
         window, window_gradient = self.windows.values_and_gradients(points, near)
-        factor, factor_x = self.constraint.at(points)
+        factor, *slopes = self.constraint.at(points)
         window_gradient = window_gradient.mul_(factor)
-        window_gradient[0].addcmul_(factor_x, window)
+        for along, slope in zip(window_gradient, slopes, strict=True):
+            along.addcmul_(slope, window)
         window = window.mul_(factor)
         function = self._unwindowed(points, near)
         rate = (1 - function[:, 1:].square()).mul_(window[:, None])
