@@ -1,20 +1,28 @@
 """Energy and force of a displacement field of the linear law, by quadrature in the elements."""
 
 import numpy as np
+from scipy.sparse import diags
+from scipy.sparse.linalg import spsolve
 
 from geometry.arrays import FloatArray
+from geometry.mesh.boundary import mean_thickness
+from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
 from solvers.elasticity import linear_energy_density, linear_stress
-from solvers.problem import Problem, contact_ends
+from solvers.lagrange import LagrangeSpace
+from solvers.problem import Problem, contact_ends, contact_nodes
 from solvers.solution import DisplacementField
+
+PLATEAU = 0.1
+"""Part of the harmonic function's range that is cut off at base and contact, where the stress is singular."""
 
 
 def energy_and_force(problem: Problem, field: DisplacementField, degree: int = 2) -> tuple[float, FloatArray]:
     """Energy per depth, N mm/mm, and the indenter's force per depth, shape (2,), N/mm.
 
-    The force is the mean of those on the sections between base and contact, each of which transmits the
-    indenter's in equilibrium: the work of the stress on a displacement that grows linearly from the base to a
-    unit translation at the contact. It is zero for a component that is free.
+    The force is the mean of those on sections between base and contact, each of which transmits the
+    indenter's in equilibrium: the work of the stress on a virtual displacement that grows from zero at the
+    base to a unit translation at the contact. It is zero for a component that is free.
 
     Args:
         problem: A problem of the linear law.
@@ -24,12 +32,39 @@ def energy_and_force(problem: Problem, field: DisplacementField, degree: int = 2
     rule = body_quadrature(problem.mesh, degree)
     gradient, lame = field.gradient(rule.location), problem.material.lame
     energy = float((rule.weights * linear_energy_density(gradient, lame)).sum())
-    x = rule.location.points[:, 0]
+    slope = section_slope(problem, rule.location)
+    stress, force = linear_stress(gradient, lame), np.zeros(2)
+    rows = ((stress.xx, stress.xy), (stress.xy, stress.yy))
+    for axis in problem.load.prescribed:
+        traction = rows[axis][0] * slope[:, 0] + rows[axis][1] * slope[:, 1]
+        force[axis] = (rule.weights * traction).sum()
+    return energy, force
+
+
+def section_slope(problem: Problem, location: LocatedPoints) -> FloatArray:
+    """Gradient of a function that is zero at the base and one at the contact, shape (n, 2), 1/mm.
+
+    It grows linearly with x where the base ends by a wall's thickness before the contact begins, so that the
+    sections x = constant between them separate the two. Elsewhere, as in a ring, it is harmonic.
+    """
     start = float(problem.mesh.points[problem.mesh.boundary("base").ravel(), 0].max())
     end, _ = contact_ends(problem)
-    between = (x > start) & (x < end)
-    stress = linear_stress(gradient[between], lame)
-    force = np.zeros(2)
-    for axis in problem.load.prescribed:
-        force[axis] = (rule.weights[between] * (stress.xx, stress.xy)[axis]).sum() / (end - start)
-    return energy, force
+    if end - start < mean_thickness(problem.mesh):
+        return harmonic_slope(problem, location)
+    x = location.points[:, :1]
+    return np.where((x > start) & (x < end), [1 / (end - start), 0.0], 0.0)
+
+
+def harmonic_slope(problem: Problem, location: LocatedPoints) -> FloatArray:
+    """Gradient of the harmonic function of linear elements, cut off at `PLATEAU`, shape (n, 2), 1/mm."""
+    mesh = problem.mesh
+    space = LagrangeSpace(mesh, 1)
+    along = space.shape_gradients(mesh.at_centroids())
+    stiffness = sum(matrix.T @ diags(mesh.areas) @ matrix for matrix in along).tocsr()
+    values = np.zeros(len(mesh.points))
+    values[contact_nodes(problem)] = 1.0
+    free = np.ones(len(values), dtype=bool)
+    free[np.concatenate([contact_nodes(problem), mesh.boundary("base").ravel()])] = False
+    values[free] = spsolve(stiffness[free][:, free].tocsc(), -stiffness[free] @ values)
+    values = np.clip((values - PLATEAU) / (1 - 2 * PLATEAU), 0.0, 1.0)
+    return np.column_stack([matrix @ values for matrix in space.shape_gradients(location)])

@@ -137,6 +137,11 @@ class Problem:
                 f"the contact from x = {left:.6g} to {right:.6g} mm is not on the front face, "
                 f"which runs from {front.min():.6g} to {front.max():.6g} mm"
             )
+        if (gap := _gap_in_front(self.mesh, left, right)) is not None:
+            raise UserError(
+                f"the contact from x = {left:.6g} to {right:.6g} mm is not all on the front face, which has "
+                f"a gap at x = {gap:.6g} mm; move the contact or make it narrower"
+            )
 
     @property
     def digest(self) -> str:
@@ -173,9 +178,10 @@ def contact_nodes(problem: Problem) -> IntArray:
 def contact_functional(problem: Problem) -> tuple[FloatArray, FloatArray]:
     """The linear functional of the load: prescribed = sum of weights times displacement at points.
 
-    For `mean` the weight along the contact of width b, at distance s from its middle, is the raised cosine
-    (1 + cos(2 pi s / b)) / b: smooth, zero at both ends, with integral one. For `point` it is the middle
-    node, or the point at `position`.
+    For `mean` the weight along the contact of width b, at distance s from its middle, both along x, is the
+    raised cosine (1 + cos(2 pi s / b)) / b: smooth, zero at both ends, with integral one. On a curved front
+    it weighs true lengths and is scaled to the integral one. For `point` it is the middle node, or the point
+    at `position`.
 
     Returns:
         Points (q, 2), mm, and weights (q,) that sum to one.
@@ -186,10 +192,17 @@ def contact_functional(problem: Problem) -> tuple[FloatArray, FloatArray]:
     left, right = contact_ends(problem)
     middle, width = 0.5 * (left + right), right - left
     if load.kind == "point":
-        return _front_between(mesh, middle, np.inf)[0][:1], np.ones(1)
+        return front_points(mesh, np.array([middle])), np.ones(1)
     points, lengths = segment_quadrature(*_front_between(mesh, left, right), POINTS_ON_EDGE)
     weights = lengths * (1 + np.cos(2 * np.pi * (points[:, 0] - middle) / width)) / width
     return points, weights / weights.sum()
+
+
+def front_points(mesh: TriangleMesh, x: FloatArray) -> FloatArray:
+    """Points of the front face at abscissae (n,), shape (n, 2), mm; a gap in it is bridged straight."""
+    nodes = mesh.points[np.unique(mesh.boundary("front"))]
+    nodes = nodes[nodes[:, 0].argsort()]
+    return np.column_stack([x, np.interp(x, nodes[:, 0], nodes[:, 1])])
 
 
 def _front_between(mesh: TriangleMesh, left: float, right: float) -> tuple[FloatArray, FloatArray]:
@@ -203,3 +216,13 @@ def _front_between(mesh: TriangleMesh, left: float, right: float) -> tuple[Float
     inside = (cuts[1] - cuts[0])[:, 0] > 1e-9
     first, last = (start + cut * (end - start) for cut in cuts)
     return first[inside], last[inside]
+
+
+def _gap_in_front(mesh: TriangleMesh, left: float, right: float) -> float | None:
+    """Start of the first gap of the front face between two abscissae, mm; None where it has none."""
+    x = np.sort(mesh.points[mesh.boundary("front"), 0], axis=1)
+    x = x[x[:, 0].argsort()]
+    start, end = np.maximum.accumulate(x[:-1, 1]), x[1:, 0]
+    slack = 1e-9 * np.ptp(x)
+    gap = (end > start + slack) & (start < right - slack) & (end > left + slack)
+    return float(max(start[gap][0], left)) if gap.any() else None

@@ -14,7 +14,7 @@ import numpy as np
 from geometry.arrays import FloatArray, IntArray
 from solvers.fem.finite_strain.constraints import LoadState
 from solvers.lagrange import LagrangeSpace
-from solvers.problem import Problem, contact_ends
+from solvers.problem import Problem, contact_ends, front_points
 
 STIFFNESS = 10.0
 """k over Young's modulus: a larger one needs fewer updates of the multipliers but more Newton iterations."""
@@ -27,11 +27,12 @@ class CylinderContact:
     Attributes:
         nodes: Numbers of the nodes, shape (m,).
         positions: Their positions before the load, shape (m, 2), mm.
-        centre: Centre of the cylinder before the load, where it touches y = 0 from outside, shape (2,), mm.
+        centre: Centre of the cylinder before the load, above the contact's middle, where it touches the front
+            from outside, shape (2,), mm.
         travel: Displacement of the cylinder under the full load, shape (2,), mm.
         radius: mm.
         stiffness: k, N/mm per mm.
-        degree: Degree of the elements.
+        edges: Rows of `nodes` along every edge, shape (e, degree + 1).
     """
 
     nodes: IntArray
@@ -40,22 +41,26 @@ class CylinderContact:
     travel: FloatArray
     radius: float
     stiffness: float
-    degree: int
+    edges: IntArray
 
     @classmethod
     def of(cls, problem: Problem, space: LagrangeSpace) -> "CylinderContact":
         """The contact of a problem whose load is a `cylinder`."""
-        load = problem.load
+        load, edges = problem.load, problem.mesh.boundary("front")
         nodes = space.boundary_nodes("front")
         nodes = nodes[np.argsort(space.nodes[nodes, 0])]
+        columns = [edges[:, :1], edges[:, 1:]]
+        if space.degree == 2:
+            columns.insert(1, space.edge_nodes(edges)[:, None])
+        order = np.argsort(nodes)
         return cls(
             nodes=nodes,
             positions=space.nodes[nodes],
-            centre=np.array([np.mean(contact_ends(problem)), load.radius]),
+            centre=_touching_centre(problem),
             travel=load.values,
             radius=float(load.radius or 0),
             stiffness=STIFFNESS * problem.material.young,
-            degree=space.degree,
+            edges=order[np.searchsorted(nodes[order], np.concatenate(columns, axis=1))],
         )
 
     @property
@@ -86,12 +91,21 @@ class CylinderContact:
 
     def lengths(self, nodal: FloatArray) -> FloatArray:
         """Weights of the nodes in an integral along the deformed front, shape (m,), mm."""
-        pieces = np.linalg.norm(np.diff(self.positions + nodal[self.nodes], axis=0), axis=1)
-        edges = pieces.reshape(-1, self.degree).sum(axis=1)
-        lengths = np.zeros(len(self.nodes))
-        for place, share in enumerate({1: (1 / 2, 1 / 2), 2: (1 / 6, 4 / 6, 1 / 6)}[self.degree]):
-            lengths[place :: self.degree][: len(edges)] += share * edges
-        return lengths
+        moved = (self.positions + nodal[self.nodes])[self.edges]
+        lengths = np.linalg.norm(np.diff(moved, axis=1), axis=2).sum(axis=1)
+        shares = {2: (1 / 2, 1 / 2), 3: (1 / 6, 4 / 6, 1 / 6)}[self.edges.shape[1]]
+        weights = np.outer(lengths, shares)
+        return np.bincount(self.edges.ravel(), weights.ravel(), len(self.nodes)).astype(np.float64)
+
+
+def _touching_centre(problem: Problem) -> FloatArray:
+    """Centre of the cylinder, shape (2,), mm: as low above the contact's middle as the front lets it."""
+    radius, middle = float(problem.load.radius or 0), float(np.mean(contact_ends(problem)))
+    front = problem.mesh.points[np.unique(problem.mesh.boundary("front"))]
+    under = np.concatenate([front_points(problem.mesh, np.array([middle])), front])
+    under = under[np.abs(under[:, 0] - middle) < radius]
+    heights = under[:, 1] + np.sqrt(radius**2 - (under[:, 0] - middle) ** 2)
+    return np.array([middle, heights.max()])
 
 
 @dataclass(frozen=True)

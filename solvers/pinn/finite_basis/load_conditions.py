@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from geometry.arrays import FloatArray
-from solvers.problem import Problem, contact_functional, contact_nodes
+from solvers.problem import Problem, contact_functional, contact_nodes, front_points
 
 MOMENTS = 12
 """Moments of the displacement that a rigid patch prescribes for each component."""
@@ -31,15 +31,15 @@ def load_conditions(problem: Problem) -> LoadConditions:
     For `patch` they are moments against the tractions T_k(s) / sqrt(1 - s^2) with Chebyshev polynomials T_k,
     which have the singularity of a rigid punch at both ends: the first is that of the punch on a half-plane
     (K. L. Johnson, Contact Mechanics, Cambridge University Press, 1985, section 2.8). Gauss-Chebyshev
-    quadrature makes them sums over its points s = cos(angle), where T_k is cos(k angle).
+    quadrature makes them sums over its points s = cos(angle), where T_k is cos(k angle); s runs along x.
     """
     values = problem.load.values[:, None]
     if problem.load.kind != "patch":
         points, weights = contact_functional(problem)
         return LoadConditions(points, weights[None], values)
     angles = np.pi * (np.arange(2 * MOMENTS) + 0.5) / (2 * MOMENTS)
-    left, right = contact_end_points(problem)
-    points = left + 0.5 * (1 + np.cos(angles))[:, None] * (right - left)
+    left, right = contact_end_points(problem)[:, 0]
+    points = front_points(problem.mesh, left + 0.5 * (1 + np.cos(angles)) * (right - left))
     weights = np.cos(np.outer(np.arange(MOMENTS), angles)) / len(angles)
     return LoadConditions(points, weights, np.pad(values, ((0, 0), (0, MOMENTS - 1))))
 
