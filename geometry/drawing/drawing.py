@@ -1,6 +1,5 @@
 """A drawing as read: closed curves with labels, marker circles and the file that they come from."""
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
+from geometry.content_hash import file_digest
 from geometry.errors import UserError
 from geometry.section.loop import Loop
 
@@ -78,7 +78,7 @@ def sha256_of(path: Path) -> str:
         UserError: If it cannot be read.
     """
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        return file_digest(path)
     except OSError as error:
         raise UserError(f"cannot read the drawing {path}: {error.strerror}") from None
 

@@ -46,6 +46,8 @@ class DrawnFinger:
         placement: From the file's frame, in mm, into the finger's.
         sources: `given`, `drawn` or `proposed` for `clamp`, `contact`, `contact_width`, `markers`,
             `marker_diameter`, `marker_height` and `depth`.
+        unit: Length of one unit of the file's coordinates, mm.
+        reading: `units` and `plane` of the description, where they were given.
         mesh: The file's own triangle mesh, in the finger's frame, or None.
 
     Raises:
@@ -65,12 +67,15 @@ class DrawnFinger:
     note: str
     placement: Placement
     sources: Mapping[str, str] = field(default_factory=dict)
+    unit: float = 1.0
+    reading: Mapping[str, str] = field(default_factory=dict)
     mesh: TriangleMesh | None = None
 
     def __post_init__(self) -> None:
         markers = frozen_array(self.markers, dtype=np.float64, shape=(None, 2), name="markers")
         object.__setattr__(self, "markers", markers)
         object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
+        object.__setattr__(self, "reading", MappingProxyType(dict(self.reading)))
         for x in self.contact_ends:
             self.section.front_place(x)
 
@@ -124,7 +129,7 @@ class DrawnFinger:
             key: getattr(self, key)
             for key in (
                 *("name", "contact_abscissa", "contact_width", "depth", "marker_diameter", "marker_height"),
-                *("file", "sha256", "note"),
+                *("file", "sha256", "note", "unit"),
             )
         }
         return {
@@ -134,6 +139,7 @@ class DrawnFinger:
             "markers": self.markers.tolist(),
             "placement": self.placement.definition(),
             "sources": dict(self.sources),
+            "reading": dict(self.reading),
             "mesh": self.mesh.digest if self.mesh else None,
         }
 
@@ -227,21 +233,22 @@ def _mesh_definition(mesh: TriangleMesh) -> dict[str, Any]:
 
 
 def description_lines(finger: DrawnFinger) -> str:
-    """Clamp, contact and markers of a finger as the lines of a description, in the file's frame and mm."""
-    place = finger.placement.inverse
-    clamp = [place(loop.ends[which]) for loop, which in finger.section.named("base")]
-    contact = place(finger.section.front_point(finger.contact_abscissa))
+    """Clamp, contact and markers of a finger as the lines of a description, in the file's coordinates."""
+    place, unit = finger.placement.inverse, finger.unit
+    clamp = [place(loop.ends[which]) / unit for loop, which in finger.section.named("base")]
+    contact = place(finger.section.front_point(finger.contact_abscissa)) / unit
     where = {
         "clamp": [pair.tolist() for pair in clamp],
         "contact": contact.tolist(),
-        "contact_width": finger.contact_width,
-        "markers": place(finger.markers).tolist(),
-        "marker_diameter": finger.marker_diameter,
-        "marker_height": finger.marker_height,
-        "depth": finger.depth,
+        "contact_width": finger.contact_width / unit,
+        "markers": (place(finger.markers) / unit).tolist(),
+        "marker_diameter": finger.marker_diameter / unit,
+        "marker_height": finger.marker_height / unit,
+        "depth": finger.depth / unit,
     }
-    lines = [f"# {finger.file}: where it is clamped, touched and marked; mm, in the file's frame."]
+    lines = [f"# {finger.file}: where it is clamped, touched and marked, in the file's coordinates."]
+    lines += [f"{key} = {json.dumps(value)}" for key, value in finger.reading.items()]
     for key, value in where.items():
         source = finger.sources.get(key)
         lines.append(f"{key} = {json.dumps(value)}" + (f"  # {source}" if source else ""))
-    return "\n".join([*lines, 'units = "mm"', ""])
+    return "\n".join([*lines, ""])

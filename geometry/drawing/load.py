@@ -156,6 +156,8 @@ def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
             "marker_height": height_source,
             "depth": depth_source,
         },
+        unit=drawing.unit,
+        reading={key: value for key in ("units", "plane") if (value := getattr(description, key))},
         mesh=mesh,
     )
 

@@ -8,7 +8,7 @@ Contact: on the longest straight piece of the hull that looks sideways from the 
 count as equal and the upper one is taken; halfway between its end at the clamp and the last cavity beneath
 it, or its own end. A body without such a piece is touched at its point farthest from the clamp.
 Markers: evenly along the longest unclamped run of the outline, front, tip and back, each as deep in as leaves
-most material around it, at most 2 mm.
+most material around it, at most 2 mm and in a solid part a quarter of the way through.
 """
 
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ from geometry.arrays import FloatArray
 from geometry.drawing.outline import renamed
 from geometry.section.loop import Loop
 from geometry.section.section import Section
-from geometry.section.thickness import boundary_samples, inner_normals
+from geometry.section.thickness import boundary_samples, inner_normals, through
 
 MARKERS = 9
 MARKER_DIAMETER = 1.6
@@ -106,9 +106,16 @@ def marker_places(section: Section, count: int) -> FloatArray:
         step = int(np.searchsorted(ends, along))
         fraction = 1 - (ends[step] - along) / outline.lengths[run[step]]
         point, normal = outline.along(run[step], fraction)[0], inner_normals(outline, run[step], fraction)[0]
-        inward = point + np.linspace(0, DEEPEST, 81)[1:, None] * normal
+        inward = point + np.linspace(0, _deepest(section, point, normal), 81)[1:, None] * normal
         places.append(inward[int(np.round(section.clearance(inward), 6).argmax())])
     return np.array(places)
+
+
+def _deepest(section: Section, point: FloatArray, normal: FloatArray) -> float:
+    """Largest depth of a marker below a point of the outline, mm; in a solid part not halfway through."""
+    crossing = through(section, point, normal)
+    solid = crossing.pieces[0] < len(section.outline.points)
+    return min(DEEPEST, float(crossing.lengths[0]) / 4) if solid else DEEPEST
 
 
 def marker_diameter(section: Section, places: FloatArray) -> float:

@@ -12,7 +12,7 @@ from geometry.cad import write_step as export_step
 from geometry.cad import write_svg as export_svg
 from geometry.drawing.checks import thinnest_wall
 from geometry.drawing.description import Description, load_description
-from geometry.drawing.drawn_finger import DrawnFinger
+from geometry.drawing.drawn_finger import DrawnFinger, description_lines
 from geometry.drawing.load import load_drawing
 from geometry.drawing.pieces import circle
 from geometry.mesh.mesher import build_mesh
@@ -159,6 +159,30 @@ def test_units_apply_to_the_description(tmp_path):
     assert finger.section.area == pytest.approx(1000)
     assert (finger.contact_abscissa, finger.contact_width, finger.depth) == pytest.approx((40, 3, 10))
     assert len(finger.markers) == 5
+
+
+@pytest.mark.parametrize(
+    ("units", "lines"),
+    [
+        (1, []),  # inches by the header
+        (0, ['units = "cm"']),  # a unit that only the description knows
+    ],
+)
+def test_the_lines_of_a_finger_give_it_again(tmp_path, units, lines):
+    """Description lines are in the file's coordinates and hold its unit where it was given."""
+    path = write_dxf(tmp_path / "beam.dxf", [[(x / 25, y / 25) for x, y in BEAM]], units=units)
+    finger = load_drawing(path, load_description(None, lines))
+    (tmp_path / "beam.toml").write_text(description_lines(finger))
+    again = load_drawing(path)
+    assert again.section.area == pytest.approx(finger.section.area)
+    np.testing.assert_allclose(again.markers, finger.markers, atol=1e-9)
+    assert (again.contact_abscissa, again.depth) == pytest.approx((finger.contact_abscissa, finger.depth))
+    assert set(again.sources.values()) == {"given"}
+
+
+def test_the_lines_of_a_cut_solid_hold_its_plane():
+    finger = load_drawing(FILES[0], Description(plane="z = 5"))
+    assert 'plane = "z = 5"' in description_lines(finger)
 
 
 def test_mesh_with_groups_is_taken_as_it_is(tmp_path):
