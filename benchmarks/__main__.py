@@ -11,6 +11,7 @@ BENCHMARKS = {
     "million": "million_triangles",
     "pinn": "pinn_against_fem",
     "designs": "networks_on_designs",
+    "drawings": "networks_on_drawings",
     "sizes": "network_sizes",
     "inference": "inference",
     "deepxde": "deepxde_against_ours",
