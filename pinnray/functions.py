@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
 from geometry.cache import drawn_finger, finger_mesh
-from geometry.drawing.description import Description, load_description
+from geometry.drawing.description import Description, description_beside, load_description
 from geometry.drawing.drawn_finger import DrawnFinger
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
@@ -57,8 +57,7 @@ def load_drawing(file: str | Path, **description: Any) -> DrawnFinger:
         UserError: If the drawing cannot be read, is no sound section, or the description does not fit it.
     """
     file = Path(file)
-    beside = file.with_suffix(".toml")
-    known = load_description(beside if beside.is_file() else None)
+    known = load_description(description_beside(file))
     given = Description(**{**known.model_dump(exclude_none=True), **description})
     return drawn_finger(file, given)
 

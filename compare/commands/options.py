@@ -100,8 +100,7 @@ class FingerOptions:
         for setting in self.set:
             key, _, value = setting.partition("=")
             lines.append(f"{key.strip()} = {toml_value(value.strip())}" if value else setting)
-        beside = file.with_suffix(".toml")
-        return drawn_finger(file, load_description(beside if beside.is_file() else None, lines))
+        return drawn_finger(file, load_description(description_beside(file), lines))
 
 
 def toml_value(text: str) -> str:

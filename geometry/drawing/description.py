@@ -63,6 +63,12 @@ class Description(CheckedModel):
         return read
 
 
+def description_beside(drawing: Path) -> Path | None:
+    """The TOML file of the drawing's name beside it, or None."""
+    path = drawing.with_suffix(".toml")
+    return path if path.is_file() and path != drawing else None
+
+
 def load_description(path: Path | None, lines: Sequence[str] = ()) -> Description:
     """A description from a TOML file, with values changed by lines such as `contact = [35, 0]`.
 

@@ -10,7 +10,7 @@ from geometry.arrays import FloatArray
 from geometry.drawing import proposal
 from geometry.drawing.chain import straightened
 from geometry.drawing.checks import body, check_contact, check_markers
-from geometry.drawing.description import Description, load_description
+from geometry.drawing.description import Description, description_beside, load_description
 from geometry.drawing.drawing import LABELS, Drawing, label_of
 from geometry.drawing.drawn_finger import DrawnFinger
 from geometry.drawing.outline import renamed, with_part
@@ -56,9 +56,8 @@ def load_drawing(path: str | Path, description: Description | None = None) -> Dr
             not fit it.
     """
     path = Path(path)
-    beside = path.with_suffix(".toml")
     if description is None:
-        description = load_description(beside if beside.is_file() else None)
+        description = load_description(description_beside(path))
     drawing = read_drawing(path, description.units, description.plane)
     try:
         return finger_of(drawing, description)
