@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from compare.commands.preset_jobs import job_defaults
 from compare.runtime.provenance import cores
 from geometry.cache import drawn_finger
-from geometry.drawing.description import load_description
+from geometry.drawing.description import description_beside, load_description
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.finger.finger import Finger
