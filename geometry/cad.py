@@ -12,12 +12,16 @@ import cadquery as cq
 from cadquery.occ_impl.exporters.dxf import DxfDocument
 
 from geometry.arrays import FloatArray
+from geometry.finger.contact import outline_with_contact
 from geometry.finger.finger import Finger
 from geometry.finger.svg import section_svg
 from geometry.section.loop import Loop
 
 BODY_COLOUR = (0.15, 0.15, 0.17)
 MARKER_COLOUR = (0.95, 0.25, 0.1)
+LABELLED = {"base": 5, "contact": 30}
+"""Layers of a DXF file that name parts of the outline, with their colours' numbers."""
+
 STL_TOLERANCE = 0.01
 """Largest distance of an STL facet from the surface, mm."""
 
@@ -72,7 +76,10 @@ def write_stl(finger: Finger, folder: Path) -> list[Path]:
 
 
 def write_dxf(finger: Finger, folder: Path) -> list[Path]:
-    """The section as DXF, mm, with the layers `outline` and `markers`."""
+    """The section as DXF, mm, with the layers `outline` and `markers`.
+
+    Lines and arcs of the layers `base` and `contact` lie on the outline and name its parts.
+    """
     path = folder / "section.dxf"
     outer, cavities = _wires(finger)
     circles = [
@@ -84,6 +91,11 @@ def write_dxf(finger: Finger, folder: Path) -> list[Path]:
     document.add_layer("markers", color=1)
     document.add_shape(cq.Workplane("XY").newObject([outer, *cavities]), "outline")
     document.add_shape(cq.Workplane("XY").newObject(circles), "markers")
+    named = outline_with_contact(finger)
+    for label, colour in LABELLED.items():
+        document.add_layer(label, color=colour)
+        parts = [_edge(named, which) for which in named.pieces(label)]
+        document.add_shape(cq.Workplane("XY").newObject(parts), label)
     document.document.saveas(str(path))
     return [path]
 
@@ -119,14 +131,14 @@ def _wires(finger: Finger) -> tuple[cq.Wire, list[cq.Wire]]:
 
 def _wire(loop: Loop) -> cq.Wire:
     """A closed curve; its arcs are exact."""
-    edges: list[cq.Edge] = []
-    for which, ends in enumerate(loop.ends):
-        start, end = map(_vector, ends)
-        if which in loop.straight:
-            edges.append(cq.Edge.makeLine(start, end))
-        else:
-            edges.append(cq.Edge.makeThreePointArc(start, _vector(loop.along(which, 0.5)[0]), end))
-    return cq.Wire.assembleEdges(edges)
+    return cq.Wire.assembleEdges([_edge(loop, which) for which in range(len(loop.points))])
+
+
+def _edge(loop: Loop, which: int) -> cq.Edge:
+    start, end = map(_vector, loop.ends[which])
+    if which in loop.straight:
+        return cq.Edge.makeLine(start, end)
+    return cq.Edge.makeThreePointArc(start, _vector(loop.along(which, 0.5)[0]), end)
 
 
 def _vector(point: FloatArray) -> cq.Vector:

@@ -14,6 +14,9 @@ from geometry.section.thickness import inner_normals
 SMOOTH = 0.01
 """Largest distance of the drawn polygon from an arc, mm."""
 
+TALLEST = 0.8
+"""Largest height of the picture as a share of its width."""
+
 HATCHES = 40
 """Hatches along the longer side of the picture."""
 
@@ -26,7 +29,7 @@ def plot_drawing(finger: DrawnFinger) -> Figure:
     contact = finger.section.front_point(finger.contact_abscissa)
     tip, tail = place(np.stack([contact, contact + np.array([0.0, 0.09 * extent])]))
     hatched = section.bounds + 0.03 * extent * np.array([[-1], [1]])
-    shown = np.concatenate([hatched, tip[None], tail[None]])
+    shown = _not_tall(np.concatenate([hatched, tip[None], tail[None]]))
     with body_figure(shown, f"Drawing “{finger.name}”") as (drawn, axes):
         axes.add_patch(PathPatch(_path(section), fc=BODY, ec=INK, lw=0.7, zorder=1))
         for loop, which in section.named("base"):
@@ -48,6 +51,14 @@ def plot_drawing(finger: DrawnFinger) -> Figure:
                 zorder=6,
             )
     return drawn
+
+
+def _not_tall(points: FloatArray) -> FloatArray:
+    """Points (n, 2) with two more that make their extent at most as high as `TALLEST` times its width."""
+    (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
+    half = max(right - left, (top - bottom) / TALLEST) / 2
+    middle = 0.5 * (left + right)
+    return np.concatenate([points, [[middle - half, bottom], [middle + half, top]]])
 
 
 def _path(section: Section) -> Outline:

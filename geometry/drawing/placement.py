@@ -12,6 +12,9 @@ from geometry.section.loop import Loop
 from geometry.section.section import Section
 from geometry.section.thickness import inner_normals
 
+MIRROR = 0.01
+"""Least distance of the base's middle beyond the contact for a reflection, as a share of the extent."""
+
 ROUND = 12
 """Decimals, mm, to which placed corners are rounded: removes the rotation's rounding."""
 
@@ -90,7 +93,8 @@ def placed(section: Section, which: int, fraction: float) -> tuple[Section, Plac
     base = list(section.outline.pieces("base"))
     middles = np.concatenate([section.outline.along(each, 0.5) for each in base]) @ matrix.T
     lengths = section.outline.lengths[base]
-    if lengths @ middles[:, 0] / lengths.sum() > (matrix @ contact)[0] + 1e-6:
+    beyond = lengths @ middles[:, 0] / lengths.sum() - (matrix @ contact)[0]
+    if beyond > MIRROR * float(np.ptp(section.bounds, axis=0).max()):
         matrix = np.diag([-1.0, 1.0]) @ matrix
     turned = Placement(matrix + 0.0, np.array([0.0, -(matrix @ contact)[1]]))
     section = turned.section(section)

@@ -6,7 +6,8 @@ beside a slot), then the widest, then the one at smaller x. A body without one i
 outline around its lowest point.
 Contact: on the longest straight piece of the hull that looks sideways from the clamp, where those within 1 %
 count as equal and the upper one is taken; halfway between its end at the clamp and the last cavity beneath
-it, or its own end. A body without such a piece is touched at its point farthest from the clamp.
+it, or its own end. A body without such a piece is touched halfway along its upper side, or, if less than
+1.5 times as long as wide, at its point farthest from the clamp.
 Markers: evenly along the longest unclamped run of the outline, front, tip and back, each as deep in as leaves
 most material around it, at most 2 mm and in a solid part a quarter of the way through.
 """
@@ -36,6 +37,9 @@ CONTACT_WIDTH = 2.0
 """Largest length of a proposed contact, mm."""
 
 SIDEWAYS = np.cos(np.radians(45))
+LONG = 1.5
+"""Least length over width of a long body."""
+
 ON_HULL = 1e-3
 """Largest distance of a piece from the hull on which it lies, mm."""
 
@@ -87,9 +91,7 @@ def contact_point(section: Section) -> FloatArray:
     extent = float(np.ptp(section.bounds, axis=0).max())
     free = [which for which in free if outline.lengths[which] >= 0.3 * extent]
     if not free:
-        samples = boundary_samples(Section(outline), extent / 200).points
-        far = np.linalg.norm(samples - middle, axis=1)
-        return np.asarray(samples[int(np.round(far, 6).argmax())])
+        return _contact_on_curve(outline, middle, normal)
     scores = {which: _sideways_length(outline, which, normal) for which in free}
     best = [which for which in free if scores[which] >= 0.99 * max(scores.values())]
     chosen = max(best, key=lambda which: round(float(-inner_normals(outline, which, 0.5)[0, 1]), 6))
@@ -197,6 +199,19 @@ def _clamp_frame(outline: Loop) -> tuple[FloatArray, FloatArray]:
 def _sideways_length(outline: Loop, which: int, normal: FloatArray) -> float:
     side = inner_normals(outline, which, 0.5)[0]
     return float(outline.lengths[which] * (1 - (side @ normal) ** 2))
+
+
+def _contact_on_curve(outline: Loop, clamp: FloatArray, normal: FloatArray) -> FloatArray:
+    """Halfway along the upper side of a long body, else its point farthest from the clamp."""
+    samples = boundary_samples(Section(outline), float(outline.lengths.sum()) / 1000)
+    away = samples.points - clamp
+    along, across = -away @ normal, away @ np.array([-normal[1], normal[0]])
+    if along.max() < LONG * np.ptp(across):
+        return np.asarray(samples.points[int(np.round(np.linalg.norm(away, axis=1), 6).argmax())])
+    beside = (np.abs(samples.normals @ normal) <= SIDEWAYS) & (samples.normals[:, 1] < 0)
+    beside = beside if beside.any() else np.ones(len(along), dtype=bool)
+    off = np.where(beside, np.abs(along - 0.5 * along.max()), np.inf)
+    return np.asarray(samples.points[int(np.round(off, 6).argmin())])
 
 
 def _mid_span(section: Section, which: int, clamp: FloatArray) -> FloatArray:

@@ -3,16 +3,31 @@
 import numpy as np
 
 from geometry.arrays import FloatArray
+from geometry.finger.contact import outline_with_contact
 from geometry.finger.finger import Finger
 from geometry.section.loop import Loop
+
+LABELLED = {"base": "#0072b2", "contact": "#d55e00"}
+"""Paths that name parts of the outline, with their colours."""
+
+STROKE = 0.4
+"""Width of their lines, mm."""
 
 MARGIN = 2.0
 """White space around the section, mm."""
 
 
 def section_svg(finger: Finger) -> str:
-    """The section in SVG, with the groups `outline` and `markers`; one user unit is 1 mm, y points up."""
-    shape = finger.section
+    """The section in SVG, with the groups `outline` and `markers`; one user unit is 1 mm, y points up.
+
+    The paths `base` and `contact` lie on the outline and name its parts.
+    """
+    shape, named = finger.section, outline_with_contact(finger)
+    parts = "\n".join(
+        f'  <path id="{label}" fill="none" stroke="{colour}" stroke-width="{STROKE}" '
+        f'd="{_parts(named, label)}"/>'
+        for label, colour in LABELLED.items()
+    )
     circles = "\n".join(
         f'    <circle cx="{x!r}" cy="{y!r}" r="{finger.marker_radius!r}"/>'
         for x, y in finger.markers.tolist()
@@ -30,6 +45,7 @@ def section_svg(finger: Finger) -> str:
   <g id="markers" fill="#f2401a">
 {circles}
   </g>
+{parts}
   </g>
 </svg>
 """
@@ -37,15 +53,22 @@ def section_svg(finger: Finger) -> str:
 
 def _path(loop: Loop) -> str:
     """A closed curve as lines and arcs, every coordinate in full."""
-    steps = [f"M {_point(loop.points[0])}"]
-    for which, end in enumerate(loop.ends[:, 1]):
-        if which in loop.straight:
-            steps.append(f"L {_point(end)}")
-        else:
-            _, radius = loop.circle(which)
-            bulge = float(loop.bulges[which])
-            steps.append(f"A {radius!r} {radius!r} 0 {int(abs(bulge) > 1)} {int(bulge > 0)} {_point(end)}")
-    return " ".join([*steps, "Z"])
+    steps = [_step(loop, which) for which in range(len(loop.points))]
+    return " ".join([f"M {_point(loop.points[0])}", *steps, "Z"])
+
+
+def _parts(loop: Loop, name: str) -> str:
+    """The pieces of a name, each by itself."""
+    return " ".join(f"M {_point(loop.points[which])} {_step(loop, which)}" for which in loop.pieces(name))
+
+
+def _step(loop: Loop, which: int) -> str:
+    end = loop.ends[which, 1]
+    if which in loop.straight:
+        return f"L {_point(end)}"
+    _, radius = loop.circle(which)
+    bulge = float(loop.bulges[which])
+    return f"A {radius!r} {radius!r} 0 {int(abs(bulge) > 1)} {int(bulge > 0)} {_point(end)}"
 
 
 def _point(point: FloatArray) -> str:

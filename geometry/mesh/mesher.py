@@ -7,13 +7,13 @@ import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
+from geometry.finger.contact import CONTACT, outline_with_contact
 from geometry.finger.finger import Finger
 from geometry.mesh.boundary import boundary_edges, elements_through_thickness
 from geometry.mesh.element_size import set_sizes, size_field
 from geometry.mesh.gmsh_model import Triangulation, add_section, session, triangulate
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
-from geometry.section.loop import Loop
 from geometry.section.section import Section
 
 MIN_ELEMENTS = 3
@@ -27,8 +27,6 @@ TOLERANCE = 1e-7
 
 RE_ENTRANT = np.radians(10)
 """Least turn of the boundary at a re-entrant corner."""
-
-CONTACT = "contact"
 
 
 def build_mesh(finger: Finger, settings: MeshSettings) -> TriangleMesh:
@@ -65,7 +63,7 @@ def _triangulation(finger: Finger, settings: MeshSettings, elements: float) -> T
     field = size_field(section, contact, settings, elements)
     with tempfile.TemporaryDirectory() as folder, session():
         try:
-            curves = add_section((_with_contact(finger), *section.cavities), finger.markers)
+            curves = add_section((outline_with_contact(finger), *section.cavities), finger.markers)
             set_sizes(field, grown, settings, Path(folder))
             return triangulate(curves)
         except Exception as error:
@@ -73,20 +71,6 @@ def _triangulation(finger: Finger, settings: MeshSettings, elements: float) -> T
             raise UserError(
                 f"Gmsh could not mesh design {finger.name!r}: {error}; try another mesh size"
             ) from error
-
-
-def _with_contact(finger: Finger) -> Loop:
-    """The outline with corners at the contact's ends and middle, and its pieces between them named so."""
-    (low, high), loop = finger.contact_ends, finger.section.outline
-    for x in (low, finger.contact_abscissa, high):
-        which, fraction = Section(loop).front_place(x)
-        if TOLERANCE < fraction * loop.lengths[which] < loop.lengths[which] - TOLERANCE:
-            loop = loop.split(which, [fraction])
-    for which in loop.pieces("front"):
-        ends = np.sort(loop.ends[which, :, 0])
-        if ends[0] > low - TOLERANCE and ends[1] < high + TOLERANCE:
-            loop = loop.named(which, CONTACT)
-    return loop
 
 
 def _contact_points(finger: Finger) -> FloatArray:

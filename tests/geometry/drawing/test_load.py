@@ -47,6 +47,23 @@ def test_a_design_comes_back_in_its_own_frame(tmp_path, export):
     assert clamped_length(finger) == pytest.approx(30)
 
 
+@pytest.mark.parametrize("export", [export_dxf, export_svg])
+@pytest.mark.parametrize(
+    "design",
+    [Design(contact_position=60, contact_width=5), load_design("csiro")],
+    ids=["contact elsewhere", "csiro"],
+)
+def test_exports_name_the_clamp_and_the_contact(tmp_path, export, design):
+    finger = load_drawing(export(design, tmp_path)[0])
+    assert finger.section.area == pytest.approx(design.section.area, rel=1e-9)
+    assert (finger.sources["clamp"], finger.sources["contact"]) == ("drawn", "drawn")
+    back = finger.placement.inverse  # x = 0 is at the foot, which the design has at negative x
+    assert back([[finger.contact_abscissa, 0]])[0] == pytest.approx((design.contact_abscissa, 0), abs=1e-9)
+    assert finger.contact_width == pytest.approx(design.contact_width)
+    assert clamped_length(finger) == pytest.approx(clamped_length(design))
+    np.testing.assert_allclose(back(finger.markers), design.markers, atol=1e-9)
+
+
 @pytest.mark.parametrize("path", FILES, ids=IDS)
 def test_frame(path):
     finger = load_drawing(path)
