@@ -192,3 +192,34 @@ def test_a_cylinder_starts_where_it_touches_a_curved_front_from_outside():
     solution = make_solver("fem-nonlinear").solve(top)
     assert solution.status.converged
     assert solution.reaction[1] < 0
+
+
+def test_a_slender_bar_is_solved_at_finite_strain():
+    """There Newton's method converges slowly along nearly dependent basis functions, and may stop."""
+    material = Material(law="neo-hookean")
+    problem = replace(problem_of("beam", COARSE), material=material)
+    solution = make_solver("pinn-std", **QUICK["pinn-std"]).solve(problem)
+    assert solution.stats["newton_iterations"] < 100
+    assert relative(solution, make_solver("fem-nonlinear").solve(problem)) < 0.03
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_the_certificate_of_finite_elements_has_no_fault_on_any_body(body):
+    from compare.evaluation.certification import Certifier
+    from compare.evaluation.evaluation import Evaluation
+
+    solution = by_fem(body, COARSE)
+    found = Certifier(solution.problem).certificate(Evaluation.of(solution, solution.problem.mesh))
+    assert not found.faults
+    assert found.weak_residual < 1e-9
+    assert sum(region.area for region in found.regions.values()) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("body", ["ring", "feet and slot", "arch"])
+def test_the_virtual_experiment_presses_on_any_body(body):
+    from compare.evaluation.virtual_experiment import simulate
+
+    solution = simulate(problem_of(body, COARSE, 1.0))
+    assert solution.status.converged
+    contact = solution.problem.mesh.points[np.unique(solution.problem.mesh.boundary("contact"))]
+    assert solution.displacement(contact)[:, 1] == pytest.approx(-1.0, abs=1e-9)

@@ -13,6 +13,12 @@ FIRST_STEP, MAX_STEP, MIN_STEP = 0.1, 0.25, 1e-3
 TOLERANCE = 1e-10
 """Newton stops when a step changes this part of the energy; the error after it is far smaller."""
 MAX_ITERATIONS = 12
+SETTLED, SLOW = 1e-6, 0.1
+"""Newton also stops at a change below the first that is no less than the second times the one before.
+
+The regularisation damps steps along nearly dependent basis functions, as in a slender bar, so that what is
+left there of the energy falls slowly. It is far below the error of the network.
+"""
 
 
 class LoadStep(NamedTuple):
@@ -33,13 +39,15 @@ def find_equilibrium(
     network: ConstrainedNetwork, guess: torch.Tensor, fraction: float
 ) -> tuple[NewtonIterate | None, int]:
     """Equilibrium under a fraction of the load, None if the iteration fails, and the iterations taken."""
+    before = np.inf
     for iteration in range(1, MAX_ITERATIONS + 1):
         state = network.step(guess, fraction)
         if state is None:
             return None, iteration
-        if state.change < TOLERANCE:
+        slow = SLOW * before < state.change < SETTLED
+        if state.change < TOLERANCE or slow:
             return state, iteration
-        guess = state.output
+        guess, before = state.output, state.change
     return None, MAX_ITERATIONS
 
 
