@@ -8,8 +8,9 @@ Contact: on the longest straight piece of the hull that looks sideways from the 
 count as equal and the upper one is taken; halfway between its end at the clamp and the last cavity beneath
 it, or its own end. A body without such a piece is touched halfway along its upper side, or, if less than
 1.5 times as long as wide, at its point farthest from the clamp.
-Markers: evenly along the longest unclamped run of the outline, front, tip and back, each as deep in as leaves
-most material around it, at most 2 mm and in a solid part a quarter of the way through.
+Markers: evenly along the longest unclamped runs of the outline, front, tip and back, each as deep in as
+leaves most material around it, at most 2 mm and in a solid part a quarter of the way through. Where that
+would put one into a sharp tip, with less than a quarter of the others' room, they are spread over the rest.
 """
 
 from collections.abc import Iterator
@@ -35,6 +36,12 @@ DEEPEST = 2.0
 
 CONTACT_WIDTH = 2.0
 """Largest length of a proposed contact, mm."""
+
+NARROW = 0.25
+"""Least room of a proposed marker as a share of the median's."""
+
+FINE = 400
+"""Number of places that are tried where some have no room."""
 
 SIDEWAYS = np.cos(np.radians(45))
 LONG = 1.5
@@ -100,17 +107,41 @@ def contact_point(section: Section) -> FloatArray:
 
 def marker_places(section: Section, count: int) -> FloatArray:
     """Proposed centres of markers, shape (count, 2), mm, in a section with a clamp."""
+    runs = _free_runs(section.outline)
+    lengths = np.array([float(section.outline.lengths[run].sum()) for run in runs])
+    long = np.flatnonzero(lengths >= lengths.max() / 2)
+    shares = np.round(count * np.cumsum(lengths[long]) / lengths[long].sum())
+    counts = np.diff(shares, prepend=0).astype(int)
+    return np.concatenate(
+        [_along(section, runs[which], own) for which, own in zip(long, counts, strict=True)]
+    )
+
+
+def _along(section: Section, run: list[int], count: int) -> FloatArray:
+    """Centres of markers along a run of pieces, shape (count, 2), mm."""
+    total = float(section.outline.lengths[run].sum())
+    places = _below(section, run, total * np.arange(1, count + 1) / (count + 1))
+    room = section.clearance(places)
+    if (room >= NARROW * np.median(room)).all():
+        return places
+    steps = total * (np.arange(FINE) + 0.5) / FINE  # a sharp tip has no room: leave such stretches out
+    room = section.clearance(_below(section, run, steps))
+    wide = steps[room >= NARROW * np.median(room)]
+    return _below(section, run, wide[len(wide) * np.arange(1, count + 1) // (count + 1)])
+
+
+def _below(section: Section, run: list[int], along: FloatArray) -> FloatArray:
+    """Places with most material around them below points of a run, given by arc length (n,), mm: (n, 2)."""
     outline = section.outline
-    run = max(_free_runs(outline), key=lambda run: float(outline.lengths[run].sum()))
     ends = np.cumsum(outline.lengths[run])
     places = []
-    for along in ends[-1] * np.arange(1, count + 1) / (count + 1):
-        step = int(np.searchsorted(ends, along))
-        fraction = 1 - (ends[step] - along) / outline.lengths[run[step]]
+    for each in along:
+        step = int(np.searchsorted(ends, each))
+        fraction = 1 - (ends[step] - each) / outline.lengths[run[step]]
         point, normal = outline.along(run[step], fraction)[0], inner_normals(outline, run[step], fraction)[0]
         inward = point + np.linspace(0, _deepest(section, point, normal), 81)[1:, None] * normal
         places.append(inward[int(np.round(section.clearance(inward), 6).argmax())])
-    return np.array(places)
+    return np.array(places).reshape(-1, 2)
 
 
 def _deepest(section: Section, point: FloatArray, normal: FloatArray) -> float:
@@ -167,11 +198,8 @@ def _on_hull(outline: Loop, which: int, corners: FloatArray) -> bool:
 
 def _with_lowest_part(outline: Loop) -> Loop:
     total = float(outline.lengths.sum())
-    samples = boundary_samples(Section(outline), total / 1200)
-    lowest = int(np.round(samples.points[:, 1], 6).argmin())
-    ends = np.cumsum(outline.lengths)
-    which = int(samples.pieces[lowest])
-    middle = ends[which] - outline.lengths[which] * (1 - samples.fractions[lowest])
+    points, _, along = _samples(outline)
+    middle = along[int(np.round(points[:, 1], 6).argmin())]
     for along in ((middle - total / 12) % total, (middle + total / 12) % total):
         ends = np.cumsum(outline.lengths)
         piece = int(np.searchsorted(ends, along))
@@ -203,15 +231,29 @@ def _sideways_length(outline: Loop, which: int, normal: FloatArray) -> float:
 
 def _contact_on_curve(outline: Loop, clamp: FloatArray, normal: FloatArray) -> FloatArray:
     """Halfway along the upper side of a long body, else its point farthest from the clamp."""
-    samples = boundary_samples(Section(outline), float(outline.lengths.sum()) / 1000)
-    away = samples.points - clamp
+    points, normals, _ = _samples(outline)
+    away = points - clamp
     along, across = -away @ normal, away @ np.array([-normal[1], normal[0]])
     if along.max() < LONG * np.ptp(across):
-        return np.asarray(samples.points[int(np.round(np.linalg.norm(away, axis=1), 6).argmax())])
-    beside = (np.abs(samples.normals @ normal) <= SIDEWAYS) & (samples.normals[:, 1] < 0)
+        return np.asarray(points[int(np.round(np.linalg.norm(away, axis=1), 6).argmax())])
+    beside = (np.abs(normals @ normal) <= SIDEWAYS) & (normals[:, 1] < 0)
     beside = beside if beside.any() else np.ones(len(along), dtype=bool)
     off = np.where(beside, np.abs(along - 0.5 * along.max()), np.inf)
-    return np.asarray(samples.points[int(np.round(off, 6).argmin())])
+    return np.asarray(points[int(np.round(off, 6).argmin())])
+
+
+def _samples(outline: Loop) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Points (n, 2) of the outline, also every piece's middle; inner normals (n, 2), arc lengths (n,)."""
+    spacing = float(outline.lengths.sum()) / 1000
+    points, normals, along, start = [], [], [], 0.0
+    for which, length in enumerate(outline.lengths):
+        count = 2 * int(np.ceil(length / spacing / 2)) + 1
+        shares = (np.arange(count) + 0.5) / count
+        points.append(outline.along(which, shares))
+        normals.append(inner_normals(outline, which, shares))
+        along.append(start + shares * length)
+        start += length
+    return np.concatenate(points), np.concatenate(normals), np.concatenate(along)
 
 
 def _mid_span(section: Section, which: int, clamp: FloatArray) -> FloatArray:

@@ -16,7 +16,7 @@ from geometry.drawing.drawn_finger import DrawnFinger, description_lines
 from geometry.drawing.load import load_drawing
 from geometry.drawing.pieces import circle
 from geometry.mesh.mesher import build_mesh
-from tests.geometry.drawing.files import BEAM, CSIRO, FINRAY, rectangle, write_beam_mesh, write_dxf
+from tests.geometry.drawing.files import BEAM, CSIRO, FINRAY, rectangle, write_beam_mesh, write_dxf, write_svg
 
 FILES = [*sorted(FINRAY.glob("*.stp")), CSIRO]
 IDS = [path.stem for path in FILES]
@@ -99,6 +99,27 @@ def test_proposals(path, clamp, contact, diameter):
     assert (finger.section.clearance(finger.markers) >= finger.marker_radius).all()
     assert 3 <= (finger.markers[:, 1] > -3).sum() <= 6  # on the front and elsewhere
     assert load_drawing(path).digest == finger.digest  # the same every time
+
+
+def test_markers_leave_a_sharp_tip_out(tmp_path):
+    finger = load_drawing(write_dxf(tmp_path / "wedge.dxf", [[(0, 0), (60, 0), (0, 20)]]))
+    assert finger.marker_diameter > 0.5
+    assert (finger.markers[:, 1] > -3).sum() >= 3
+
+
+def test_a_body_held_at_both_ends_has_markers_on_both_sides(tmp_path):
+    path = write_dxf(tmp_path / "beam.dxf", [BEAM])
+    finger = load_drawing(path, Description(clamp=[[[0, 0], [0, -10]], [[100, 0], [100, -10]]]))
+    assert sorted(set(finger.markers[:, 1])) == pytest.approx([-8, -2])
+    assert len(finger.markers) == 9
+
+
+def test_a_long_curved_body_is_touched_at_its_side(tmp_path):
+    drop = '<path d="M5 30 C 5 5 60 5 95 25 L 95 35 C 60 40 5 55 5 30 z"/>'
+    finger = load_drawing(write_svg(tmp_path / "drop.svg", drop))
+    x, y = finger.placement.inverse([[finger.contact_abscissa, 0]])[0]
+    assert (x, y) == pytest.approx((50, -11), abs=0.3)  # half of 5 to 95, on the upper side
+    assert clamped_length(finger) == pytest.approx(10)
 
 
 @pytest.mark.parametrize("turn", [0, 37, 90, 180, 271])
