@@ -60,7 +60,7 @@ def read_step(path: Path, units: str | None = None, plane: str | None = None) ->
             f"{path.name} holds {len(bodies)} solids besides markers{': ' + found if found else ''}; keep "
             "one, and call the others marker-1, marker-2, ... if they are markers"
         )
-    solid = bodies[0][1]
+    solid = _filled(bodies[0][1], markers)
     unit = UNITS[units or "mm"]
     try:
         cut = _cut_at(solid, *plane_of(plane)) if plane else _across(solid)
@@ -112,6 +112,12 @@ def _parts(path: Path) -> tuple[list[tuple[str, cq.Solid]], list[cq.Solid]]:
         raise UserError(f"cannot read {path.name} as STEP: it holds no solid; export the body as a solid")
     bodies = [(name, solid) for name, solid in solids if not MARKER.match(name)]
     return bodies, [solid for name, solid in solids if MARKER.match(name)]
+
+
+def _filled(body: cq.Solid, markers: Sequence[cq.Solid]) -> cq.Solid:
+    """The body with its markers in their pockets; the body alone if they do not touch it."""
+    whole = body.fuse(*markers).clean().Solids() if markers else [body]
+    return whole[0] if len(whole) == 1 else body
 
 
 def _across(solid: cq.Solid) -> Cut:

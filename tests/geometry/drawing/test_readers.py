@@ -90,6 +90,16 @@ def test_exports_are_read_back(tmp_path, design, export):
         assert drawing.marker_height == pytest.approx(design.marker_height, rel=1e-6)
 
 
+@pytest.mark.parametrize("height", [15, 19.8])
+def test_deep_markers_leave_no_holes(tmp_path, height):
+    """Inlays through more than half of the depth, and through almost all of it."""
+    design = Design(marker_height=height)
+    drawing = read_drawing(export_step(design, tmp_path)[0])
+    assert area(drawing) == pytest.approx(design.section.area, rel=1e-9)
+    assert len(drawing.loops) == len(design.section.loops)
+    assert drawing.marker_height == pytest.approx(height)
+
+
 def test_mesh_of_an_extruded_body_gives_its_section():
     drawing = read_drawing(CSIRO)
     section = body(drawing.loops)
