@@ -118,7 +118,7 @@ def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
         x = float(placement(outline.along(which, fraction))[0, 0])
         width, width_source = _first(
             given=_scaled(description.contact_width, drawing.unit),
-            proposed=proposal.contact_width(section.outline),
+            proposed=proposal.contact_width(section.outline, x),
         )
     else:
         ends = placement(contact.ends)[:, 0]

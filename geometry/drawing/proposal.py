@@ -157,10 +157,12 @@ def marker_diameter(section: Section, places: FloatArray) -> float:
     return float(np.floor(100 * largest + 1e-6) / 100 or largest)
 
 
-def contact_width(outline: Loop) -> float:
-    """A proposed extent of the contact, mm, on an outline with a front."""
+def contact_width(outline: Loop, middle: float) -> float:
+    """A proposed extent of the contact around an abscissa, mm, on an outline with a front."""
     front = np.concatenate([outline.ends[which][:, 0] for which in outline.pieces("front")])
-    return min(CONTACT_WIDTH, float(np.ptp(front)) / 5)
+    beside = min(middle - front.min(), front.max() - middle)
+    widest = min(CONTACT_WIDTH, float(np.ptp(front)) / 5)
+    return min(widest, 2 * float(beside)) if beside > 1e-3 else widest  # at the very end the check refuses it
 
 
 def _principal_axis(outline: Loop) -> FloatArray:

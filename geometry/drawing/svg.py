@@ -1,7 +1,7 @@
 """Reads the curves of an SVG file. The names of its groups and elements are the labels."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import ParseError
@@ -37,19 +37,20 @@ def read_svg(path: Path, units: str | None = None) -> Drawing:
     """
     digest = sha256_of(path)
     try:
-        parsed = svgelements.SVG.parse(str(path), reify=True)
+        parsed = svgelements.SVG.parse(str(path), reify=False)
     except (OSError, ParseError, ValueError, UnicodeDecodeError) as error:
         raise UserError(f"cannot read {path.name} as SVG: {error}") from None
     back = ~svgelements.Matrix(parsed.viewbox_transform or "")
-    unit, origin = (UNITS[units], "given") if units else (_unit(parsed, path.name), "of width and viewBox")
+    unit = UNITS[units] if units else _unit(parsed, path.name)
     marks = Marks(path.name)
     pieces: list[Piece] = []
     for element, label in _shapes(parsed, ""):
-        shape = element * back
-        shape.reify()
-        if not marks.took(*_mark(shape, unit), label):
-            pieces += _pieces(svgelements.Path(shape), label, unit)
-    return marks.drawing(pieces, digest, note=f"SVG, {unit:.6g} mm in a user unit ({origin})")
+        place = _Transformation(element.transform * back, unit)
+        if not marks.took(*_mark(element, place), label):
+            pieces += _pieces(element.segments(transformed=False), label, place)
+    return marks.drawing(
+        pieces, digest, note=f"SVG, {unit:.6g} mm in a user unit{' (given)' if units else ''}"
+    )
 
 
 def _unit(parsed: Any, file: str) -> float:
@@ -80,7 +81,7 @@ def _unit(parsed: Any, file: str) -> float:
 def _shapes(group: Any, label: str) -> Iterator[tuple[Any, str]]:
     for element in group:
         name = _name(element) or label
-        if isinstance(element, svgelements.Group):
+        if isinstance(element, svgelements.Group | svgelements.Use):
             yield from _shapes(element, name)
         elif isinstance(element, svgelements.Shape) and element.values.get("visibility") != "hidden":
             yield element, name
@@ -94,40 +95,49 @@ def _name(element: Any) -> str:
     return ""
 
 
-def _mark(shape: Any, unit: float) -> tuple[FloatArray | None, float]:
-    if (
-        not isinstance(shape, svgelements.Circle | svgelements.Ellipse)
-        or abs(shape.rx - shape.ry) > 1e-6 * shape.rx
-    ):
+class _Transformation:
+    """From an element's own coordinates into the drawing's, mm, y upward."""
+
+    def __init__(self, matrix: Any, unit: float) -> None:
+        flip = np.array([[unit, 0.0], [0.0, -unit]])
+        self._matrix = flip @ np.array([[matrix.a, matrix.c], [matrix.b, matrix.d]])
+        self._shift = flip @ np.array([matrix.e, matrix.f])
+
+    @property
+    def scale(self) -> float | None:
+        """Length of a unit, mm; None if circles do not stay circles."""
+        low, high = sorted(np.linalg.svd(self._matrix, compute_uv=False))
+        return float(high) if high - low <= 1e-9 * high else None
+
+    def __call__(self, point: Any) -> FloatArray:
+        """A point in the drawing, shape (2,), mm."""
+        return np.asarray(self._matrix @ [float(point[0]), float(point[1])] + self._shift)
+
+    def along(self, segment: Any) -> Callable[[FloatArray], FloatArray]:
+        """Points of a segment at parameters from 0 to 1."""
+        return lambda parameters: np.array([self(segment.point(float(t))) for t in parameters])
+
+
+def _mark(shape: Any, place: _Transformation) -> tuple[FloatArray | None, float]:
+    """Centre and diameter of a circle, mm; None for another shape."""
+    if not isinstance(shape, svgelements.Circle | svgelements.Ellipse) or not place.scale:
         return None, 0.0
-    return _flat(shape.implicit_center, unit), float(shape.implicit_rx + shape.implicit_ry) * unit
+    if abs(shape.rx - shape.ry) > 1e-9 * shape.rx:
+        return None, 0.0
+    return place((shape.cx, shape.cy)), 2 * float(shape.rx) * place.scale
 
 
-def _pieces(path: Any, label: str, unit: float) -> Iterator[Piece]:
-    for segment in path:
+def _pieces(segments: Iterable[Any], label: str, place: _Transformation) -> Iterator[Piece]:
+    for segment in segments:
         if isinstance(segment, svgelements.Move) or segment.start is None or segment.end is None:
             continue
-        start, end = _flat(segment.start, unit), _flat(segment.end, unit)
+        start, end = place(segment.start), place(segment.end)
+        round_arc = isinstance(segment, svgelements.Arc) and abs(segment.rx - segment.ry) <= 1e-9 * segment.rx
         if isinstance(segment, svgelements.Line | svgelements.Close):
             yield line(start, end, label)
-        elif isinstance(segment, svgelements.Arc) and abs(segment.rx - segment.ry) <= 1e-9 * segment.rx:
-            if abs(segment.sweep) > 2 * np.pi - 1e-9:
-                yield from circle(_flat(segment.center, unit), float(segment.rx) * unit, label)
-            else:
-                yield arc_through(start, _flat(segment.point(0.5), unit), end, label)
+        elif not (round_arc and place.scale):
+            yield from arcs_along(place.along(segment), 0.0, 1.0, label)
+        elif abs(segment.sweep) > 2 * np.pi - 1e-9:
+            yield from circle(place(segment.center), float(segment.rx) * place.scale, label)
         else:
-            yield from arcs_along(_Along(segment, unit), 0.0, 1.0, label)
-
-
-class _Along:
-    """Points of a segment, mm."""
-
-    def __init__(self, segment: Any, unit: float) -> None:
-        self._segment, self._unit = segment, unit
-
-    def __call__(self, parameters: FloatArray) -> FloatArray:
-        return np.array([_flat(self._segment.point(float(t)), self._unit) for t in parameters])
-
-
-def _flat(point: Any, unit: float) -> FloatArray:
-    return np.array([point.x, -point.y], dtype=np.float64) * unit
+            yield arc_through(start, place(segment.point(0.5)), end, label)

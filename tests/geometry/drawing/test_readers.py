@@ -180,6 +180,15 @@ def test_svg_transformations_units_and_names(tmp_path):
     assert read_drawing(path, units="mm").markers == pytest.approx(np.array([[12, -22]]))
 
 
+def test_svg_circles_under_a_skew_are_ellipses_and_copies_are_shapes(tmp_path):
+    svg = """<defs><rect id="hole" width="4" height="3"/></defs><use href="#hole" x="40" y="30"/>
+      <g transform="skewX(20) scale(2 1)"><circle cx="15" cy="30" r="12"/></g>"""
+    outline, hole = read_drawing(write_svg(tmp_path / "a.svg", svg)).loops[::-1]
+    assert abs(outline.area) == pytest.approx(2 * np.pi * 144, rel=1e-4)
+    assert np.ptp(outline.bounds[:, 0]) == pytest.approx(24 * np.hypot(2, np.tan(np.radians(20))), rel=1e-4)
+    assert hole.bounds == pytest.approx(np.array([[40, -33], [44, -30]]))
+
+
 def test_layers_name_pieces(tmp_path):
     document = ezdxf.new(units=4)
     for start, end, layer in zip(BEAM, BEAM[1:] + BEAM[:1], ("Clamp", "0", "0", "0"), strict=True):
