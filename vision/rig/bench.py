@@ -74,7 +74,7 @@ class Bench:
             BENCH,
             [
                 *(Shape(closed(border), PAINTS["dark"]) for border in fiducials),
-                Shape(self._clamp, CLAMP, plane),
+                *(Shape(block, CLAMP, plane) for block in self._clamps),
                 Shape(self._indenter(moved), INDENTER, plane),
                 Shape(moved[self._border], FINGER, plane),
                 *self.discs(displacement),
@@ -83,26 +83,29 @@ class Bench:
         )
 
     def _indenter(self, moved: FloatArray) -> FloatArray:
-        """Edges of a blade on the contact, shape (n, 2, 2)."""
-        foot = moved[np.unique(self.mesh.boundary("contact"))]
+        """Edges of a blade on the contact, along its normal before loading, shape (n, 2, 2)."""
+        edges = self.mesh.boundary("contact")
+        frame = _frame(self.mesh.points[edges])
+        foot = moved[np.unique(edges)] @ frame.T
         middle, width = foot.mean(axis=0), np.ptp(foot[:, 0])
         blade = np.array(BLADE) * np.ptp(self.finger.section.bounds[:, 0])
-        right = np.concatenate([[(0.0, -OVERLAP)], blade]) + middle + (width / 2, 0.0)
-        left = 2 * middle[0] - right[::-1, 0]
-        return closed(np.concatenate([right, np.column_stack([left, right[::-1, 1]])]))
+        ahead = np.concatenate([[(0.0, -OVERLAP)], blade]) + middle + (width / 2, 0.0)
+        behind = 2 * middle[0] - ahead[::-1, 0]
+        corners = np.concatenate([ahead, np.column_stack([behind, ahead[::-1, 1]])])
+        return closed(corners @ frame)
 
     @cached_property
-    def _clamp(self) -> FloatArray:
-        """Edges of a block behind the base and beyond its ends, shape (4, 2, 2)."""
-        ends = self.mesh.points[self.mesh.boundary("base")]
-        along = (ends[:, 1] - ends[:, 0]).sum(axis=0)
-        along = along / np.linalg.norm(along)
-        outward = np.array([along[1], -along[0]])
-        places = ends.reshape(-1, 2) @ np.column_stack([along, outward])
-        (first, inner), (last, _) = places.min(axis=0), places.max(axis=0)
+    def _clamps(self) -> list[FloatArray]:
+        """Edges of a block behind each piece of the base and beyond its ends, each of shape (4, 2, 2)."""
         depth, beyond = CLAMP_SIZE
-        block = rectangle((first - beyond, inner), (last + beyond, inner + depth))
-        return np.asarray(block @ np.array([along, outward]))
+        blocks = []
+        for loop, which in self.finger.section.named("base"):
+            points = loop.along(which, np.linspace(0, 1, 65))
+            frame = _frame(points[[[0, -1]]])
+            (first, inner), (last, outer) = (bound(points @ frame.T, axis=0) for bound in (np.min, np.max))
+            block = rectangle((first - beyond, inner), (last + beyond, outer + depth))
+            blocks.append(np.asarray(block @ frame))
+        return blocks
 
     @cached_property
     def _border(self) -> IntArray:
@@ -112,6 +115,13 @@ class Bench:
     def _marker_borders(self) -> LocatedPoints:
         radius = self.finger.marker_radius
         return self.mesh.locate(np.concatenate([circle(centre, radius) for centre in self.mesh.markers]))
+
+
+def _frame(edges: FloatArray) -> FloatArray:
+    """Unit vectors against edges (k, 2, 2) with the body on their left, and out of it, shape (2, 2)."""
+    along = (edges[:, 0] - edges[:, 1]).sum(axis=0)
+    along = along / np.linalg.norm(along)
+    return np.stack([along, along[::-1] * (-1, 1)])
 
 
 def _checked(displacement: FloatArray, mesh: TriangleMesh) -> FloatArray:

@@ -11,6 +11,7 @@ from vision.discs.disc_detector import DiscDetections, detect_discs, detect_disc
 from vision.frames.frame import Image
 from vision.tracking.data_association import (
     associate_markers,
+    distance_from_base,
     rest_covariances,
     step_covariances,
     with_predictions,
@@ -68,7 +69,8 @@ class FrameTracker:
         self.plane, self._fiducials = scene.first_plane(image)
         self._rest = self._places = scene.design.markers
         self._step = np.zeros_like(self._rest)
-        self._steps = step_covariances(self._rest)
+        self._reach = distance_from_base(scene.design.section, self._rest)
+        self._steps = step_covariances(self._rest, self._reach)
         self._size, self._contrast = 1.0, np.nan
         detections = self._search(image, sized=False)
         fields = rest_covariances(self._rest)
@@ -123,7 +125,7 @@ class FrameTracker:
         known = np.isfinite(markers.radii)
         step = np.full_like(self._places, np.nan)
         step[known] = self.plane.points(markers.centres[known]) - self._places[known]
-        return with_predictions(self._rest, step)
+        return with_predictions(self._rest, self._reach, step)
 
     def _search(self, image: Image, *, sized: bool = True) -> DiscDetections:
         """Detect discs of the markers' size in the part of the image that the finger can reach."""

@@ -8,9 +8,12 @@ in the image until the motion of the finger shows its direction. Units: pixels, 
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
+
+ComplexArray = NDArray[np.complex128]
 
 GATE = 0.15
 """Largest distance of a disc from its marker, over the smallest distance of two markers."""
@@ -30,10 +33,16 @@ def match_layout(pixels: FloatArray, radii: FloatArray, markers: FloatArray, dia
         diameter: Of a marker, mm.
 
     Raises:
-        UserError: If fewer than three, or less than half of the markers, are seen.
+        UserError: If fewer than three, or less than half of the markers, are seen, or they look the same
+            after a turn by another angle than 180 degrees.
     """
     discs, places = pixels @ (1, -1j), markers @ (1, 1j)
     apart = np.abs(places[:, None] - places)[~np.eye(len(places), dtype=bool)].min(initial=np.inf)
+    if (turn := _symmetry(places, GATE * apart)) is not None:
+        raise UserError(
+            f"the fiducials cannot be made out, and the markers look the same after a turn by {turn:.0f} "
+            "degrees, so they do not tell how the finger lies; show the fiducials"
+        )
     first, second = np.nonzero(~np.eye(len(discs), dtype=bool))
     best, most = np.full(len(places), -1), -np.inf
     for one, other in combinations(range(len(places)), 2):
@@ -56,3 +65,17 @@ def match_layout(pixels: FloatArray, radii: FloatArray, markers: FloatArray, dia
             "and give the design, the workspace and the markers' colour"
         )
     return best
+
+
+def _symmetry(places: ComplexArray, gate: float) -> float | None:
+    """Smallest turn but 180, degrees, that maps places, shape (m,), on each other within `gate`, or None."""
+    arms = places - places.mean()
+    farthest = arms[np.abs(arms).argmax()]
+    turns = np.angle(arms / farthest)[np.abs(np.abs(arms) - np.abs(farthest)) < gate]
+    found = [
+        abs(float(np.degrees(turn)))
+        for turn in turns
+        if np.pi / 180 < abs(turn) < np.pi * 179 / 180
+        and (np.abs(arms[:, None] * np.exp(1j * turn) - arms).min(axis=1) < gate).all()
+    ]
+    return min(found, default=None)

@@ -78,7 +78,7 @@ class FilmedScene:
             if not self.markers_only:
                 raise
         design = self.design
-        length = float(np.ptp(design.section.bounds[:, 0]))
+        length = float(np.ptp(design.section.bounds, axis=0).max())
         detections = self._discs(image, self.colour, length, design.marker_diameter)
         numbers = match_layout(detections.centres, detections.radii, design.markers, design.marker_diameter)
         absent = np.full(len(self.workspace.fiducials), -1)

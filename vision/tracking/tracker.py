@@ -99,7 +99,7 @@ def track(
 
 
 def _oriented_by_motion(scene: FilmedScene, tracking: Tracking) -> Tracking:
-    """A track without fiducials, turned so that the finger is pressed in on its front face.
+    """A track without fiducials, turned so that the finger is pressed in on its front.
 
     Raises:
         UserError: If the markers move out of that face and do not look the same from both ends.
@@ -110,7 +110,7 @@ def _oriented_by_motion(scene: FilmedScene, tracking: Tracking) -> Tracking:
         markers = tracking.expected
         if not np.allclose(2 * markers.mean(axis=0) - markers[::-1], markers):  # by a half turn
             raise UserError(
-                "the markers move out of the front face: the image is mirrored; flip it, or show fiducials"
+                "the markers move out of the front: the image is mirrored; flip it, or show fiducials"
             )
         initial, final = (end.where(np.s_[::-1]) for end in (tracking.initial, tracking.final))
         tracking = replace(

@@ -18,6 +18,8 @@ from geometry.finger.finger import Finger
 
 MARGIN = 12.0
 """Distance of the fiducials from the finger's bounding box before loading."""
+INDENTER = 0.08
+"""Room for the indenter on either side of the contact, as a share of the finger's length."""
 SHEET_MARGIN, RULER = 10.0, 50.0
 """White space around the printed fiducials, and length of the line to measure on the print."""
 
@@ -25,7 +27,7 @@ Point = tuple[float, float]
 
 
 class Workspace(BaseModel):
-    """Fiducials around the finger, in the finger's frame: x to the tip, y out of the front face.
+    """Fiducials around the finger, in the finger's frame: x to the tip, y out of the front.
 
     Attributes:
         fiducials: Centres of the fiducials, in the plane z = 0.
@@ -70,7 +72,15 @@ def default_workspace(finger: Finger) -> Workspace:
     """Seven fiducials around a finger: four in front of it, with room for the indenter, three behind."""
     (start, below), (end, above) = finger.section.bounds
     left, right, length = start - MARGIN, end + MARGIN, end - start
-    front = product((left, start + 0.15 * length, start + 0.7 * length, right), (above + MARGIN,))
+    contact, room = finger.contact_abscissa, finger.contact_width / 2 + INDENTER * length
+
+    def beside(x: float) -> float:
+        """The place, or the nearest one that the indenter leaves free."""
+        return x if abs(x - contact) >= room else contact + float(np.copysign(room, x - contact))
+
+    front = product(
+        (left, beside(start + 0.15 * length), beside(start + 0.7 * length), right), (above + MARGIN,)
+    )
     back = product((left, start + 0.45 * length, right), (below - MARGIN,))
     return Workspace(fiducials=(*front, *back))
 

@@ -1,0 +1,168 @@
+"""Rig and tracker with fingers that are no wedge: displacements as good as the default finger's."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.finger.finger import Finger
+from geometry.finger.presets import load_design
+from geometry.mesh.mesher import build_mesh
+from geometry.mesh.settings import MeshSettings
+from tests.fingers import beam, ring
+from tests.vision.films import frames_of
+from vision.rig.bench import Bench
+from vision.rig.exposure import Exposure
+from vision.rig.motion import Motion
+from vision.rig.recording import Recording
+from vision.rig.shapes import area
+from vision.rig.virtual_camera import default_camera, viewing_pose
+from vision.tracking.data_association import (
+    NOISE,
+    associate_markers,
+    distance_from_base,
+    step_covariances,
+)
+from vision.tracking.layout_matching import match_layout
+from vision.tracking.scene import FilmedScene
+from vision.tracking.tracker import track
+from vision.tracking.workspace import default_workspace
+
+FINGERS: dict[str, Finger] = {
+    "default": Design(marker_layout="joints"),
+    "csiro": load_design("csiro", {"marker_layout": "joints"}),
+    "beam": beam(),
+    "ring": ring(),
+}
+FLATTENED = np.array(
+    [
+        *((-4.10, -3.00), (-3.39, -3.46), (-1.33, -1.57), (-0.66, -7.07), (0.01, -10.04)),
+        *((0.68, -7.07), (1.34, -1.58), (3.41, -3.47), (4.11, -3.01)),
+    ]
+)
+"""Displacements of the ring's markers by `fem-nonlinear`, pressed in by 10 mm, shape (9, 2), mm."""
+PRESSED_IN = 6.0
+"""Largest displacement, mm."""
+
+
+def squeezed(finger: Finger, points: FloatArray) -> FloatArray:
+    """A smooth displacement, zero at the base: a ring is flattened and bulges, others bend; shape (n, 2)."""
+    share = (
+        distance_from_base(finger.section, points)
+        / distance_from_base(finger.section, finger.section.outline.flattened()[0]).max()
+    )
+    middle = finger.section.bounds.mean(axis=0)[0]
+    bulge = 0.5 * np.sin(np.pi * share) * np.sign(points[:, 0] - middle) * (finger.name == "ring")
+    return PRESSED_IN * np.column_stack([bulge - 0.2 * share**2, -(share**2)])
+
+
+@cache
+def recording(name: str) -> Recording:
+    finger, camera = FINGERS[name], default_camera()
+    mesh, workspace = build_mesh(finger, MeshSettings(size=1.0)), default_workspace(finger)
+    return Recording(
+        bench=Bench(mesh, finger, workspace),
+        displacement=squeezed(finger, mesh.points),
+        camera=camera,
+        pose=viewing_pose(camera, workspace, tilt=3.0),
+        exposure=Exposure(noise=2),
+        motion=Motion(rest=3, moving=3, held=3),
+    )
+
+
+@cache
+def error(name: str) -> float:
+    """Mean length of the errors of the tracked displacements against those of the discs, mm."""
+    film = recording(name)
+    scene = FilmedScene(FINGERS[name], film.bench.workspace, camera=film.camera)
+    tracking = track(frames_of([image for image, _ in film.frames()]), scene)
+    observed = tracking.observations("rig")
+    assert observed.visible.all()
+    wrong = observed.displacements - film.observations("rig", discs=True).displacements
+    return float(np.linalg.norm(wrong, axis=1).mean())
+
+
+@pytest.mark.parametrize("name", ["csiro", "beam", "ring"])
+def test_any_finger_is_tracked_as_accurately_as_the_default_one(name: str) -> None:
+    """In proportion to the size of a pixel, about 0.1 mm: hundredths of it."""
+    assert error(name) < max(2 * error("default"), 0.003)
+
+
+@pytest.mark.parametrize("name", FINGERS)
+def test_nothing_lies_on_a_fiducial_and_all_are_in_the_picture(name: str) -> None:
+    film = recording(name)
+    fiducials = film.bench.workspace.points
+    radius = film.bench.workspace.fiducial_diameter / 2
+    seen = film.camera.project(np.column_stack([fiducials, np.zeros(len(fiducials))]), film.pose)
+    assert ((seen > 0) & (seen < (film.camera.width, film.camera.height))).all()
+    shapes = film.bench.scene(film.displacement).shapes[len(fiducials) :]
+    for shape in shapes:
+        along = shape.edges[:, :1] + np.linspace(0, 1, 9)[:, None] * (shape.edges[:, 1:] - shape.edges[:, :1])
+        away = np.linalg.norm(along.reshape(-1, 1, 2) - fiducials, axis=2)
+        assert away.min() > radius
+    assert all(abs(area(shape.edges)) > 0 for shape in shapes)
+
+
+def test_a_fiducial_makes_room_for_the_indenter_wherever_it_presses() -> None:
+    for position in (12.0, 35.0, 60.0, 63.0, 66.0):
+        points = default_workspace(Design(contact_position=position)).points
+        front = points[points[:, 1] > 0]
+        assert np.abs(front[:, 0] - position).min() > 7
+
+
+def test_the_clamp_holds_every_part_of_the_base() -> None:
+    for name, count in (("csiro", 2), ("ring", 1), ("default", 1)):
+        film = recording(name)
+        section = film.bench.finger.section
+        blocks = film.bench._clamps
+        assert len(blocks) == count
+        for block, (loop, which) in zip(blocks, section.named("base"), strict=True):
+            low, high = block.reshape(-1, 2).min(axis=0), block.reshape(-1, 2).max(axis=0)
+            points = loop.along(which, np.linspace(0, 1, 9))
+            assert (points > low - 1e-9).all()
+            assert (points < high + 1e-9).all()
+
+
+def test_the_blade_stands_on_a_curved_front_along_its_normal() -> None:
+    finger = ring().at_contact(32.0)  # where the ring slopes
+    mesh = build_mesh(finger, MeshSettings(size=2.0))
+    bench = Bench(mesh, finger, default_workspace(finger))
+    blade = bench._indenter(mesh.points)[:, 0]
+    centre, foot = np.array([15.0, -30.0]), finger.section.front_point(32.0)
+    normal = (foot - centre) / 30.0
+    farthest = blade[((blade - foot) @ normal).argsort()[-2:]].mean(axis=0) - foot
+    np.testing.assert_allclose(farthest / np.linalg.norm(farthest), normal, atol=0.01)
+
+
+def test_markers_on_both_sides_of_a_ring_keep_their_names_though_they_are_equally_far_from_the_base() -> None:
+    finger = ring()
+    points = finger.markers
+    reach = distance_from_base(finger.section, points)
+    fields = step_covariances(points, reach)
+    for field in fields.reshape(-1, len(points), len(points)):
+        assert np.linalg.eigvalsh(field + NOISE**2 * np.eye(len(points))).min() > NOISE**2 / 2
+    generator = np.random.default_rng(3)
+    for _ in range(50):
+        before, jump = generator.uniform(0, 0.3), generator.uniform(0.1, 0.7)
+        step = jump * FLATTENED + generator.normal(0, 0.01, points.shape)
+        order = generator.permutation(len(points))
+        names = associate_markers(
+            (points + before * FLATTENED + step)[order], points + before * FLATTENED, fields
+        )
+        np.testing.assert_array_equal(order[names], np.arange(len(points)))
+        assert (names >= 0).all()
+
+
+def test_without_fiducials_markers_that_look_the_same_when_turned_are_refused() -> None:
+    """With fiducials the frame is theirs, and a marker is named by its place."""
+    angles = 2 * np.pi * np.arange(8) / 8
+    even = 28 * np.column_stack([np.cos(angles), np.sin(angles)])
+    pixels = 10 * even * (1, -1) + 400
+    with pytest.raises(UserError, match="look the same after a turn by 45 degrees"):
+        match_layout(pixels, np.full(8, 8.0), even, 1.6)
+    uneven = even * (1.0, 0.9) + np.arange(8)[:, None]
+    pixels = 10 * uneven * (1, -1) + 400
+    np.testing.assert_array_equal(match_layout(pixels, np.full(8, 8.0), uneven, 1.6), np.arange(8))
