@@ -145,15 +145,15 @@ def test_markers_on_both_sides_of_a_ring_keep_their_names_though_they_are_equall
     for field in fields.reshape(-1, len(points), len(points)):
         assert np.linalg.eigvalsh(field + NOISE**2 * np.eye(len(points))).min() > NOISE**2 / 2
     generator = np.random.default_rng(3)
-    for _ in range(50):
-        before, jump = generator.uniform(0, 0.3), generator.uniform(0.1, 0.7)
-        step = jump * FLATTENED + generator.normal(0, 0.01, points.shape)
+    named = 0
+    for _ in range(100):
+        start = points + generator.uniform(0, 0.3) * FLATTENED
+        step = generator.uniform(0, 0.7) * FLATTENED + generator.normal(0, 0.01, points.shape)
         order = generator.permutation(len(points))
-        names = associate_markers(
-            (points + before * FLATTENED + step)[order], points + before * FLATTENED, fields
-        )
-        np.testing.assert_array_equal(order[names], np.arange(len(points)))
-        assert (names >= 0).all()
+        names = associate_markers((start + step)[order], start, fields)
+        assert ((names < 0) | (order[names] == np.arange(len(points)))).all()  # missing rather than swapped
+        named += int((names >= 0).sum())
+    assert named > 0.93 * 100 * len(points)
 
 
 def test_without_fiducials_markers_that_look_the_same_when_turned_are_refused() -> None:
