@@ -55,7 +55,7 @@ def squeezed(finger: Finger, points: FloatArray) -> FloatArray:
         / distance_from_base(finger.section, finger.section.outline.flattened()[0]).max()
     )
     middle = finger.section.bounds.mean(axis=0)[0]
-    bulge = 0.5 * np.sin(np.pi * share) * np.sign(points[:, 0] - middle) * (finger.name == "ring")
+    bulge = 0.5 * np.sin(np.pi * share) * np.tanh((points[:, 0] - middle) / 8) * (finger.name == "ring")
     return PRESSED_IN * np.column_stack([bulge - 0.2 * share**2, -(share**2)])
 
 
