@@ -103,8 +103,8 @@ def _close_ups(mesh: TriangleMesh, ratio: float) -> dict[str, Extent]:
 
 
 def _inward(mesh: TriangleMesh, middle: FloatArray, width: float, ratio: float) -> FloatArray:
-    """The middle of a window, moved so that at most a third of it lies beyond the body's bounds."""
-    room = np.array([width, width * ratio]) / 6
+    """The middle of a window, moved so that at most a tenth of it lies beyond the body's bounds."""
+    room = 0.4 * np.array([width, width * ratio])
     low, high = mesh.points.min(axis=0) + room, mesh.points.max(axis=0) - room
     return np.where(low < high, np.clip(middle, low, high), (low + high) / 2)
 
