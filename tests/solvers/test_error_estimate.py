@@ -60,7 +60,7 @@ def graded():
 @pytest.mark.parametrize("kind", ["mean", "patch"])
 @pytest.mark.parametrize("degree", [1, 2])
 def test_estimates_on_the_finger_are_within_a_factor_of_two(coarse_mesh, medium_mesh, graded, kind, degree):
-    """Seen: 0.95 to 1.09 in energy, 0.84 to 1.31 for displacements, 0.97 to 1.61 for the von Mises stress."""
+    """Seen: 0.94 to 1.09 in energy, 0.83 to 1.39 for displacements, 0.97 to 1.58 for the von Mises stress."""
     finer = FemSolver(estimate=False).solve(Problem(graded, load=Load(kind=kind)))
     for mesh in (coarse_mesh, medium_mesh):
         found = effectivity(FemSolver(degree).solve(Problem(mesh, load=Load(kind=kind))), finer)
@@ -157,7 +157,7 @@ def test_at_a_small_stroke_the_finite_strain_estimate_is_the_linear_one(coarse_m
     "load", [Load(), Load(kind="patch", displacement=(None, -10.0))], ids=["mean", "slide"]
 )
 def test_estimates_at_finite_strain_are_within_a_factor_of_two(coarse_mesh, graded, load):
-    """Seen: 1.04 in energy, 1.06 to 1.18 for displacements, 1.5 to 1.6 for the von Mises stress."""
+    """Seen: 1.03 in energy, 1.03 to 1.11 for displacements, 1.5 to 1.6 for the von Mises stress."""
     material, solver = Material(law="neo-hookean"), FemNonlinearSolver()
     finer = solver.solve(Problem(graded, material, load))
     solution = solver.solve(Problem(coarse_mesh, material, load))
