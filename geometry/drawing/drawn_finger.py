@@ -143,10 +143,17 @@ class DrawnFinger:
             "mesh": self.mesh.digest if self.mesh else None,
         }
 
+    def whole(self) -> dict[str, Any]:
+        """The definition with the arrays of the file's own mesh."""
+        return {**self.definition(), "mesh": _mesh_definition(self.mesh) if self.mesh else None}
+
     def save(self, path: Path) -> None:
         """Write the definition and the file's own mesh as JSON."""
-        mesh = _mesh_definition(self.mesh) if self.mesh else None
-        path.write_text(json.dumps({**self.definition(), "mesh": mesh}), encoding="utf-8")
+        path.write_text(json.dumps(self.whole()), encoding="utf-8")
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle the whole definition, for other processes."""
+        return type(self).from_definition, (self.whole(),)
 
     @classmethod
     def load(cls, path: Path) -> Self:

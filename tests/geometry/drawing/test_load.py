@@ -1,6 +1,7 @@
 """Fingers from drawings: proposals, placement, description, and meshes of them."""
 
 import json
+import pickle
 
 import ezdxf
 import numpy as np
@@ -240,6 +241,7 @@ def test_mesh_with_groups_is_taken_as_it_is(tmp_path):
     assert (finger.contact_abscissa, finger.contact_width) == pytest.approx((42, 4))
     finger.save(tmp_path / "finger.json")
     assert DrawnFinger.load(tmp_path / "finger.json").digest == finger.digest
+    assert pickle.loads(pickle.dumps(finger)).digest == finger.digest
     assert finger.definition()["mesh"] == mesh.digest
     assert finger.at_contact(30).mesh is None
 
