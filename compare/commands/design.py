@@ -4,6 +4,9 @@ from pathlib import Path
 
 from compare.commands.options import FingerOptions, OutputPath, comma_list
 
+STEP = "finger"
+"""Name of the STEP file, beside which its clamp and contact lie."""
+
 
 def design(
     finger: FingerOptions = FingerOptions(),
@@ -13,8 +16,8 @@ def design(
 ) -> int:
     """Draw the finger: CAD files of the body and its markers, and a dimensioned picture.
 
-    With --section, the picture shows what was read and proposed, and a .toml file has the clamp, the contact
-    and the markers as lines to change.
+    A .toml file has clamp, contact and markers as lines to change: those of finger.step or, with --section,
+    of the drawing, with what was proposed.
 
     Args:
         out: Output folder.
@@ -28,13 +31,12 @@ def design(
 
     chosen, _ = finger.read()
     paths = cad_files(chosen, out, formats=comma_list(formats))
-    if isinstance(chosen, DrawnFinger):
-        lines = out / f"{chosen.name}.toml"
-        with atomic_path(lines) as partial:
-            partial.write_text(description_lines(chosen), encoding="utf-8")
-        paths.append(lines)
+    stem = Path(chosen.file).stem if isinstance(chosen, DrawnFinger) else STEP
+    lines = out / f"{stem}.toml"
+    with atomic_path(lines) as partial:
+        partial.write_text(description_lines(chosen), encoding="utf-8")
     drawn = draw_design(chosen) if isinstance(chosen, Design) else chosen.plot()
     picture = drawn.save(out / "design.png")
-    for path in [*paths, picture]:
+    for path in [*paths, lines, picture]:
         print(path)
     return 0

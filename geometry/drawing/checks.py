@@ -8,8 +8,8 @@ import shapely
 from scipy.spatial import cKDTree
 
 from geometry.arrays import FloatArray
-from geometry.drawing.chain import straightened
-from geometry.drawing.drawing import place
+from geometry.drawing.formats.chain import straightened
+from geometry.drawing.formats.drawing import place
 from geometry.drawing.outline import on_curve
 from geometry.errors import UserError
 from geometry.section.loop import Loop

@@ -15,6 +15,7 @@ from geometry.content_hash import content_hash
 from geometry.drawing.checks import thinnest_wall
 from geometry.drawing.placement import Placement
 from geometry.errors import UserError
+from geometry.finger.finger import Finger
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.notebook import fact_table, png_image
 from geometry.section.loop import Loop
@@ -239,9 +240,14 @@ def _mesh_definition(mesh: TriangleMesh) -> dict[str, Any]:
     }
 
 
-def description_lines(finger: DrawnFinger) -> str:
-    """Clamp, contact and markers of a finger as the lines of a description, in the file's coordinates."""
-    place, unit = finger.placement.inverse, finger.unit
+def description_lines(finger: Finger) -> str:
+    """Clamp, contact and markers of a finger as the lines of a description.
+
+    Those of a drawn finger are in its file's coordinates, those of another in its own frame, mm.
+    """
+    drawn = finger if isinstance(finger, DrawnFinger) else None
+    place = drawn.placement.inverse if drawn else np.asarray
+    unit, sources = (drawn.unit, drawn.sources) if drawn else (1.0, {})
     clamp = [place(loop.ends[which]) / unit for loop, which in finger.section.named("base")]
     contact = place(finger.section.front_point(finger.contact_abscissa)) / unit
     where = {
@@ -253,9 +259,10 @@ def description_lines(finger: DrawnFinger) -> str:
         "marker_height": finger.marker_height / unit,
         "depth": finger.depth / unit,
     }
-    lines = [f"# {finger.file}: where it is clamped, touched and marked, in the file's coordinates."]
-    lines += [f"{key} = {json.dumps(value)}" for key, value in finger.reading.items()]
+    file = drawn.file if drawn else finger.name
+    lines = [f"# {file}: where it is clamped, touched and marked, in the file's coordinates."]
+    lines += [f"{key} = {json.dumps(value)}" for key, value in (drawn.reading if drawn else {}).items()]
     for key, value in where.items():
-        source = finger.sources.get(key)
+        source = sources.get(key)
         lines.append(f"{key} = {json.dumps(value)}" + (f"  # {source}" if source else ""))
     return "\n".join([*lines, ""])

@@ -8,11 +8,11 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.drawing import proposal
-from geometry.drawing.chain import straightened
 from geometry.drawing.checks import body, check_contact, check_markers
 from geometry.drawing.description import Description, description_beside, load_description
-from geometry.drawing.drawing import LABELS, Drawing, label_of
 from geometry.drawing.drawn_finger import DrawnFinger
+from geometry.drawing.formats.chain import straightened
+from geometry.drawing.formats.drawing import LABELS, Drawing, label_of
 from geometry.drawing.outline import renamed, with_part
 from geometry.drawing.placement import placed
 from geometry.drawing.ready_mesh import ready_mesh
@@ -84,18 +84,18 @@ def read_drawing(path: Path, units: str | None = None, plane: str | None = None)
     if plane is not None and suffix not in (".step", ".stp"):
         raise UserError(f"{path.name} is plane already; a plane cuts solids of STEP files only")
     if suffix in (".step", ".stp"):
-        from geometry.drawing.step import read_step
+        from geometry.drawing.formats.step import read_step
 
         return read_step(path, units, plane)
     if suffix == ".dxf":
-        from geometry.drawing.dxf import read_dxf
+        from geometry.drawing.formats.dxf import read_dxf
 
         return read_dxf(path, units)
     if suffix == ".svg":
-        from geometry.drawing.svg import read_svg
+        from geometry.drawing.formats.svg import read_svg
 
         return read_svg(path, units)
-    from geometry.drawing.msh import read_msh
+    from geometry.drawing.formats.msh import read_msh
 
     return read_msh(path, units)
 

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.drawing.chain import corner_at, cut_at, nearest_piece, run_between
-from geometry.drawing.drawing import place
+from geometry.drawing.formats.chain import corner_at, cut_at, nearest_piece, run_between
+from geometry.drawing.formats.drawing import place
 from geometry.errors import UserError
 from geometry.section.loop import STRAIGHT, Loop
 from geometry.section.thickness import inner_normals

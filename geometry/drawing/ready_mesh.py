@@ -4,7 +4,7 @@ import numpy as np
 import shapely
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
-from geometry.drawing.drawing import MeshInFile
+from geometry.drawing.formats.drawing import MeshInFile
 from geometry.drawing.placement import Placement
 from geometry.errors import UserError
 from geometry.mesh.boundary import boundary_edges

@@ -14,8 +14,8 @@ from geometry.cad import write_svg as export_svg
 from geometry.drawing.checks import thinnest_wall
 from geometry.drawing.description import Description, load_description
 from geometry.drawing.drawn_finger import DrawnFinger, description_lines
+from geometry.drawing.formats.pieces import circle
 from geometry.drawing.load import load_drawing
-from geometry.drawing.pieces import circle
 from geometry.mesh.mesher import build_mesh
 from tests.geometry.drawing.files import BEAM, CSIRO, FINRAY, rectangle, write_beam_mesh, write_dxf, write_svg
 

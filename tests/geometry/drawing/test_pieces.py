@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from geometry.drawing.chain import closed_loops, nearest_piece, straightened
-from geometry.drawing.pieces import DEVIATION, arc_through, arcs_along, circle, line
+from geometry.drawing.formats.chain import closed_loops, nearest_piece, straightened
+from geometry.drawing.formats.pieces import DEVIATION, arc_through, arcs_along, circle, line
 from geometry.errors import UserError
 from geometry.section.loop import Loop
 

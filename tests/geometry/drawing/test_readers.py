@@ -12,7 +12,7 @@ from geometry.cad import write_dxf as export_dxf
 from geometry.cad import write_step as export_step
 from geometry.cad import write_svg as export_svg
 from geometry.drawing.checks import body
-from geometry.drawing.drawing import Drawing
+from geometry.drawing.formats.drawing import Drawing
 from geometry.drawing.load import read_drawing
 from tests.geometry.drawing.files import (
     BEAM,

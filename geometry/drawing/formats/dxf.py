@@ -10,9 +10,9 @@ import numpy as np
 from ezdxf.lldxf.const import DXFError
 
 from geometry.arrays import FloatArray
-from geometry.drawing.drawing import UNITS, Drawing, label_of, sha256_of
-from geometry.drawing.marks import Marks
-from geometry.drawing.pieces import Piece, arc_through, arcs_along, circle, line
+from geometry.drawing.formats.drawing import UNITS, Drawing, label_of, sha256_of
+from geometry.drawing.formats.marks import Marks
+from geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, circle, line
 from geometry.errors import UserError
 
 HEADER_UNITS = {1: "in", 4: "mm", 5: "cm", 6: "m", 13: "um"}

@@ -9,8 +9,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from geometry.arrays import FloatArray, IntArray
-from geometry.drawing.drawing import place
-from geometry.drawing.pieces import Piece
+from geometry.drawing.formats.drawing import place
+from geometry.drawing.formats.pieces import Piece
 from geometry.errors import UserError
 from geometry.section.loop import STRAIGHT, Loop
 

@@ -10,9 +10,9 @@ import numpy as np
 import svgelements
 
 from geometry.arrays import FloatArray
-from geometry.drawing.drawing import LABELS, UNITS, Drawing, label_of, sha256_of
-from geometry.drawing.marks import Marks
-from geometry.drawing.pieces import Piece, arc_through, arcs_along, circle, line
+from geometry.drawing.formats.drawing import LABELS, UNITS, Drawing, label_of, sha256_of
+from geometry.drawing.formats.marks import Marks
+from geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, circle, line
 from geometry.errors import UserError
 
 LENGTHS = {**UNITS, "": 25.4 / 96, "px": 25.4 / 96, "pt": 25.4 / 72, "pc": 25.4 / 6}

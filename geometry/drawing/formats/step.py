@@ -12,10 +12,10 @@ import cadquery as cq
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.drawing.chain import closed_loops
-from geometry.drawing.drawing import UNITS, Drawing, sha256_of
-from geometry.drawing.frames import axes_across, plane_of, plane_text
-from geometry.drawing.pieces import Piece, arc_through, arcs_along, circle, line
+from geometry.drawing.formats.chain import closed_loops
+from geometry.drawing.formats.drawing import UNITS, Drawing, sha256_of
+from geometry.drawing.formats.frames import axes_across, plane_of, plane_text
+from geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, circle, line
 from geometry.errors import UserError
 
 MARKER = re.compile(r"marker[-_ ]?\d+$", re.IGNORECASE)

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.drawing.chain import closed_loops
-from geometry.drawing.drawing import LABELS, Drawing, place
-from geometry.drawing.pieces import Piece
+from geometry.drawing.formats.chain import closed_loops
+from geometry.drawing.formats.drawing import LABELS, Drawing, place
+from geometry.drawing.formats.pieces import Piece
 from geometry.errors import UserError
 
 MARKINGS = frozenset(label for label in LABELS if label != "markers")

@@ -10,10 +10,10 @@ import gmsh
 import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
-from geometry.drawing.chain import closed_loops, straightened
-from geometry.drawing.drawing import LABELS, UNITS, Drawing, MeshInFile, label_of, sha256_of
-from geometry.drawing.frames import axes_across, plane_text
-from geometry.drawing.pieces import line
+from geometry.drawing.formats.chain import closed_loops, straightened
+from geometry.drawing.formats.drawing import LABELS, UNITS, Drawing, MeshInFile, label_of, sha256_of
+from geometry.drawing.formats.frames import axes_across, plane_text
+from geometry.drawing.formats.pieces import line
 from geometry.errors import UserError
 from geometry.mesh.gmsh_model import session
 
