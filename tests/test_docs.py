@@ -185,7 +185,10 @@ def test_command_lines_parse(page, line):
         return
     _, bound, _ = pinnray.parse_args(tokens, exit_on_error=False, print_error=False)
     given = bound.arguments
-    if (finger := given.get("finger")) is not None and not finger.design.endswith(".toml"):
+    finger = given.get("finger")
+    if finger is not None and finger.section is not None:
+        assert (ROOT / finger.section).is_file()
+    elif finger is not None and not finger.design.endswith(".toml"):
         finger.read()
     if "physics" in given:
         given["physics"].read()

@@ -29,7 +29,7 @@ def test_every_export_is_read_back_as_the_same_finger(options: list[str], tmp_pa
     for name in ("finger.step", "section.dxf", "section.svg"):
         drawn = load_drawing(tmp_path / name)
         shift = drawn.placement.shift
-        np.testing.assert_array_equal(drawn.placement.matrix, np.eye(2))
+        np.testing.assert_allclose(drawn.placement.matrix, np.eye(2), atol=1e-12)
         assert drawn.section.area == pytest.approx(design.section.area, rel=1e-9)
         np.testing.assert_allclose(drawn.markers - shift, design.markers, atol=1e-9)
         assert drawn.contact_abscissa - shift[0] == pytest.approx(design.contact_abscissa, abs=1e-9)
