@@ -45,7 +45,7 @@ def draw_held_out(errors: Mapping[str, Mapping[str, Sequence[float]]], simulated
             axes = axes_at(drawn, (LEFT, top + row * ROW, WIDTH - LEFT - 0.1, HEIGHT))
             for label, values in by_label.items():
                 _line(axes, range(1, len(values) + 1), values, labels.index(label), label)
-            axes.set_xlabel("marker (1 is nearest the base)" + _layout_note(errors, layout))
+            axes.set_xlabel("marker, by its number in the drawing" + _layout_note(errors, layout))
             axes.set_ylabel(r"$|\Delta u| + |\Delta v|$, mm")
             axes.set_xticks(range(1, len(values) + 1))
             _finish(axes, legend=row == 0)

@@ -11,7 +11,7 @@ from compare.evaluation.regions import NEAR
 from compare.figures import Picture
 from compare.report import text
 from compare.report.sentences import certificate_sentences, truth_sentences
-from compare.report.tables import PRINTED, millimetres, seconds, table_one
+from compare.report.tables import millimetres, printed_rows, seconds, table_one
 from compare.runtime.html import template_environment
 from geometry.atomic import write_text
 
@@ -48,7 +48,7 @@ def render(comparison: Comparison, pictures: Sequence[Picture], provenance: Mapp
         own_error=text.own_error_sentence(reference),
         beside=text.beside,
         table_one=table_one(comparison),
-        printed=PRINTED,
+        printed=printed_rows(design),
         truth_sentences=truth_sentences(comparison),
         entries=[_entry(evaluation, comparison) for evaluation in comparison.evaluations],
         presets=text.preset_meanings(comparison.settings),

@@ -20,6 +20,9 @@ from compare.evaluation.metrics import (
     truth_differences,
 )
 from compare.runtime.tables import Cell, write_csv
+from geometry.finger.design import Design
+from geometry.finger.finger import Finger
+from geometry.finger.parameters import SYMBOLS
 
 Means = tuple[float, float, float | None, float]
 """Mean absolute errors at the markers in the order of `MEANS`, mm; None where it is not printed."""
@@ -53,6 +56,13 @@ Source: X. Wang et al., PINN-Ray, arXiv:2407.08222, Table I.
 """
 
 
+def printed_rows(finger: Finger) -> tuple[Row, ...]:
+    """The rows that the paper prints, for a finger with its nine parameters; none for another."""
+    own, paper = finger.definition(), Design()
+    same = all(own.get(name) == getattr(paper, name) for name in SYMBOLS.values())
+    return PRINTED if same else ()
+
+
 def table_one(comparison: Comparison) -> list[Row]:
     """A row of Table I for each solver of this run."""
     rows, observations = [], comparison.observations
@@ -70,9 +80,9 @@ def millimetres(error: float, printed: bool = False) -> str:
 
 
 def write_table_one(path: Path, comparison: Comparison) -> None:
-    """Write a row a solver, then those that the paper prints; what does not exist is empty."""
+    """Write a row a solver, then `printed_rows`; what does not exist is empty."""
     rows: list[dict[str, Cell]] = []
-    for row in (*table_one(comparison), *PRINTED):
+    for row in (*table_one(comparison), *printed_rows(comparison.design)):
         rows.append({"solver": row.solver, "observations": row.source})
         for column, means in (("in_sample", row.given), ("held_out", row.held_out)):
             for name, value in zip(MEANS, means or [None] * len(MEANS), strict=True):

@@ -7,12 +7,12 @@ from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import reference_differences, truth_differences
 from compare.evaluation.number_format import NONE, percent
-from compare.report.tables import PAPER, PRINTED, Row, millimetres, seconds, table_one
+from compare.report.tables import PAPER, Row, millimetres, printed_rows, seconds, table_one
 
 
 def marker_table(comparison: Comparison) -> Table:
-    """Mean absolute errors at the markers, those of the paper's Table I below."""
-    observations = comparison.observations
+    """Mean absolute errors at the markers; below, for the paper's finger, those of the paper's Table I."""
+    observations, printed = comparison.observations, printed_rows(comparison.design)
     seen, count = int(observations.visible.sum()), len(observations.visible)
     markers = f"{count} marker{'s' * (count > 1)}" if seen == count else f"{seen} of {count} markers"
     table = _table(
@@ -20,8 +20,8 @@ def marker_table(comparison: Comparison) -> Table:
         "given: at markers that the solver was given, a training error.\n"
         "held out: at markers that it was not given; one that is given markers has\n"
         "all but the one that it predicts.\n"
-        "sum: mean of |Δu| + |Δv| (the paper's text); rss: √(u² + v²) (its Table I).\n"
-        "paper: as it prints them, of its own experiment and not of this run.",
+        "sum: mean of |Δu| + |Δv| (the paper's text); rss: √(u² + v²) (its Table I)."
+        + ("\npaper: as it prints them, of its own experiment and not of this run." if printed else ""),
     )
     for heading in ("given\nu", "\nv", "\nsum", "\nrss", "held out\nu", "\nv", "\nsum", "\nrss"):
         table.add_column(heading, justify="right", no_wrap=True)
@@ -29,7 +29,7 @@ def marker_table(comparison: Comparison) -> Table:
         style = None if evaluation.converged else "yellow"
         table.add_row(_name(evaluation), *_means(row), style=style)
     table.add_section()
-    for row in PRINTED:
+    for row in printed:
         label = f"{row.source}: {row.solver.removeprefix('PINN-Ray ')}"
         table.add_row(label, *_means(row), style="dim")
     return table

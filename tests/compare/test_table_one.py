@@ -10,7 +10,8 @@ import pytest
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
-from compare.report.tables import PRINTED, table_one, write_table_one
+from compare.report.tables import PRINTED, printed_rows, table_one, write_table_one
+from geometry import Design, load_design
 from geometry.observations import Observations
 
 
@@ -43,3 +44,9 @@ def test_the_file_has_this_run_and_the_paper(
     assert [row["observations"] for row in rows] == ["simulated"] * 2 + ["paper"] * 3
     assert [row["held_out_mae_v_mm"][:5] for row in rows] == ["0.400", "0.125", "0.39", "0.48", ""]
     assert [bool(row["in_sample_mae_v_mm"]) for row in rows] == [False, True, False, False, True]
+
+
+def test_the_papers_numbers_stand_beside_the_papers_finger_alone() -> None:
+    assert printed_rows(Design()) == printed_rows(Design(marker_layout="front", fillet_radius=1)) == PRINTED
+    assert printed_rows(Design(rib_count=3)) == ()
+    assert printed_rows(load_design("csiro")) == ()
