@@ -18,6 +18,7 @@ BENCHMARKS = {
     "recipes": "pinn_recipes",
     "epochs": "deepxde_epochs",
     "kernels": "kernels",
+    "meshing": "meshing",
     "scenes": "tracker_scenes",
     "stress": "tracker_stress",
     "live": "live_tracking",

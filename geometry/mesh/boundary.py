@@ -25,7 +25,9 @@ LIKE = 0.5
 def boundary_edges(triangles: IntArray) -> IntArray:
     """Edges that belong to one triangle only, shape (k, 2), with the body on their left."""
     directed = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    _, first, count = np.unique(np.sort(directed, axis=1), axis=0, return_index=True, return_counts=True)
+    low, high = directed.min(axis=1), directed.max(axis=1)
+    keys = low * (int(triangles.max()) + 1) + high  # many times faster than unique pairs
+    _, first, count = np.unique(keys, return_index=True, return_counts=True)
     return np.asarray(directed[np.sort(first[count == 1])], dtype=np.int64)
 
 
