@@ -114,7 +114,7 @@ class FieldSampler:
         """Sample a solution, which may have another mesh than the shared one."""
         inside, discs = self.inside, self.discs
         if solution.problem.mesh is not mesh:  # a location belongs to its mesh
-            inside, discs = (solution.problem.mesh.locate(place.points) for place in (inside, discs))
+            inside, discs = (mesh.locate_on(solution.problem.mesh, place.points) for place in (inside, discs))
         return SampledField(
             markers=self.means @ solution.field.displacement(discs),
             displacement=solution.field.displacement(inside),

@@ -97,7 +97,7 @@ class Evaluation:
         quadrature = body_quadrature(mesh, QUADRATURE_DEGREE)
         inside, nodes = quadrature.location, LagrangeSpace(mesh, 2).at_nodes()
         if solution.problem.mesh is not mesh:  # a location belongs to its mesh
-            inside, nodes = (solution.problem.mesh.locate(place.points) for place in (inside, nodes))
+            inside, nodes = (mesh.locate_on(solution.problem.mesh, place.points) for place in (inside, nodes))
         state, displacement = solution.state(inside), solution.displacement(nodes)
         return cls(
             solver=solution.solver,

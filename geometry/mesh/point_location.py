@@ -39,15 +39,23 @@ class Locator:
         self._centroids = cKDTree(corners.mean(axis=1))
         self._radius = np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).max()
         self._origin = corners[:, 0]
+        across = corners - np.roll(corners, -1, axis=1)  # the sides beside corners 2, 0 and 1
+        double = np.abs(across[:, 0, 0] * across[:, 1, 1] - across[:, 0, 1] * across[:, 1, 0])
+        self._heights = double[:, None] / np.roll(np.linalg.norm(across, axis=2), -1, axis=1)
         self._inverse = np.linalg.inv(
             np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
         )
 
-    def locate(self, points: ArrayLike) -> LocatedPoints:
+    def locate(self, points: ArrayLike, slack: float = 0.0) -> LocatedPoints:
         """Locate points of shape (n, 2), mm.
 
+        Args:
+            points: Shape (n, 2), mm.
+            slack: Distance from the body up to which a point counts to the nearest triangle, mm; it then has
+                a negative barycentric coordinate.
+
         Raises:
-            OutsideBodyError: If a point lies outside the body.
+            OutsideBodyError: If a point lies outside the body by more than that.
         """
         where = frozen_array(points, dtype=np.float64, shape=(None, 2), name="points")
         cells = np.full(len(where), -1, dtype=np.int64)
@@ -70,7 +78,15 @@ class Locator:
             cells[todo[found]] = candidates[rows, best][found]
             barycentric[todo[found]] = all_three[rows, best][found]
             # A triangle reaches at most _radius from its centroid: beyond it no candidate is left.
-            exhausted = ~found & ((distance[:, -1] > self._radius) | (count == self._centroids.n))
+            exhausted = ~found & ((distance[:, -1] > self._radius + slack) | (count == self._centroids.n))
+            if slack > 0 and exhausted.any():
+                beyond = (-all_three[exhausted] * self._heights[candidates[exhausted]]).max(axis=2)
+                nearest, late = beyond.argmin(axis=1), np.flatnonzero(exhausted)
+                close = beyond[np.arange(len(late)), nearest] <= slack
+                late, nearest = late[close], nearest[close]
+                cells[todo[late]] = candidates[late, nearest]
+                barycentric[todo[late]] = all_three[late, nearest]
+                found[late], exhausted[late] = True, False
             if exhausted.any():
                 x, y = where[todo[exhausted][0]]
                 raise OutsideBodyError(

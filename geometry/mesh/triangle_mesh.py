@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 BOUNDARY_PREFIX = "boundary_"
 
+CHORD = 0.1
+"""Largest distance of an arc from its chord, in lengths of the mesh's longest boundary edge."""
+
 
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
@@ -122,6 +125,22 @@ class TriangleMesh:
             OutsideBodyError: If a point lies outside the body.
         """
         return self._locator.locate(points)
+
+    def locate_on(self, other: "TriangleMesh", points: ArrayLike) -> LocatedPoints:
+        """The location on another mesh of the same body of points of this one.
+
+        Both meshes replace arcs by chords, so that a point may lie beyond the other's boundary: up to a tenth
+        of this mesh's longest boundary edge it counts to the nearest triangle.
+
+        Raises:
+            OutsideBodyError: If a point lies farther outside.
+        """
+        return other._locator.locate(points, CHORD * self._longest_boundary_edge)
+
+    @cached_property
+    def _longest_boundary_edge(self) -> float:
+        ends = self.points[np.concatenate(list(self.boundaries.values()))]
+        return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
 
     @cached_property
     def _locator(self) -> Locator:

@@ -8,6 +8,9 @@ from shapely.geometry import Point, Polygon
 
 from geometry import Design, OutsideBodyError, ShapeError, TriangleMesh, UserError
 from geometry.finger.section import cells
+from geometry.mesh.mesher import build_mesh
+from geometry.mesh.settings import MeshSettings
+from solvers.lagrange import LagrangeSpace
 from tests.meshes import permuted
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -137,8 +140,6 @@ def test_points_are_inside_exactly_where_the_section_is() -> None:
 
 
 def build_default() -> TriangleMesh:
-    from geometry import MeshSettings
-    from geometry.mesh.mesher import build_mesh
 
     return build_mesh(Design(), MeshSettings(size=1.0, coarsening=2))
 
@@ -160,3 +161,18 @@ def test_location_at_nodes_and_barycentric_points_agrees_with_search(default_mes
     nodes = mesh.at_nodes()
     held = np.einsum("nc,ncx->nx", nodes.barycentric, mesh.points[mesh.triangles[nodes.cells]])
     np.testing.assert_allclose(held, mesh.points, atol=1e-12)
+
+
+def test_points_of_another_mesh_of_a_round_body_are_located() -> None:
+    """Chords of two meshes cut an arc differently: points between them count to the nearest triangle."""
+    design = Design(fillet_radius=1.0, tip_radius=1.5)
+    coarse, fine = (build_mesh(design, MeshSettings(size=size)) for size in (1.0, 0.3))
+    points = LagrangeSpace(coarse, 2).nodes
+    with pytest.raises(OutsideBodyError):
+        fine.locate(points)
+    found = coarse.locate_on(fine, points)
+    corners = fine.points[fine.triangles[found.cells]]
+    np.testing.assert_allclose(np.einsum("nc,ncx->nx", found.barycentric, corners), points, atol=1e-12)
+    assert found.barycentric.min() > -0.5
+    with pytest.raises(OutsideBodyError, match="1 of 1 points"):
+        coarse.locate_on(fine, [[45.0, 0.5]])
