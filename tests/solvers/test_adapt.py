@@ -67,11 +67,11 @@ def test_a_mesh_that_is_fine_enough_stays_as_it_is(medium_mesh):
     assert len(adaptation.rounds) == 1
 
 
-@pytest.mark.parametrize("cap", [{"most_triangles": 4000}, {"most_rounds": 3}])
+@pytest.mark.parametrize("cap", [{"most_triangles": 4500}, {"most_rounds": 3}])
 def test_a_cap_ends_it_and_it_says_so(coarse_mesh, cap):
     adaptation = adapted(Problem(coarse_mesh), 1e-6, **cap)
     assert not adaptation.reached
-    assert len(adaptation.mesh.triangles) <= 4000
+    assert len(adaptation.mesh.triangles) <= 4500
     said = f"not to the 1e-06 mm asked for: refinement stopped at {len(adaptation.mesh.triangles)} triangles"
     assert said in adaptation.message
 

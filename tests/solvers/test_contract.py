@@ -187,7 +187,7 @@ def test_one_point_and_many_points_agree(solution, coarse_mesh):
         solution.displacement(coarse_mesh.markers[1:2]),
         many[1:2],
         rtol=0,
-        atol=1e-7,  # a network may leave out what is less than 1e-8 of the travel
+        atol=1e-6,  # a network leaves out encoders with shares below 1e-8; they give several times the travel
     )
 
 
