@@ -1,4 +1,4 @@
-"""Where a drawn finger is held, touched and marked: a small TOML file beside the drawing, or lines of one."""
+"""Clamp, contact and markers of a drawn finger: a small TOML file beside the drawing, or lines of one."""
 
 import tomllib
 from collections.abc import Mapping, Sequence

@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 
 from compare.figures.design_drawing import draw_design
+from geometry.drawing.drawn_finger import DrawnFinger
 from geometry.finger.design import Design
 from geometry.finger.presets import load_design, preset_names
 from tests.compare.drawn_pages import page_of
-from tests.fingers import SectionFinger, beam, ring
+from tests.fingers import beam, ring
 
 DESIGNS = {
     **{name: load_design(name) for name in preset_names()},
@@ -36,7 +37,7 @@ def test_a_drawing_has_every_dimension_and_none_overlaps(design: Design) -> None
 
 
 @pytest.mark.parametrize("finger", [ring(), ring(24), beam()], ids=["ring", "many markers", "beam"])
-def test_a_finger_without_parameters_has_its_overall_dimensions(finger: SectionFinger) -> None:
+def test_a_finger_without_parameters_has_its_overall_dimensions(finger: DrawnFinger) -> None:
     page = page_of(draw_design(finger))
     width, height = np.ptp(finger.section.bounds, axis=0)
     expected = [f"{width:.4g} mm", f"{height:.4g} mm", "depth 20 mm", "clamped", str(len(finger.markers))]

@@ -1,4 +1,4 @@
-"""What `pinnray design` writes, read back as a drawing: the same finger."""
+"""Exports of `pinnray design` are read back as the same finger."""
 
 from pathlib import Path
 
