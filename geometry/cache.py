@@ -85,7 +85,7 @@ def drawn_finger(
     task: dict[str, object] = {
         "kind": "drawing",
         "what": f"reading {file.name}",
-        "file": str(file),
+        "file": str(file.absolute()),  # the child process has its own working directory
         "name": file.name,
         "description": description.model_dump(mode="json"),
     }
@@ -174,7 +174,7 @@ def _cached(
     try:
         with atomic_path(entry) as partial:
             partial.touch()
-            run_task({**task, "output": str(partial)}, timeout_s)
+            run_task({**task, "output": str(partial.absolute())}, timeout_s)
             return load(partial)
     except OSError as error:
         raise UserError(

@@ -510,7 +510,7 @@ def test_the_mesh_alone(folder, capsys):
 def test_the_design_alone(folder, capsys):
     assert main(["design", "--formats", "svg", "--out", "here"]) == 0
     listed = capsys.readouterr().out.splitlines()
-    assert listed == ["here/section.svg", "here/design.png"]
+    assert listed == ["here/section.svg", "here/finger.toml", "here/design.png"]
     assert all(Path(name).is_file() for name in listed)
 
 

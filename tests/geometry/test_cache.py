@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from geometry import Design, MeshSettings, UserError, cad_files, finger_mesh
-from geometry.cache import cache_folder, cache_key
+from geometry.cache import cache_folder, cache_key, drawn_finger
+from geometry.drawing.description import Description
 from geometry.worker import child_environment, run_task
 
 COARSE = MeshSettings(size=1.5, coarsening=2)
@@ -94,6 +95,20 @@ def test_refusal_in_the_worker_comes_back_as_its_own_line(tmp_path: Path) -> Non
     with pytest.raises(UserError, match="ribs") as refused:
         run_task({**task, "finger": {"rib_count": 50}}, 60)
     assert "\n" not in str(refused.value)
+
+
+def test_the_worker_stays_and_follows_a_change_of_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    finger_mesh(Design(), settings=COARSE, cache_dir=tmp_path / "first")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "beam.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="60mm" height="10mm" viewBox="0 0 60 10">'
+        '<path d="M 0 0 H 60 V 10 H 0 Z"/></svg>'
+    )
+    drawn = drawn_finger(Path("beam.svg"), Description(), cache_dir=Path("cache"))
+    assert drawn.section.area == pytest.approx(600)
+    assert finger_mesh(drawn, settings=COARSE, cache_dir=Path("cache")).areas.sum() == pytest.approx(600)
 
 
 def test_crash_in_the_worker_gives_one_line(tmp_path: Path) -> None:
