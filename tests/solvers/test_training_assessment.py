@@ -1,4 +1,4 @@
-"""What is made of a trained network, tried on the field of finite elements."""
+"""Assessment of a trained network, tried on the field of finite elements."""
 
 from types import SimpleNamespace
 
