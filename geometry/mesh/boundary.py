@@ -137,7 +137,7 @@ def re_entrant_points(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray, Float
 
 
 def walls_and_ribs(mesh: TriangleMesh) -> dict[str, BoolArray]:
-    """Triangles of the `front` and `back` wall, where cavities are beside them, and of the `rib`s.
+    """Triangles of the `front` and `back` wall, where cavities are beside them, of the `rib`s and the `base`.
 
     A wall is as thick as the nearest cavity is far from its face. What remains falls into pieces: the one at
     the base and the one that reaches farthest are base and tip, the others are ribs.
@@ -149,7 +149,7 @@ def walls_and_ribs(mesh: TriangleMesh) -> dict[str, BoolArray]:
     inner = [mesh.points[loop] for loop in boundary_loops(mesh)[1:]]
     none = np.zeros(len(mesh.triangles), dtype=bool)
     if not inner or "back" not in mesh.boundaries:
-        return {"front": none, "back": none, "rib": none}
+        return {"front": none, "back": none, "rib": none, "base": none}
     cavities = np.concatenate(inner)
     centroids = mesh.at_centroids().points
     beside = (centroids[:, 0] > cavities[:, 0].min()) & (centroids[:, 0] < cavities[:, 0].max())
@@ -163,7 +163,9 @@ def walls_and_ribs(mesh: TriangleMesh) -> dict[str, BoolArray]:
     _, piece = connected_components(touching @ touching.T)
     base = np.isin(mesh.triangles[rest], mesh.boundary("base")).any(axis=1)
     ends = [*piece[base], piece[centroids[rest, 0].argmax()]]
-    return parts | {"rib": np.isin(np.arange(len(none)), rest[~np.isin(piece, ends)])}
+    for name, chosen in (("rib", ~np.isin(piece, ends)), ("base", np.isin(piece, piece[base]))):
+        parts[name] = np.isin(np.arange(len(none)), rest[chosen])
+    return parts
 
 
 def elements_through_thickness(mesh: TriangleMesh) -> int:

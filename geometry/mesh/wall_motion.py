@@ -1,0 +1,239 @@
+"""The motion of a drawn mesh when its walls are thicker or thinner than drawn.
+
+A thicker wall takes its place from the cavities: the outline stays, an inner face of a wall moves by the
+whole change into its cavity, each of the two faces of a rib by half of it. Corners and fillets move with the
+faces beside them. Between the boundaries the motion is harmonic.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix, diags
+from scipy.sparse.linalg import splu
+
+from geometry.arrays import BoolArray, FloatArray, IntArray
+from geometry.mesh.boundary import (
+    CORNER_ANGLE,
+    boundary_edges,
+    boundary_loops,
+    mean_thickness,
+    walls_and_ribs,
+)
+from geometry.mesh.point_location import LocatedPoints
+from geometry.mesh.triangle_mesh import TriangleMesh
+
+SHARE = {"front": 1.0, "back": 1.0, "rib": 0.5, "base": 1.0}
+"""Motion of a face of each wall per change of the wall's thickness."""
+SLIGHT = np.radians(1.0)
+"""Turn of the boundary below which a point is not on an arc."""
+PARALLEL = np.sin(np.radians(15.0))
+"""Sine of the angle of two faces below which a corner between them moves by their mean."""
+
+
+@dataclass(frozen=True, eq=False)
+class WallMotion:
+    """Motions of a mesh by the thickness of each of its k walls.
+
+    Attributes:
+        mesh: The drawn mesh.
+        names: `front_thickness`, `back_thickness`, `rib_thickness`, `base_thickness`, those that the body
+            has: none without cavities or without a boundary called `back`.
+        thickness: Drawn thickness of each, shape (k,), mm: where the wall is thinnest, for ribs their mean.
+        nodal: Motion of the mesh's nodes per mm of change, shape (k, N, 2), mm.
+    """
+
+    mesh: TriangleMesh
+    names: tuple[str, ...]
+    thickness: FloatArray
+    nodal: FloatArray
+
+    @classmethod
+    def of(cls, mesh: TriangleMesh) -> "WallMotion":
+        """The motions of a mesh."""
+        parts = {name: mask for name, mask in walls_and_ribs(mesh).items() if mask.any()}
+        loops = _cavities(mesh)
+        names, thickness, boundary = [], [], []
+        for name, mask in parts.items():
+            moved = np.zeros((len(mesh.points), 2))
+            for loop in loops:
+                moved[loop] = _loop_motion(mesh, loop, mask, SHARE[name])
+            if not moved.any():
+                continue
+            names.append(f"{name}_thickness")
+            thickness.append(_thickness(mesh, name, mask, loops))
+            boundary.append(moved)
+        nodal = np.array(boundary).reshape(-1, len(mesh.points), 2)
+        return cls(mesh, tuple(names), np.array(thickness), _harmonic(mesh, nodal))
+
+    def changes(self, thickness: Mapping[str, float]) -> FloatArray:
+        """Changes, shape (k,), mm, from thicknesses by name, mm; those that are not given are as drawn."""
+        drawn = zip(self.names, self.thickness, strict=True)
+        return np.array([thickness.get(name, value) - value for name, value in drawn], dtype=np.float64)
+
+    def shifts(self, location: LocatedPoints, changes: FloatArray) -> FloatArray:
+        """Motion of points of the drawn body, shape (n, 2), mm, by changes of shape (k,), mm."""
+        moved = np.einsum("k,knx->nx", changes, self.nodal)[self.mesh.triangles[location.cells]]
+        return np.asarray(np.einsum("nc,ncx->nx", location.barycentric, moved))
+
+    def gradients(self) -> FloatArray:
+        """Gradients dV_i/dX_j of the motions per mm of change in every triangle, shape (k, t, 2, 2), 1/mm."""
+        corners = self.nodal[:, self.mesh.triangles]
+        return np.asarray(np.einsum("ktci,tcj->ktij", corners, _barycentric_gradients(self.mesh)))
+
+    def moved(self, changes: FloatArray) -> FloatArray:
+        """Nodes of the moved mesh, shape (N, 2), mm."""
+        return np.asarray(self.mesh.points + np.einsum("k,knx->nx", changes, self.nodal))
+
+
+def _cavities(mesh: TriangleMesh) -> list[IntArray]:
+    """The nodes of every cavity in order, the body on their left."""
+    follows = dict(boundary_edges(mesh.triangles).tolist())
+    loops = []
+    for nodes in boundary_loops(mesh)[1:]:
+        loop = [int(nodes[0])]
+        while (after := follows[loop[-1]]) != loop[0]:
+            loop.append(after)
+        loops.append(np.array(loop))
+    return loops
+
+
+def _loop_motion(mesh: TriangleMesh, loop: IntArray, mask: BoolArray, share: float) -> FloatArray:
+    """Motion of a cavity's nodes (n, 2) when the triangles of a mask are those of the thicker wall."""
+    along = mesh.points[np.roll(loop, -1)] - mesh.points[loop]
+    lengths = np.linalg.norm(along, axis=1)
+    normals = np.column_stack([along[:, 1], -along[:, 0]]) / lengths[:, None]  # out of the body
+    owned = _beside(mesh, loop, mask)
+    breaks = _breaks(along, lengths, mean_thickness(mesh))
+    if not breaks.any():
+        return _node_mean(normals * (share * owned)[:, None])
+    first = int(np.flatnonzero(breaks & ~np.roll(breaks, 1))[0]) if not breaks.all() else 0
+    order = np.roll(np.arange(len(loop)), -first)
+    faces = _faces(order, breaks)
+    if not faces:
+        return _node_mean(normals * (share * owned)[:, None])
+    speeds = [share * (lengths[face] @ owned[face] > 0.5 * lengths[face].sum()) for face in faces]
+    motion = np.zeros((len(loop), 2))
+    corners = [
+        _corner(normals[one[-1]], normals[other[0]], speed, next_speed)
+        for one, other, speed, next_speed in zip(
+            faces, faces[1:] + faces[:1], speeds, speeds[1:] + speeds[:1], strict=True
+        )
+    ]
+    for number, face in enumerate(faces):
+        left, right = corners[number - 1], corners[number]
+        place = np.append(0.0, lengths[face].cumsum()) / lengths[face].sum()
+        nodes = np.append(face, (face[-1] + 1) % len(loop))
+        between = (1 - place)[:, None] * left + place[:, None] * right
+        outward = np.concatenate([normals[face], normals[face[-1:]]])
+        outward += np.concatenate([normals[face[:1]], normals[face]])
+        outward /= np.linalg.norm(outward, axis=1)[:, None]
+        normal_part = (between * outward).sum(axis=1)
+        inside = between + (speeds[number] - normal_part)[:, None] * outward
+        motion[nodes[1:-1]] = inside[1:-1]
+        motion[_bend(face[-1], faces[(number + 1) % len(faces)][0], len(loop))] = right
+    return motion
+
+
+def _beside(mesh: TriangleMesh, loop: IntArray, mask: BoolArray) -> FloatArray:
+    """One for each edge of a loop whose triangle is in a mask, else zero, shape (n,)."""
+    count = len(mesh.points)
+    edges = mesh.triangles[mask][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    wanted = loop * count + np.roll(loop, -1)
+    return np.isin(wanted, edges[:, 0] * count + edges[:, 1]).astype(np.float64)
+
+
+def _breaks(along: FloatArray, lengths: FloatArray, thickness: float) -> BoolArray:
+    """Mask of the nodes that are corners, or points of an arc tighter than a thickness, shape (n,)."""
+    before = np.roll(along, 1, axis=0)
+    turn = np.abs(
+        np.arctan2(before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0], (before * along).sum(axis=1))
+    )
+    mean_length = 0.5 * (lengths + np.roll(lengths, 1))
+    tight = (turn > SLIGHT) & (mean_length < turn * thickness)
+    return np.asarray((turn > CORNER_ANGLE) | tight)
+
+
+def _faces(order: IntArray, breaks: BoolArray) -> list[IntArray]:
+    """The edges of every face, in order; an edge between two breaks belongs to an arc, and to no face.
+
+    Where no edge would be left, as between corners of a coarse mesh, every such edge is a face.
+    """
+    following = np.roll(breaks, -1)
+    arcs = breaks & following
+    if arcs.all():
+        return [np.array([edge]) for edge in order]
+    faces: list[list[int]] = []
+    open_face = False
+    for edge in order:
+        if arcs[edge]:
+            open_face = False
+            continue
+        if breaks[edge] or not open_face:
+            faces.append([])
+        faces[-1].append(int(edge))
+        open_face = True
+    return [np.array(face) for face in faces]
+
+
+def _bend(last: int, first: int, count: int) -> IntArray:
+    """Nodes from the end of a face to the start of the next one."""
+    return np.arange(last + 1, last + 1 + (first - last - 1) % count + 1) % count
+
+
+def _corner(one: FloatArray, other: FloatArray, speed: float, next_speed: float) -> FloatArray:
+    """Motion of the corner of two faces with outer normals, each moved along its own: shape (2,)."""
+    if abs(one[0] * other[1] - one[1] * other[0]) < PARALLEL:
+        return np.asarray(0.5 * (speed * one + next_speed * other))
+    return np.linalg.solve(np.stack([one, other]), np.array([speed, next_speed]))
+
+
+def _node_mean(of_edges: FloatArray) -> FloatArray:
+    """Means over the two edges of each node of a closed boundary."""
+    return np.asarray(0.5 * (of_edges + np.roll(of_edges, 1, axis=0)))
+
+
+def _thickness(mesh: TriangleMesh, name: str, mask: BoolArray, loops: list[IntArray]) -> float:
+    """The drawn thickness of a wall, mm."""
+    cavities = np.concatenate([mesh.points[loop] for loop in loops])
+    if name == "rib":
+        length = 0.0
+        for loop in loops:
+            steps = np.linalg.norm(mesh.points[np.roll(loop, -1)] - mesh.points[loop], axis=1)
+            length += float(steps @ _beside(mesh, loop, mask))
+        return float(2 * mesh.areas[mask].sum() / length)
+    start, end = mesh.points[mesh.boundary(name)].transpose(1, 0, 2)
+    along = end - start
+    offset = cavities[:, None] - start
+    share = ((offset * along).sum(axis=2) / (along**2).sum(axis=1)).clip(0, 1)
+    return float(np.linalg.norm(offset - share[..., None] * along, axis=2).min())
+
+
+def _barycentric_gradients(mesh: TriangleMesh) -> FloatArray:
+    """Gradients of the barycentric coordinates, shape (t, 3, 2), 1/mm."""
+    corners = mesh.points[mesh.triangles]
+    opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+    rotated = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
+    return np.asarray(rotated / (2 * mesh.areas)[:, None, None], dtype=np.float64)
+
+
+def _harmonic(mesh: TriangleMesh, boundary: FloatArray) -> FloatArray:
+    """Harmonic extension (k, N, 2), by linear elements, of values on the boundary."""
+    count = len(mesh.points)
+    gradients = _barycentric_gradients(mesh)
+    columns = mesh.triangles.ravel()
+    rows = np.repeat(np.arange(len(mesh.triangles)), 3)
+    along = [
+        coo_matrix((gradients[..., axis].ravel(), (rows, columns)), (len(mesh.triangles), count)).tocsr()
+        for axis in range(2)
+    ]
+    stiffness = sum(matrix.T @ diags(mesh.areas) @ matrix for matrix in along).tocsr()
+    free = np.ones(count, dtype=bool)
+    free[np.unique(boundary_edges(mesh.triangles))] = False
+    found = boundary.copy()
+    if free.any() and len(boundary):
+        flat = boundary.transpose(1, 0, 2).reshape(count, -1)
+        factors = splu(stiffness[free][:, free].tocsc())
+        inner = factors.solve(np.ascontiguousarray(-(stiffness[free] @ flat)))
+        found[:, free] = inner.reshape(-1, len(boundary), 2).transpose(1, 0, 2)
+    return found
