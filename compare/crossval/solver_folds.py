@@ -9,9 +9,10 @@ import numpy as np
 from pydantic import ConfigDict, TypeAdapter
 from pydantic_core import to_jsonable_python
 
-from compare.crossval.folds import Fold, FoldResult, LoadCase, hide_markers
+from compare.crossval.folds import ALL, Fold, FoldResult, LoadCase, StatedIntervals, hide_markers
 from compare.crossval.study import SolverVariant, Study
-from compare.crossval.true_fields import FieldSampler, SampledField
+from compare.crossval.true_fields import FieldSampler, SampledField, TrueField
+from compare.evaluation.truths import SLIDING, Truth
 from geometry.atomic import atomic_path
 from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
@@ -34,6 +35,7 @@ class SolverTask:
         truths: File of the true fields at each load; empty with measured markers.
         observations: For each seed, those at every load.
         folds: The folds.
+        truth: The truth of the true fields; None with measured markers.
     """
 
     study: Study
@@ -43,11 +45,13 @@ class SolverTask:
     truths: Sequence[Path]
     observations: Sequence[Sequence[Observations]]
     folds: Sequence[Fold]
+    truth: Truth | None = SLIDING
 
     @property
     def folder(self) -> Path:
         """Folder of finished folds."""
-        return self.study.out / "runs" / self.layout / self.variant.label.replace(" ", "_")
+        parts = [] if self.truth is None else [self.truth.name]
+        return self.study.out.joinpath("runs", *parts, self.layout, self.variant.label.replace(" ", "_"))
 
 
 @dataclass(frozen=True)

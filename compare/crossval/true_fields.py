@@ -1,5 +1,6 @@
-"""The true fields of a cross-validation: the virtual experiment on a finer mesh, sampled over the body."""
+"""The true fields of a cross-validation: simulations on finer meshes, sampled over the body."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,17 +9,20 @@ import numpy as np
 from compare.crossval.folds import LoadCase
 from compare.crossval.study import Study
 from compare.evaluation.differences import field_difference
+from compare.evaluation.truths import Truth
 from compare.evaluation.virtual_experiment import SOURCES, simulate
 from compare.runtime.provenance import package_versions, sources_digest
 from geometry.arrays import FloatArray
 from geometry.atomic import atomic_path
 from geometry.cache import cache_folder, finger_mesh
 from geometry.content_hash import content_hash
+from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.mesh.wall_motion import WallMotion
 from solvers.assimilation.misfit import disc_quadrature, radius_within
-from solvers.problem import Load, Problem
+from solvers.problem import Load, Problem, contact_ends
 from solvers.solution import Solution, State
 from solvers.solver import Progress, silent
 
@@ -49,17 +53,6 @@ class SampledField:
 
     def __mul__(self, factor: float) -> "SampledField":
         return SampledField(factor * self.markers, factor * self.displacement, factor * self.gradient)
-
-    @classmethod
-    def load(cls, path: Path) -> "SampledField":
-        """Read the file that `save` wrote."""
-        with np.load(path) as archive:
-            return cls(**archive)
-
-    def save(self, path: Path) -> None:
-        """Write atomically."""
-        with atomic_path(path) as partial:
-            np.savez(partial, **vars(self))
 
     def distances(
         self, truth: "SampledField", own: Problem, finite: Problem, weights: FloatArray
@@ -110,11 +103,22 @@ class FieldSampler:
         points, means = disc_quadrature(markers, radius_within(mesh, markers, radius))
         return cls(rule.location, rule.weights, mesh.locate(markers), mesh.locate(points), means)
 
-    def of_solution(self, solution: Solution, mesh: TriangleMesh) -> SampledField:
-        """Sample a solution, which may have another mesh than the shared one."""
+    def of_solution(
+        self, solution: Solution, mesh: TriangleMesh, changes: Mapping[str, float] | None = None
+    ) -> SampledField:
+        """Sample a solution, which may have another mesh than the shared one.
+
+        Args:
+            solution: On a mesh of the same finger.
+            mesh: The shared mesh.
+            changes: Wall thicknesses of the solution's finger minus those of the shared mesh, mm, by their
+                names in `Design`: the points of the body move with the walls, markers stay in space.
+        """
         inside, discs = self.inside, self.discs
         if solution.problem.mesh is not mesh:  # a location belongs to its mesh
-            inside, discs = (mesh.locate_on(solution.problem.mesh, place.points) for place in (inside, discs))
+            points = inside.points + (_shifts(mesh, inside, changes) if changes else 0.0)
+            inside = mesh.locate_on(solution.problem.mesh, points)
+            discs = mesh.locate_on(solution.problem.mesh, discs.points)
         return SampledField(
             markers=self.means @ solution.field.displacement(discs),
             displacement=solution.field.displacement(inside),
@@ -122,11 +126,53 @@ class FieldSampler:
         )
 
 
+def _shifts(mesh: TriangleMesh, location: LocatedPoints, changes: Mapping[str, float]) -> FloatArray:
+    """Motion of points of a mesh with its walls, shape (n, 2), mm."""
+    motion = WallMotion.of(mesh)
+    if missing := [name for name in changes if name not in motion.names]:
+        raise UserError(f"the finger has no wall of the {missing[0]} that the truth changes")
+    return motion.shifts(location, np.array([changes.get(name, 0.0) for name in motion.names]))
+
+
+@dataclass(frozen=True, eq=False)
+class TrueField:
+    """A true field with the force and the place of its contact.
+
+    Attributes:
+        sampled: The field at the points of the shared mesh, moved with the walls.
+        reaction: Force of the indenter on the finger, shape (2,), N/mm.
+        contact: Middle and width of the contact before the load, along x, shape (2,), mm.
+    """
+
+    sampled: SampledField
+    reaction: FloatArray
+    contact: FloatArray
+
+    @property
+    def force(self) -> float:
+        """Magnitude of the reaction, N/mm."""
+        return float(np.linalg.norm(self.reaction))
+
+    @classmethod
+    def load(cls, path: Path) -> "TrueField":
+        """Read the file that `save` wrote."""
+        with np.load(path) as archive:
+            content = dict(archive)
+        reaction, contact = content.pop("reaction"), content.pop("contact")
+        return cls(SampledField(**content), reaction, contact)
+
+    def save(self, path: Path) -> None:
+        """Write atomically."""
+        with atomic_path(path) as partial:
+            np.savez(partial, **vars(self.sampled), reaction=self.reaction, contact=self.contact)
+
+
 @dataclass(frozen=True)
 class TruthTask:
-    """A load case of a study, of which a process simulates the truth."""
+    """A truth and a load case of a study, which a process simulates."""
 
     study: Study
+    truth: Truth
     case: LoadCase
 
 
@@ -139,8 +185,9 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Pa
     Raises:
         UserError: If the simulation cannot be run or does not reach the full load.
     """
-    study = task.study
-    design = study.design.at_contact(task.case.contact)
+    study, truth = task.study, task.truth
+    drawn = study.design.at_contact(task.case.contact)
+    design = truth.finger(drawn)
     stroke = -task.case.share * float(study.load.displacement[1] or 0.0)
     shared = TriangleMesh.load(study.mesh_file)
     markers = study.markers
@@ -148,11 +195,11 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Pa
         design.digest,
         study.mesh.model_dump(),
         shared.digest,
-        study.material.model_dump(),
-        stroke,
+        truth.material(study.material).model_dump(),
+        truth.load(stroke).model_dump(),
         FINER,
         package_versions(),
-        sources_digest([*SOURCES, __name__, "compare.evaluation.virtual_experiment"]),
+        sources_digest([*SOURCES, __name__, "compare.evaluation.truths", "compare.evaluation.virtual_experiment"]),
     ]
     files = {
         layout: cache_folder() / f"truth-{content_hash([*parts, points.tolist()])}.npz"
@@ -165,8 +212,20 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Pa
     finer = study.mesh.model_copy(update={"size": FINER * study.mesh.size})
     mesh = finger_mesh(design, settings=finer)
     problem = Problem(mesh, study.material, Load(displacement=(0.0, -stroke)))
-    solution = simulate(problem, progress)
+    solution = simulate(problem, progress, truth)
+    contact = _contact(solution)
     for layout in missing:
         sampler = FieldSampler.of(shared, markers[layout], design.marker_radius)
-        sampler.of_solution(solution, shared).save(files[layout])
+        sampled = sampler.of_solution(solution, shared, truth.changes(drawn))
+        TrueField(sampled, solution.reaction, contact).save(files[layout])
     return files
+
+
+def _contact(solution: Solution) -> FloatArray:
+    """Middle and width of a truth's contact before the load, along x, shape (2,), mm."""
+    start, end = contact_ends(solution.problem)
+    if solution.problem.load.kind == "cylinder":
+        if "contact_start_mm" not in solution.stats:
+            raise UserError(f"the virtual experiment: {solution.status.message}")
+        start, end = (float(solution.stats[f"contact_{name}_mm"]) for name in ("start", "end"))
+    return np.array([0.5 * (start + end), end - start])

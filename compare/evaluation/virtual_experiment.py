@@ -11,21 +11,19 @@ from zipfile import BadZipFile
 import numpy as np
 
 from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.truths import SLIDING, Truth
 from compare.runtime.provenance import package_versions, sources_digest
 from geometry.cache import cache_folder
 from geometry.content_hash import content_hash
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.problem import Load, Problem
+from solvers.problem import Problem
 from solvers.registry import make_solver
 from solvers.solution import Solution
 from solvers.solver import Progress, Solver, silent
 
-SOURCE = (
-    "simulated by fem-nonlinear (neo-Hookean, finite strain, plane strain, contact patch that is "
-    "pressed in by {:.4g} mm and slides along x); no camera was involved"
-)
-"""Provenance that is shown with the numbers; the number is -v of the indenter."""
+SOURCE = "simulated by fem-nonlinear ({}); no camera was involved"
+"""Provenance that is shown with the numbers, around the description of the truth."""
 
 SOURCES = (
     "compare.evaluation.evaluation",
@@ -86,18 +84,23 @@ def _truth(problem: Problem, progress: Progress) -> Evaluation:
     return evaluation
 
 
-def simulate(problem: Problem, progress: Progress = silent) -> Solution:
+def simulate(problem: Problem, progress: Progress = silent, truth: Truth = SLIDING) -> Solution:
     """The solution behind `virtual_experiment`, solved anew.
+
+    Args:
+        problem: The finger, with the walls of the truth, and its load.
+        progress: Told how far the simulation is.
+        truth: Gives law and kind of load.
 
     Raises:
         UserError: If it cannot be run or does not reach the full load.
     """
-    return _solved(*_richer(problem), progress)
+    return _solved(*_richer(problem, truth), progress)
 
 
-def experiment_source(problem: Problem) -> str:
+def experiment_source(problem: Problem, truth: Truth = SLIDING) -> str:
     """Provenance of the simulated numbers, one sentence."""
-    return SOURCE.format(-(problem.load.displacement[1] or 0.0))
+    return SOURCE.format(truth.description.format(-(problem.load.displacement[1] or 0.0)))
 
 
 def _solved(solver: Solver, richer: Problem, progress: Progress) -> Solution:
@@ -107,7 +110,7 @@ def _solved(solver: Solver, richer: Problem, progress: Progress) -> Solution:
     return solution
 
 
-def _richer(problem: Problem) -> tuple[Solver, Problem]:
+def _richer(problem: Problem, truth: Truth = SLIDING) -> tuple[Solver, Problem]:
     """The finite-strain solver and its problem."""
     normal = problem.load.displacement[1]
     if normal is None:
@@ -123,8 +126,8 @@ def _richer(problem: Problem) -> tuple[Solver, Problem]:
         raise UserError(f"the virtual experiment: {error}") from None
     richer = Problem(
         mesh=problem.mesh,
-        material=problem.material.model_copy(update={"law": "neo-hookean", "plane": "strain"}),
-        load=Load(kind="patch", displacement=(None, normal)),
+        material=truth.material(problem.material),
+        load=truth.load(-normal),
     )
     return solver, richer
 

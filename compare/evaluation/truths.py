@@ -1,0 +1,180 @@
+"""Simulated truths with other laws, walls and loads than the solvers that are judged by them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import radians, tan
+
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.finger.finger import Finger
+from geometry.finger.section import rib_feet, rib_pitch, rib_slope
+from solvers.elasticity import LawName
+from solvers.problem import Load, Material
+
+
+@dataclass(frozen=True, kw_only=True)
+class Truth:
+    """A simulated finger and its load, as they differ from the drawn finger and the load of the solvers.
+
+    Attributes:
+        name: Its name on the command line and in tables.
+        description: Law, walls and load in words; `{:.4g}` stands for the stroke, mm.
+        law: Law of finite strain, in plane strain.
+        poisson: Poisson's ratio; None for that of the material.
+        scaled: Factors of wall thicknesses, by their names in `Design`.
+        thicker: Additions to wall thicknesses, mm, by their names in `Design`.
+        radius: Radius of a rigid cylinder without friction, mm; None for a patch of the contact's width.
+        slope: Displacement of the indenter along the front over the stroke; None lets a patch slide.
+    """
+
+    name: str
+    description: str
+    law: LawName = "neo-hookean"
+    poisson: float | None = None
+    scaled: Mapping[str, float] = field(default_factory=dict)
+    thicker: Mapping[str, float] = field(default_factory=dict)
+    radius: float | None = None
+    slope: float | None = None
+
+    @property
+    def keeps_walls(self) -> bool:
+        """Whether its walls are as thick as drawn."""
+        return not (self.scaled or self.thicker)
+
+    def changes(self, drawn: Finger) -> dict[str, float]:
+        """Changes of the wall thicknesses of a drawn finger, mm, by their names in `Design`.
+
+        Raises:
+            UserError: If the walls change and the finger has no parameters.
+        """
+        if self.keeps_walls:
+            return {}
+        if not isinstance(drawn, Design):
+            possible = ", ".join(name for name, truth in TRUTHS.items() if truth.keeps_walls)
+            raise UserError(
+                f"--truth {self.name}: {drawn.name} is a drawing, whose walls have no parameters to change; "
+                f"it can have {possible}"
+            )
+        return {
+            name: (self.scaled.get(name, 1.0) - 1.0) * getattr(drawn, name) + self.thicker.get(name, 0.0)
+            for name in (*self.scaled, *self.thicker)
+        }
+
+    def finger(self, drawn: Finger) -> Finger:
+        """The finger with its walls, whose ribs have the axes of the drawn ones.
+
+        Raises:
+            UserError: If the finger has no parameters, or cannot have such walls.
+        """
+        changes = self.changes(drawn)
+        if not changes or not isinstance(drawn, Design):
+            return drawn
+        values: dict[str, float] = {name: getattr(drawn, name) + change for name, change in changes.items()}
+        if drawn.rib_count:  # given, because the foot lies on the inner face and the pitch follows the walls
+            deeper = changes.get("front_thickness", 0.0)
+            values["rib_start"] = float(rib_feet(drawn)[0]) + deeper * tan(radians(rib_slope(drawn)))
+            values["rib_pitch"] = rib_pitch(drawn)
+        try:
+            return drawn.replaced(**values)
+        except UserError as error:
+            raise UserError(f"--truth {self.name}: {error}") from None
+
+    def material(self, material: Material) -> Material:
+        """The material with its law and Poisson's ratio."""
+        own = {} if self.poisson is None else {"poisson": self.poisson}
+        return material.model_copy(update={"law": self.law, "plane": "strain", **own})
+
+    def load(self, stroke: float) -> Load:
+        """Its load for a stroke into the finger, mm."""
+        along = None if self.slope is None else self.slope * stroke
+        kind = "patch" if self.radius is None else "cylinder"
+        return Load(kind=kind, displacement=(along, -stroke), radius=self.radius)
+
+
+SLIDING = Truth(
+    name="sliding",
+    description=(
+        "neo-Hookean, finite strain, plane strain, contact patch that is pressed in by {:.4g} mm and slides "
+        "along x"
+    ),
+)
+"""The truth of every virtual experiment that names no other."""
+
+_PRINTED = {"front_thickness": 1.05, "back_thickness": 0.95, "rib_thickness": 1.05}
+_THICK_BASE = {"base_thickness": 1.0}
+
+TRUTHS: Mapping[str, Truth] = {
+    truth.name: truth
+    for truth in (
+        SLIDING,
+        Truth(
+            name="stvk",
+            law="st-venant-kirchhoff",
+            description="St Venant-Kirchhoff, contact patch that is pressed in by {:.4g} mm and slides along x",
+        ),
+        Truth(
+            name="print",
+            scaled=_PRINTED,
+            description=(
+                "neo-Hookean, front wall and ribs printed 5 % thicker and back wall 5 % thinner than drawn, "
+                "contact patch that is pressed in by {:.4g} mm and slides along x"
+            ),
+        ),
+        Truth(
+            name="base",
+            scaled=_PRINTED,
+            thicker=_THICK_BASE,
+            description=(
+                "neo-Hookean, front wall and ribs printed 5 % thicker, back wall 5 % thinner and base wall "
+                "1 mm thicker than drawn, contact patch that is pressed in by {:.4g} mm and slides along x"
+            ),
+        ),
+        Truth(
+            name="cylinder",
+            radius=10.0,
+            slope=0.0,
+            description=(
+                "neo-Hookean, rigid cylinder of radius 10 mm without friction that is pressed in by {:.4g} mm"
+            ),
+        ),
+        Truth(
+            name="oblique",
+            radius=20.0,
+            slope=0.3,
+            description=(
+                "neo-Hookean, rigid cylinder of radius 20 mm without friction that is pressed in by {:.4g} mm "
+                "and moves 0.3 times as far towards the tip"
+            ),
+        ),
+        Truth(
+            name="mixed",
+            law="st-venant-kirchhoff",
+            poisson=0.42,
+            scaled=_PRINTED,
+            thicker=_THICK_BASE,
+            radius=10.0,
+            slope=0.0,
+            description=(
+                "St Venant-Kirchhoff with Poisson's ratio 0.42, front wall and ribs printed 5 % thicker, back "
+                "wall 5 % thinner and base wall 1 mm thicker than drawn, rigid cylinder of radius 10 mm "
+                "without friction that is pressed in by {:.4g} mm"
+            ),
+        ),
+        Truth(
+            name="sticking",
+            slope=0.0,
+            description="neo-Hookean, contact patch that is pressed in by {:.4g} mm, sticks and cannot turn",
+        ),
+    )
+}
+"""Every truth by name."""
+
+
+def check_truths(names: Sequence[str], drawn: Finger) -> None:
+    """Raise a `UserError` if a truth does not exist, is named twice, or is not for a finger."""
+    if unknown := next((name for name in names if name not in TRUTHS), None):
+        raise UserError(f"--truth: there is no truth {unknown!r}; there are all, {', '.join(TRUTHS)}")
+    if not names or len(set(names)) < len(names):
+        raise UserError(f"--truth: name at least one of {', '.join(TRUTHS)}, none twice")
+    for name in names:
+        TRUTHS[name].finger(drawn)
