@@ -232,7 +232,11 @@ def crossval(
         material: The elastic constants.
         load: What moves the finger.
         progress: Whether to show the stages on standard error.
-        study: Further attributes of `compare.crossval.study.Study`, such as `schemes`, `seeds`, `noise`.
+        study: Further attributes of `compare.crossval.study.Study`, such as `truths`, `schemes`, `seeds`,
+            `noise`.
+
+    Returns:
+        The scores; `table()` has them by truth, layout, solver and scheme.
 
     Raises:
         UserError: If the study cannot be made, or the folder holds another one.

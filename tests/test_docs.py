@@ -437,13 +437,25 @@ def test_the_guide_has_every_file_of_a_cross_validation(tmp_path):
     assert main(["crossval", *study.split(), "--out", str(tmp_path / "out")]) == 0
     actual = [path.relative_to(tmp_path / "out").as_posix() for path in tmp_path.rglob("*") if path.is_file()]
     rows = names(table(GUIDE, "file of a cross-validation"))
-    assert_same([name.replace("SEED", "seed-NAME").replace("LAYOUT", "joints") for name in rows], actual)
+    assert_same(
+        [
+            name.replace("SEED", "seed-NAME").replace("LAYOUT", "joints").replace("TRUTH", "sliding")
+            for name in rows
+        ],
+        actual,
+    )
 
 
 def test_the_guide_has_every_scheme():
     from compare.crossval.folds import ALL, SCHEMES
 
     assert names(table(GUIDE, "scheme")) == [scheme for scheme in SCHEMES if scheme != ALL]
+
+
+def test_the_guide_has_every_truth():
+    from compare.evaluation.truths import TRUTHS
+
+    assert names(table(GUIDE, "truth")) == list(TRUTHS)
 
 
 def test_the_guide_has_every_output_file(run_folder):

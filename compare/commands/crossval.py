@@ -28,6 +28,7 @@ def crossval(
     *,
     solvers: str = "fem,fem-nonlinear,fem-asm,fem-id,gp,statfem",
     schemes: str = "one-out,tip-out,random,load-out",
+    truth: str = "sliding",
     layouts: str | None = None,
     seeds: int = 5,
     noise: float = 0.005,
@@ -37,14 +38,16 @@ def crossval(
 ) -> int:
     """Score solvers on markers, loads and fields that they were not given.
 
-    The truth is a finite-strain simulation with a sliding contact on a finer mesh; the marker displacements
-    are taken from it with noise. The default --mesh-size is 0.5. Finished folds are kept: the same command
-    again goes on where it was stopped.
+    A truth is a finite-strain simulation on a finer mesh; the marker displacements are taken from it with
+    noise. The default --mesh-size is 0.5. Finished folds are kept: the same command again goes on where it
+    was stopped.
 
     Args:
         solvers: Names of solvers, separated by commas. One that can choose the weight of the markers runs in
             three variants (linear law).
         schemes: Hold-out schemes, separated by commas.
+        truth: Truths, separated by commas, or all: sliding, stvk, print, base, cylinder, oblique, mixed,
+            sticking.
         layouts: Marker layouts at which the same truth is sampled, separated by commas; default: the
             design's own.
         seeds: Number of noise draws.
@@ -72,6 +75,7 @@ def crossval(
         load=load,
         variants=read_variants(options, solvers, material),
         schemes=comma_list(schemes),
+        truths=comma_list(truth),
         layouts=comma_list(layouts) if layouts else (),
         seeds=seeds,
         noise=noise,
@@ -90,7 +94,7 @@ def crossval(
     console = Console()
     for table in tables(result):
         console.print(table)
-    for name in ("crossval.json", "report.html", "held_out.csv", "fields.csv"):
+    for name in ("crossval.json", "report.html", "truths.csv", "held_out.csv", "fields.csv"):
         if (study.out / name).exists():
             print(study.out / name)
     for name, message in result.failed.items():

@@ -5,25 +5,42 @@ from collections.abc import Mapping
 from compare.crossval.folds import ALL
 from compare.crossval.result import BASELINES, CrossvalResult, LayoutResult
 from compare.crossval.scores import FIELD_NAMES
+from compare.crossval.truth_summary import held_out_scheme, verdict_sentences
 from compare.evaluation.number_format import percent
 from solvers.assimilation.misfit import assimilates
 
 
 def answers(result: CrossvalResult) -> Mapping[str, list[str]]:
-    """Sentences on the solvers that assimilate, by question; questions without an answer are left out."""
+    """Sentences on the solvers that assimilate, by question; questions without an answer are left out.
+
+    With several truths the questions are about what holds with which of them.
+    """
     given = [variant.label for variant in result.study.variants if assimilates(variant.make(0))]
+    if len(result.truths) > 1:
+        question = "With which truths is a solver better than the null models and fem-asm?"
+        return {question: _by_truth(result)}
     found: dict[str, list[str]] = {
         "Are held-out markers better predicted with the others than without?": [],
         "Do these verdicts depend on the layout of the markers?": _contrasts(result, given),
         "Is the stress better after assimilation?": [],
     }
     predictions, _, stresses = found.values()
-    for layout, each in result.layouts.items():
+    for case, each in result.cases.items():
         scored = [label for label in given if label in each.scores]
-        before = "" if len(result.layouts) == 1 else f"{layout}: "
+        before = f"{case.layout}: " if case.said_among(result.cases) else ""
         predictions += [before + sentence for sentence in _predictions(each, scored)]
         stresses += [before + sentence for sentence in _stresses(each, scored)]
     return {question: sentences for question, sentences in found.items() if sentences}
+
+
+def _by_truth(result: CrossvalResult) -> list[str]:
+    """The verdicts of every solver by truth, for each layout."""
+    layouts = list(dict.fromkeys(case.layout for case in result.cases))
+    return [
+        sentence if len(layouts) == 1 else f"{layout}: {sentence}"
+        for layout in layouts
+        for sentence in verdict_sentences(result.of_layout(layout), held_out_scheme(result))
+    ]
 
 
 def _predictions(result: LayoutResult, given: list[str]) -> list[str]:
@@ -48,15 +65,15 @@ def _contrasts(result: CrossvalResult, given: list[str]) -> list[str]:
         for baseline in BASELINES:
             for scheme in result.schemes:
                 verdicts = {
-                    layout: found.verdict
-                    for layout, each in result.layouts.items()
+                    case.layout: found.verdict
+                    for case, each in result.cases.items()
                     if label in each.scores
                     and (found := each.difference(label, baseline, scheme, "mae_sum")) is not None
                 }
                 if len(set(verdicts.values())) > 1:
                     said = ", ".join(f"{verdict} with {layout}" for layout, verdict in verdicts.items())
                     sentences.append(f"{label} against {baseline} in {scheme}: {said}.")
-    return sentences or ["No."] * (len(result.layouts) > 1)
+    return sentences or ["No."] * (len(result.cases) > 1)
 
 
 def _stresses(result: LayoutResult, given: list[str]) -> list[str]:

@@ -7,10 +7,10 @@ import numpy as np
 
 from compare.crossval.folds import LOAD, FoldResult, LoadCase, SeedResults, folds_of, load_cases_of
 from compare.crossval.output_files import write_results
-from compare.crossval.result import CrossvalResult, LayoutResult
+from compare.crossval.result import Case, CrossvalResult, LayoutResult
 from compare.crossval.solver_folds import SolverTask, run_folds
 from compare.crossval.study import MEASURED, Study, visible_markers
-from compare.crossval.true_fields import SampledField, TruthTask, simulate_truth
+from compare.crossval.true_fields import TrueField, TruthTask, simulate_truth
 from compare.crossval.weight_sweep import SWEPT, sweep_weights
 from compare.evaluation.shared_mesh import check_inside
 from compare.evaluation.virtual_experiment import experiment_source
@@ -57,35 +57,36 @@ def cross_validate(study: Study, stages: Stages | None = None) -> CrossvalResult
     with locked(study.out):
         write_json(study.out / DEFINITION, definition)
         mesh.save(study.mesh_file)
-        truths = {} if measured else _truths(study, load_cases, stages)
+        files = {} if measured else _true_fields(study, load_cases, stages)
         if measured:
-            observations = {MEASURED: [[measured]] * study.seeds}
+            observations = {Case(MEASURED, MEASURED): [[measured]] * study.seeds}
         else:
-            observations = _noisy(study, truths, experiment_source(problem))
+            observations = _noisy(study, files, problem)
         folds = {
-            layout: folds_of(study.schemes, len(seeds[0][0].points), load_cases)
-            for layout, seeds in observations.items()
+            case: folds_of(study.schemes, len(seeds[0][0].points), load_cases)
+            for case, seeds in observations.items()
         }
         tasks = {
-            (layout, variant.label): SolverTask(
+            (case, variant.label): SolverTask(
                 study,
-                layout,
+                case.layout,
                 variant,
                 load_cases,
-                truths.get(layout, []),
-                observations[layout],
-                folds[layout],
+                files.get(case, []),
+                observations[case],
+                folds[case],
+                study.chosen_truths.get(case.truth),
             )
-            for layout in observations
+            for case in observations
             for variant in study.variants
         }
         results, failed = _results(study, tasks, stages)
-        sweeps = _sweeps(tasks, results, stages) if truths else {}
+        sweeps = _sweeps(tasks, results, stages) if files else {}
         found = CrossvalResult(
             study,
             {
-                layout: LayoutResult.of(seeds[0][0], folds[layout], results[layout], failed[layout])
-                for layout, seeds in observations.items()
+                case: LayoutResult.of(seeds[0][0], folds[case], results[case], failed[case])
+                for case, seeds in observations.items()
             },
         )
         provenance = {**definition, "problem_sha256": problem.digest, **stages.record()}
@@ -94,9 +95,14 @@ def cross_validate(study: Study, stages: Stages | None = None) -> CrossvalResult
     return found
 
 
-def _truths(study: Study, load_cases: Sequence[LoadCase], stages: Stages) -> dict[str, list[Path]]:
-    """Files of the true fields of every layout at every load; each load is simulated in its own process."""
-    tasks = {f"truth, {case.name}": TruthTask(study, case) for case in load_cases}
+def _true_fields(study: Study, load_cases: Sequence[LoadCase], stages: Stages) -> dict[Case, list[Path]]:
+    """Files of the true fields at every load, each of which is simulated in its own process."""
+    truths = study.chosen_truths
+    tasks = {
+        "truth, " + (f"{name}, " if len(truths) > 1 else "") + case.name: TruthTask(study, truth, case)
+        for name, truth in truths.items()
+        for case in load_cases
+    }
     found: dict[str, dict[str, Path]] = {}
     for name, answer in in_stages(
         simulate_truth,
@@ -108,18 +114,23 @@ def _truths(study: Study, load_cases: Sequence[LoadCase], stages: Stages) -> dic
     ):
         if isinstance(answer, ProcessFailed):
             raise UserError(
-                f"{name}: the virtual experiment did not come to its end; press less, or give --measurements"
+                f"{name}: the virtual experiment did not come to its end; press less, leave the truth or "
+                f"{LOAD} out, or give --measurements"
             )
         found[name] = answer
-    return {layout: [found[name][layout] for name in tasks] for layout in study.markers}
+    return {
+        Case(truth, layout): [found[name][layout] for name, task in tasks.items() if task.truth.name == truth]
+        for truth in truths
+        for layout in study.markers
+    }
 
 
 def _noisy(
-    study: Study, truths: Mapping[str, Sequence[Path]], source: str
-) -> dict[str, list[list[Observations]]]:
-    """For each layout the true marker displacements with noise, for each seed at each load."""
+    study: Study, files: Mapping[Case, Sequence[Path]], problem: Problem
+) -> dict[Case, list[list[Observations]]]:
+    """The true marker displacements with noise, for each seed at each load; the same noise in every truth."""
 
-    def observed(points: FloatArray, true: FloatArray, seed: int, at: int) -> Observations:
+    def observed(points: FloatArray, true: FloatArray, seed: int, at: int, source: str) -> Observations:
         return Observations(
             points=points,
             displacements=true + np.random.default_rng([seed, at]).normal(0, study.noise, true.shape),
@@ -131,27 +142,31 @@ def _noisy(
         )
 
     found = {}
-    for layout, points in study.markers.items():
-        displacements = [SampledField.load(path).markers for path in truths[layout]]
-        found[layout] = [
-            [observed(points, true, seed, at) for at, true in enumerate(displacements)]
+    for case, paths in files.items():
+        points, source = (
+            study.markers[case.layout],
+            experiment_source(problem, study.chosen_truths[case.truth]),
+        )
+        displacements = [TrueField.load(path).sampled.markers for path in paths]
+        found[case] = [
+            [observed(points, true, seed, at, source) for at, true in enumerate(displacements)]
             for seed in range(study.seeds)
         ]
     return found
 
 
 def _results(
-    study: Study, tasks: Mapping[tuple[str, str], SolverTask], stages: Stages
-) -> tuple[dict[str, dict[str, SeedResults]], dict[str, dict[str, str]]]:
-    """By layout the results of every solver, and the error messages of the solvers that failed."""
+    study: Study, tasks: Mapping[tuple[Case, str], SolverTask], stages: Stages
+) -> tuple[dict[Case, dict[str, SeedResults]], dict[Case, dict[str, str]]]:
+    """By truth and layout the results of every solver, and the error messages of the solvers that failed."""
 
     def note(_: str, answer: list[list[FoldResult]] | str | ProcessFailed) -> str:
         if isinstance(answer, ProcessFailed):
             return answer.message
         return answer if isinstance(answer, str) else "scored"
 
-    layouts = list(dict.fromkeys(layout for layout, _ in tasks))
-    named = {label if len(layouts) == 1 else f"{label}, {layout}": (layout, label) for layout, label in tasks}
+    cases = list(dict.fromkeys(case for case, _ in tasks))
+    named = {", ".join(filter(None, [label, case.said_among(cases)])): (case, label) for case, label in tasks}
     answers = dict(
         in_stages(
             run_folds,
@@ -162,28 +177,29 @@ def _results(
             note=note,
         )
     )
-    results: dict[str, dict[str, SeedResults]] = {layout: {} for layout in layouts}
-    failed: dict[str, dict[str, str]] = {layout: {} for layout in layouts}
-    for name, (layout, label) in named.items():
+    results: dict[Case, dict[str, SeedResults]] = {case: {} for case in cases}
+    failed: dict[Case, dict[str, str]] = {case: {} for case in cases}
+    for name, (case, label) in named.items():
         answer = answers[name]
         if isinstance(answer, list):
-            results[layout][label] = answer
+            results[case][label] = answer
         else:
-            failed[layout][label] = note(name, answer)
+            failed[case][label] = note(name, answer)
     if not all(results.values()):
-        messages = {name: note(name, answers[name]) for name, (layout, _) in named.items() if failed[layout]}
+        messages = {name: note(name, answers[name]) for name, (case, _) in named.items() if failed[case]}
         raise UserError("; ".join(f"{name}: {message}" for name, message in messages.items()))
     return results, failed
 
 
 def _sweeps(
-    tasks: Mapping[tuple[str, str], SolverTask],
-    results: Mapping[str, Mapping[str, SeedResults]],
+    tasks: Mapping[tuple[Case, str], SolverTask],
+    results: Mapping[Case, Mapping[str, SeedResults]],
     stages: Stages,
-) -> dict[str, dict[str, list[float]]]:
-    """The sweep of `sweep_weights` for each layout, if its solver is there."""
-    swept = {layout: tasks[layout, SWEPT] for layout, each in results.items() if SWEPT in each}
+) -> dict[Case, dict[str, list[float]]]:
+    """The sweep of `sweep_weights` for each truth and layout, if its solver is there."""
+    cases = {f"{case.truth}, {case.layout}": case for case, each in results.items() if SWEPT in each}
+    swept = {name: tasks[case, SWEPT] for name, case in cases.items()}
     answers = dict(
         in_stages(sweep_weights, swept, processes=1, stages=stages, kind="curves", note=lambda *_: "weighed")
     )
-    return {layout: each for layout, each in answers.items() if not isinstance(each, ProcessFailed)}
+    return {cases[name]: each for name, each in answers.items() if not isinstance(each, ProcessFailed)}

@@ -74,6 +74,13 @@ class FoldResult:
         fields: Relative L2 distances from the truth; empty without a truth.
         converged: Whether the solver converged, by its own criterion.
         given: Whether it was given any markers.
+        force: Magnitude of the reaction over that of the truth, less one; None without a truth, like the
+            following, and None in schemes other than `ALL`.
+        position: Stated minus true abscissa of the contact's middle, mm; None if the solver states none.
+        von_mises_coverage: Share of the body whose true von Mises stress lies in the stated interval; None
+            if the solver states none.
+        force_within: Whether the magnitude of the true force lies in the stated interval; None likewise.
+        position_within: Whether the middle of the true contact lies in the stated interval; None likewise.
     """
 
     fold: Fold
@@ -82,6 +89,11 @@ class FoldResult:
     fields: Mapping[str, float] = field(default_factory=dict)
     converged: bool = True
     given: bool = True
+    force: float | None = None
+    position: float | None = None
+    von_mises_coverage: float | None = None
+    force_within: bool | None = None
+    position_within: bool | None = None
 
     @property
     def held(self) -> list[int]:

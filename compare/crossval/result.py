@@ -1,9 +1,9 @@
 """The scores of a finished cross-validation."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from math import isnan, nan
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from compare.crossval.folds import SCHEMES, Fold, SeedResults
 from compare.crossval.scores import (
@@ -26,13 +26,36 @@ from solvers.assimilation.misfit import assimilates
 if TYPE_CHECKING:
     import pandas as pd
 
-BASELINES = ("fem", "gp")
+BASELINES = ("fem", "gp", "statfem", "fem-asm")
 """Solvers that the others are compared with."""
+
+
+class Case(NamedTuple):
+    """A truth and a layout of its markers.
+
+    Attributes:
+        truth: Name of the truth, or `MEASURED`.
+        layout: Name of the layout, or `MEASURED`.
+    """
+
+    truth: str
+    layout: str
+
+    def said_among(self, cases: Collection["Case"]) -> str:
+        """The names in which cases differ, for messages; an empty text for a single case."""
+        return ", ".join(
+            own for own, others in zip(self, zip(*cases, strict=True), strict=True) if len(set(others)) > 1
+        )
+
+    @property
+    def cells(self) -> dict[str, Cell]:
+        """The first columns of every CSV file."""
+        return {"truth": self.truth, "layout": self.layout}
 
 
 @dataclass(frozen=True, eq=False)
 class LayoutResult:
-    """The scores of all solvers with the markers of one layout.
+    """The scores of all solvers in one case: with a truth and the markers of one layout.
 
     Attributes:
         source: One sentence on the source of the markers' displacements.
@@ -102,9 +125,12 @@ class LayoutResult:
                 row: dict[str, Cell] = {"solver": label, "scheme": scheme}
                 for kind, errors in (("in_sample", found.in_sample), ("held_out", found.held_out)):
                     for name in MARKERS:
-                        row |= _interval_cells(f"{kind}_{name}", "_mm", errors.get(name))
+                        row |= interval_cells(f"{kind}_{name}", "_mm", errors.get(name))
                 row["within_stated"] = "" if found.coverage is None else found.coverage
                 row |= self._difference_cells(label, scheme, "mae_sum", "_mm")
+                row |= interval_cells("force_error", "", found.force)
+                row |= interval_cells("position_error", "_mm", found.position)
+                row |= {name: "" if share is None else share for name, share in found.stated.items()}
                 rows.append(row | {"converged": found.converged})
         return rows
 
@@ -112,7 +138,7 @@ class LayoutResult:
         """Relative L2 distances from the truth by solver, scheme and field."""
         return [
             {"solver": label, "scheme": scheme, "field": name}
-            | _interval_cells("rel_l2", "", interval)
+            | interval_cells("rel_l2", "", interval)
             | self._difference_cells(label, scheme, name, "")
             for label, scores in self.scores.items()
             for scheme, found in scores.items()
@@ -123,7 +149,7 @@ class LayoutResult:
         row: dict[str, Cell] = {}
         for baseline in BASELINES:
             found = self.difference(label, baseline, scheme, what)
-            row |= _interval_cells(f"from_{baseline}", unit, found, "_mean")
+            row |= interval_cells(f"from_{baseline}", unit, found, "_mean")
             row[f"from_{baseline}"] = found.verdict if found else ""
         return row
 
@@ -159,29 +185,42 @@ class CrossvalResult:
 
     Attributes:
         study: The study.
-        layouts: The scores by layout of the markers; of `MEASURED` alone if the markers were measured.
+        cases: The scores by truth and layout of the markers; of `MEASURED` alone with measured markers.
     """
 
     study: Study
-    layouts: Mapping[str, LayoutResult]
+    cases: Mapping[Case, LayoutResult]
+
+    @property
+    def truths(self) -> list[str]:
+        """Names of the truths, or `MEASURED`."""
+        return list(dict.fromkeys(case.truth for case in self.cases))
+
+    def of_truth(self, truth: str) -> dict[str, LayoutResult]:
+        """The scores with a truth by layout."""
+        return {case.layout: each for case, each in self.cases.items() if case.truth == truth}
+
+    def of_layout(self, layout: str) -> dict[str, LayoutResult]:
+        """The scores with a layout by truth."""
+        return {case.truth: each for case, each in self.cases.items() if case.layout == layout}
 
     @property
     def schemes(self) -> list[str]:
         """The schemes of the folds, in the order of `SCHEMES`."""
-        present = {fold.scheme for each in self.layouts.values() for fold in each.folds}
+        present = {fold.scheme for each in self.cases.values() for fold in each.folds}
         return [scheme for scheme in SCHEMES if scheme in present]
 
     @property
     def source(self) -> str:
-        """One sentence on the source of the markers' displacements, the same for every layout."""
-        return next(iter(self.layouts.values())).source
+        """The sources of the markers' displacements, which are the same for every layout."""
+        return "; ".join(dict.fromkeys(each.source for each in self.cases.values()))
 
     @property
     def scores(self) -> list[Score]:
-        """All scores, of every layout, solver and scheme."""
+        """All scores, of every truth, layout, solver and scheme."""
         return [
             score
-            for each in self.layouts.values()
+            for each in self.cases.values()
             for by_scheme in each.scores.values()
             for score in by_scheme.values()
         ]
@@ -193,43 +232,49 @@ class CrossvalResult:
 
     @property
     def failed(self) -> dict[str, str]:
-        """Error messages of the solvers that have no score, by solver (and layout, if there are several)."""
+        """Error messages of the solvers without a score, by solver (and truth and layout, if several)."""
         return {
-            label if len(self.layouts) == 1 else f"{label}, {layout}": message
-            for layout, each in self.layouts.items()
+            ", ".join(filter(None, [label, case.said_among(self.cases)])): message
+            for case, each in self.cases.items()
             for label, message in each.failed.items()
         }
 
     def table(self) -> "pd.DataFrame":
-        """The columns of `held_out.csv` by layout, solver and scheme; NaN where there is no number."""
+        """The columns of `held_out.csv` by truth, layout, solver and scheme; NaN where there is no number."""
         import pandas as pd
 
         rows = [
             {name: nan if cell == "" else cell for name, cell in row.items()} for row in self.held_out_rows()
         ]
-        return pd.DataFrame(rows).set_index(["layout", "solver", "scheme"])
+        return pd.DataFrame(rows).set_index(["truth", "layout", "solver", "scheme"])
 
     def held_out_rows(self) -> list[dict[str, Cell]]:
-        """The rows of `held_out.csv`: errors at given and held-out markers by layout, solver and scheme."""
-        return [
-            {"layout": layout, **row} for layout, each in self.layouts.items() for row in each.held_out_rows()
-        ]
+        """The rows of `held_out.csv`: errors at markers by truth, layout, solver and scheme."""
+        return [case.cells | row for case, each in self.cases.items() for row in each.held_out_rows()]
 
     def field_rows(self) -> list[dict[str, Cell]]:
-        """The rows of `fields.csv`: distances from the truth by layout, solver, scheme and field."""
-        return [
-            {"layout": layout, **row} for layout, each in self.layouts.items() for row in each.field_rows()
-        ]
+        """The rows of `fields.csv`: distances from the truth by truth, layout, solver, scheme and field."""
+        return [case.cells | row for case, each in self.cases.items() for row in each.field_rows()]
 
     def content(self) -> dict[str, Any]:
         """The part of `crossval.json` that holds the result."""
         return {
-            "schema": 2,
+            "schema": 3,
             "seeds": self.study.seeds,
             "level": LEVEL,
-            "truth": f"elements of {FINER:g} times the size" if self.study.measurements is None else None,
+            "truth_mesh": f"elements of {FINER:g} times the size"
+            if self.study.measurements is None
+            else None,
             "schemes": {scheme: SCHEMES[scheme] for scheme in self.schemes},
-            "layouts": {layout: each.content(self.study.variants) for layout, each in self.layouts.items()},
+            "truths": {
+                truth: {
+                    "layouts": {
+                        layout: each.content(self.study.variants)
+                        for layout, each in self.of_truth(truth).items()
+                    }
+                }
+                for truth in self.truths
+            },
         }
 
 
@@ -237,7 +282,8 @@ def _with_verdicts(differences: Mapping[str, Difference]) -> dict[str, dict[str,
     return {what: {**asdict(one), "verdict": one.verdict} for what, one in differences.items()}
 
 
-def _interval_cells(name: str, unit: str, interval: Interval | None, mean: str = "") -> dict[str, Cell]:
+def interval_cells(name: str, unit: str, interval: Interval | None, mean: str = "") -> dict[str, Cell]:
+    """Three columns of a CSV file: a mean and the ends of its interval, empty where there is none."""
     values = (None, None, None) if interval is None else (interval.mean, interval.low, interval.high)
     return {
         f"{name}{end}{unit}": "" if value is None or isnan(value) else value

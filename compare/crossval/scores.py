@@ -19,7 +19,8 @@ RESAMPLES = 2000
 MARKERS = ("mae_u", "mae_v", "mae_sum", "mae_rss")
 FIELDS = ("displacement", "strain", "von_mises", "von_mises_finite")
 FIELD_NAMES = {"displacement": "displacement", "strain": "strain", "von_mises": "von Mises stress"}
-COMPARED = ("mae_sum", *FIELD_NAMES)
+FORCE = "force"
+COMPARED = ("mae_sum", *FIELD_NAMES, FORCE)
 """Scores of which differences from the baselines are computed."""
 
 
@@ -86,6 +87,13 @@ class Score:
             deviations that the solver states; None if it states none.
         per_marker: Mean of |du| + |dv| at each marker over the folds that hold it out, shape (m,), mm.
         converged: Share of folds and seeds in which the solver converged.
+        force: Magnitude of the reaction over that of the truth, less one; in the scheme `ALL` only, like the
+            following, and None without a truth.
+        position: Stated minus true abscissa of the contact's middle, mm; None if the solver states none.
+        von_mises_coverage: Share of the body, weighted by area, whose true von Mises stress lies in the
+            interval of `LEVEL` that the solver states; None if it states none.
+        force_within: Share of seeds in which the true force lies in the stated interval; None likewise.
+        position_within: Share of seeds in which the true contact's middle does; None likewise.
     """
 
     in_sample: Mapping[str, Interval]
@@ -94,6 +102,20 @@ class Score:
     coverage: float | None
     per_marker: Sequence[float]
     converged: float
+    force: Interval | None = None
+    position: Interval | None = None
+    von_mises_coverage: float | None = None
+    force_within: float | None = None
+    position_within: float | None = None
+
+    @property
+    def stated(self) -> dict[str, float | None]:
+        """How often the stated intervals of stress, force and place hold the truth, by column."""
+        return {
+            "von_mises_within_stated": self.von_mises_coverage,
+            "force_within_stated": self.force_within,
+            "position_within_stated": self.position_within,
+        }
 
 
 def of_scheme(results: SeedResults, scheme: str) -> list[list[FoldResult]]:
@@ -116,6 +138,11 @@ def score(results: SeedResults) -> Score:
         coverage=float(inside.mean()) if inside.size else None,
         per_marker=_per_marker(results),
         converged=float(np.mean([found.converged for seed in results for found in seed])),
+        force=_interval(results, "force"),
+        position=_interval(results, "position"),
+        von_mises_coverage=_share(results, "von_mises_coverage"),
+        force_within=_share(results, "force_within"),
+        position_within=_share(results, "position_within"),
     )
 
 
@@ -141,12 +168,28 @@ def _values(results: SeedResults, what: str) -> FloatArray | None:
     """A score for each seed and fold, shape (s, f); None if some fold has none."""
 
     def value(found: FoldResult) -> float:
+        if what == FORCE:
+            return nan if found.force is None else abs(found.force)
         if what in FIELDS:
             return found.fields.get(what, nan)
         return marker_errors(found.held_out)[what] if len(found.held_out) else nan
 
     values = np.array([[value(found) for found in seed] for seed in results])
     return values if np.isfinite(values).all() else None
+
+
+def _interval(results: SeedResults, name: str) -> Interval | None:
+    """Interval of an optional number of a fold from its mean for each seed; None if some fold has none."""
+    values = [[getattr(found, name) for found in seed] for seed in results]
+    if any(value is None for seed in values for value in seed):
+        return None
+    return Interval.of([float(np.mean(seed)) for seed in values])
+
+
+def _share(results: SeedResults, name: str) -> float | None:
+    """Mean of an optional number of a fold over folds and seeds; None if some fold has none."""
+    found = _interval(results, name)
+    return None if found is None else found.mean
 
 
 def _errors(results: SeedResults, chosen: Callable[[FoldResult], FloatArray]) -> dict[str, Interval]:

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 from pydantic import ConfigDict, TypeAdapter
 from pydantic_core import to_jsonable_python
+from scipy.stats import norm
 
-from compare.crossval.folds import ALL, Fold, FoldResult, LoadCase, StatedIntervals, hide_markers
+from compare.crossval.folds import ALL, Fold, FoldResult, LoadCase, hide_markers
+from compare.crossval.scores import LEVEL
 from compare.crossval.study import SolverVariant, Study
 from compare.crossval.true_fields import FieldSampler, SampledField, TrueField
 from compare.evaluation.truths import SLIDING, Truth
@@ -19,7 +21,7 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.assimilation.misfit import assimilates
 from solvers.problem import Problem
-from solvers.solution import Solution
+from solvers.solution import Solution, State
 from solvers.solver import Progress, Solver, Transferable, UnsupportedProblemError, refitter, silent, with_law
 
 
@@ -100,12 +102,11 @@ class FoldRunner:
         self._task, self._solver = task, solver
         mesh, material = TriangleMesh.load(task.study.mesh_file), task.study.material
         self.problem = Problem(mesh, with_law(material, solver), task.load_cases[0].load)
-        finite = material.model_copy(update={"law": "neo-hookean", "plane": "strain"})
-        self._finite = replace(self.problem, material=finite)
+        self._true_law = replace(self.problem, material=(task.truth or SLIDING).material(material))
         markers = task.observations[0][0]
         self.sampler = FieldSampler.of(mesh, markers.points, markers.marker_radius)
-        self._truths = [SampledField.load(path) for path in task.truths]
-        self._unassimilated: dict[int, tuple[SampledField, bool]] = {}
+        self._truths = [TrueField.load(path) for path in task.truths]
+        self._unassimilated: dict[int, tuple[Solution, SampledField]] = {}
         self._refit: Callable[[Observations], Solution] | None = None
         self._fit: tuple[tuple[int, ...], Solution] | None = None
 
@@ -127,23 +128,60 @@ class FoldRunner:
         """One fold, of which `observations` holds the markers at every load."""
         given, deviations = assimilates(self._solver), None
         if not given:
-            sampled, converged = self._without_markers(fold.load_case)
+            solution, sampled = self._without_markers(fold.load_case)
         else:
             solution = self._fitted(observations[0], fold.held)
-            sampled, converged = self._at_load_case(solution, fold.load_case), bool(solution.status.converged)
+            sampled = self._at_load_case(solution, fold.load_case)
             stated = getattr(solution.field, "standard_deviation", None)
             if stated is not None and fold.load_case == 0:
                 noise = observations[0].standard_deviations
                 deviations = np.hypot(stated(self.sampler.centres), noise).tolist()
-        fields = self.distances(sampled, fold.load_case)
-        errors = (sampled.markers - observations[fold.load_case].displacements).tolist()
-        return FoldResult(fold, errors, deviations, fields, converged, given)
+        own = replace(self.problem, material=solution.problem.material)  # a solver may have estimated it
+        return FoldResult(
+            fold,
+            errors=(sampled.markers - observations[fold.load_case].displacements).tolist(),
+            deviations=deviations,
+            fields=self.distances(sampled, fold.load_case, own),
+            converged=bool(solution.status.converged),
+            given=given,
+            **(self._against_truth(solution, sampled) if fold.scheme == ALL and self._truths else {}),
+        )
 
-    def distances(self, sampled: SampledField, case: int) -> dict[str, float]:
-        """Relative L2 distances from the truth at a load case; none without a truth."""
+    def distances(self, sampled: SampledField, case: int, own: Problem | None = None) -> dict[str, float]:
+        """Relative L2 distances from the truth at a load case; none without a truth.
+
+        Args:
+            sampled: The field.
+            case: Number of the load case.
+            own: Problem with the solver's material; that of the study with the solver's law if None.
+        """
         if not self._truths:
             return {}
-        return sampled.distances(self._truths[case], self.problem, self._finite, self.sampler.weights)
+        true, weights = self._truths[case].sampled, self.sampler.weights
+        return sampled.distances(true, own or self.problem, self._true_law, weights)
+
+    def _against_truth(self, solution: Solution, sampled: SampledField) -> dict[str, Any]:
+        """Force, place of the contact and stated intervals against the truth at the full load."""
+        truth, stats = self._truths[0], solution.stats
+        found: dict[str, Any] = {}
+        if np.isfinite(solution.reaction).all():
+            found["force"] = float(np.linalg.norm(solution.reaction)) / truth.force - 1
+        if "position" in stats:
+            found["position"] = float(stats["position"]) - truth.middle
+        for name, value in (("force", truth.force), ("position", truth.middle)):
+            if f"{name}_low" in stats:
+                low, high = (float(stats[f"{name}_{end}"]) for end in ("low", "high"))
+                found[f"{name}_within"] = low <= value <= high
+        stated = getattr(solution.field, "von_mises_deviation", None)
+        if stated is not None:
+            inside = self.sampler.inside_of(solution, self.problem.mesh)
+            errors = (
+                State.from_gradient(sampled.gradient, solution.problem).von_mises
+                - State.from_gradient(truth.sampled.gradient, self._true_law).von_mises
+            )
+            within = np.abs(errors) <= norm.ppf((1 + LEVEL) / 2) * stated(inside)
+            found["von_mises_coverage"] = float(np.average(within, weights=self.sampler.weights))
+        return found
 
     def _fitted(self, observations: Observations, held: tuple[int, ...]) -> Solution:
         """The solution with the markers that are not held out; folds that hold out the same share it."""
@@ -166,7 +204,7 @@ class FoldRunner:
         if case == 0 or isinstance(self._solver, Transferable):
             return sampled
         try:
-            there, here = (self._without_markers(each)[0] for each in (case, 0))
+            there, here = (self._without_markers(each)[1] for each in (case, 0))
         except UnsupportedProblemError:
             return sampled * share
         return there + (sampled + here * -1.0) * share
@@ -174,12 +212,11 @@ class FoldRunner:
     def _at(self, case: int) -> Problem:
         return replace(self.problem, load=self._task.load_cases[case].load)
 
-    def _without_markers(self, case: int) -> tuple[SampledField, bool]:
-        """The solver's field without markers at a load case, and whether it converged; solved once."""
+    def _without_markers(self, case: int) -> tuple[Solution, SampledField]:
+        """The solver's solution without markers at a load case, and its field; solved once."""
         if case not in self._unassimilated:
             solution = self._solver.solve(self._at(case))
-            sampled = self.sampler.of_solution(solution, self.problem.mesh)
-            self._unassimilated[case] = sampled, bool(solution.status.converged)
+            self._unassimilated[case] = solution, self.sampler.of_solution(solution, self.problem.mesh)
         return self._unassimilated[case]
 
 

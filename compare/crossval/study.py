@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from compare.crossval.folds import ALL, SCHEMES
+from compare.evaluation.truths import SLIDING, TRUTHS, Truth, check_truths
 from compare.runtime.provenance import cores
 from compare.runtime.resumable_folder import job_definition
 from geometry.arrays import FloatArray
@@ -31,7 +32,10 @@ FEWEST = 3
 """Fewest markers: some to hold out and some to give."""
 
 MEASURED = "measured"
-"""Name in place of a layout where the markers were measured."""
+"""Name in place of a truth and of a layout where the markers were measured."""
+
+EVERY_TRUTH = "all"
+"""Name that stands for every truth."""
 
 WEIGHT_CHOICES = ("left-out", "evidence")
 """Rules by which a solver can choose the weight of the markers, beside the paper's fixed weight."""
@@ -98,7 +102,8 @@ class Study:
         mesh: Element sizes of the mesh that solvers share.
         material: The elastic constants; each solver takes the law that it has.
         load: The prescribed displacement of the contact.
-        layouts: Marker layouts at which the same truth is sampled; empty for the design's own.
+        truths: Keys of `TRUTHS`, or `EVERY_TRUTH` alone.
+        layouts: Marker layouts at which every truth is sampled; empty for the design's own.
         schemes: Keys of `SCHEMES` other than `ALL`.
         seeds: Number of draws of the noise, and of the solvers' random numbers.
         noise: Standard deviation of a simulated marker's displacement, mm.
@@ -112,6 +117,7 @@ class Study:
     mesh: MeshSettings = field(default_factory=lambda: MeshSettings(size=ELEMENT_SIZE))
     material: Material = field(default_factory=Material)
     load: Load = field(default_factory=Load)
+    truths: Sequence[str] = (SLIDING.name,)
     layouts: Sequence[str] = ()
     schemes: Sequence[str] = tuple(scheme for scheme in SCHEMES if scheme != ALL)
     seeds: int = 5
@@ -123,6 +129,17 @@ class Study:
     def mesh_file(self) -> Path:
         """File of the shared mesh."""
         return self.out / "mesh.npz"
+
+    @property
+    def chosen_truths(self) -> dict[str, Truth]:
+        """The truths by name; none with measured markers."""
+        if self.measurements is not None:
+            return {}
+        return {name: TRUTHS[name] for name in self._truth_names}
+
+    @property
+    def _truth_names(self) -> tuple[str, ...]:
+        return tuple(TRUTHS) if tuple(self.truths) == (EVERY_TRUTH,) else tuple(self.truths)
 
     @property
     def markers(self) -> dict[str, FloatArray]:
@@ -138,6 +155,9 @@ class Study:
         """Raise a `UserError` for what cannot be done, before anything is computed."""
         if self.layouts and self.measurements:
             raise UserError("--layouts: measured markers are where they are; leave out --layouts")
+        if tuple(self.truths) != (SLIDING.name,) and self.measurements:
+            raise UserError("--truth: measured markers have a truth that nobody knows; leave out --truth")
+        check_truths(self._truth_names, self.design)
         if len(set(self.layouts)) < len(self.layouts):
             raise UserError(f"--layouts: a layout is named twice: {', '.join(self.layouts)}")
         if too_few := next((name for name, points in self.markers.items() if len(points) < FEWEST), None):
@@ -163,8 +183,12 @@ class Study:
             solver = variant.make(0)
             check_load(solver, self.load)
             with_law(self.material, solver)
-        if self.measurements is None and self.load.displacement[1] is None:
+        normal = self.load.displacement[1]
+        if self.measurements is None and normal is None:
             raise UserError("the virtual experiment presses on the finger: prescribe v")
+        for name, truth in self.chosen_truths.items():
+            if truth.radius is not None and (normal or 0.0) >= 0:
+                raise UserError(f"--truth {name}: a cylinder presses on the finger: prescribe a v below zero")
 
     def _laid_out(self, layout: str) -> Finger:
         """The finger with the markers of a layout."""
@@ -184,7 +208,10 @@ class Study:
             self.mesh,
             self.material,
             self.load,
-            [f"compare.crossval.{name}" for name in ("solver_folds", "folds", "true_fields")],
+            [
+                *(f"compare.crossval.{name}" for name in ("solver_folds", "folds", "true_fields")),
+                "compare.evaluation.truths",
+            ],
         ) | {
             "noise_mm": None if measured else self.noise,
             "measured": measured

@@ -1,15 +1,16 @@
 """A cross-validation as tables for the terminal, the report and CSV files."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
 
 from rich.table import Table
 
 from compare.crossval.folds import ALL, SCHEMES, SeedResults
-from compare.crossval.result import BASELINES, CrossvalResult, LayoutResult
+from compare.crossval.grid import Grid
+from compare.crossval.result import Case, CrossvalResult, LayoutResult
 from compare.crossval.scores import FIELDS, LEVEL, Difference, Interval
+from compare.crossval.truth_summary import truth_grids, truth_rows
 from compare.evaluation.number_format import NONE, percent, significant
 from compare.runtime.tables import Cell, terminal_table, write_csv
 
@@ -25,25 +26,8 @@ CAPTION = (
 )
 
 
-@dataclass(frozen=True)
-class Grid:
-    """A table of texts.
-
-    Attributes:
-        title: Above the table.
-        headings: Headings of the columns.
-        rows: As many texts as headings.
-        caption: Below the table.
-    """
-
-    title: str
-    headings: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    caption: str = ""
-
-
 def grids(result: CrossvalResult) -> list[Grid]:
-    """One table of the markers for each scheme, and one of the fields."""
+    """Solvers by truths, one table of the markers for each scheme, and one of the fields."""
     held = [scheme for scheme in result.schemes if scheme != ALL]
     headings = [
         "solver",
@@ -61,43 +45,48 @@ def grids(result: CrossvalResult) -> list[Grid]:
         Grid(
             f"{scheme}: {SCHEMES[scheme]}; mm",
             headings,
-            _by_layout(result, _marker_row, [scheme]),
+            _by_case(result, _marker_row, [scheme]),
             CAPTION if scheme == held[-1] else "",
         )
         for scheme in held
     ]
-    return [*markers, *([_field_grid(result)] if result.has_fields else [])]
+    return [*truth_grids(result), *markers, *([_field_grid(result)] if result.has_fields else [])]
 
 
 def tables(result: CrossvalResult) -> list[Table]:
-    """The tables of `grids` for the terminal."""
-    left = ("solver", "held out")
+    """The tables of `grids` for the terminal; with several truths those of solvers by truths alone."""
+    left = ("solver", "held out", "truth", "layout")
     return [
         terminal_table(grid.title, grid.headings, grid.rows, caption=grid.caption, left=left, narrow=True)
-        for grid in grids(result)
+        for grid in (truth_grids(result) if len(result.truths) > 1 else grids(result))
     ]
 
 
-def write_tables(out: Path, result: CrossvalResult, results: Mapping[str, Mapping[str, SeedResults]]) -> None:
-    """Write the CSV files: markers and fields by scheme, and every error of every fold."""
+def write_tables(
+    out: Path, result: CrossvalResult, results: Mapping[Case, Mapping[str, SeedResults]]
+) -> None:
+    """Write the CSV files: markers and fields by scheme, every error of every fold, solvers by truths."""
     write_csv(out / "held_out.csv", result.held_out_rows())
     if result.has_fields:
         write_csv(out / "fields.csv", result.field_rows())
-    rows = [{"layout": layout, **row} for layout, each in results.items() for row in _fold_rows(each)]
-    write_csv(out / "folds.csv", rows)
+    if result.study.chosen_truths:
+        write_csv(out / "truths.csv", truth_rows(result))
+    write_csv(
+        out / "folds.csv", [case.cells | row for case, each in results.items() for row in _fold_rows(each)]
+    )
 
 
-def _by_layout(
+def _by_case(
     result: CrossvalResult,
     row: Callable[[LayoutResult, str, str], list[str]],
     schemes: Sequence[str],
 ) -> list[list[str]]:
-    """The rows of all solvers in all schemes, those of each layout below its name if there are several."""
+    """The rows of all solvers in all schemes, those of each truth and layout below its name if several."""
     rows: list[list[str]] = []
-    for layout, each in result.layouts.items():
+    for case, each in result.cases.items():
         own = [row(each, label, scheme) for scheme in schemes for label in each.scores]
-        if len(result.layouts) > 1:
-            rows.append([f"markers: {layout}", *[""] * (len(own[0]) - 1)])
+        if said := case.said_among(result.cases):
+            rows.append([said if len(result.truths) > 1 else f"markers: {said}", *[""] * (len(own[0]) - 1)])
         rows += own
     return rows
 
@@ -128,7 +117,7 @@ def _marker_row(result: LayoutResult, label: str, scheme: str) -> list[str]:
         *(_mm(held.get(name)) for name in ("mae_u", "mae_v", "mae_sum")),
         NONE if total is None or isnan(total.high) else significant(total.high - total.mean, 1),
         _mm(held.get("mae_rss")),
-        *(_verdict(result.difference(label, baseline, scheme, "mae_sum")) for baseline in BASELINES),
+        *(_verdict(result.difference(label, baseline, scheme, "mae_sum")) for baseline in ("fem", "gp")),
         NONE if score.coverage is None else f"{100 * score.coverage:.0f} %",
     ]
 
@@ -139,9 +128,9 @@ def _field_grid(result: CrossvalResult) -> Grid:
     return Grid(
         "Relative L2 distance from the truth over the body, %",
         [*headings, "truth's\nlaw"],
-        _by_layout(result, _field_row, result.schemes),
+        _by_case(result, _field_row, result.schemes),
         f"{ALL}: {SCHEMES[ALL]}. Strain: of the solver's own law, Green-Lagrange for finite strain. Truth's "
-        "law: the von Mises stress that the neo-Hookean law gives for the solver's displacement gradient. "
+        "law: the von Mises stress that the law of the truth gives for the solver's displacement gradient. "
         "vs fem: better or worse, by a bootstrap over folds and seeds; ≈: not told apart.",
     )
 

@@ -114,16 +114,25 @@ class FieldSampler:
             changes: Wall thicknesses of the solution's finger minus those of the shared mesh, mm, by their
                 names in `Design`: the points of the body move with the walls, markers stay in space.
         """
-        inside, discs = self.inside, self.discs
+        inside, discs = self.inside_of(solution, mesh, changes), self.discs
         if solution.problem.mesh is not mesh:  # a location belongs to its mesh
-            points = inside.points + (_shifts(mesh, inside, changes) if changes else 0.0)
-            inside = mesh.locate_on(solution.problem.mesh, points)
             discs = mesh.locate_on(solution.problem.mesh, discs.points)
         return SampledField(
             markers=self.means @ solution.field.displacement(discs),
             displacement=solution.field.displacement(inside),
             gradient=solution.field.gradient(inside),
         )
+
+    def inside_of(
+        self, solution: Solution, mesh: TriangleMesh, changes: Mapping[str, float] | None = None
+    ) -> LocatedPoints:
+        """The quadrature points on the mesh of a solution; for the arguments see `of_solution`."""
+        if solution.problem.mesh is mesh:
+            return self.inside
+        points = self.inside.points
+        if changes:
+            points = points + _shifts(mesh, self.inside, changes)
+        return mesh.locate_on(solution.problem.mesh, points)
 
 
 def _shifts(mesh: TriangleMesh, location: LocatedPoints, changes: Mapping[str, float]) -> FloatArray:
@@ -152,6 +161,11 @@ class TrueField:
     def force(self) -> float:
         """Magnitude of the reaction, N/mm."""
         return float(np.linalg.norm(self.reaction))
+
+    @property
+    def middle(self) -> float:
+        """Abscissa of the contact's middle, mm."""
+        return float(self.contact[0])
 
     @classmethod
     def load(cls, path: Path) -> "TrueField":
@@ -199,7 +213,9 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Pa
         truth.load(stroke).model_dump(),
         FINER,
         package_versions(),
-        sources_digest([*SOURCES, __name__, "compare.evaluation.truths", "compare.evaluation.virtual_experiment"]),
+        sources_digest(
+            [*SOURCES, __name__, "compare.evaluation.truths", "compare.evaluation.virtual_experiment"]
+        ),
     ]
     files = {
         layout: cache_folder() / f"truth-{content_hash([*parts, points.tolist()])}.npz"

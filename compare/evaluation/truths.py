@@ -87,8 +87,9 @@ class Truth:
     def load(self, stroke: float) -> Load:
         """Its load for a stroke into the finger, mm."""
         along = None if self.slope is None else self.slope * stroke
-        kind = "patch" if self.radius is None else "cylinder"
-        return Load(kind=kind, displacement=(along, -stroke), radius=self.radius)
+        if self.radius is None:
+            return Load(kind="patch", displacement=(along, -stroke))
+        return Load(kind="cylinder", displacement=(along, -stroke), radius=self.radius)
 
 
 SLIDING = Truth(
@@ -110,7 +111,9 @@ TRUTHS: Mapping[str, Truth] = {
         Truth(
             name="stvk",
             law="st-venant-kirchhoff",
-            description="St Venant-Kirchhoff, contact patch that is pressed in by {:.4g} mm and slides along x",
+            description=(
+                "St Venant-Kirchhoff, contact patch that is pressed in by {:.4g} mm and slides along x"
+            ),
         ),
         Truth(
             name="print",
@@ -142,8 +145,8 @@ TRUTHS: Mapping[str, Truth] = {
             radius=20.0,
             slope=0.3,
             description=(
-                "neo-Hookean, rigid cylinder of radius 20 mm without friction that is pressed in by {:.4g} mm "
-                "and moves 0.3 times as far towards the tip"
+                "neo-Hookean, rigid cylinder of radius 20 mm without friction that is pressed in by {:.4g} "
+                "mm and moves 0.3 times as far towards the tip"
             ),
         ),
         Truth(
@@ -155,8 +158,8 @@ TRUTHS: Mapping[str, Truth] = {
             radius=10.0,
             slope=0.0,
             description=(
-                "St Venant-Kirchhoff with Poisson's ratio 0.42, front wall and ribs printed 5 % thicker, back "
-                "wall 5 % thinner and base wall 1 mm thicker than drawn, rigid cylinder of radius 10 mm "
+                "St Venant-Kirchhoff with Poisson's ratio 0.42, front wall and ribs printed 5 % thicker, "
+                "back wall 5 % thinner and base wall 1 mm thicker than drawn, rigid cylinder of radius 10 mm "
                 "without friction that is pressed in by {:.4g} mm"
             ),
         ),

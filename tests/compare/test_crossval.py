@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 from scipy.stats import t
 
 from compare.cli import main
@@ -29,13 +30,19 @@ from compare.crossval.folds import (
     hide_markers,
     load_cases_of,
 )
+from compare.crossval.result import Case, CrossvalResult, LayoutResult
 from compare.crossval.scores import Difference, Interval, difference, of_scheme, score
 from compare.crossval.solver_folds import SolverTask, run_folds
-from compare.crossval.study import MEASURED, SolverVariant, Study, solver_variants
-from compare.crossval.true_fields import FieldSampler
+from compare.crossval.study import EVERY_TRUTH, MEASURED, SolverVariant, Study, solver_variants
+from compare.crossval.true_fields import FieldSampler, TrueField
+from compare.crossval.truth_summary import truth_grids
 from compare.crossval.weight_sweep import sweep_weights
+from compare.evaluation.truths import TRUTHS
+from compare.runtime.tables import terminal_table
+from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.finger.design import Design
+from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
@@ -44,7 +51,7 @@ from solvers.assimilation.misfit import misfit_of
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
-from solvers.solution import Solution, State
+from solvers.solution import DisplacementField, Solution, State
 from solvers.solver import silent
 from tests.compare.drawn_pages import page_of
 
@@ -80,7 +87,7 @@ def task(
     sampled = FieldSampler.of(coarse_mesh, coarse_mesh.markers, 0.8).of_solution(truth, coarse_mesh)
     paths = [tmp_path / f"truth-{share}.npz" for share in (1.0, 0.5)]
     for path, share in zip(paths, (1.0, 0.5), strict=True):
-        (sampled * share).save(path)
+        TrueField(sampled * share, share * truth.reaction, np.array([35.0, 2.0])).save(path)
     half = replace(observations, displacements=0.5 * observations.displacements)
     return SolverTask(
         study=Study(design=Design(), variants=[], out=tmp_path),
@@ -208,6 +215,60 @@ def test_a_solver_that_is_given_nothing_has_nothing_in_sample(task):
     assert outcomes[0].errors == outcomes[1].errors
 
 
+class Stating:
+    """A field that states the von Mises stress exactly near the base, and without bounds elsewhere."""
+
+    def __init__(self, field: DisplacementField) -> None:
+        self.displacement, self.gradient = field.displacement, field.gradient
+
+    def von_mises_deviation(self, location: LocatedPoints) -> FloatArray:
+        return np.where(location.points[:, 0] < 30.0, 0.0, 1e9)
+
+
+def test_force_place_and_stated_intervals_are_judged_by_the_truth(task, coarse_mesh, truth, monkeypatch):
+    """The truth's own field with twice its force, a contact 1.5 mm off, and intervals by hand."""
+    force = float(np.linalg.norm(truth.reaction))
+    stats = {
+        **{"position": 36.5, "position_low": 35.5, "position_high": 37.5},
+        **{"force_low": 0.9 * force, "force_high": 1.1 * force},
+    }
+    stating = replace(truth, field=Stating(truth.field), stats=stats, reaction=2 * truth.reaction)
+    monkeypatch.setattr("compare.crossval.solver_folds.refitter", lambda *_: lambda observations: stating)
+    full, one, _ = judged(task)
+    assert full.force == pytest.approx(1.0)
+    assert full.position == pytest.approx(1.5)
+    assert full.force_within is True
+    assert full.position_within is False
+    rule = body_quadrature(coarse_mesh)
+    beyond = rule.location.points[:, 0] >= 30.0  # the linear stress is nowhere exactly the neo-Hookean one
+    assert full.von_mises_coverage == pytest.approx(np.average(beyond, weights=rule.weights), abs=1e-12)
+    assert (one.force, one.force_within, one.von_mises_coverage) == (None, None, None)
+    found = score([[full]])
+    assert found.force.mean == pytest.approx(1.0)
+    assert (found.force_within, found.position_within) == (1.0, 0.0)
+
+
+def test_a_force_that_is_too_small_is_as_wrong_as_one_that_is_too_large():
+    """The nearer of two is better, whatever the sign."""
+    low, high = (
+        [[outcome_of(ALL, (), [[0.0, 0.0]], force=force)] for _ in range(2)] for force in (-0.5, 0.1)
+    )
+    assert difference(low, high, "force").mean == pytest.approx(0.4)
+    assert difference(low, high, "force").verdict == "worse"
+
+
+def test_the_stress_is_that_of_the_material_that_a_solver_has_found(task, truth, monkeypatch):
+    softer = replace(truth.problem, material=Material(young=5.7))
+    monkeypatch.setattr(
+        "compare.crossval.solver_folds.refitter", lambda *_: lambda _: replace(truth, problem=softer)
+    )
+    halved = judged(task)[0].fields
+    monkeypatch.setattr("compare.crossval.solver_folds.refitter", lambda *_: lambda _: truth)
+    own = judged(replace(task, variant=replace(task.variant, label="own")))[0].fields
+    assert halved["displacement"] == own["displacement"]
+    assert halved["von_mises"] > own["von_mises"] + 0.1  # 0.69 and 0.48
+
+
 def test_finished_folds_are_kept_and_those_of_other_settings_are_not(task, monkeypatch):
     first = judged(task)
 
@@ -328,7 +389,7 @@ def test_the_command_writes_what_the_guide_says_and_goes_on(tmp_path, capsys, in
     said = " ".join(capsys.readouterr().out.split())
     assert "tip-out: the third of the markers nearest the tip held out together; mm" in said
     content = json.loads((tmp_path / "out" / "crossval.json").read_text())
-    (joints,) = content["layouts"].values()
+    joints = content["truths"]["sliding"]["layouts"]["joints"]
     assert list(joints["solvers"]) == ["fem", "gp", "fem-asm"]
     assert joints["solvers"]["fem"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["low"] is None
     before = joints["solvers"]["gp"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["mean"]
@@ -339,7 +400,7 @@ def test_the_command_writes_what_the_guide_says_and_goes_on(tmp_path, capsys, in
 
     assert run(f"{line} --seeds 2", tmp_path / "out") == 0
     content = json.loads((tmp_path / "out" / "crossval.json").read_text())
-    solvers = content["layouts"]["joints"]["solvers"]
+    solvers = content["truths"]["sliding"]["layouts"]["joints"]["solvers"]
     against = solvers["fem-asm"]["against"]["fem"]["tip-out"]
     assert against["mae_sum"]["verdict"] == "better"
     assert against["von_mises"]["verdict"] == "worse"
@@ -374,7 +435,7 @@ def test_layouts_sample_one_truth_and_stay_apart(tmp_path, capsys, in_line):
             tuple(row[key] for key in ("layout", "solver", "scheme")): row for row in csv.DictReader(file)
         }
     assert list(rows)[::4] == [("front", "fem", "all"), ("joints", "fem", "all")]
-    layouts = json.loads((tmp_path / "out" / "crossval.json").read_text())["layouts"]
+    layouts = json.loads((tmp_path / "out" / "crossval.json").read_text())["truths"]["sliding"]["layouts"]
     errors, fields = (
         [float(layouts[name]["solvers"]["fem"]["schemes"][ONE][kind][what]["mean"]) for name in layouts]
         for kind, what in (("held_out", "mae_v"), ("fields", "displacement"))
@@ -387,11 +448,85 @@ def test_layouts_sample_one_truth_and_stay_apart(tmp_path, capsys, in_line):
     assert "Do these verdicts depend on the layout of the markers?" in report
 
     # One layout alone reuses its folds, and has what it had beside the other.
-    kept = (tmp_path / "out" / "runs" / "front" / "gp" / "seed-0.json").stat().st_mtime_ns
+    runs = tmp_path / "out" / "runs" / "sliding"
+    kept = (runs / "front" / "gp" / "seed-0.json").stat().st_mtime_ns
     assert run(f"{line} --layouts front", tmp_path / "out") == 0
-    assert (tmp_path / "out" / "runs" / "front" / "gp" / "seed-0.json").stat().st_mtime_ns == kept
-    alone = json.loads((tmp_path / "out" / "crossval.json").read_text())["layouts"]
+    assert (runs / "front" / "gp" / "seed-0.json").stat().st_mtime_ns == kept
+    alone = json.loads((tmp_path / "out" / "crossval.json").read_text())["truths"]["sliding"]["layouts"]
     assert alone == {"front": layouts["front"]}
+
+
+def test_solvers_are_judged_by_several_truths(tmp_path, capsys, in_line):
+    """`fem` has one field: the same error in all truths would mean that there is one."""
+    line = "--truth cylinder,base --solvers fem,gp --schemes one-out --seeds 1"
+    assert run(line, tmp_path / "out") == 0
+    said = capsys.readouterr().out
+    assert all(len(each) <= 80 for each in said.splitlines() if not each.startswith(str(tmp_path)))
+    words = " ".join(said.split())
+    assert "solver cylinder base" in words
+    assert "fem against gp: worse with every truth in held-out error; better with every truth in" in words
+    assert "base: other law, walls and load than every solver" in words
+    with (tmp_path / "out" / "truths.csv").open() as file:
+        rows = {(row["truth"], row["solver"]): row for row in csv.DictReader(file)}
+    assert list(rows) == [(truth, name) for truth in ("cylinder", "base") for name in ("fem", "gp")]
+    assert rows["cylinder", "fem"]["mae_sum_against_gp"] == "worse"
+    content = json.loads((tmp_path / "out" / "crossval.json").read_text())
+    assert content["schema"] == 3
+    for truth, name in rows:
+        each = content["truths"][truth]["layouts"]["joints"]
+        schemes = each["solvers"][name]["schemes"]
+        mean = schemes[ONE]["held_out"]["mae_sum"]["mean"]
+        assert float(rows[truth, name]["held_out_mae_sum_mm"]) == mean
+        assert float(rows[truth, name]["force_error"]) == schemes[ALL]["force"]["mean"]
+        assert ("cylinder" in each["measurements"]["description"]) == (truth == "cylinder")
+    forces = [float(rows[truth, "fem"]["force_error"]) for truth in ("cylinder", "base")]
+    assert abs(forces[0] - forces[1]) > 0.05
+    pictures = sorted(path.name for path in (tmp_path / "out").glob("*.png"))
+    assert pictures == [
+        "fields-base.png",
+        "fields-cylinder.png",
+        "held_out-base.png",
+        "held_out-cylinder.png",
+    ]
+    report = (tmp_path / "out" / "report.html").read_text()
+    assert "Truth: cylinder" in report
+    assert "With which truths is a solver better" in report
+
+    assert run(line.replace("cylinder,base", "base"), tmp_path / "out") == 0
+    alone = json.loads((tmp_path / "out" / "crossval.json").read_text())["truths"]
+    assert alone == {"base": content["truths"]["base"]}
+    assert sorted(path.name for path in (tmp_path / "out").glob("*.png")) == ["fields.png", "held_out.png"]
+
+
+def test_tables_of_many_truths_fit_a_terminal():
+    full = score([[outcome_of(ALL, (), [[1.0, 1.0]], fields={"von_mises": 9.99}, force=-0.123)]])
+    one = score([[outcome_of(ONE, (0,), [[0.1, 0.1]])]])
+    study = Study(
+        design=Design(),
+        variants=[variant("fem"), variant("fem-nonlinear")],
+        out=Path(),
+        truths=[EVERY_TRUTH],
+    )
+    cases = {
+        Case(truth, layout): LayoutResult(
+            "a test",
+            1,
+            [Fold(ALL, "all", ()), Fold(ONE, "marker 1", (0,))],
+            {label: {ALL: full, ONE: one} for label in ("fem", "fem-nonlinear evidence")},
+            {"fem": {}, "fem-nonlinear evidence": {}},
+            {},
+        )
+        for truth in TRUTHS
+        for layout in ("front", "joints")
+    }
+    grids = truth_grids(CrossvalResult(study, cases))
+    assert [name for grid in grids for name in grid.headings[1:]] == [*TRUTHS, *TRUTHS]
+    assert grids[0].rows[0][1] == "0.2 / 999 / −12"
+    for grid in grids:
+        table = terminal_table(grid.title, grid.headings, grid.rows, narrow=True)
+        assert Console(width=200).measure(table).maximum <= 80
+    assert "sliding: same law as fem-nonlinear, walls as drawn;" in grids[-1].caption
+    assert "mixed: other law, walls and load than every solver" in grids[-1].caption
 
 
 def test_measured_markers_have_no_truth(tmp_path, capsys, in_line, observations):
@@ -408,7 +543,10 @@ def test_measured_markers_have_no_truth(tmp_path, capsys, in_line, observations)
     assert "fields.csv" not in printed.out
     content = json.loads((tmp_path / "out" / "crossval.json").read_text())
     assert list(content["schemes"]) == ["all", "one-out"]
-    (gp,) = (layout["solvers"]["gp"]["schemes"]["one-out"] for layout in content["layouts"].values())
+    (gp,) = (
+        layout["solvers"]["gp"]["schemes"]["one-out"]
+        for layout in content["truths"][MEASURED]["layouts"].values()
+    )
     assert len(gp["per_marker"]) == 8
     assert gp["fields"] == {}
     assert not (tmp_path / "out" / "fields.csv").exists()
@@ -427,11 +565,19 @@ def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, 
     )
     result = cross_validate(study)
     assert capsys.readouterr() == ("", "")
-    row = result.table().loc[MEASURED, "gp", ONE]
-    assert row["held_out_mae_sum_mm"] == result.layouts[MEASURED].scores["gp"][ONE].held_out["mae_sum"].mean
+    row = result.table().loc[MEASURED, MEASURED, "gp", ONE]
+    assert (
+        row["held_out_mae_sum_mm"]
+        == result.cases[MEASURED, MEASURED].scores["gp"][ONE].held_out["mae_sum"].mean
+    )
     assert np.isnan(row["from_fem_mean_mm"])  # fem is not in the study
     with pytest.raises(UserError, match="there is no scheme 'two-out'"):
         cross_validate(replace(study, schemes=["two-out"]))
+    with pytest.raises(UserError, match="--truth: measured markers have a truth that nobody knows"):
+        cross_validate(replace(study, truths=["stvk"]))
+    pulled = replace(study, measurements=None, truths=["mixed"], load=Load(displacement=(1.0, 0.0)))
+    with pytest.raises(UserError, match="--truth mixed: a cylinder presses on the finger: prescribe a v"):
+        cross_validate(pulled)
 
 
 @pytest.mark.parametrize(
@@ -444,6 +590,8 @@ def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, 
         ("--solvers fem,fem", "a solver is named twice: fem, fem"),
         ("--measurements nowhere.csv", "there is no file nowhere.csv"),
         ("--layouts front,back", "marker_layout = 'back': input should be 'front' or 'joints'"),
+        ("--truth tip", "there is no truth 'tip'; there are all, sliding, stvk, print, base, cylinder, obl"),
+        ("--truth base,base", "--truth: name at least one of sliding, stvk, print, base, cylinder, oblique"),
         ("--layouts front,front", "--layouts: a layout is named twice: front, front"),
         ("--layouts joints --set rib_count=0 --set name=plain", "needs 3 markers, not the 1 of the layout"),
     ],

@@ -1,0 +1,154 @@
+"""The simulated truths: walls, laws and loads, and fields at points that move with the walls."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compare.crossval.folds import LoadCase
+from compare.crossval.study import Study
+from compare.crossval.true_fields import FieldSampler, TrueField, TruthTask, simulate_truth
+from compare.evaluation.truths import SLIDING, TRUTHS, Truth
+from compare.evaluation.virtual_experiment import experiment_source, simulate
+from geometry.cache import finger_mesh
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.finger.section import rib_axes
+from geometry.mesh.quadrature import body_quadrature
+from geometry.mesh.settings import MeshSettings
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.problem import Load, Material, Problem, contact_ends
+from tests.fingers import beam
+
+FULL = LoadCase("full", Load(), 1.0, 35.0)
+
+
+@pytest.fixture
+def study(tmp_path: Path, coarse_mesh: TriangleMesh, monkeypatch: pytest.MonkeyPatch) -> Study:
+    monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path / "cache"))
+    study = Study(design=Design(), variants=[], out=tmp_path, mesh=MeshSettings(size=1.0))
+    coarse_mesh.save(study.mesh_file)
+    return study
+
+
+def true_field(study: Study, truth: Truth, case: LoadCase = FULL) -> TrueField:
+    return TrueField.load(simulate_truth(TruthTask(study, truth, case))["joints"])
+
+
+def test_walls_are_redrawn_around_the_axes_of_the_ribs():
+    drawn = Design()
+    printed, base = (TRUTHS[name].finger(drawn) for name in ("print", "base"))
+    for finger, wall in ((printed, 2.0), (base, 3.0)):
+        thickness = [getattr(finger, f"{name}_thickness") for name in ("front", "back", "rib", "base")]
+        assert thickness == pytest.approx([2.1, 1.9, 2.1, wall])
+        start, end = rib_axes(drawn).transpose(1, 0, 2)
+        along, ends = end - start, rib_axes(finger)
+        for side in (0, 1):
+            offset = ends[:, side] - start
+            away = offset[:, 0] * along[:, 1] - offset[:, 1] * along[:, 0]
+            np.testing.assert_allclose(away, 0, atol=1e-9)  # rounding
+    assert TRUTHS["cylinder"].finger(drawn) is drawn
+
+
+def test_laws_and_loads_are_those_of_the_names():
+    problems = {
+        name: (truth.material(Material()), truth.load(10.0).model_dump(exclude_none=True))
+        for name, truth in TRUTHS.items()
+    }
+    laws = {name: (material.law, material.poisson) for name, (material, _) in problems.items()}
+    assert {name: law for name, law in laws.items() if law != ("neo-hookean", 0.45)} == {
+        "stvk": ("st-venant-kirchhoff", 0.45),
+        "mixed": ("st-venant-kirchhoff", 0.42),
+    }
+    sliding = {"kind": "patch", "displacement": (None, -10.0)}
+    cylinder = {"kind": "cylinder", "displacement": (0.0, -10.0), "radius": 10.0}
+    assert {name: load for name, (_, load) in problems.items()} == {
+        **dict.fromkeys(("sliding", "stvk", "print", "base"), sliding),
+        "cylinder": cylinder,
+        "oblique": {"kind": "cylinder", "displacement": (3.0, -10.0), "radius": 20.0},
+        "mixed": cylinder,
+        "sticking": {"kind": "patch", "displacement": (0.0, -10.0)},
+    }
+
+
+def test_the_source_names_law_and_load(mesh: TriangleMesh):
+    problem = Problem(mesh, load=Load(displacement=(0.0, -0.5)))
+    said = experiment_source(problem, TRUTHS["cylinder"])
+    assert said == (
+        "simulated by fem-nonlinear (neo-Hookean, rigid cylinder of radius 10 mm without friction that is "
+        "pressed in by 0.5 mm); no camera was involved"
+    )
+
+
+def test_a_drawing_has_the_truths_that_keep_its_walls():
+    drawn = beam()
+    with pytest.raises(
+        UserError, match=r"it can have sliding, stvk, cylinder, oblique, sticking$"
+    ) as refused:
+        TRUTHS["print"].finger(drawn)
+    assert "\n" not in str(refused.value)
+    assert TRUTHS["oblique"].finger(drawn) is drawn
+
+
+def test_walls_that_a_design_cannot_have_are_refused_with_the_name_of_the_truth():
+    tight = Design(rib_count=0, marker_layout="front", tip_length=87.0)
+    with pytest.raises(UserError, match=r"^--truth base: no room for a cavity"):
+        TRUTHS["base"].finger(tight)
+
+
+def test_the_sliding_truth_is_the_virtual_experiment_on_the_finer_mesh(study, coarse_mesh):
+    """By hand, as before there were other truths; force and contact are those of the solution."""
+    found = true_field(study, SLIDING)
+    problem = Problem(finger_mesh(Design(), settings=MeshSettings(size=0.5)))
+    solution = simulate(problem)
+    points = body_quadrature(coarse_mesh).location.points
+    np.testing.assert_allclose(found.sampled.displacement, solution.displacement(points), atol=1e-12)
+    np.testing.assert_allclose(found.reaction, solution.reaction, atol=1e-12)
+    left, right = contact_ends(problem)
+    np.testing.assert_allclose(found.contact, [(left + right) / 2, right - left])
+    assert found.middle == pytest.approx(35.0)
+
+
+def test_fields_are_compared_at_points_that_move_with_the_walls(study, coarse_mesh):
+    """The finger with the same walls on a coarse mesh of its own is near; at fixed points it would not be."""
+    truth = TRUTHS["base"]
+    found = true_field(study, truth)
+    finger = truth.finger(study.design)
+    other = finger_mesh(finger, settings=MeshSettings(size=1.0))
+    solution = simulate(Problem(other), truth=truth)
+    sampler = FieldSampler.of(coarse_mesh, coarse_mesh.markers, 0.8)
+    own = replace(solution.problem, mesh=coarse_mesh)
+    moved, fixed = (
+        sampler.of_solution(solution, coarse_mesh, changes).distances(
+            found.sampled, own, own, sampler.weights
+        )
+        for changes in (truth.changes(study.design), None)
+    )
+    assert moved["displacement"] < 0.001  # 0.0002 by the coarse mesh; 0.005 at fixed points
+    assert fixed["von_mises"] > 2 * moved["von_mises"]  # 0.14 and 0.036, which is the coarse mesh's error
+
+
+def test_a_cylinder_says_where_it_touches_and_is_kept_in_the_cache(study, monkeypatch):
+    truth = TRUTHS["cylinder"]
+    found = true_field(study, truth)
+    assert found.middle == pytest.approx(35.0, abs=1.0)  # within the contact, which rolls towards the tip
+    assert 1.0 < found.contact[1] < 3.0
+    assert found.force == pytest.approx(np.hypot(*found.reaction))
+
+    def again(*_: object) -> None:
+        raise RuntimeError("simulated again")
+
+    monkeypatch.setattr("compare.crossval.true_fields.simulate", again)
+    assert true_field(study, truth).force == found.force
+    half = replace(FULL, name="half", share=0.5)
+    with pytest.raises(RuntimeError, match="simulated again"):
+        true_field(study, truth, half)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", list(TRUTHS))
+def test_every_truth_comes_to_its_full_load(study, name):
+    found = true_field(study, TRUTHS[name])
+    assert 0.1 < found.force < 2.0  # N/mm: thick or thin, sliding or not, the finger stays the same finger
+    assert np.isfinite(found.sampled.gradient).all()
