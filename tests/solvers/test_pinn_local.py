@@ -163,7 +163,7 @@ def test_patches_hold_every_point_once(coarse_mesh):
     assert max(len(patch) for patch in patches) <= PATCH
 
 
-@pytest.mark.parametrize("law", ["linear", "neo-hookean"])
+@pytest.mark.parametrize("law", ["linear", "neo-hookean", "st-venant-kirchhoff"])
 def test_hessian_is_the_derivative_of_the_slope_and_that_of_the_energy(basis, coarse_mesh, law):
     """Differences in one direction, of the energy that the law's density gives at the quadrature points."""
     rule = body_quadrature(coarse_mesh, 2)
@@ -280,10 +280,11 @@ def test_loads_and_plane_states_are_those_of_finite_elements(coarse_mesh, graded
     np.testing.assert_allclose(network.reaction, reference.reaction, rtol=0.04, atol=1e-6)
 
 
-def test_finite_strain_of_a_bar_is_that_of_finite_elements():
+@pytest.mark.parametrize("law", ["neo-hookean", "st-venant-kirchhoff"])
+def test_finite_strain_of_a_bar_is_that_of_finite_elements(law):
     """A cantilever that is bent by half its length; the finer level starts from the coarser one's shape."""
     mesh = bar_mesh(40.0, 4.0, 80, 8, contact=(38.0, 40.0))
-    problem = Problem(mesh, Material(law="neo-hookean"), Load(displacement=(None, -20.0)))
+    problem = Problem(mesh, Material(law=law), Load(displacement=(None, -20.0)))
     network, reference = FAST.solve(problem), FemNonlinearSolver().solve(problem)
     exact = reference.displacement(mesh.points)
     linear = FAST.solve(Problem(mesh, load=problem.load)).displacement(mesh.points)

@@ -9,7 +9,13 @@ from solvers.pinn.finite_basis.energy import energy_density, piola_stress_and_ta
 
 
 @pytest.mark.parametrize(
-    ("law", "plane"), [("linear", "strain"), ("linear", "stress"), ("neo-hookean", "strain")]
+    ("law", "plane"),
+    [
+        ("linear", "strain"),
+        ("linear", "stress"),
+        ("neo-hookean", "strain"),
+        ("st-venant-kirchhoff", "strain"),
+    ],
 )
 def test_stress_and_tangent_are_derivatives_of_the_density(law, plane):
     lame = lame_constants(11.4, 0.45, plane)

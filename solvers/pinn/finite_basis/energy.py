@@ -1,21 +1,29 @@
 """Elastic energy of a finite-basis network, with its gradient and Hessian in the output layer.
 
 Source of stress and tangent: J. Bonet, R. D. Wood, Nonlinear Continuum Mechanics for Finite Element Analysis,
-2nd ed., section 6.4.3; with d(F^-T) = -F^-T dF^T F^-T.
+2nd ed., sections 6.4.3 (neo-Hookean, with d(F^-T) = -F^-T dF^T F^-T) and 6.4.1 (St Venant-Kirchhoff).
 """
 
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 from typing import NamedTuple
 
 import numpy as np
 import torch
 
 from geometry.arrays import FloatArray, IntArray
-from solvers.elasticity import Lame, LawName, energy_density_of
+from solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
 from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
 from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
 from solvers.pinn.threading import boxes_around, imap_in_threads
 from solvers.problem import Material
+
+KEPT = 2**30
+"""Most bytes of basis gradients that an energy of finite strain keeps for its next evaluation.
+
+The two levels of `pinn-std` on the default finger have 0.12 and 0.4 GB of them. Above the limit they are
+computed anew for every evaluation.
+"""
 
 
 class QuadraturePatch(NamedTuple):
@@ -23,15 +31,15 @@ class QuadraturePatch(NamedTuple):
 
     Attributes:
         points: Shape (p, 2), mm.
-        weights: Shape (p,), mm^2.
         near: Numbers of the windows that reach them, (w,).
-        pairs: Block numbers in the matrix of these windows' pairs i <= j, (w (w + 1) / 2,).
+        pairs: Numbers of the blocks of all pairs of these windows, (w w,); see `NetworkEnergy`.
+        rows: Of the points among those of all patches.
     """
 
     points: torch.Tensor
-    weights: torch.Tensor
     near: torch.Tensor
     pairs: torch.Tensor
+    rows: slice
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,60 +48,72 @@ class NetworkEnergy:
 
     Every patch adds a small dense Hessian of the output weights that reach it. With the derivatives Z_x and
     Z_y of the basis functions and the tangent A, the block of the components i and k is the sum over j and l
-    of Z_j^T w A_ijkl Z_l; one matrix product gives all blocks.
+    of Z_j^T w A_ijkl Z_l; one matrix product gives all blocks. Those of the windows (a, b) have the number of
+    the pair's row and column if a <= b, else that of (b, a) plus the number of rows.
 
     Attributes:
         basis: The basis functions.
         material: The elastic law.
-        patches: The quadrature.
+        patches: The quadrature points; all arrays by points have the patches' order.
+        weights: Of the points, shape (q,), mm^2.
+        order: Number of every point in the rule that was given, shape (q,).
         rows: First window of every pair that a patch has, shape (b,).
         columns: Second window, not before the first, shape (b,).
         origin: Displacement of zero energy; None for zero.
+        kept: Basis gradients of the patches met so far, by their numbers; None if they are not kept.
     """
 
     basis: FiniteBasis
     material: Material
     patches: list[QuadraturePatch]
+    weights: torch.Tensor
+    order: IntArray
     rows: IntArray
     columns: IntArray
     origin: FiniteBasisField | None = None
+    kept: dict[int, torch.Tensor] | None = dataclass_field(default=None, repr=False)
 
     @classmethod
     def of(
         cls, basis: FiniteBasis, material: Material, points: FloatArray, weights: FloatArray
     ) -> "NetworkEnergy":
         """The energy by a quadrature rule: points (q, 2), mm, and weights (q,), mm^2."""
-        cuts, keys = basis.patches(points), []
-        for _, _, windows in cuts:
-            first, second = torch.triu_indices(len(windows), len(windows))
-            keys.append(windows[first] * basis.windows.count + windows[second])
-        count = basis.windows.count
+        cuts, keys, count = basis.patches(points), [], basis.windows.count
+        for _, _, near in cuts:
+            keys.append((torch.minimum(near, near[:, None]) * count + near.maximum(near[:, None])).flatten())
         diagonal = torch.arange(count) * (count + 1)
         known, number = torch.unique(torch.cat([*keys, diagonal]), return_inverse=True)
-        pairs = number[:-count].split([len(key) for key in keys])
-        patches = [
-            QuadraturePatch(places, torch.from_numpy(weights[cut]), near, blocks)
-            for (cut, places, near), blocks in zip(cuts, pairs, strict=True)
-        ]
-        rows, columns = np.divmod(known.numpy(), count)
-        return cls(basis, material, patches, rows, columns)
+        patches, used, start = [], 0, 0
+        for (_, places, near), pairs in zip(
+            cuts, number[:-count].split([len(key) for key in keys]), strict=True
+        ):
+            below = torch.ones(len(near), len(near), dtype=torch.int64).tril_(-1).flatten()
+            rows = slice(start, start + len(places))
+            patches.append(QuadraturePatch(places, near, pairs + len(known) * below, rows))
+            start = rows.stop
+            used += 16 * len(places) * len(near) * basis.per_window
+        order = np.concatenate([numbers for numbers, *_ in cuts])
+        keep = material.law != "linear" and used <= KEPT
+        return cls(
+            basis=basis,
+            material=material,
+            patches=patches,
+            weights=torch.from_numpy(weights[order]),
+            order=order,
+            rows=known.numpy() // count,
+            columns=known.numpy() % count,
+            kept={} if keep else None,
+        )
 
     @property
     def points(self) -> int:
-        """Number of quadrature points."""
-        return sum(len(patch.points) for patch in self.patches)
+        """Number of quadrature points, q."""
+        return len(self.order)
 
     def total(self, output: torch.Tensor) -> float:
         """The energy per depth of an output layer (c, 2, m + 1), N mm / mm."""
-        field = FiniteBasisField(self.basis, output)
-
-        def task(patch: QuadraturePatch) -> float:
-            density = energy_density(
-                field.gradient_of_patch(patch.points, patch.near), self.material.lame, self.material.law
-            )
-            return float(patch.weights @ density)
-
-        return sum(imap_in_threads(task, self.patches))
+        gradient = self.gradients(output[None])[0]
+        return float(self.weights @ energy_density(gradient, self.material.lame, self.material.law))
 
     def derivatives(self, output: torch.Tensor) -> tuple[torch.Tensor, BlockMatrix]:
         """Gradient and Hessian of the energy at an output layer (c, 2, m + 1).
@@ -101,47 +121,101 @@ class NetworkEnergy:
         Returns:
             The gradient, of the shape of `output`, N/mm, and the Hessian, N/mm^2.
         """
-        size = 2 * self.basis.per_window
-        blocks = output.new_zeros(len(self.rows), size, size)
-        first = torch.zeros_like(output)
-
-        def task(patch: QuadraturePatch) -> tuple[QuadraturePatch, torch.Tensor, torch.Tensor]:
-            return patch, *self._of_patch(patch, output[patch.near])
-
-        for patch, gradient, curvature in imap_in_threads(task, self.patches):
-            first.index_add_(0, patch.near, gradient)
-            blocks.index_add_(0, patch.pairs, curvature)
-        # Windows that reach one patch need not overlap; one that reaches none keeps its empty diagonal.
-        filled = (blocks.abs().amax(dim=(1, 2)).numpy() > 0) | (self.rows == self.columns)
-        parts = (self.rows[filled], self.columns[filled], blocks.numpy()[filled])
-        return first, BlockMatrix(self.basis.windows.count, *parts)
-
-    def _of_patch(self, patch: QuadraturePatch, output: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Contribution of a patch to the gradient, (w, 2, m + 1), and to the blocks of its pairs."""
-        along = self.basis.gradients(patch.points, patch.near)
-        windows, functions = along.shape[2:]
-        gradient = torch.einsum("xnwu,wiu->nix", along, output)
-        if self.origin is not None:
-            (near,) = self.origin.basis.windows.near(boxes_around([patch.points]))
-            gradient -= self.origin.gradient_of_patch(patch.points, near)
+        gradient = self.gradients(output[None])[0]
         stress, tangent = piola_stress_and_tangent(gradient, self.material.lame, self.material.law)
-        first = torch.einsum("xnwu,nix->wiu", along, patch.weights[:, None, None] * stress)
-        weighted = patch.weights[:, None, None, None, None] * tangent
-        flat = along.flatten(2)
-        right = flat.new_empty(2, len(patch.points), 3, windows * functions)
-        for part, (i, k) in enumerate(((0, 0), (0, 1), (1, 1))):
-            for j in range(2):
-                torch.mul(weighted[:, i, j, k, 0, None], flat[0], out=right[j, :, part])
-                right[j, :, part].addcmul_(weighted[:, i, j, k, 1, None], flat[1])
-        product = flat.flatten(0, 1).T @ right.flatten(0, 1).flatten(1)
-        uu, uv, vv = product.view(windows, functions, 3, windows, functions).unbind(2)
-        above, below = torch.triu_indices(windows, windows)
-        blocks = product.new_empty(len(above), 2, functions, 2, functions)
-        blocks[:, 0, :, 0] = uu[above, :, below]
-        blocks[:, 0, :, 1] = uv[above, :, below]
-        blocks[:, 1, :, 0] = uv[below, :, above].mT
-        blocks[:, 1, :, 1] = vv[above, :, below]
-        return first, blocks.view(len(above), 2 * functions, 2 * functions)
+        return self.forces(stress[None])[0], self.hessian(tangent)
+
+    def gradients(self, outputs: torch.Tensor) -> torch.Tensor:
+        """Gradients less the origin's at the points, (s, q, 2, 2), of output layers (s, c, 2, m + 1)."""
+        found = outputs.new_zeros(len(outputs), self.points, 2, 2)
+        if outputs.any():
+            layers = outputs.permute(1, 3, 0, 2).contiguous()
+
+            def task(number: int) -> tuple[slice, torch.Tensor]:
+                patch, along = self.patches[number], self._along(number)
+                here = along.flatten(2) @ layers[patch.near].flatten(0, 1).flatten(1)
+                return patch.rows, here.view(2, len(patch.points), -1, 2).permute(2, 1, 3, 0)
+
+            for rows, here in imap_in_threads(task, range(len(self.patches))):
+                found[:, rows] = here
+        if self.origin is not None:
+            origin = self.origin
+
+            def minus(patch: QuadraturePatch) -> None:
+                (near,) = origin.basis.windows.near(boxes_around([patch.points]))
+                found[:, patch.rows] -= origin.gradient_of_patch(patch.points, near)
+
+            for _ in imap_in_threads(minus, self.patches):
+                pass
+        return found
+
+    def forces(self, stresses: torch.Tensor) -> torch.Tensor:
+        """Forces (s, c, 2, m + 1), N/mm, of Piola-Kirchhoff stresses P at the points, (s, q, 2, 2), MPa."""
+        count = len(stresses)
+        found = stresses.new_zeros(self.basis.windows.count, self.basis.per_window, count, 2)
+        if stresses.any():
+            weighted = (self.weights[:, None, None] * stresses).permute(3, 1, 0, 2).contiguous()
+
+            def task(number: int) -> tuple[torch.Tensor, torch.Tensor]:
+                patch, along = self.patches[number], self._along(number)
+                here = along.flatten(2).flatten(0, 1).T @ weighted[:, patch.rows].flatten(0, 1).flatten(1)
+                return patch.near, here.view(len(patch.near), -1, count, 2)
+
+            for near, here in imap_in_threads(task, range(len(self.patches))):
+                found.index_add_(0, near, here)
+        return found.permute(2, 0, 3, 1).contiguous()
+
+    def hessian(self, tangent: torch.Tensor) -> BlockMatrix:
+        """Second derivative by the output layer, N/mm^2, of a tangent at the points, (q, 2, 2, 2, 2), MPa."""
+        count, functions = len(self.rows), self.basis.per_window
+        blocks = tangent.new_zeros(2 * count, functions, 3, functions)
+        weighted = self.weights[:, None, None, None, None] * tangent
+
+        def task(number: int) -> tuple[torch.Tensor, torch.Tensor]:
+            patch = self.patches[number]
+            return patch.pairs, _blocks(self._along(number), weighted[patch.rows])
+
+        for pairs, here in imap_in_threads(task, range(len(self.patches))):
+            blocks.index_add_(0, pairs, here)
+        upper, lower = blocks.split(count)
+        diagonal = torch.from_numpy(self.rows == self.columns)
+        lower[diagonal] = upper[diagonal]
+        whole = tangent.new_empty(count, 2, functions, 2, functions)
+        whole[:, 0, :, 0], whole[:, 0, :, 1], whole[:, 1, :, 1] = upper.unbind(2)
+        whole[:, 1, :, 0] = lower[:, :, 1].mT
+        # Windows that reach one patch need not overlap; one that reaches none keeps its empty diagonal.
+        filled = (whole.abs().amax(dim=(1, 2, 3, 4)) > 0) | diagonal
+        parts = (self.rows[filled], self.columns[filled], whole[filled].flatten(1, 2).flatten(2).numpy())
+        return BlockMatrix(self.basis.windows.count, *parts)
+
+    def _along(self, number: int) -> torch.Tensor:
+        """Derivatives of the basis functions that reach a patch, at its points: (2, p, w, m + 1), 1/mm."""
+        patch = self.patches[number]
+        if self.kept is None:
+            return self.basis.gradients(patch.points, patch.near)
+        if number not in self.kept:
+            self.kept[number] = self.basis.gradients(patch.points, patch.near)
+        return self.kept[number]
+
+
+def _blocks(along: torch.Tensor, tangent: torch.Tensor) -> torch.Tensor:
+    """Blocks of all pairs of windows, (w w, m + 1, 3, m + 1), N/mm^2: of the components uu, uv and vv.
+
+    NumPy's matrix product was measured to take 0.6 of the time of torch's on AMD's processors.
+
+    Args:
+        along: Derivatives of the basis functions, shape (2, p, w, m + 1), 1/mm.
+        tangent: Weights times the tangent, shape (p, 2, 2, 2, 2), N.
+    """
+    _, points, windows, functions = along.shape
+    right = along.new_empty(2, points, windows, 3, functions)
+    for part, (i, k) in enumerate(((0, 0), (0, 1), (1, 1))):
+        for j in range(2):
+            torch.mul(tangent[:, i, j, k, 0, None, None], along[0], out=right[j, :, :, part])
+            right[j, :, :, part].addcmul_(tangent[:, i, j, k, 1, None, None], along[1])
+    left = along.flatten(2).flatten(0, 1).numpy().T
+    product = torch.from_numpy(left @ right.flatten(0, 1).flatten(1).numpy())
+    return product.view(windows, functions, windows, 3, functions).transpose(1, 2).flatten(0, 1)
 
 
 def energy_density(gradient: torch.Tensor, lame: Lame, law: LawName) -> torch.Tensor:
@@ -158,28 +232,44 @@ def piola_stress_and_tangent(
 
         A_ijkl = μ δ_ik δ_jl + (μ - λ ln J) G_il G_kj + λ G_ij G_kl
 
-    Hooke's law has the same tangent at H = 0, whatever H.
+    The St Venant-Kirchhoff law has P = F S with S = λ tr(E) I + 2 μ E and
+
+        A_ijkl = δ_ik S_jl + λ F_ij F_kl + μ ((F F^T)_ik δ_jl + F_il F_kj)
+
+    Hooke's law has their tangent at H = 0, whatever H.
 
     Args:
-        gradient: H[n, i, j] = du_i/dx_j, shape (n, 2, 2), with det(I + H) > 0 for the law "neo-hookean".
+        gradient: H[n, i, j] = du_i/dx_j, shape (n, 2, 2).
         lame: Lamé constants of the plane law, MPa.
-        law: "linear" or "neo-hookean".
+        law: The law.
 
     Returns:
-        P, shape (n, 2, 2), and A, shape (n, 2, 2, 2, 2), MPa.
+        P, shape (n, 2, 2), MPa, not a number where a finite deformation turns the material inside out, and
+        A, shape (n, 2, 2, 2, 2), MPa.
     """
     λ, μ = lame.λ, lame.μ
     one = torch.eye(2, dtype=gradient.dtype)
-    linear = law == "linear"
-    deformation = one + (torch.zeros_like(gradient) if linear else gradient)
-    log_j = torch.linalg.det(deformation).log()[:, None, None]
-    inverse = torch.linalg.inv(deformation).mT
-    pressure = λ * log_j
+    if law == "linear":
+        first, second = torch.einsum("ik,jl->ijkl", one, one), torch.einsum("il,kj->ijkl", one, one)
+        tangent = λ * torch.einsum("ij,kl->ijkl", one, one) + μ * (first + second)
+        return torch.einsum("ijkl,nkl->nij", tangent, gradient), tangent.expand(len(gradient), 2, 2, 2, 2)
+    deformation, jacobian = one + gradient, deformation_jacobian(gradient)[:, None, None]
+    if law == "st-venant-kirchhoff":
+        strain = 0.5 * (deformation.mT @ deformation - one)
+        trace = strain.diagonal(dim1=1, dim2=2).sum(dim=1)[:, None, None]
+        second_piola = λ * trace * one + 2 * μ * strain
+        tangent = (
+            torch.einsum("ik,njl->nijkl", one, second_piola)
+            + λ * torch.einsum("nij,nkl->nijkl", deformation, deformation)
+            + μ * torch.einsum("nik,jl->nijkl", deformation @ deformation.mT, one)
+            + μ * torch.einsum("nil,nkj->nijkl", deformation, deformation)
+        )
+        return (deformation @ second_piola).where(jacobian > 0, torch.nan), tangent
+    pressure = λ * jacobian.log()
+    inverse = deformation.flip(1, 2) * torch.tensor([[1.0, -1.0], [-1.0, 1.0]]).to(gradient) / jacobian
     tangent = (
         μ * torch.einsum("ik,jl->ijkl", one, one)
         + torch.einsum("nil,nkj->nijkl", (μ - pressure) * inverse, inverse)
         + λ * torch.einsum("nij,nkl->nijkl", inverse, inverse)
     )
-    if linear:
-        return torch.einsum("nijkl,nkl->nij", tangent, gradient), tangent
     return μ * (deformation - inverse) + pressure * inverse, tangent

@@ -45,9 +45,9 @@ class FiniteBasisSolver(ABC):
 
     Its windows are spread over the body, denser at re-entrant corners, and have a few random tanh neurons
     each. The energy of the linear law is quadratic in the output layer, which takes one sparse factorisation;
-    the neo-Hookean energy is minimised by Newton's method. The network is solved on two levels of spacing,
-    whose change estimates the error; if that is too large, on a third. Spacings are in units of the body's
-    thickness, so that one setting serves every design.
+    that of a law of finite strain is minimised by Newton's method. The network is solved on two levels of
+    spacing, whose change estimates the error; if that is too large, on a third. Spacings are in units of the
+    body's thickness, so that one setting serves every design.
 
     Attributes:
         wall_spacing: Spacing of the windows in the width of a wall or cavity, at most the mean thickness.
@@ -75,7 +75,7 @@ class FiniteBasisSolver(ABC):
     base_length: float = 5.0
     seed: int = 0
     name: ClassVar[str]
-    laws: ClassVar[tuple[str, ...]] = ("linear", "neo-hookean")
+    laws: ClassVar[tuple[str, ...]] = ("linear", "neo-hookean", "st-venant-kirchhoff")
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
 
     def __post_init__(self) -> None:

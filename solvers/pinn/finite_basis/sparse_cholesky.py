@@ -31,10 +31,17 @@ class BlockMatrix:
         return np.diagonal(self.blocks[self.rows == self.columns], axis1=1, axis2=2)
 
     def solve(self, right: FloatArray, regularisation: float, *, definite: bool = True) -> FloatArray:
-        """Solve for several right-hand sides with one factorisation, the diagonal scaled to one.
+        """Solve for several right-hand sides (r, n b) with one factorisation; see `factorised`."""
+        factors = self.factorised(regularisation, definite=definite)
+        try:
+            return factors.solve(right)
+        finally:
+            factors.close()
+
+    def factorised(self, regularisation: float, *, definite: bool = True) -> "Factors":
+        """The factors of the matrix with its diagonal scaled to one, for any number of solves.
 
         Args:
-            right: Right-hand sides, shape (r, n b).
             regularisation: Added to the unit diagonal.
             definite: Whether the matrix is known to be positive definite.
 
@@ -43,7 +50,8 @@ class BlockMatrix:
         """
         diagonal = np.abs(self.diagonal())
         scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
-        scaled = self.blocks * scale[self.rows, :, None] * scale[self.columns, None, :]
+        scaled = self.blocks * scale[self.rows, :, None]
+        scaled *= scale[self.columns, None, :]
         scaled[self.rows == self.columns] += regularisation * np.eye(scaled.shape[-1])
         starts = np.searchsorted(self.rows, np.arange(self.size + 1))
         index: Any = PETSc.IntType
@@ -55,24 +63,49 @@ class BlockMatrix:
         )
         stored.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         stored.setOption(PETSc.Mat.Option.SPD, definite)
-        ksp = PETSc.KSP().create(PETSc.COMM_SELF)
-        ksp.setOperators(stored)
-        ksp.setType(PETSc.KSP.Type.PREONLY)
-        preconditioner = ksp.getPC()
-        preconditioner.setType(PETSc.PC.Type.CHOLESKY)
-        preconditioner.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-        ksp.setErrorIfNotConverged(True)
-        solution = np.empty_like(right)
-        vector, result = stored.createVecs()
+        preconditioner = PETSc.PC().create(PETSc.COMM_SELF)
         try:
-            for row, found in zip(right * scale.ravel(), solution, strict=True):
-                vector.array[:] = row
-                ksp.solve(vector, result)
-                found[:] = result.array
-        except PETSc.Error as error:
-            raise UserError("MUMPS cannot factorise the output layer; take fewer neurons") from error
+            preconditioner.setOperators(stored)
+            preconditioner.setType(PETSc.PC.Type.CHOLESKY)
+            preconditioner.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+            preconditioner.setUp()
+            failed = preconditioner.getFactorMatrix().getMumpsInfog(1) < 0
+        except PETSc.Error:
+            failed = True
+        stored.destroy()
+        if failed:
+            preconditioner.destroy()
+            raise UserError("MUMPS cannot factorise the output layer; take fewer neurons")
+        return Factors(scale.ravel(), preconditioner)
+
+
+@dataclass(frozen=True, eq=False)
+class Factors:
+    """Factors of a matrix in MUMPS; they must be closed, because petsc4py would keep them for ever.
+
+    Attributes:
+        scale: One over the roots of the diagonal, shape (n b,).
+        preconditioner: PETSc's object that holds them.
+    """
+
+    scale: FloatArray
+    preconditioner: Any
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """The solutions for right-hand sides, both of shape (r, n b)."""
+        count, size = right.shape
+        given, found = (PETSc.Mat().createDense((size, count), comm=PETSc.COMM_SELF) for _ in range(2))
+        for dense in (given, found):
+            dense.setUp()
+        given.getDenseArray()[:] = (right * self.scale).T
+        given.assemble()
+        try:
+            self.preconditioner.getFactorMatrix().matSolve(given, found)
+            return np.asarray(found.getDenseArray().T * self.scale, dtype=np.float64)
         finally:
-            # petsc4py would keep the preconditioner, and the factors, for ever.
-            for item in (vector, result, preconditioner, ksp, stored):
-                item.destroy()
-        return np.asarray(solution * scale.ravel(), dtype=np.float64)
+            given.destroy()
+            found.destroy()
+
+    def close(self) -> None:
+        """Free the factors."""
+        self.preconditioner.destroy()
