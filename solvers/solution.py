@@ -110,6 +110,15 @@ class Solution:
         """
         return self.field.displacement(self._locate(points))
 
+    def displacement_in_space(self, points: ArrayLike | LocatedPoints) -> FloatArray:
+        """Displacement of the material that is at points (n, 2), mm, before the load: shape (n, 2), mm.
+
+        It is `displacement` unless the solver has found that the walls are not as drawn, so that other
+        material is there.
+        """
+        found = getattr(self.field, "displacement_in_space", self.field.displacement)
+        return np.asarray(found(self._locate(points)))
+
     def gradient(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j at points of shape (n, 2), mm: shape (n, 2, 2).
 

@@ -165,24 +165,30 @@ class Estimate:
 
 
 def estimate(
-    model: Callable[[FloatArray], Prediction],
+    model: Callable[[FloatArray], Prediction | None],
     observed: FloatArray,
     deviations: FloatArray,
     parameters: Sequence[Parameter],
+    start: FloatArray | None = None,
 ) -> Estimate:
     """Find the parameters by Gauss-Newton steps in a trust region.
 
     Args:
-        model: Predictions and derivatives from parameter values, shape (p,).
+        model: Predictions and derivatives from parameter values, shape (p,); None where it has none, which
+            a step of the search then avoids. It must have them at the start.
         observed: Shape (n,).
         deviations: Their standard deviations σ, shape (n,), all positive.
         parameters: The p parameters.
+        start: Standardised values z from which the search starts, shape (p,); None: the priors' middles.
     """
 
     @lru_cache(maxsize=1)  # least_squares asks for residuals and derivatives separately
     def evaluated(z: tuple[float, ...]) -> Prediction:
         pairs = list(zip(parameters, z, strict=True))
-        predicted, derivatives = model(np.array([float(u.value(place)) for u, place in pairs]))
+        found = model(np.array([float(u.value(place)) for u, place in pairs]))
+        if found is None:
+            return np.full(len(observed), np.inf), np.zeros((len(observed), len(pairs)))
+        predicted, derivatives = found
         derivatives = derivatives * [u.derivative(place) for u, place in pairs] / deviations[:, None]
         return (predicted - observed) / deviations, derivatives
 
@@ -192,8 +198,8 @@ def estimate(
 
     count, one = len(parameters), np.eye(len(parameters))
     bounds = np.array([parameter.bounds for parameter in parameters]).T
-    z = np.clip(np.zeros(count), *bounds)
-    inflation = _inflation(whitened(z)[0], len(observed))
+    z = np.clip(np.zeros(count) if start is None else start, *bounds)
+    inflation = 1.0  # a larger one from the start could leave the search where the priors are
     for _ in range(MAX_ROUNDS):
         weight = 1 / inflation
         fit = least_squares(
@@ -202,7 +208,7 @@ def estimate(
             lambda z, weight=weight: np.concatenate([weight * whitened(z)[1], one]),
             bounds=bounds,
             xtol=1e-6,
-            ftol=1e-10,
+            ftol=1e-6,
             gtol=1e-8,
         )
         z = fit.x

@@ -4,6 +4,7 @@ import inspect
 import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import dolfinx
@@ -162,6 +163,13 @@ class DistributedSpace:
         """An integral over the whole body."""
         return float(self.comm.allreduce(dolfinx.fem.assemble_scalar(form), op=MPI.SUM))
 
+    def node_function(self) -> "NodeFunction":
+        """A continuous vector field, linear in every triangle, that forms can be written with; zero."""
+        with _quiet_compiler():
+            space = _vector_space(self.domain, 1)
+        nodes = _nodes_of_dofs(LagrangeSpace(self.space.mesh, 1), self.domain, space)
+        return NodeFunction(dolfinx.fem.Function(space), nodes)
+
     def set_function(self, values: FloatArray) -> None:
         """Give `function` nodal values of shape (N, 2)."""
         self.function.x.array[:] = values[self._node_of_dof].ravel()
@@ -177,3 +185,20 @@ class DistributedSpace:
         if self.comm.size > 1:
             self.comm.Allreduce(MPI.IN_PLACE, values, op=MPI.SUM)
         return values
+
+
+@dataclass(frozen=True, eq=False)
+class NodeFunction:
+    """A vector field given at the nodes of the mesh.
+
+    Attributes:
+        function: The DOLFINx function.
+        node_of_dof: Its degrees of freedom.
+    """
+
+    function: Any
+    node_of_dof: IntArray
+
+    def set(self, values: FloatArray) -> None:
+        """Give it values of shape (number of the mesh's nodes, 2)."""
+        self.function.x.array[:] = values[self.node_of_dof].ravel()

@@ -84,6 +84,31 @@ class Factorisation(StiffnessSolver):
                 "is there enough memory, and is no element nearly flat?"
             ) from error
 
+    def solve_all(self, nodal: FloatArray) -> FloatArray:
+        """Solve for several right-hand sides at once, shape (r, N, 2); the solutions have the same shape."""
+        if self._space.comm.size > 1 or not len(nodal):
+            return np.array([self.solve(each) for each in nodal]).reshape(nodal.shape)
+        right = PETSc.Mat().createDense((nodal[0].size, len(nodal)), comm=self._space.comm)
+        right.setUp()
+        held, _ = self._matrix.createVecs()
+        columns = right.getDenseArray()
+        for column, each in zip(columns.T, nodal, strict=True):
+            self._space.distribute(np.where(self._clamped, 0.0, each), held)
+            column[:] = held.array_r
+        del columns
+        right.assemble()
+        solution = right.duplicate()
+        preconditioner = self._ksp.getPC()
+        factors = preconditioner.getFactorMatrix()
+        factors.matSolve(right, solution)
+        found = np.empty_like(nodal)
+        for column, each in zip(solution.getDenseArray().T, found, strict=True):
+            held.array[:] = column
+            each[:] = self._space.gather(held)
+        for item in (right, solution, held, factors, preconditioner):
+            item.destroy()  # petsc4py would keep the factors for ever
+        return found
+
 
 class Multigrid(StiffnessSolver):
     """A symmetric positive definite stiffness, solved by conjugate gradients.

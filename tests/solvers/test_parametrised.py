@@ -10,7 +10,12 @@ from geometry.mesh.boundary import walls_and_ribs
 from geometry.mesh.quadrature import body_quadrature, edge_quadrature
 from solvers.elasticity import lame_constants, lame_derivatives
 from solvers.fem.identification.linear_model import LinearModel
-from solvers.fem.identification.parameters import MEANINGS, parameters_of, parse_parameters, problem_with
+from solvers.fem.identification.linear_parameters import (
+    MEANINGS,
+    parameters_of,
+    parse_parameters,
+    problem_with,
+)
 from solvers.fem.linear import FemSolver
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Material, Problem

@@ -19,7 +19,7 @@ SOLVERS: dict[str, dict[str, object]] = {
     "fem-asm, weights chosen": {"degree": 1, "weights": "precision", "choose": "left-out"},
     "fem-asm, without weight": {"degree": 1, "asm_weight": 0.0},
     "fem-asm, a soft contact": {"degree": 1, "weights": "precision", "contact_deviation": 1.0},
-    "fem-id": {"degree": 1},
+    "fem-id": {"degree": 1, "model": "fem"},
     "gp": {},
     "statfem": {"degree": 1},
     "pinn-asm": QUICK,
@@ -83,7 +83,7 @@ def test_another_solver_is_just_asked_again(coarse_mesh, observed):
 
 def test_parameters_are_carried_to_another_load(coarse_mesh, observed):
     """The truth is off by (-1, 1) of 10 mm: at 5 mm and 4 mm nearer to the tip by half of it there."""
-    solver = make_solver("fem-id", degree=1)
+    solver = make_solver("fem-id", degree=1, model="fem")
     problem = Problem(coarse_mesh, observations=observed[0])
     solution = solver.solve(problem)
     other = Problem(coarse_mesh, load=Load(displacement=(0.0, -5.0), position=39.0))

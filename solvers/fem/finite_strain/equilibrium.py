@@ -7,7 +7,6 @@ potential Π of the elastic energy and, for a cylinder, of contact, equilibrium 
 """
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import ufl
@@ -15,7 +14,7 @@ import ufl
 from geometry.arrays import BoolArray, FloatArray
 from geometry.mesh.quadrature import body_quadrature
 from solvers.constrained_elimination import ConstrainedElimination
-from solvers.elasticity import Lame, deformation_jacobian, energy_density_of
+from solvers.elasticity import deformation_jacobian, energy_density_of
 from solvers.fem.boundary_conditions import dirichlet_displacement, dirichlet_mask
 from solvers.fem.dolfinx_compat import DistributedSpace
 from solvers.fem.finite_strain.constraints import DisplacementConstraints, LoadState
@@ -53,7 +52,6 @@ class FiniteStrainEquilibrium:
         self.contact = CylinderContact.of(problem, space) if problem.load.kind == "cylinder" else None
         self._derivatives = space.shape_gradients(body_quadrature(problem.mesh, QUADRATURE_DEGREE).location)
         constants = self.distributed.moduli(problem.material.lame)
-        self._moduli: tuple[Any, Any] = constants[:2]
         gradient = ufl.grad(self.distributed.function)
         measure = ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
         energy = energy_density_of(problem.material.law, gradient, constants, ufl.ln) * measure
@@ -63,28 +61,6 @@ class FiniteStrainEquilibrium:
         self.matrix = self.distributed.assemble_matrix(self._tangent, self._conditions)
         self.factors = Factorisation(self.distributed, self.matrix, self.clamped, positive_definite=False)
         self.elimination = self._elimination()
-
-    def set_problem(self, problem: Problem) -> None:
-        """Take another `mean` or `point` load, with the same components prescribed, and other moduli."""
-        self.constraints = DisplacementConstraints.of(problem, self.distributed.space)
-        self._set_moduli(problem.material.lame)
-
-    def force_slope(self, nodal: FloatArray, moduli: Lame, slopes: Lame) -> FloatArray:
-        """Derivative of the internal force, which is linear in λ and μ, along a change of them, (N, 2), N/mm.
-
-        Args:
-            nodal: Displacements, shape (N, 2), mm.
-            moduli: λ and μ, MPa.
-            slopes: Their change, MPa.
-        """
-        self._set_moduli(slopes)
-        force = self.internal_force(nodal)
-        self._set_moduli(moduli)
-        return force
-
-    def _set_moduli(self, lame: Lame) -> None:
-        for constant, value in zip(self._moduli, lame[:2], strict=True):
-            constant.value = value
 
     def energy(self, nodal: FloatArray) -> float:
         """Elastic energy per depth, N mm / mm."""

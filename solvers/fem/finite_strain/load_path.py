@@ -94,17 +94,6 @@ class LoadPath:
             progress(fraction, f"{fraction:.0%} of the load, {self.iterations - before} Newton iterations")
             step = min(self._max_step, step * (2 if hardest <= QUICK else 1))
 
-    def continued(self, problem: Problem, nodal: FloatArray, forces: FloatArray) -> LoadState | None:
-        """Equilibrium under the full load of another problem; None if none is found.
-
-        Args:
-            problem: With another load and moduli.
-            nodal: Displacements that are near, shape (N, 2), mm.
-            forces: Multipliers that are near, shape (k,), N/mm.
-        """
-        self.equilibrium.set_problem(problem)
-        return self._settled(self._newton, LoadState(1.0, nodal, forces, np.zeros(0)))
-
     def relaxed(self, kept: BoolArray) -> LoadState | None:
         """Equilibrium near the last one under the constraints of a mask alone; None if none is found."""
         last, constraints = self.points[-1], self.equilibrium.constraints

@@ -21,8 +21,8 @@ from geometry.mesh.quadrature import body_quadrature, edge_quadrature
 from solvers.constrained_elimination import ConstrainedElimination
 from solvers.elasticity import lame_derivatives
 from solvers.fem.boundary_conditions import load_functionals
-from solvers.fem.identification.parameters import STIFFNESS, problem_with
-from solvers.fem.identification.response import Response
+from solvers.fem.identification.linear_parameters import STIFFNESS, problem_with
+from solvers.fem.identification.linear_response import Response
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 
@@ -33,7 +33,7 @@ class LinearModel:
     Args:
         problem: With the values of everything else.
         space: The elements.
-        names: The parameters, keys of `solvers.fem.identification.parameters.MEANINGS`.
+        names: The parameters, keys of `solvers.fem.identification.linear_parameters.MEANINGS`.
     """
 
     def __init__(self, problem: Problem, space: LagrangeSpace, names: Sequence[str]) -> None:

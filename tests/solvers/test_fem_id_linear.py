@@ -1,4 +1,4 @@
-"""`fem-id`: twin experiments, whose parameters are known, and what is said where they cannot be found."""
+"""`fem-id` with the linear model: twin experiments, and what is said where parameters cannot be found."""
 
 from dataclasses import replace
 
@@ -36,7 +36,7 @@ def twin(problem, truth, *, noise=0.0, deviation=NOISE, seed=0, degree=1):
 
 
 def solver(*names, **settings):
-    settings = {"degree": 1, "marker_radius": 0.0} | settings
+    settings = {"model": "fem", "degree": 1, "marker_radius": 0.0} | settings
     return FemIdSolver(parameters=",".join(names), **settings) if names else FemIdSolver(**settings)
 
 
@@ -93,7 +93,7 @@ def test_a_dense_least_squares_by_finite_differences_finds_the_same(problem):
 
 
 def test_young_needs_a_force(problem):
-    with pytest.raises(UserError, match=r"Young's modulus cancels out .* give reaction="):
+    with pytest.raises(UserError, match=r"cannot find young from displacements alone.* give reaction="):
         solver("young")
     truth = {"stroke_v": -9.5, "young": 8.0}
     observed, force = twin(problem, truth)
@@ -180,11 +180,13 @@ def test_without_markers_it_is_fem(problem):
     np.testing.assert_array_equal(plain.field.values, fem.field.values)
     assert plain.solver == "fem-id"
     assert plain.status.message.startswith("without markers, this is fem: ")
+    assert solver().laws == ("linear",)
 
 
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
+        ({"model": "pinn-std"}, "model must be fem-nonlinear or fem, got 'pinn-std'"),
         ({"degree": 3}, "elements of degree 1 and 2, not 3"),
         ({"prior": 0.0}, "prior must be positive"),
         ({"reaction": 0.0}, "a force other than zero"),

@@ -1,0 +1,154 @@
+"""The finger at finite strain in finite elements, with moved walls, for the inverse problem."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import ufl
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.mesh.point_location import LocatedPoints
+from geometry.mesh.quadrature import body_quadrature
+from geometry.mesh.wall_motion import WallMotion
+from solvers.elasticity import Lame, deformation_jacobian, energy_density_of
+from solvers.fem.boundary_conditions import dirichlet_mask
+from solvers.fem.dolfinx_compat import DistributedSpace
+from solvers.fem.finite_strain.equilibrium import QUADRATURE_DEGREE
+from solvers.fem.linear_solvers import Factorisation
+from solvers.lagrange import LagrangeField, LagrangeSpace
+from solvers.problem import Load, Problem
+
+
+class FemBody:
+    """Lagrange elements on the drawn mesh; see `solvers.identification.body.Body`.
+
+    A state is the array of nodal displacements, shape (N, 2), mm.
+
+    Args:
+        problem: With a law of finite strain; its load is ignored.
+        space: The elements.
+        motion: The walls' motion on the same mesh.
+    """
+
+    def __init__(self, problem: Problem, space: LagrangeSpace, motion: WallMotion) -> None:
+        self.space, self._motion = space, motion
+        self._distributed = DistributedSpace(space)
+        self._clamped = dirichlet_mask(Problem(problem.mesh, problem.material, Load()), space)
+        rule = body_quadrature(problem.mesh, QUADRATURE_DEGREE)
+        self._derivatives = space.shape_gradients(rule.location)
+        self._wall_gradients = motion.gradients()[:, rule.location.cells]
+        moduli = self._distributed.moduli(problem.material.lame)
+        self._moduli: tuple[Any, Any] = moduli[:2]
+        self._moved, self._direction = (self._distributed.node_function() for _ in range(2))
+        shift = ufl.Identity(2) + ufl.grad(self._moved.function)
+        gradient = ufl.dot(ufl.grad(self._distributed.function), ufl.inv(shift))
+        density = energy_density_of(problem.material.law, gradient, moduli, ufl.ln)
+        energy = density * ufl.det(shift) * ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
+        self._energy = self._distributed.form(energy)
+        function = self._distributed.function
+        force = ufl.derivative(energy, function, ufl.TestFunction(function.function_space))
+        tangent = ufl.derivative(force, function, ufl.TrialFunction(function.function_space))
+        slope = ufl.derivative(force, self._moved.function, self._direction.function)
+        self._force, self._tangent, self._wall_slope = map(self._distributed.form, (force, tangent, slope))
+        self._conditions = self._distributed.clamp(self._clamped)
+        self._matrix = self._distributed.assemble_matrix(self._tangent, self._conditions)
+        self._factors = Factorisation(self._distributed, self._matrix, self._clamped, positive_definite=False)
+        self._sampled: dict[bytes, LocatedPoints] = {}
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(N, 2)."""
+        return self._clamped.shape
+
+    def close(self) -> None:
+        """Free what PETSc holds."""
+        self._factors.destroy()
+
+    def linearised(self, state: FloatArray, lame: Lame, changes: FloatArray) -> "_Linearised | None":
+        """Assemble and factorise at a state; see `Body`."""
+        if not self._admissible(state, changes):
+            return None
+        self._set(state, lame, changes)
+        force = np.where(self._clamped, 0.0, self._distributed.assemble_nodal(self._force))
+        self._distributed.assemble_matrix(self._tangent, self._conditions, into=self._matrix)
+        try:
+            self._factors.update()
+        except UserError:  # a singular tangent
+            return None
+        return _Linearised(force, self._factors)
+
+    def force_slopes(
+        self, state: FloatArray, lame: Lame, changes: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """By the walls and by the moduli, in both of which it is a form; see `Body`."""
+        self._set(state, lame, changes)
+        of_walls = np.zeros((len(changes), *self.shape))
+        for found, nodal in zip(of_walls, self._motion.nodal, strict=True):
+            self._direction.set(nodal)
+            found[:] = self._distributed.assemble_nodal(self._wall_slope)
+        of_moduli = np.zeros((2, *self.shape))
+        for found, unit in zip(of_moduli, np.eye(2), strict=True):
+            self._set_moduli(unit)
+            found[:] = self._distributed.assemble_nodal(self._force)
+        self._set_moduli(lame[:2])
+        return of_walls, of_moduli
+
+    def displacement_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
+        """From the shape functions; see `Body`."""
+        values = weights @ self.space.shape_functions(self._located(points))
+        return _both_components(values)
+
+    def gradient_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
+        """From the derivatives of the shape functions; see `Body`."""
+        along = self.space.shape_gradients(self._located(points))
+        return _both_components(sum(weights[..., axis] @ along[axis] for axis in range(2)))
+
+    def energy(self, state: FloatArray, lame: Lame, changes: FloatArray) -> float:
+        """By quadrature; see `Body`."""
+        self._set(state, lame, changes)
+        return self._distributed.assemble_scalar(self._energy)
+
+    def field(self, state: FloatArray) -> LagrangeField:
+        """The finite-element field."""
+        return LagrangeField(self.space, state)
+
+    def _admissible(self, state: FloatArray, changes: FloatArray) -> bool:
+        """Whether neither the walls' motion nor the deformation turns a quadrature point inside out."""
+        walls = np.einsum("k,kqij->qij", changes, self._wall_gradients)
+        gradient = np.stack([derivative @ state for derivative in self._derivatives], axis=-1)
+        inside_out = (deformation_jacobian(walls) <= 0) | (deformation_jacobian(gradient + walls) <= 0)
+        return bool(np.isfinite(state).all() and not inside_out.any())
+
+    def _set(self, state: FloatArray, lame: Lame, changes: FloatArray) -> None:
+        self._distributed.set_function(state)
+        self._moved.set(np.einsum("k,knx->nx", changes, self._motion.nodal))
+        self._set_moduli(lame[:2])
+
+    def _set_moduli(self, values: Iterable[float]) -> None:
+        for constant, value in zip(self._moduli, values, strict=True):
+            constant.value = value
+
+    def _located(self, points: FloatArray) -> LocatedPoints:
+        key = points.tobytes()
+        if key not in self._sampled:
+            self._sampled[key] = self.space.mesh.locate(points)
+        return self._sampled[key]
+
+
+@dataclass(frozen=True, eq=False)
+class _Linearised:
+    """See `solvers.identification.body.Linearised`."""
+
+    force: FloatArray
+    factors: Factorisation
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """By the factors that the body holds."""
+        return self.factors.solve_all(right)
+
+
+def _both_components(values: FloatArray) -> FloatArray:
+    """Rows (r, 2, N, 2) of both components from those of one, shape (r, N)."""
+    return np.asarray(np.einsum("rn,ab->ranb", np.asarray(values), np.eye(2)))

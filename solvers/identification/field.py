@@ -1,0 +1,119 @@
+"""The identified displacement with standard deviations, over the drawn body."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.mesh.point_location import LocatedPoints
+from geometry.mesh.wall_motion import WallMotion
+from solvers.identification.clamp import RigidMotion
+from solvers.identification.response import Response, ResponseModel
+from solvers.problem import Problem
+from solvers.solution import DisplacementField, State
+
+STEP = 1e-3
+"""Difference quotient's step in standard errors: the error of first order is a thousandth of a deviation."""
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """The finger for one set of values of the unknowns.
+
+    Positions are those of the drawing: the material drawn at X is at X + W(X) before the load.
+
+    Attributes:
+        problem: With the law and the moduli.
+        walls: The motions by the walls' thickness.
+        changes: Of the walls' thickness, shape (k,), mm.
+        clamp: Motion of the clamp.
+        drawn: The displacement without that, as a function of the drawn position.
+    """
+
+    problem: Problem
+    walls: WallMotion
+    changes: FloatArray
+    clamp: RigidMotion
+    drawn: DisplacementField
+
+    def displacement(self, location: LocatedPoints) -> FloatArray:
+        """Displacement of the material drawn at points, shape (n, 2), mm."""
+        places = location.points + self.walls.shifts(location, self.changes)
+        return self.clamp.moved(places + self.drawn.displacement(location)) - places
+
+    def displacement_in_space(self, location: LocatedPoints) -> FloatArray:
+        """Displacement of the material that is at points before the load, to first order, (n, 2), mm."""
+        shifts = self.walls.shifts(location, self.changes)
+        moved = np.einsum("nij,nj->ni", self.drawn.gradient(location), shifts)
+        drawn = location.points + self.drawn.displacement(location)
+        return self.clamp.moved(drawn - moved) - location.points
+
+    def gradient(self, location: LocatedPoints) -> FloatArray:
+        """Gradient of the displacement by the place before the load, shape (n, 2, 2)."""
+        walls = np.einsum("k,ktij->tij", self.changes, self.walls.gradients())[location.cells]
+        gradient = self.drawn.gradient(location) @ np.linalg.inv(np.eye(2) + walls)
+        return np.asarray(self.clamp.rotation @ (np.eye(2) + gradient) - np.eye(2))
+
+    def von_mises(self, location: LocatedPoints) -> FloatArray:
+        """Von Mises stress, shape (n,), MPa."""
+        return State.from_gradient(self.gradient(location), self.problem).von_mises
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """The finger by one law.
+
+    Attributes:
+        probability: Of the law.
+        found: The finger that was found.
+        steps: The same, `STEP` times each of p independent standard errors away.
+        response: The equilibrium.
+        model: The finger as a function of the unknowns.
+    """
+
+    probability: float
+    found: Snapshot
+    steps: Sequence[Snapshot]
+    response: Response
+    model: ResponseModel
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedField:
+    """The displacement by the most probable law; its deviations include those of the other laws from it.
+
+    Attributes:
+        members: The most probable law first.
+    """
+
+    members: Sequence[Member]
+
+    def displacement(self, location: LocatedPoints) -> FloatArray:
+        """Displacement of the material drawn at points, shape (n, 2), mm."""
+        return self.members[0].found.displacement(location)
+
+    def displacement_in_space(self, location: LocatedPoints) -> FloatArray:
+        """Displacement of the material that is at points before the load, shape (n, 2), mm."""
+        return self.members[0].found.displacement_in_space(location)
+
+    def gradient(self, location: LocatedPoints) -> FloatArray:
+        """Gradient of the displacement by the place before the load, shape (n, 2, 2)."""
+        return self.members[0].found.gradient(location)
+
+    def standard_deviation(self, location: LocatedPoints) -> FloatArray:
+        """Standard deviation of `displacement_in_space`, shape (n, 2), mm."""
+        return self._deviation(lambda snapshot: snapshot.displacement_in_space(location))
+
+    def von_mises_deviation(self, location: LocatedPoints) -> FloatArray:
+        """Standard deviation of the von Mises stress, shape (n,), MPa."""
+        return self._deviation(lambda snapshot: snapshot.von_mises(location))
+
+    def _deviation(self, quantity: Callable[[Snapshot], FloatArray]) -> FloatArray:
+        best = quantity(self.members[0].found)
+        variance = np.zeros_like(best)
+        for member in self.members:
+            own = quantity(member.found)
+            spread = sum(((quantity(step) - own) / STEP) ** 2 for step in member.steps)
+            variance += member.probability * (spread + (own - best) ** 2)
+        return np.sqrt(variance)

@@ -1,0 +1,299 @@
+"""Contact, walls and law from the markers: the search, doubtful markers, and the evidence for each law.
+
+The evidence of a law is Laplace's approximation of the integral of likelihood times prior: with the
+residuals r over φ σ, the sensitivities A and the standardised values z of `Estimate`, for n observations
+
+    log Z = -n log φ - (r . r + z . z) / 2 - log det(A^T A + 1) / 2
+
+Sources: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415-447, for the evidence;
+R. D. Cook, S. Weisberg, Residuals and Influence in Regression, Chapman and Hall 1982, for the misfit without
+an observation.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from geometry.arrays import FloatArray, IntArray
+from geometry.errors import UserError
+from geometry.observations import Observations
+from solvers.assimilation.estimation import Estimate, Prediction, estimate
+from solvers.assimilation.misfit import MarkerSettings, Misfit, misfit_of, standard_deviations
+from solvers.elasticity import LawName
+from solvers.identification.body import Body
+from solvers.identification.hypothesis import Unknowns
+from solvers.identification.response import EXACT, MarkerModel, Response, ResponseModel
+from solvers.problem import Problem
+from solvers.solver import Progress, silent
+
+DOUBTFUL = 30.0
+"""Drop of the misfit, in squared standard deviations, by which a marker contradicts the others.
+
+Noise alone drops it by more once in three million markers (χ² of two degrees of freedom).
+"""
+CLEARER = 2.0
+"""Factor by which φ has to fall as well, so that a model that is wrong everywhere loses no marker."""
+MOST_DOUBTFUL = 1 / 3
+"""Largest share of the markers that are left out as doubtful."""
+PROBABLE = 0.01
+"""Least probability of a law whose field is kept."""
+AWAY = (-2.0, 2.0)
+"""Places of the contact from which the search starts again, in standard deviations of its prior."""
+UNEXPLAINED = 2.0
+"""φ from which on the search is started again."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What was measured.
+
+    Attributes:
+        misfit: The markers that were seen and are believed.
+        deviations: Their standard deviations, shape (m, 2), mm.
+        kept: Which of the markers that were seen these are, shape (seen,).
+        reaction: Force of the indenter along y per depth, with its standard deviation, N/mm.
+    """
+
+    misfit: Misfit
+    deviations: FloatArray
+    kept: IntArray
+    reaction: tuple[float, float] | None = None
+
+    @classmethod
+    def of(
+        cls,
+        problem: Problem,
+        observations: Observations,
+        radius: float | None,
+        reaction: tuple[float, float] | None,
+    ) -> "Reading":
+        """All markers that were seen; see `MarkerSettings.marker_radius` for the radius, mm."""
+        settings = MarkerSettings(marker_radius=radius)
+        misfit = misfit_of(replace(problem, observations=observations), settings)
+        if misfit is None or not len(misfit.points):
+            raise UserError("there are no markers to find a force by")
+        return cls(misfit, standard_deviations(observations), np.arange(len(misfit.points)), reaction)
+
+    def without(self, marker: int) -> "Reading":
+        """The reading without one of its markers."""
+        return replace(
+            self,
+            misfit=self.misfit.without(marker),
+            deviations=np.delete(self.deviations, marker, axis=0),
+            kept=np.delete(self.kept, marker),
+        )
+
+    @property
+    def observed(self) -> FloatArray:
+        """Displacements u v u v ..., then the reaction if there is one."""
+        return self._joined(self.misfit.observed, 0)
+
+    @property
+    def noise(self) -> FloatArray:
+        """Standard deviations of `observed`."""
+        return self._joined(self.deviations, 1)
+
+    def _joined(self, values: FloatArray, which: int) -> FloatArray:
+        return np.append(values.ravel(), [] if self.reaction is None else [self.reaction[which]])
+
+    def predicted(self, markers: MarkerModel, response: Response) -> Prediction:
+        """Predictions of `observed`, with their derivatives."""
+        values, slopes = markers.predicted(response)
+        if self.reaction is None:
+            return values, slopes
+        along_y = markers.unknowns.force_slopes()[:, 1]
+        return np.append(values, response.hypothesis.force[1]), np.vstack([slopes, along_y])
+
+
+class Fit(NamedTuple):
+    """The best values of the unknowns under one law.
+
+    Attributes:
+        law: The law.
+        estimate: Values, covariance, residuals.
+        response: The equilibrium there.
+        markers: The marker displacements as a function of a response.
+        reading: The markers that were believed.
+        exact: Whether the equilibrium was found to the last digit.
+    """
+
+    law: LawName
+    estimate: Estimate
+    response: Response
+    markers: MarkerModel
+    reading: Reading
+    exact: bool
+
+    @property
+    def log_evidence(self) -> float:
+        """Logarithm of the evidence, up to what all laws share."""
+        found = self.estimate
+        a, r = found.sensitivities, found.residuals
+        _, volume = np.linalg.slogdet(a.T @ a + np.eye(a.shape[1]))
+        misfit = float(r @ r + found.z @ found.z)
+        return -len(r) * float(np.log(found.inflation)) - 0.5 * (misfit + float(volume))
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """The fits of all laws to the same markers.
+
+    Attributes:
+        fits: The most probable law first.
+        probabilities: Of the laws, shape (number of fits,).
+        doubtful: Markers that contradict the others and were not used: number among those seen, and their
+            computed minus their observed displacement, shape (2,), mm.
+    """
+
+    fits: Sequence[Fit]
+    probabilities: FloatArray
+    doubtful: Mapping[int, FloatArray]
+
+    @property
+    def best(self) -> Fit:
+        """The fit of the most probable law."""
+        return self.fits[0]
+
+
+class Identifier:
+    """Finds the unknowns of one finger for any observations; each search starts from the last result.
+
+    Args:
+        problem: The finger; its law does not matter, its load only by the drawn contact.
+        names: The unknowns.
+        laws: The laws to choose from.
+        body: Makes the discretised finger of a problem, whose law is set, and the unknowns.
+        prior: Factor of the standard deviations of the priors.
+        radius: Of the markers, mm; None: the observations'.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        names: Sequence[str],
+        laws: Sequence[LawName],
+        body: Callable[[Unknowns], Body],
+        *,
+        prior: float = 1.0,
+        radius: float | None = None,
+    ) -> None:
+        self._laws, self._radius = tuple(laws), radius
+        self.models: dict[LawName, ResponseModel] = {}
+        for law in self._laws:
+            own = replace(problem, material=problem.material.model_copy(update={"law": law}))
+            unknowns = Unknowns.of(own, names)
+            self.models[law] = ResponseModel(body(unknowns), unknowns)
+        first = self.models[self._laws[0]]
+        flexibility = first.flexibility()
+        self.parameters = first.unknowns.parameters(flexibility, prior)
+        self._known: dict[LawName, Fit] = {}
+
+    def identify(
+        self,
+        observations: Observations,
+        reaction: tuple[float, float] | None = None,
+        progress: Progress = silent,
+    ) -> Identified:
+        """The unknowns under every law, and the laws' probabilities.
+
+        Args:
+            observations: The markers.
+            reaction: Force along y per depth and its standard deviation, N/mm, if it was measured.
+            progress: Told of the values that are tried.
+
+        Raises:
+            UserError: If there are no markers, or the finger has no equilibrium near rest.
+        """
+        first = self.models[self._laws[0]]
+        reading = Reading.of(first.unknowns.problem, observations, self._radius, reaction)
+        fit = self._settled(self._laws[0], reading, self._known.get(self._laws[0]), progress)
+        fit, doubtful = self._believed(fit, progress)
+        fits = [fit]
+        for law in self._laws[1:]:
+            near = self._known.get(law) or fit
+            fits.append(self._settled(law, fit.reading, near, progress))
+        for fit in fits:
+            self._known.setdefault(fit.law, fit)
+        fits.sort(key=lambda fit: -fit.log_evidence)
+        logs = np.array([fit.log_evidence for fit in fits])
+        weights = np.exp(logs - logs.max())
+        return Identified(fits, weights / weights.sum(), doubtful)
+
+    def _settled(self, law: LawName, reading: Reading, near: Fit | None, progress: Progress) -> Fit:
+        """A fit; where it explains little, the best of several that start at other places of the contact."""
+        best = self._fit(law, reading, near, progress)
+        if best.estimate.inflation < UNEXPLAINED or "position" not in self._names:
+            return best
+        for away in AWAY if near is None else ():
+            start = np.zeros(len(self._names))
+            start[self._names.index("position")] = away
+            other = self._fit(law, reading, None, progress, start)
+            best = max(best, other, key=lambda fit: fit.log_evidence)
+        return best
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        return self.models[self._laws[0]].unknowns.names
+
+    def _fit(
+        self,
+        law: LawName,
+        reading: Reading,
+        near: Fit | None,
+        progress: Progress,
+        start: FloatArray | None = None,
+    ) -> Fit:
+        model = self.models[law]
+        markers = MarkerModel.of(model.body, model.unknowns, reading.misfit)
+        same = near is not None and near.law == law
+        model.restart(near.response if near is not None and same else None)
+
+        def predict(values: FloatArray) -> Prediction | None:
+            force = np.linalg.norm(model.unknowns.hypothesis(values).force)
+            progress(0.5, f"{law}: force {force:.4g} N/mm")
+            found = model.response(values)
+            return None if found is None else reading.predicted(markers, found)
+
+        start = near.estimate.z if near is not None else start
+        found = estimate(predict, reading.observed, reading.noise, self.parameters, start)
+        response = model.response(found.values, EXACT)
+        exact = response is not None
+        if response is None:
+            response = model.response(found.values)
+        if response is None:
+            raise UserError(
+                f"no equilibrium of the {law} law was found near the markers; take a smaller prior"
+            )
+        return Fit(law, found, response, markers, reading, exact)
+
+    def _believed(self, fit: Fit, progress: Progress) -> tuple[Fit, dict[int, FloatArray]]:
+        """The fit without markers that contradict the others, and by how much they are off, mm."""
+        doubtful: dict[int, FloatArray] = {}
+        most = int(MOST_DOUBTFUL * len(fit.reading.kept))
+        while fit.estimate.inflation > 1 and len(doubtful) < most:
+            count = len(fit.reading.kept)
+            drops = [_drop(fit.estimate, marker) for marker in range(count)]
+            worst = int(np.argmax(drops))
+            if drops[worst] < DOUBTFUL:
+                break
+            reading = fit.reading.without(worst)
+            without = self._settled(fit.law, reading, fit, progress)
+            if without.estimate.inflation * CLEARER > fit.estimate.inflation:
+                break
+            doubtful[int(fit.reading.kept[worst])] = self._missed(without, fit.reading, worst)
+            fit = without
+        return fit, doubtful
+
+    def _missed(self, fit: Fit, reading: Reading, marker: int) -> FloatArray:
+        """Computed by a fit without it minus observed displacement of a marker, shape (2,), mm."""
+        model = self.models[fit.law]
+        values, _ = MarkerModel.of(model.body, model.unknowns, reading.misfit).predicted(fit.response)
+        return np.asarray(values.reshape(-1, 2)[marker] - reading.misfit.observed[marker])
+
+
+def _drop(found: Estimate, marker: int) -> float:
+    """Drop of the misfit without a marker, to first order, in squared standard deviations."""
+    rows = np.array([2 * marker, 2 * marker + 1])
+    return float(found.residuals[rows] @ found.left_out(rows)) * found.inflation**2

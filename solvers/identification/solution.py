@@ -1,0 +1,105 @@
+"""The solution of a solver that identifies contact, walls and law, from its fits."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from solvers.assimilation.misfit import leave_one_out_displacements
+from solvers.identification.field import STEP, IdentifiedField, Member, Snapshot
+from solvers.identification.hypothesis import Unknowns
+from solvers.identification.identifier import PROBABLE, Fit, Identified, Identifier
+from solvers.identification.summary import identified_sentence, identified_stats, standard_errors
+from solvers.problem import Problem
+from solvers.solution import Solution, Status
+
+
+def identified_solution(
+    name: str,
+    problem: Problem,
+    identifier: Identifier,
+    found: Identified,
+    stats: Mapping[str, float | int | str],
+) -> Solution:
+    """The solution of the most probable law, with deviations that the others widen.
+
+    Args:
+        name: The solver's name.
+        problem: As it was given, with its observations.
+        identifier: Holds the bodies.
+        found: The fits.
+        stats: Columns of the solution's `stats` beside those of the identification.
+    """
+    best = found.best
+    model = identifier.models[best.law]
+    hypothesis = best.response.hypothesis
+    missed, left_out = residuals_by_marker(found)
+    return Solution(
+        solver=name,
+        problem=_with_values(best.markers.unknowns, best.response.values, problem),
+        field=IdentifiedField(
+            [
+                _member(identifier, fit, float(probability), problem)
+                for fit, probability in zip(found.fits, found.probabilities, strict=True)
+                if fit is best or probability >= PROBABLE
+            ]
+        ),
+        energy=model.body.energy(best.response.state, hypothesis.lame, hypothesis.changes),
+        reaction=hypothesis.force,
+        status=Status(best.estimate.converged and best.exact, identified_sentence(found, missed)),
+        stats={**stats, **identified_stats(found)},
+        left_out=leave_one_out_displacements(problem, left_out),
+    )
+
+
+def residuals_by_marker(found: Identified) -> tuple[FloatArray, FloatArray]:
+    """Misfit of the markers that were believed, and left-out residuals of all that were seen, (m, 2), mm.
+
+    The first is computed minus observed; the second observed minus predicted without the marker, to first
+    order for those that were believed.
+    """
+    best, estimate = found.best, found.best.estimate
+    scale = estimate.inflation * best.reading.noise
+    count = 2 * len(best.reading.kept)
+    missed = (estimate.residuals * scale)[:count].reshape(-1, 2)
+    left_out = np.zeros((len(best.reading.kept) + len(found.doubtful), 2))
+    for place, marker in enumerate(best.reading.kept):
+        rows = np.array([2 * place, 2 * place + 1])
+        left_out[marker] = -estimate.left_out(rows) * scale[rows]
+    for marker, off in found.doubtful.items():
+        left_out[marker] = -off
+    return missed, left_out
+
+
+def _member(identifier: Identifier, fit: Fit, probability: float, problem: Problem) -> Member:
+    """The finger of a fit and its neighbours by a step of each independent standard error."""
+    response, model, unknowns = fit.response, identifier.models[fit.law], fit.markers.unknowns
+
+    def snapshot(error: FloatArray) -> Snapshot:
+        """The finger with values that differ by (p,), to first order."""
+        values = response.values + error
+        shifts, turns = response.motion_slopes
+        motion = replace(
+            response.motion,
+            shift=response.motion.shift + error @ shifts,
+            turn=response.motion.turn + float(error @ turns),
+        )
+        return Snapshot(
+            problem=_with_values(unknowns, values, problem),
+            walls=unknowns.motion,
+            changes=unknowns.hypothesis(values).changes,
+            clamp=motion,
+            drawn=model.body.field(response.state + np.tensordot(error, response.slopes, axes=1)),
+        )
+
+    errors = STEP * standard_errors(fit.estimate)
+    still = np.zeros(len(response.values))
+    steps = [snapshot(error) for error in errors.T]
+    return Member(probability, snapshot(still), steps, response, model)
+
+
+def _with_values(unknowns: Unknowns, values: FloatArray, problem: Problem) -> Problem:
+    """The problem with the law and the moduli that were found."""
+    own = unknowns.material(values)
+    return replace(problem, material=own)

@@ -1,0 +1,83 @@
+"""The identified finger at another load.
+
+Walls, law and clamp stay. The contact keeps its distance from the drawn place, its width and the direction of
+its force. The stroke is not trusted, but its share is: the contact's displacement into the finger is that of
+the fit times the ratio of the two loads' displacements.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from solvers.identification.field import IdentifiedField, Snapshot
+from solvers.identification.response import EXACT, Response, ResponseModel
+from solvers.problem import Problem, contact_ends
+from solvers.solution import Solution
+
+ITERATIONS, TOLERANCE = 12, 1e-5
+"""Newton steps for the size of the force, and the missed displacement of the contact that ends them, mm."""
+FORCES = ("normal_force", "tangential_force")
+
+
+def transferred(solution: Solution, problem: Problem, other: Problem) -> Solution:
+    """The solution of another problem with the finger of a solution.
+
+    Args:
+        solution: With an `IdentifiedField`.
+        problem: The problem that it solves.
+        other: The same finger under another load.
+
+    Raises:
+        UserError: If no equilibrium is found there.
+    """
+    if not isinstance(solution.field, IdentifiedField):
+        return replace(solution, problem=other)
+    member = solution.field.members[0]
+    share = float(np.linalg.norm(other.load.values) / np.linalg.norm(problem.load.values))
+    shift = float(np.mean(contact_ends(other)) - np.mean(contact_ends(problem)))
+    response = _response(member.model, member.response, share, shift)
+    hypothesis, found = response.hypothesis, member.found
+    return replace(
+        solution,
+        problem=replace(found.problem, load=other.load),
+        field=Snapshot(
+            problem=found.problem,
+            walls=found.walls,
+            changes=hypothesis.changes,
+            clamp=response.motion,
+            drawn=member.model.body.field(response.state),
+        ),
+        energy=member.model.body.energy(response.state, hypothesis.lame, hypothesis.changes),
+        reaction=hypothesis.force,
+        left_out=None,
+    )
+
+
+def _response(model: ResponseModel, start: Response, share: float, shift: float) -> Response:
+    """The response at a share of the contact's displacement, the contact shifted along x by mm."""
+    unknowns, into = model.unknowns, model.unknowns.directions[0]
+    target = share * float(start.contact @ into)
+    sizes = [unknowns.names.index(name) for name in FORCES if name in unknowns.names]
+    direction = np.zeros(len(unknowns.names))
+    direction[sizes] = start.values[sizes]
+    values = start.values - direction
+    if "position" in unknowns.names:
+        values[unknowns.names.index("position")] += shift
+    model.restart(start)
+    scale = share
+    for _ in range(ITERATIONS):
+        response = model.response(values + scale * direction, EXACT)
+        if response is None:
+            break
+        missed = target - float(response.contact @ into)
+        if abs(missed) < TOLERANCE:
+            return response
+        scale += missed / _slope(response, direction, into)
+    raise UserError("no equilibrium of the identified finger was found at the other load")
+
+
+def _slope(response: Response, direction: FloatArray, into: FloatArray) -> float:
+    """Displacement of the contact into the finger per change of the force along a direction, mm."""
+    return float(direction @ response.contact_slopes @ into)
