@@ -337,9 +337,11 @@ def test_the_guide_has_the_settings_of_assimilation_as_they_are(name, settings):
 
 
 def test_the_guide_has_every_parameter_that_can_be_found():
-    from solvers.fem.identification.parameters import MEANINGS
+    from solvers.fem.identification import linear_parameters
+    from solvers.identification import hypothesis
 
-    assert names(table(GUIDE, "parameter that can be found")) == list(MEANINGS)
+    assert names(table(GUIDE, "parameter that can be found")) == list(hypothesis.MEANINGS)
+    assert names(table(GUIDE, "parameter of the linear model")) == list(linear_parameters.MEANINGS)
 
 
 def test_the_guide_has_every_setting_of_the_other_presets_as_it_is():

@@ -147,9 +147,9 @@ BAD = [
     ("compare --device cuda", "--device cuda: none of the solvers fem,.*,statfem can choose a device"),
     ("compare --preset paper --device tpu", "pinn-std: device = 'tpu': input should be 'cpu' or 'cuda'"),
     ("solve fem --preset paper", "--preset paper: none of the solvers fem has it"),
-    ("compare --solvers fem,fem-id --load patch", "fem-id takes the loads mean, point, not 'patch'"),
-    ("compare --reference fem-id --load patch", "fem-id takes the loads mean, point, not 'patch'"),
-    ("compare --solver-set fem-id.prior=2 --load patch", "fem-id takes the loads mean, point, not 'patch'"),
+    ("compare --solvers fem --load cylinder", "fem takes the loads mean, point, patch, not 'cylinder'"),
+    ("compare --reference fem --load cylinder", "fem takes the loads mean, point, patch, not 'cylinder'"),
+    ("compare --solver-set fem.degree=1 --load cylinder", "fem takes the loads mean, point, patch, not 'cyl"),
     ("compare --load cylinder --plane stress", "statfem takes the loads mean"),  # none can
     (
         "compare --solvers gp --mesh-size 1 --quiet --measurements good.csv",
@@ -352,7 +352,7 @@ def test_a_design_with_many_changes_still_has_a_name():
 
 
 def test_without_names_a_solver_that_cannot_do_the_job_is_left_out(folder, capsys, monkeypatch):
-    """Two are known before anything is solved, and one once the markers are."""
+    """Two are known before anything is solved, for their law, and one once the markers are."""
     monkeypatch.setattr("compare.pipeline.draw_all", lambda *_: [])
     monkeypatch.setitem(JOBS, "", JobDefaults(solvers="gp,fem-id,fem,fem-nonlinear"))
     options = ["--load", "patch", "--plane", "stress", "--mesh-size", "1", "--measurements", "good.csv"]
@@ -360,13 +360,15 @@ def test_without_names_a_solver_that_cannot_do_the_job_is_left_out(folder, capsy
     output = capsys.readouterr()
     warnings = [line for line in output.err.splitlines() if line.startswith("warning: ")]
     assert len(warnings) == 3
-    assert warnings[0] == "warning: left out: fem-id (no load 'patch')"
+    assert warnings[0].startswith("warning: left out: fem-id (fem-id: the neo-hookean law is given")
     assert warnings[1].startswith("warning: left out: fem-nonlinear (fem-nonlinear: ")
     assert warnings[2].startswith("warning: left out: gp (gp goes through markers")
     assert not any(line.startswith("gp:") for line in output.err.splitlines())
     run = json.loads(Path("out/default/run.json").read_text())
     assert (list(run["solvers"]), list(run["left_out"])) == (["fem"], ["fem-id", "fem-nonlinear", "gp"])
-    assert "Left out: fem-id (no load &#39;patch&#39;)." in Path("out/default/report.html").read_text("utf-8")
+    assert "Left out: fem-id (fem-id: the neo-hookean law" in Path("out/default/report.html").read_text(
+        "utf-8"
+    )
 
 
 def test_the_complete_table_and_that_of_the_paper_are_solvers_that_exist():
