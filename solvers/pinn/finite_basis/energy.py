@@ -56,7 +56,6 @@ class NetworkEnergy:
         material: The elastic law.
         patches: The quadrature points; all arrays by points have the patches' order.
         weights: Of the points, shape (q,), mm^2.
-        order: Number of every point in the rule that was given, shape (q,).
         rows: First window of every pair that a patch has, shape (b,).
         columns: Second window, not before the first, shape (b,).
         origin: Displacement of zero energy; None for zero.
@@ -67,7 +66,6 @@ class NetworkEnergy:
     material: Material
     patches: list[QuadraturePatch]
     weights: torch.Tensor
-    order: IntArray
     rows: IntArray
     columns: IntArray
     origin: FiniteBasisField | None = None
@@ -99,7 +97,6 @@ class NetworkEnergy:
             material=material,
             patches=patches,
             weights=torch.from_numpy(weights[order]),
-            order=order,
             rows=known.numpy() // count,
             columns=known.numpy() % count,
             kept={} if keep else None,
@@ -108,7 +105,7 @@ class NetworkEnergy:
     @property
     def points(self) -> int:
         """Number of quadrature points, q."""
-        return len(self.order)
+        return len(self.weights)
 
     def total(self, output: torch.Tensor) -> float:
         """The energy per depth of an output layer (c, 2, m + 1), N mm / mm."""
@@ -138,16 +135,16 @@ class NetworkEnergy:
 
             for rows, here in imap_in_threads(task, range(len(self.patches))):
                 found[:, rows] = here
-        if self.origin is not None:
-            origin = self.origin
+        return found if self.origin is None else found - self.gradients_of(self.origin)
 
-            def minus(patch: QuadraturePatch) -> None:
-                (near,) = origin.basis.windows.near(boxes_around([patch.points]))
-                found[:, patch.rows] -= origin.gradient_of_patch(patch.points, near)
+    def gradients_of(self, field: FiniteBasisField) -> torch.Tensor:
+        """Displacement gradients of another network at the points, shape (q, 2, 2)."""
 
-            for _ in imap_in_threads(minus, self.patches):
-                pass
-        return found
+        def task(patch: QuadraturePatch) -> torch.Tensor:
+            (near,) = field.basis.windows.near(boxes_around([patch.points]))
+            return field.gradient_of_patch(patch.points, near)
+
+        return torch.cat(list(imap_in_threads(task, self.patches)))
 
     def forces(self, stresses: torch.Tensor) -> torch.Tensor:
         """Forces (s, c, 2, m + 1), N/mm, of Piola-Kirchhoff stresses P at the points, (s, q, 2, 2), MPa."""

@@ -109,6 +109,15 @@ class FiniteBasis:
             found.index_add_(1, near, torch.einsum("kn,nuw->kwu", of_patch, self.values(place, near)))
         return np.asarray(found)
 
+    def gradient_functionals(self, points: FloatArray, weights: FloatArray) -> FloatArray:
+        """Sums of weights (k, n, 2) times the functions' derivatives at points (n, 2), mm: (k, c, m + 1)."""
+        found = torch.zeros(len(weights), self.windows.count, self.per_window, dtype=torch.float64)
+        for patch, place, near in self.patches(points):
+            of_patch = torch.from_numpy(weights[:, patch])
+            along = self.gradients(place, near)
+            found.index_add_(1, near, torch.einsum("knx,xnwu->kwu", of_patch, along))
+        return np.asarray(found)
+
     def _unwindowed(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
         """One and the neurons without window and constraint, (n, m + 1, w)."""
         function = points.new_ones(len(points), self.per_window, len(near))

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from typing import Any
+from weakref import finalize
 
 import numpy as np
 from petsc4py import PETSc
@@ -81,7 +82,7 @@ class BlockMatrix:
 
 @dataclass(frozen=True, eq=False)
 class Factors:
-    """Factors of a matrix in MUMPS; they must be closed, because petsc4py would keep them for ever.
+    """Factors of a matrix in MUMPS, freed by `close` or with this object: petsc4py would keep them for ever.
 
     Attributes:
         scale: One over the roots of the diagonal, shape (n b,).
@@ -91,15 +92,18 @@ class Factors:
     scale: FloatArray
     preconditioner: Any
 
+    def __post_init__(self) -> None:
+        finalize(self, self.preconditioner.destroy)
+
     def solve(self, right: FloatArray) -> FloatArray:
         """The solutions for right-hand sides, both of shape (r, n b)."""
         count, size = right.shape
         given, found = (PETSc.Mat().createDense((size, count), comm=PETSc.COMM_SELF) for _ in range(2))
-        for dense in (given, found):
-            dense.setUp()
-        given.getDenseArray()[:] = (right * self.scale).T
-        given.assemble()
         try:
+            for dense in (given, found):
+                dense.setUp()
+            given.getDenseArray()[:] = (right * self.scale).T
+            given.assemble()
             self.preconditioner.getFactorMatrix().matSolve(given, found)
             return np.asarray(found.getDenseArray().T * self.scale, dtype=np.float64)
         finally:

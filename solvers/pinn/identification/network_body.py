@@ -1,0 +1,265 @@
+"""A finger at finite strain by a finite-basis network, for the inverse problem.
+
+The body is drawn at X; its walls moved by W put the material at X + W(X). With M = (I + ∇W)^-1 the energy is
+
+    E = ∫ ψ(H M) det(I + ∇W) dX        H = ∇u by the drawn X
+
+so that the stress and the tangent conjugate to H are those of the law at G = H M, times det(I + ∇W) and an M
+for every derivative by X:
+
+    P_ij = det(I + ∇W) P(G)_im M_jm        A_ijkl = det(I + ∇W) A(G)_imkn M_jm M_ln
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import torch
+
+from geometry.arrays import FloatArray
+from geometry.mesh.wall_motion import WallMotion
+from solvers.elasticity import Lame, deformation_jacobian
+from solvers.pinn.finite_basis.constrained_network import REGULARISATION
+from solvers.pinn.finite_basis.energy import NetworkEnergy, energy_density, piola_stress_and_tangent
+from solvers.pinn.finite_basis.network import FiniteBasisField
+from solvers.pinn.finite_basis.solver import FiniteBasisSolver
+from solvers.pinn.finite_basis.sparse_cholesky import Factors
+from solvers.pinn.threading import pool
+from solvers.problem import Problem
+
+TOLERANCE = 1e-4
+"""Relative error of a solve in the energy norm, by which a Newton step shrinks what is left."""
+MOST_ITERATIONS = 10
+"""Iterations of conjugate gradients that cost less than factors of the tangent at hand."""
+TRIAL = 2
+"""Iterations after which their number is foreseen."""
+INDEPENDENT = (Lame(1.0, 0.0, 1.0), Lame(0.0, 1.0, 0.0))
+"""Both moduli, MPa, of which every law is a sum."""
+
+
+class WallMetric(NamedTuple):
+    """Change of the material's coordinates by moved walls, at the quadrature points.
+
+    Attributes:
+        inverse: M, shape (q, 2, 2).
+        volume: det(I + ∇W), shape (q,).
+    """
+
+    inverse: torch.Tensor
+    volume: torch.Tensor
+
+
+class NetworkLinearisation:
+    """A network's body about a state; see `solvers.identification.body`.
+
+    Args:
+        body: The body.
+        force: F, of the shape of a state, N/mm.
+        tangent: A at the quadrature points, shape (q, 2, 2, 2, 2), MPa.
+    """
+
+    def __init__(self, body: "NetworkBody", force: FloatArray, tangent: torch.Tensor) -> None:
+        self.force = force
+        self._body, self._tangent = body, tangent
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """K^-1 of generalised forces, shape (r, *shape)."""
+        return self._body.solved(self._tangent, right)
+
+
+class NetworkBody:
+    """A finger of one law, clamped at its base, as a network; see `solvers.identification.body`.
+
+    The factors of one tangent serve as the preconditioner of conjugate gradients for the tangents after it,
+    as long as these converge in a few iterations.
+
+    Args:
+        energy: The elastic energy of the drawn body.
+        walls: Gradients of the walls' motions at the quadrature points, shape (k, q, 2, 2), 1/mm.
+    """
+
+    def __init__(self, energy: NetworkEnergy, walls: FloatArray) -> None:
+        self._energy, self._walls = energy, torch.from_numpy(walls)
+        self._law = energy.material.law
+        self._factors: Factors | None = None
+        self.factorisations = 0
+
+    @classmethod
+    def of(
+        cls, solver: FiniteBasisSolver, problem: Problem, motion: WallMotion, scale: float = 1.0
+    ) -> "NetworkBody":
+        """The body by a refinement level of a solver.
+
+        Args:
+            solver: Its spacings and its windows are taken.
+            problem: The body, its law, and the load at whose place the windows are denser.
+            motion: Of the walls.
+            scale: Of the spacings.
+        """
+        energy = solver.level(problem, scale).energy
+        points = torch.cat([patch.points for patch in energy.patches]).numpy()
+        return cls(energy, motion.gradients()[:, problem.mesh.locate(points).cells])
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape (c, 2, m + 1) of a state: windows, components, functions of a window."""
+        basis = self._energy.basis
+        return basis.windows.count, 2, basis.per_window
+
+    def linearised(self, state: FloatArray, lame: Lame, changes: FloatArray) -> NetworkLinearisation | None:
+        """The force at a state and the tangent; None if a point is turned inside out."""
+        metric = self._metric(changes)
+        with pool():
+            gradient = self._gradient(state) @ metric.inverse
+            if not ((metric.volume > 0).all() and (deformation_jacobian(gradient) > 0).all()):
+                return None
+            stress, tangent = piola_stress_and_tangent(gradient, lame, self._law)
+            force = self._energy.forces(_pulled_back(stress, metric)[None])[0]
+        return NetworkLinearisation(self, force.numpy(), _tangent_pulled_back(tangent, metric))
+
+    def solved(self, tangent: torch.Tensor, right: FloatArray) -> FloatArray:
+        """Solutions for generalised forces (r, *shape) with the tangent A at the quadrature points."""
+        given = torch.from_numpy(np.ascontiguousarray(right))
+        with pool():
+            found = None if self._factors is None else self._iterated(self._factors, tangent, given)
+            if found is None:
+                factors = self._factorised(tangent)
+                found = _solved(factors, given)
+                found += _solved(factors, given - self._product(factors, tangent, found))
+        return np.asarray(found)
+
+    def force_slopes(
+        self, state: FloatArray, lame: Lame, changes: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of F by the k thicknesses, (k, *shape), and by λ and μ, (2, *shape), at fixed state.
+
+        By a thickness with the gradient V = ∇V_k of its motion, M' = -M V M, G' = -G V M, and the volume's
+        factor changes by its product with tr(M V).
+        """
+        metric = self._metric(changes)
+        with pool():
+            gradient = self._gradient(state) @ metric.inverse
+            stress, tangent = piola_stress_and_tangent(gradient, lame, self._law)
+            slopes = []
+            for wall in self._walls:
+                moved = metric.inverse @ wall
+                of_gradient = -gradient @ wall @ metric.inverse
+                change = torch.einsum("nijkl,nkl->nij", tangent, of_gradient)
+                change += moved.diagonal(dim1=1, dim2=2).sum(dim=1)[:, None, None] * stress
+                slopes.append(_pulled_back(change - stress @ metric.inverse.mT @ wall.mT, metric))
+            for moduli in INDEPENDENT:
+                part, _ = piola_stress_and_tangent(gradient, moduli, self._law)
+                slopes.append(_pulled_back(part, metric))
+            found = self._energy.forces(torch.stack(slopes)).numpy()
+        return found[:-2], found[-2:]
+
+    def displacement_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
+        """Rows (r, 2, *shape) of the sums of weights (r, q) times the displacement at points (q, 2), mm."""
+        return self._both_components(self._energy.basis.functionals(points, weights))
+
+    def gradient_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
+        """Rows (r, 2, *shape) of Σ_qj w_rqj ∂u/∂X_j(P_q), with weights (r, q, 2), at points (q, 2), mm."""
+        return self._both_components(self._energy.basis.gradient_functionals(points, weights))
+
+    def energy(self, state: FloatArray, lame: Lame, changes: FloatArray) -> float:
+        """Elastic energy per depth, N mm / mm."""
+        metric = self._metric(changes)
+        with pool():
+            density = energy_density(self._gradient(state) @ metric.inverse, lame, self._law)
+        return float((self._energy.weights * metric.volume) @ density)
+
+    def field(self, state: FloatArray) -> FiniteBasisField:
+        """The displacement as a function of the drawn position."""
+        return FiniteBasisField(self._energy.basis, torch.from_numpy(state))
+
+    def projected(
+        self, other: "NetworkBody", state: FloatArray, lame: Lame, changes: FloatArray
+    ) -> FloatArray:
+        """The state nearest to another network's, in the energy norm of the tangent there.
+
+        Its factors are kept for the solves that follow.
+        """
+        metric = self._metric(changes)
+        with pool():
+            gradient = self._energy.gradients_of(other.field(state))
+            _, tangent = piola_stress_and_tangent(gradient @ metric.inverse, lame, self._law)
+            tangent = _tangent_pulled_back(tangent, metric)
+            stress = torch.einsum("nijkl,nkl->nij", tangent, gradient)
+            self._factorised(tangent)
+            found: FloatArray = self.solved(tangent, self._energy.forces(stress[None]).numpy())[0]
+        return found
+
+    def _both_components(self, rows: FloatArray) -> FloatArray:
+        found = np.zeros((len(rows), 2, *self.shape))
+        for axis in range(2):
+            found[:, axis, :, axis] = rows
+        return found
+
+    def _gradient(self, state: FloatArray) -> torch.Tensor:
+        return self._energy.gradients(torch.from_numpy(state)[None])[0]
+
+    def _metric(self, changes: FloatArray) -> WallMetric:
+        moved = torch.eye(2, dtype=torch.float64) + torch.einsum(
+            "k,knij->nij", torch.from_numpy(np.asarray(changes, dtype=np.float64)), self._walls
+        )
+        return WallMetric(torch.linalg.inv(moved), torch.linalg.det(moved))
+
+    def _factorised(self, tangent: torch.Tensor) -> Factors:
+        if self._factors is not None:
+            self._factors.close()
+        self._factors = self._energy.hessian(tangent).factorised(REGULARISATION, definite=False)
+        self.factorisations += 1
+        return self._factors
+
+    def _product(self, factors: Factors, tangent: torch.Tensor, states: torch.Tensor) -> torch.Tensor:
+        """The tangent's matrix, with the regularisation of factors, times states (r, *shape)."""
+        stresses = torch.einsum("nijkl,snkl->snij", tangent, self._energy.gradients(states))
+        diagonal = torch.from_numpy(1 / factors.scale**2).view(self.shape)
+        return self._energy.forces(stresses) + REGULARISATION * diagonal * states
+
+    def _iterated(self, factors: Factors, tangent: torch.Tensor, right: torch.Tensor) -> torch.Tensor | None:
+        """Solutions by conjugate gradients, preconditioned by the factors of another tangent.
+
+        Returns:
+            None if they need more than `MOST_ITERATIONS`, or the matrix is indefinite.
+        """
+        found, residual = torch.zeros_like(right), right.clone()
+        direction = steepest = _solved(factors, residual)
+        work = first = _dot(residual, steepest)
+        for iteration in range(1, MOST_ITERATIONS + 1):
+            if not (work.abs() > TOLERANCE**2 * first.abs()).any():
+                return found
+            product = self._product(factors, tangent, direction)
+            stiffness = _dot(direction, product)
+            if not ((stiffness >= 0).all() and (work >= 0).all()):
+                return None
+            step = torch.where(stiffness > 0, work / stiffness, 0.0)
+            found = found + step * direction
+            residual = residual - step * product
+            steepest = _solved(factors, residual)
+            before, work = work, _dot(residual, steepest)
+            rest = float((work.abs() / first.abs()).nan_to_num().max()) ** 0.5
+            foreseen = iteration * np.log(TOLERANCE) / np.log(rest) if 0 < rest < 1 else np.inf
+            if rest > 0 and iteration >= TRIAL and foreseen > MOST_ITERATIONS:
+                return None
+            direction = steepest + torch.where(before > 0, work / before, 0.0) * direction
+        return None
+
+
+def _pulled_back(stress: torch.Tensor, metric: WallMetric) -> torch.Tensor:
+    """P conjugate to H from the law's, both of shape (q, 2, 2), MPa."""
+    return metric.volume[:, None, None] * stress @ metric.inverse.mT
+
+
+def _tangent_pulled_back(tangent: torch.Tensor, metric: WallMetric) -> torch.Tensor:
+    """A conjugate to H from the law's, both of shape (q, 2, 2, 2, 2), MPa."""
+    found = torch.einsum("nimko,njm->nijko", tangent, metric.inverse)
+    return torch.einsum("nijko,nlo,n->nijkl", found, metric.inverse, metric.volume)
+
+
+def _dot(left: torch.Tensor, right: torch.Tensor) -> torch.Tensor:
+    """Products of the states of two lists (r, *shape), shape (r, 1, 1, 1)."""
+    return (left * right).sum(dim=(1, 2, 3), keepdim=True)
+
+
+def _solved(factors: Factors, right: torch.Tensor) -> torch.Tensor:
+    return torch.from_numpy(factors.solve(right.flatten(1).numpy())).view_as(right)

@@ -1,0 +1,178 @@
+"""The network's body of the inverse problem: its derivatives by differences, its rows by its field."""
+
+import numpy as np
+import pytest
+
+from geometry.cache import finger_mesh
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from geometry.mesh.wall_motion import WallMotion
+from solvers.elasticity import lame_constants
+from solvers.pinn.finite_basis.standard import PinnStdSolver
+from solvers.pinn.identification import network_body
+from solvers.pinn.identification.network_body import NetworkBody
+from solvers.problem import Material, Problem
+
+COARSE = PinnStdSolver(wall_spacing=1.0, corner_spacing=0.2, neurons=4)
+LAME = lame_constants(11.4, 0.4, "strain")
+LAWS = ("neo-hookean", "st-venant-kirchhoff")
+STEP = 1e-5
+"""Of central differences: their error is about 1e-10 of a third derivative, and 1e-11 of rounding."""
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    """A short finger with one rib."""
+    design = Design(height=50, rib_count=1, tip_length=12, contact_position=20)
+    return finger_mesh(design, settings=MeshSettings(size=1.0))
+
+
+@pytest.fixture(scope="module")
+def motion(mesh):
+    return WallMotion.of(mesh)
+
+
+def body_of(mesh, motion, law="neo-hookean", scale=1.0) -> NetworkBody:
+    return NetworkBody.of(COARSE, Problem(mesh, Material(law=law)), motion, scale)
+
+
+@pytest.fixture(scope="module", params=LAWS)
+def body(request, mesh, motion) -> NetworkBody:
+    return body_of(mesh, motion, request.param)
+
+
+@pytest.fixture(scope="module")
+def state(mesh, motion):
+    """Near equilibrium of 0.2 N/mm at the last marker, by the neo-Hookean law with walls as drawn."""
+    return bent(body_of(mesh, motion), mesh, np.zeros(len(motion.names)))
+
+
+def pressed(body, mesh):
+    """Generalised force of one newton per mm down on the front, shape `body.shape`."""
+    return body.displacement_rows(np.array([[mesh.markers[:, 0].max(), 0.0]]), np.array([[-1.0]]))[0, 1]
+
+
+def bent(body, mesh, changes, force=0.2):
+    found = np.zeros(body.shape)
+    for _ in range(5):
+        linearised = body.linearised(found, LAME, changes)
+        found = found + linearised.solve((force * pressed(body, mesh) - linearised.force)[None])[0]
+    return found
+
+
+@pytest.fixture(scope="module")
+def changes(motion):
+    return 0.1 * np.array([1.0, -1.0, 0.5, 0.8])[: len(motion.names)]
+
+
+def direction_at(body, state, seed=0):
+    return np.random.default_rng(seed).normal(size=body.shape) * np.abs(state).mean()
+
+
+def test_the_force_is_the_slope_of_the_energy(body, state, changes):
+    """In a direction as large as the state, to four digits more than its curvature would change it."""
+    direction = direction_at(body, state)
+    ahead, behind = (body.energy(state + sign * STEP * direction, LAME, changes) for sign in (1, -1))
+    force = body.linearised(state, LAME, changes).force
+    assert (force * direction).sum() == pytest.approx((ahead - behind) / (2 * STEP), rel=1e-5)
+
+
+def test_a_solve_inverts_the_slope_of_the_force(body, mesh, state, changes):
+    """The works of what is left are below those of the forces by about the tolerance of a solve."""
+    right = np.stack([pressed(body, mesh), body.force_slopes(state, LAME, changes)[1][0]])
+    found = body.linearised(state, LAME, changes).solve(right)
+    size = np.sqrt((found * right).sum(axis=(1, 2, 3)))
+    for one, given, own in zip(found, right, size, strict=True):
+        ahead, behind = (body.linearised(state + sign * STEP * one, LAME, changes).force for sign in (1, -1))
+        left = (ahead - behind) / (2 * STEP) - given
+        np.testing.assert_array_less(np.abs((found * left).sum(axis=(1, 2, 3))), 3e-4 * own * size)
+
+
+def test_old_factors_lead_to_the_solution_for_a_new_tangent(body, mesh, state, changes):
+    """Conjugate gradients from the tangent of other walls end within their tolerance of new factors."""
+    right = pressed(body, mesh)[None]
+    body.linearised(state, LAME, changes).solve(right)
+    before = body.factorisations
+    near = body.linearised(1.02 * state, LAME, 0.9 * changes)
+    found = near.solve(right)
+    assert body.factorisations == before
+    exact = body.linearised(1.02 * state, LAME, 0.9 * changes)
+    body._factors = None
+    expected = exact.solve(right)
+    assert body.factorisations == before + 1
+    assert (found * right).sum() == pytest.approx((expected * right).sum(), rel=1e-5)
+
+
+def test_factors_from_far_away_are_replaced(body, mesh, state, changes):
+    right = pressed(body, mesh)[None]
+    body.linearised(0 * state, LAME, changes).solve(right)
+    before = body.factorisations
+    body.linearised(state, LAME, changes).solve(right)
+    assert body.factorisations == before + 1
+
+
+def test_slopes_by_walls_and_moduli_are_those_of_differences(body, state, changes):
+    walls, moduli = body.force_slopes(state, LAME, changes)
+
+    def force(lame, moved):
+        return body.linearised(state, lame, moved).force
+
+    for found, one in zip(walls, np.eye(len(changes)), strict=True):
+        expected = (force(LAME, changes + STEP * one) - force(LAME, changes - STEP * one)) / (2 * STEP)
+        np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
+    for found, name in zip(moduli, ("λ", "μ"), strict=True):
+        step = 1e-4 * getattr(LAME, name)
+        ahead, behind = (
+            force(LAME._replace(**{name: getattr(LAME, name) + sign * step}), changes) for sign in (1, -1)
+        )
+        expected = (ahead - behind) / (2 * step)
+        np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_rows_give_sums_of_displacements_and_gradients(body, mesh, state):
+    location = mesh.locate(mesh.markers)
+    rng = np.random.default_rng(0)
+    weights = rng.normal(size=(3, len(location.points), 2))
+    field = body.field(state)
+    found = np.tensordot(body.displacement_rows(location.points, weights[..., 0]), state, axes=3)
+    np.testing.assert_allclose(found, weights[..., 0] @ field.displacement(location), rtol=1e-9)
+    found = np.tensordot(body.gradient_rows(location.points, weights), state, axes=3)
+    np.testing.assert_allclose(found, np.einsum("rqj,qaj->ra", weights, field.gradient(location)), rtol=1e-9)
+
+
+def test_a_stretched_body_without_moved_material_has_the_energy_of_its_own_gradient(
+    body, mesh, motion, state
+):
+    """With the motion W = 0.1 (X, 0) of an invented wall, G = H diag(1 / 1.1, 1) and 1.1 of the volume."""
+    count = body._energy.points
+    stretch = np.zeros((1, count, 2, 2))
+    stretch[..., 0, 0] = 1.0
+    moved = NetworkBody(body._energy, stretch)
+    gradient = body._energy.gradients(network_body.torch.from_numpy(state)[None])[0].clone()
+    gradient[:, :, 0] /= 1.1
+    density = network_body.energy_density(gradient, LAME, body._law)
+    expected = 1.1 * float(body._energy.weights @ density)
+    assert moved.energy(state, LAME, np.array([0.1])) == pytest.approx(expected, rel=1e-12)
+
+
+def test_walls_that_overlap_are_inside_out(body, state, changes):
+    assert body.linearised(state, LAME, 100 + 0 * changes) is None
+    assert body.linearised(-1e3 * state, LAME, changes) is None
+
+
+def test_thinner_walls_bend_more(mesh, motion, state):
+    body = body_of(mesh, motion)
+    thinner = bent(body, mesh, np.full(len(motion.names), -0.2))
+    down = pressed(body, mesh)
+    assert (down * thinner).sum() > 1.1 * (down * state).sum() > 0
+
+
+def test_a_state_is_carried_to_a_finer_network(mesh, motion, state):
+    """The finer network's functions include nothing of the coarser's; both are within 2 % of each other."""
+    coarse, fine = body_of(mesh, motion), body_of(mesh, motion, scale=0.8)
+    changes = np.zeros(len(motion.names))
+    found = fine.projected(coarse, state, LAME, changes)
+    there = mesh.at_nodes()
+    expected = coarse.field(state).displacement(there)
+    error = np.linalg.norm(fine.field(found).displacement(there) - expected)
+    assert error < 0.02 * np.linalg.norm(expected)
