@@ -88,6 +88,7 @@ def cross_validate(study: Study, stages: Stages | None = None) -> CrossvalResult
                 case: LayoutResult.of(seeds[0][0], folds[case], results[case], failed[case])
                 for case, seeds in observations.items()
             },
+            {case.truth: TrueField.load(paths[0]).contact for case, paths in files.items()},
         )
         provenance = {**definition, "problem_sha256": problem.digest, **stages.record()}
         with stages.stage("report"):

@@ -1,7 +1,7 @@
 """The scores of a finished cross-validation."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from math import isnan, nan
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -18,7 +18,7 @@ from compare.crossval.scores import (
     score,
 )
 from compare.crossval.study import SolverVariant, Study
-from compare.crossval.true_fields import FINER
+from compare.crossval.true_fields import FINER, TrueContact
 from compare.runtime.tables import Cell
 from geometry.observations import Observations
 from solvers.assimilation.misfit import assimilates
@@ -186,10 +186,12 @@ class CrossvalResult:
     Attributes:
         study: The study.
         cases: The scores by truth and layout of the markers; of `MEASURED` alone with measured markers.
+        true_contacts: Force and place of the contact of each truth at the full load.
     """
 
     study: Study
     cases: Mapping[Case, LayoutResult]
+    true_contacts: Mapping[str, TrueContact] = field(default_factory=dict)
 
     @property
     def truths(self) -> list[str]:
@@ -268,10 +270,11 @@ class CrossvalResult:
             "schemes": {scheme: SCHEMES[scheme] for scheme in self.schemes},
             "truths": {
                 truth: {
+                    "contact": self.true_contacts[truth].cells if truth in self.true_contacts else None,
                     "layouts": {
                         layout: each.content(self.study.variants)
                         for layout, each in self.of_truth(truth).items()
-                    }
+                    },
                 }
                 for truth in self.truths
             },

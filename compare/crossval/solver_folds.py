@@ -163,12 +163,13 @@ class FoldRunner:
     def _against_truth(self, solution: Solution, sampled: SampledField) -> dict[str, Any]:
         """Force, place of the contact and stated intervals against the truth at the full load."""
         truth, stats = self._truths[0], solution.stats
+        contact = truth.contact
         found: dict[str, Any] = {}
         if np.isfinite(solution.reaction).all():
-            found["force"] = float(np.linalg.norm(solution.reaction)) / truth.force - 1
+            found["force"] = float(np.linalg.norm(solution.reaction)) / contact.force - 1
         if "position" in stats:
-            found["position"] = float(stats["position"]) - truth.middle
-        for name, value in (("force", truth.force), ("position", truth.middle)):
+            found["position"] = float(stats["position"]) - contact.middle
+        for name, value in (("force", contact.force), ("position", contact.middle)):
             if f"{name}_low" in stats:
                 low, high = (float(stats[f"{name}_{end}"]) for end in ("low", "high"))
                 found[f"{name}_within"] = low <= value <= high

@@ -5,6 +5,7 @@ from math import isnan
 from pathlib import Path
 
 from rich.table import Table
+from rich.text import Text
 
 from compare.crossval.folds import ALL, SCHEMES, SeedResults
 from compare.crossval.grid import Grid
@@ -53,13 +54,15 @@ def grids(result: CrossvalResult) -> list[Grid]:
     return [*truth_grids(result), *markers, *([_field_grid(result)] if result.has_fields else [])]
 
 
-def tables(result: CrossvalResult) -> list[Table]:
-    """The tables of `grids` for the terminal; with several truths those of solvers by truths alone."""
+def tables(result: CrossvalResult) -> list[Table | Text]:
+    """The tables of `grids` and their captions; with several truths those of solvers by truths alone."""
     left = ("solver", "held out", "truth", "layout")
-    return [
-        terminal_table(grid.title, grid.headings, grid.rows, caption=grid.caption, left=left, narrow=True)
-        for grid in (truth_grids(result) if len(result.truths) > 1 else grids(result))
-    ]
+    shown: list[Table | Text] = []
+    for grid in truth_grids(result) if len(result.truths) > 1 else grids(result):
+        shown.append(terminal_table(grid.title, grid.headings, grid.rows, left=left, narrow=True))
+        if grid.caption:  # apart from the table, which may be much narrower than the terminal
+            shown.append(Text(f"{grid.caption}\n", style="table.caption"))
+    return shown
 
 
 def write_tables(

@@ -12,6 +12,7 @@ from compare.evaluation.differences import field_difference
 from compare.evaluation.truths import Truth
 from compare.evaluation.virtual_experiment import SOURCES, simulate
 from compare.runtime.provenance import package_versions, sources_digest
+from compare.runtime.tables import Cell
 from geometry.arrays import FloatArray
 from geometry.atomic import atomic_path
 from geometry.cache import cache_folder, finger_mesh
@@ -143,19 +144,19 @@ def _shifts(mesh: TriangleMesh, location: LocatedPoints, changes: Mapping[str, f
     return motion.shifts(location, np.array([changes.get(name, 0.0) for name in motion.names]))
 
 
-@dataclass(frozen=True, eq=False)
-class TrueField:
-    """A true field with the force and the place of its contact.
+@dataclass(frozen=True)
+class TrueContact:
+    """Force and place of a truth's contact.
 
     Attributes:
-        sampled: The field at the points of the shared mesh, moved with the walls.
-        reaction: Force of the indenter on the finger, shape (2,), N/mm.
-        contact: Middle and width of the contact before the load, along x, shape (2,), mm.
+        reaction: Force of the indenter on the finger, N/mm.
+        middle: Abscissa of the contact's middle before the load, mm.
+        width: Extent of the contact along x before the load, mm.
     """
 
-    sampled: SampledField
-    reaction: FloatArray
-    contact: FloatArray
+    reaction: tuple[float, float]
+    middle: float
+    width: float
 
     @property
     def force(self) -> float:
@@ -163,22 +164,40 @@ class TrueField:
         return float(np.linalg.norm(self.reaction))
 
     @property
-    def middle(self) -> float:
-        """Abscissa of the contact's middle, mm."""
-        return float(self.contact[0])
+    def cells(self) -> dict[str, Cell]:
+        """Columns of a CSV file, and an entry of `crossval.json`."""
+        return {
+            "true_force_N_mm": self.force,
+            "true_position_mm": self.middle,
+            "true_contact_width_mm": self.width,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class TrueField:
+    """A true field with its contact.
+
+    Attributes:
+        sampled: The field at the points of the shared mesh, moved with the walls.
+        contact: Force and place.
+    """
+
+    sampled: SampledField
+    contact: TrueContact
 
     @classmethod
     def load(cls, path: Path) -> "TrueField":
         """Read the file that `save` wrote."""
         with np.load(path) as archive:
             content = dict(archive)
-        reaction, contact = content.pop("reaction"), content.pop("contact")
-        return cls(SampledField(**content), reaction, contact)
+        (u, v), middle, width = (content.pop(name) for name in ("reaction", "middle", "width"))
+        contact = TrueContact((float(u), float(v)), float(middle), float(width))
+        return cls(SampledField(**content), contact)
 
     def save(self, path: Path) -> None:
         """Write atomically."""
         with atomic_path(path) as partial:
-            np.savez(partial, **vars(self.sampled), reaction=self.reaction, contact=self.contact)
+            np.savez(partial, **vars(self.sampled), **vars(self.contact))
 
 
 @dataclass(frozen=True)
@@ -233,15 +252,16 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Pa
     for layout in missing:
         sampler = FieldSampler.of(shared, markers[layout], design.marker_radius)
         sampled = sampler.of_solution(solution, shared, truth.changes(drawn))
-        TrueField(sampled, solution.reaction, contact).save(files[layout])
+        TrueField(sampled, contact).save(files[layout])
     return files
 
 
-def _contact(solution: Solution) -> FloatArray:
-    """Middle and width of a truth's contact before the load, along x, shape (2,), mm."""
+def _contact(solution: Solution) -> TrueContact:
+    """Force and place of the contact in a simulation."""
     start, end = contact_ends(solution.problem)
     if solution.problem.load.kind == "cylinder":
         if "contact_start_mm" not in solution.stats:
             raise UserError(f"the virtual experiment: {solution.status.message}")
         start, end = (float(solution.stats[f"contact_{name}_mm"]) for name in ("start", "end"))
-    return np.array([0.5 * (start + end), end - start])
+    u, v = solution.reaction.tolist()
+    return TrueContact((u, v), 0.5 * (start + end), end - start)

@@ -57,7 +57,8 @@ def truth_rows(result: CrossvalResult) -> list[dict[str, Cell]]:
     for case, each in result.cases.items():
         for label, scores in each.scores.items():
             row: dict[str, Cell] = {**case.cells, "solver": label, "scheme": scheme}
-            full = scores[ALL]
+            full, true = scores[ALL], result.true_contacts.get(case.truth)
+            row |= {} if true is None else true.cells
             row |= interval_cells("held_out_mae_sum", "_mm", scores[scheme].held_out.get("mae_sum"))
             row |= interval_cells("von_mises_rel_l2", "", full.fields.get("von_mises"))
             row |= interval_cells("force_error", "", full.force)
@@ -100,10 +101,12 @@ def _judged(scheme: str) -> dict[str, tuple[str, str]]:
 
 
 def _grouped(verdicts: Mapping[str, Sequence[str]], truths: int) -> str:
-    """Verdicts with their truths in words."""
-    if len(verdicts) == 1 and len(next(iter(verdicts.values()))) == truths:
-        return f"{next(iter(verdicts))} with every truth"
-    return ", ".join(f"{verdict} with {' '.join(names)}" for verdict, names in verdicts.items())
+    """Verdicts with their truths in words, the most frequent one last if every truth has a verdict."""
+    ordered = sorted(verdicts.items(), key=lambda item: len(item[1]))
+    named = {verdict: f"with {' '.join(names)}" for verdict, names in ordered}
+    if sum(map(len, verdicts.values())) == truths:
+        named[ordered[-1][0]] = "with the others" if len(ordered) > 1 else "with every truth"
+    return ", ".join(f"{verdict} {names}" for verdict, names in named.items())
 
 
 def _labels(by_truth: Mapping[str, LayoutResult]) -> list[str]:

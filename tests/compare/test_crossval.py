@@ -34,8 +34,8 @@ from compare.crossval.result import Case, CrossvalResult, LayoutResult
 from compare.crossval.scores import Difference, Interval, difference, of_scheme, score
 from compare.crossval.solver_folds import SolverTask, run_folds
 from compare.crossval.study import EVERY_TRUTH, MEASURED, SolverVariant, Study, solver_variants
-from compare.crossval.true_fields import FieldSampler, TrueField
-from compare.crossval.truth_summary import truth_grids
+from compare.crossval.true_fields import FieldSampler, TrueContact, TrueField
+from compare.crossval.truth_summary import truth_grids, verdict_sentences
 from compare.crossval.weight_sweep import sweep_weights
 from compare.evaluation.truths import TRUTHS
 from compare.runtime.tables import terminal_table
@@ -87,7 +87,8 @@ def task(
     sampled = FieldSampler.of(coarse_mesh, coarse_mesh.markers, 0.8).of_solution(truth, coarse_mesh)
     paths = [tmp_path / f"truth-{share}.npz" for share in (1.0, 0.5)]
     for path, share in zip(paths, (1.0, 0.5), strict=True):
-        TrueField(sampled * share, share * truth.reaction, np.array([35.0, 2.0])).save(path)
+        u, v = (share * truth.reaction).tolist()
+        TrueField(sampled * share, TrueContact((u, v), 35.0, 2.0)).save(path)
     half = replace(observations, displacements=0.5 * observations.displacements)
     return SolverTask(
         study=Study(design=Design(), variants=[], out=tmp_path),
@@ -474,6 +475,8 @@ def test_solvers_are_judged_by_several_truths(tmp_path, capsys, in_line):
     assert content["schema"] == 3
     for truth, name in rows:
         each = content["truths"][truth]["layouts"]["joints"]
+        contact = content["truths"][truth]["contact"]
+        assert float(rows[truth, name]["true_force_N_mm"]) == contact["true_force_N_mm"]
         schemes = each["solvers"][name]["schemes"]
         mean = schemes[ONE]["held_out"]["mae_sum"]["mean"]
         assert float(rows[truth, name]["held_out_mae_sum_mm"]) == mean
@@ -496,6 +499,26 @@ def test_solvers_are_judged_by_several_truths(tmp_path, capsys, in_line):
     alone = json.loads((tmp_path / "out" / "crossval.json").read_text())["truths"]
     assert alone == {"base": content["truths"]["base"]}
     assert sorted(path.name for path in (tmp_path / "out").glob("*.png")) == ["fields.png", "held_out.png"]
+
+
+def test_verdicts_are_said_once_for_all_truths_that_share_them():
+    def result(stress: float, force: float | None) -> LayoutResult:
+        found = {
+            "von_mises": Difference(stress, stress - 0.1, stress + 0.1),
+            **({} if force is None else {"force": Difference(force, force - 0.1, force + 0.1)}),
+        }
+        own = {"fem": {"gp": {ALL: found}}}
+        return LayoutResult("a test", 9, [], {"fem": {}, "gp": {}}, own, {})
+
+    by_truth = {"stvk": result(-1, -1), "print": result(-1, 0), "base": result(-1, -1)}
+    assert verdict_sentences(by_truth, ONE) == [
+        "fem against gp: better with every truth in von Mises stress; not told apart with print, better with "
+        "the others in force."
+    ]
+    by_truth["base"] = result(-1, None)
+    assert verdict_sentences(by_truth, ONE)[0].endswith(
+        "better with stvk, not told apart with print in force."
+    )
 
 
 def test_tables_of_many_truths_fit_a_terminal():

@@ -18,7 +18,7 @@ from geometry.finger.section import rib_axes
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.problem import Load, Material, Problem, contact_ends
+from solvers.problem import Load, Material, Problem
 from tests.fingers import beam
 
 FULL = LoadCase("full", Load(), 1.0, 35.0)
@@ -104,10 +104,8 @@ def test_the_sliding_truth_is_the_virtual_experiment_on_the_finer_mesh(study, co
     solution = simulate(problem)
     points = body_quadrature(coarse_mesh).location.points
     np.testing.assert_allclose(found.sampled.displacement, solution.displacement(points), atol=1e-12)
-    np.testing.assert_allclose(found.reaction, solution.reaction, atol=1e-12)
-    left, right = contact_ends(problem)
-    np.testing.assert_allclose(found.contact, [(left + right) / 2, right - left])
-    assert found.middle == pytest.approx(35.0)
+    np.testing.assert_allclose(found.contact.reaction, solution.reaction, atol=1e-12)
+    assert (found.contact.middle, found.contact.width) == pytest.approx((35.0, 2.0))  # as designed
 
 
 def test_fields_are_compared_at_points_that_move_with_the_walls(study, coarse_mesh):
@@ -132,15 +130,16 @@ def test_fields_are_compared_at_points_that_move_with_the_walls(study, coarse_me
 def test_a_cylinder_says_where_it_touches_and_is_kept_in_the_cache(study, monkeypatch):
     truth = TRUTHS["cylinder"]
     found = true_field(study, truth)
-    assert found.middle == pytest.approx(35.0, abs=1.0)  # within the contact, which rolls towards the tip
-    assert 1.0 < found.contact[1] < 3.0
-    assert found.force == pytest.approx(np.hypot(*found.reaction))
+    assert found.contact.middle == pytest.approx(
+        35.0, abs=1.0
+    )  # within the contact, which rolls towards the tip
+    assert 1.0 < found.contact.width < 3.0
 
     def again(*_: object) -> None:
         raise RuntimeError("simulated again")
 
     monkeypatch.setattr("compare.crossval.true_fields.simulate", again)
-    assert true_field(study, truth).force == found.force
+    assert true_field(study, truth).contact == found.contact
     half = replace(FULL, name="half", share=0.5)
     with pytest.raises(RuntimeError, match="simulated again"):
         true_field(study, truth, half)
@@ -150,5 +149,7 @@ def test_a_cylinder_says_where_it_touches_and_is_kept_in_the_cache(study, monkey
 @pytest.mark.parametrize("name", list(TRUTHS))
 def test_every_truth_comes_to_its_full_load(study, name):
     found = true_field(study, TRUTHS[name])
-    assert 0.1 < found.force < 2.0  # N/mm: thick or thin, sliding or not, the finger stays the same finger
+    assert (
+        0.1 < found.contact.force < 2.0
+    )  # N/mm: thick or thin, sliding or not, the finger stays the same finger
     assert np.isfinite(found.sampled.gradient).all()
