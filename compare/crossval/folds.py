@@ -76,11 +76,11 @@ class FoldResult:
         given: Whether it was given any markers.
         force: Magnitude of the reaction over that of the truth, less one; None without a truth, like the
             following, and None in schemes other than `ALL`.
-        position: Stated minus true abscissa of the contact's middle, mm; None if the solver states none.
+        position: Stated minus true abscissa at which the contact's force acts, mm; None if none is stated.
         von_mises_coverage: Share of the body whose true von Mises stress lies in the stated interval; None
             if the solver states none.
         force_within: Whether the magnitude of the true force lies in the stated interval; None likewise.
-        position_within: Whether the middle of the true contact lies in the stated interval; None likewise.
+        position_within: Whether the place of the true force lies in the stated interval; None likewise.
     """
 
     fold: Fold

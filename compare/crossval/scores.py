@@ -89,11 +89,11 @@ class Score:
         converged: Share of folds and seeds in which the solver converged.
         force: Magnitude of the reaction over that of the truth, less one; in the scheme `ALL` only, like the
             following, and None without a truth.
-        position: Stated minus true abscissa of the contact's middle, mm; None if the solver states none.
+        position: Stated minus true abscissa at which the contact's force acts, mm; None if none is stated.
         von_mises_coverage: Share of the body, weighted by area, whose true von Mises stress lies in the
             interval of `LEVEL` that the solver states; None if it states none.
         force_within: Share of seeds in which the true force lies in the stated interval; None likewise.
-        position_within: Share of seeds in which the true contact's middle does; None likewise.
+        position_within: Share of seeds in which the place of the true force does; None likewise.
     """
 
     in_sample: Mapping[str, Interval]

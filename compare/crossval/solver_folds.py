@@ -168,8 +168,8 @@ class FoldRunner:
         if np.isfinite(solution.reaction).all():
             found["force"] = float(np.linalg.norm(solution.reaction)) / contact.force - 1
         if "position" in stats:
-            found["position"] = float(stats["position"]) - contact.middle
-        for name, value in (("force", contact.force), ("position", contact.middle)):
+            found["position"] = float(stats["position"]) - contact.position
+        for name, value in (("force", contact.force), ("position", contact.position)):
             if f"{name}_low" in stats:
                 low, high = (float(stats[f"{name}_{end}"]) for end in ("low", "high"))
                 found[f"{name}_within"] = low <= value <= high

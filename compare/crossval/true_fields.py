@@ -119,7 +119,7 @@ class FieldSampler:
         if solution.problem.mesh is not mesh:  # a location belongs to its mesh
             discs = mesh.locate_on(solution.problem.mesh, discs.points)
         return SampledField(
-            markers=self.means @ solution.field.displacement(discs),
+            markers=self.means @ solution.displacement_in_space(discs),
             displacement=solution.field.displacement(inside),
             gradient=solution.field.gradient(inside),
         )
@@ -150,11 +150,13 @@ class TrueContact:
 
     Attributes:
         reaction: Force of the indenter on the finger, N/mm.
+        position: Abscissa before the load at which it acts, mm.
         middle: Abscissa of the contact's middle before the load, mm.
         width: Extent of the contact along x before the load, mm.
     """
 
     reaction: tuple[float, float]
+    position: float
     middle: float
     width: float
 
@@ -168,7 +170,8 @@ class TrueContact:
         """Columns of a CSV file, and an entry of `crossval.json`."""
         return {
             "true_force_N_mm": self.force,
-            "true_position_mm": self.middle,
+            "true_position_mm": self.position,
+            "true_contact_middle_mm": self.middle,
             "true_contact_width_mm": self.width,
         }
 
@@ -190,9 +193,9 @@ class TrueField:
         """Read the file that `save` wrote."""
         with np.load(path) as archive:
             content = dict(archive)
-        (u, v), middle, width = (content.pop(name) for name in ("reaction", "middle", "width"))
-        contact = TrueContact((float(u), float(v)), float(middle), float(width))
-        return cls(SampledField(**content), contact)
+        u, v = content.pop("reaction")
+        places = {name: float(content.pop(name)) for name in ("position", "middle", "width")}
+        return cls(SampledField(**content), TrueContact((float(u), float(v)), **places))
 
     def save(self, path: Path) -> None:
         """Write atomically."""
@@ -258,10 +261,10 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Pa
 
 def _contact(solution: Solution) -> TrueContact:
     """Force and place of the contact in a simulation."""
+    if "force_abscissa_mm" not in solution.stats:  # the cylinder has slipped off
+        raise UserError(f"the virtual experiment: {solution.status.message}")
     start, end = contact_ends(solution.problem)
     if solution.problem.load.kind == "cylinder":
-        if "contact_start_mm" not in solution.stats:
-            raise UserError(f"the virtual experiment: {solution.status.message}")
         start, end = (float(solution.stats[f"contact_{name}_mm"]) for name in ("start", "end"))
     u, v = solution.reaction.tolist()
-    return TrueContact((u, v), 0.5 * (start + end), end - start)
+    return TrueContact((u, v), float(solution.stats["force_abscissa_mm"]), 0.5 * (start + end), end - start)

@@ -160,10 +160,18 @@ def shared_sentence(study: Study, truth: Truth) -> str:
     """Law, walls and load that the solvers of a study share with a truth, in words."""
     stroke = -float(study.load.displacement[1] or 0.0)
     true, parts = truth.material(study.material), []
-    solvers = {variant.label: with_law(study.material, variant.make(0)) for variant in study.variants}
-    alike = [label for label, own in solvers.items() if (own.law, own.poisson) == (true.law, true.poisson)]
+    alike, found = [], []
+    for variant in study.variants:
+        solver = variant.make(0)
+        own = with_law(study.material, solver)
+        if variant.settings.get("law") == "evidence" and true.law in solver.laws:
+            found.append(variant.label)
+        elif (own.law, own.poisson) == (true.law, true.poisson):
+            alike.append(variant.label)
     if alike:
         parts.append(f"same law as {', '.join(alike)}")
+    if found:
+        parts.append(f"law among those of {', '.join(found)}")
     if truth.keeps_walls:
         parts.append("walls as drawn")
     if truth.load(stroke) == study.load:
@@ -193,6 +201,6 @@ def _stated_grids(result: CrossvalResult) -> list[Grid]:
             f"Truth within the intervals of {LEVEL:.0%} that a solver states, every marker given, %",
             ["solver", "truth", "layout", "von Mises", "force", "position"],
             rows,
-            "von Mises: share of the body, by area. Force; position of the contact's middle: share of seeds.",
+            "von Mises: share of the body, by area. Force, and the position where it acts: share of seeds.",
         )
     ]

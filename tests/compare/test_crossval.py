@@ -56,6 +56,8 @@ from solvers.solver import silent
 from tests.compare.drawn_pages import page_of
 
 NOISE = 0.005
+SETTINGS: dict[str, dict[str, object]] = {"gp": {}, "fem-id": {"degree": 1, "model": "fem"}}
+"""Settings other than linear elements: `fem-id` has the linear law of this truth."""
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +90,7 @@ def task(
     paths = [tmp_path / f"truth-{share}.npz" for share in (1.0, 0.5)]
     for path, share in zip(paths, (1.0, 0.5), strict=True):
         u, v = (share * truth.reaction).tolist()
-        TrueField(sampled * share, TrueContact((u, v), 35.0, 2.0)).save(path)
+        TrueField(sampled * share, TrueContact((u, v), 35.0, 34.0, 2.0)).save(path)
     half = replace(observations, displacements=0.5 * observations.displacements)
     return SolverTask(
         study=Study(design=Design(), variants=[], out=tmp_path),
@@ -147,8 +149,9 @@ def test_nothing_is_left_of_what_is_held_out(observations):
 def test_predictions_do_not_depend_on_what_is_held_out(task, observations, name):
     """A marker that is held out is moved by 5 mm: so is its error, and no prediction changes."""
     fold = Fold(ONE, "marker 4", (3,))
-    settings = {"degree": 1} if name != "gp" else {}
-    settings |= {"weights": "precision", "choose": "left-out"} if name == "fem-asm" else {}
+    settings = SETTINGS.get(name, {"degree": 1})
+    if name == "fem-asm":
+        settings = {**settings, "weights": "precision", "choose": "left-out"}
     own = replace(task, variant=variant(name, **settings), folds=[fold])
     moved = observations.displacements.copy()
     moved[3] += [5.0, -5.0]
@@ -171,7 +174,7 @@ def test_a_fold_is_the_solver_s_own_solution_without_what_is_held_out(
 ):
     """By `solve`, with what the command shares between folds left aside; errors and distances by hand."""
     held = (1, 3)
-    settings = {"degree": 1} if name != "gp" else {}
+    settings = SETTINGS.get(name, {"degree": 1})
     folds = [Fold(ALL, "all", ()), Fold(RANDOM, "draw 1", held)]  # the second one finds shared work
     _, outcome = judged(replace(task, variant=variant(name, **settings), folds=folds))
     visible = ~np.isin(np.arange(9), held)
@@ -201,7 +204,7 @@ def test_a_fold_is_the_solver_s_own_solution_without_what_is_held_out(
 @pytest.mark.parametrize("name", ["gp", "fem-asm", "fem-id", "statfem"])
 def test_what_was_learnt_is_carried_to_half_the_load(task, name):
     """All of it is linear, and so is this truth: half the load has half the errors."""
-    settings = {"degree": 1} if name != "gp" else {}
+    settings = SETTINGS.get(name, {"degree": 1})
     outcomes = judged(replace(task, variant=variant(name, **settings)))
     np.testing.assert_allclose(outcomes[2].errors, 0.5 * np.array(outcomes[0].errors), atol=1e-6)
     assert outcomes[2].held == list(range(9))
@@ -499,6 +502,18 @@ def test_solvers_are_judged_by_several_truths(tmp_path, capsys, in_line):
     alone = json.loads((tmp_path / "out" / "crossval.json").read_text())["truths"]
     assert alone == {"base": content["truths"]["base"]}
     assert sorted(path.name for path in (tmp_path / "out").glob("*.png")) == ["fields.png", "held_out.png"]
+
+
+@pytest.mark.slow
+def test_force_and_place_that_a_solver_identifies_are_near_those_of_the_truth(tmp_path, in_line):
+    """At finite strain `fem-id` finds both from the markers, and says how well."""
+    assert run("--truth cylinder --solvers fem-id --schemes tip-out --seeds 1", tmp_path / "out") == 0
+    with (tmp_path / "out" / "truths.csv").open() as file:
+        (row,) = csv.DictReader(file)
+    assert abs(float(row["force_error"])) < 0.05
+    assert abs(float(row["position_error_mm"])) < 0.5
+    assert float(row["von_mises_within_stated"]) > 0.5  # on a mesh whose own error is 4 % of the stress
+    assert {row["force_within_stated"], row["position_within_stated"]} <= {"0.0", "1.0"}
 
 
 def test_verdicts_are_said_once_for_all_truths_that_share_them():

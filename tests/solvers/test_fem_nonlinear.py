@@ -6,7 +6,7 @@ from scipy.integrate import trapezoid
 
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Material, Problem
+from solvers.problem import Load, Material, Problem, contact_ends
 
 NEO_HOOKEAN = Material(law="neo-hookean")
 
@@ -63,6 +63,15 @@ def test_work_of_the_indenter_is_the_stored_energy_up_to_the_square_of_the_step(
         differences.append(done / solution.energy - 1)
     assert abs(differences[1]) < 5e-4
     assert abs(np.log2(differences[0] / differences[1]) - 2) < 0.1
+
+
+@pytest.mark.parametrize("position", [None, 30.3])
+def test_the_force_acts_where_the_load_is_centred(coarse_mesh, position):
+    """A mean is prescribed by a traction that is symmetric about the contact's middle, whatever the mesh."""
+    load = Load(displacement=(0.0, -1.0), position=position)
+    solution = FemNonlinearSolver(degree=1).solve(Problem(coarse_mesh, NEO_HOOKEAN, load))
+    middle = np.mean(contact_ends(solution.problem))
+    assert solution.stats["force_abscissa_mm"] == pytest.approx(middle, abs=1e-4)  # Newton's tolerance
 
 
 @pytest.mark.parametrize("degree", [1, 2])

@@ -141,6 +141,17 @@ class LoadPath:
         """Force of the indenter on the finger, shape (2,), N/mm."""
         return reaction_by_residual_work(self._space, self.equilibrium.internal_force(point.nodal))
 
+    def force_abscissa(self, point: LoadState) -> float | None:
+        """Abscissa before the load at which the indenter's force into the front face acts, mm.
+
+        The mean of the front's nodes, weighted by their forces along y; None without such a force. It differs
+        from the contact's middle where the contact cannot turn, and holds the finger by a couple, too.
+        """
+        front = np.setdiff1d(self._space.boundary_nodes("front"), self._space.boundary_nodes("base"))
+        forces = self.equilibrium.internal_force(point.nodal)[front, 1]
+        total = float(forces.sum())
+        return float(forces @ self._space.nodes[front, 0]) / total if total else None
+
     def region(self, point: LoadState) -> ContactRegion | None:
         """The contact region; None without contact or without a cylinder."""
         contact = self.equilibrium.contact

@@ -86,6 +86,7 @@ class FemNonlinearSolver:
         reactions = np.array([path.reaction(point) for point in points])
         last = points[-1]
         regions = [path.region(point) for point in points]
+        abscissa = path.force_abscissa(last)
         solved = time.perf_counter()
         error = _error(path, problem, space)
         path.close()
@@ -108,6 +109,7 @@ class FemNonlinearSolver:
                 "halved_steps": path.halved,
                 "newton_iterations": path.iterations,
                 "degree": self.degree,
+                **({} if abscissa is None else {"force_abscissa_mm": abscissa}),
                 **(regions[-1].stats() if regions[-1] else {}),
             },
             history={
