@@ -213,7 +213,7 @@ def estimate(
         )
         z = fit.x
         residuals, derivatives = whitened(z)
-        used, inflation = inflation, _inflation(residuals, degrees_of_freedom(weight * derivatives))
+        used, inflation = inflation, inflation_of(residuals, degrees_of_freedom(weight * derivatives))
         if settled := abs(inflation / used - 1) < INFLATION_CHANGE:
             break
     return Estimate(
@@ -233,7 +233,7 @@ def degrees_of_freedom(sensitivities: FloatArray) -> float:
     return max(len(sensitivities) - float((squares / (1 + squares)).sum()), 1.0)
 
 
-def _inflation(residuals: FloatArray, freedom: float) -> float:
+def inflation_of(residuals: FloatArray, freedom: float) -> float:
     """φ: one where noise explains the residuals."""
     misfit = float(residuals @ residuals)
     return 1.0 if misfit <= chi2.ppf(LEVEL, freedom) else float(np.sqrt(misfit / freedom))

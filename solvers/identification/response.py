@@ -23,6 +23,8 @@ MAX_ITERATIONS = 8
 """Newton iterations before a guess counts as too far away."""
 ROUGH, EXACT = 2e-3, 1e-6
 """Relative size of the last Newton step, in the energy norm, while unknowns are sought and at the end."""
+REST = 1e-10
+"""Least work of a load to compare a step with, N mm/mm: that of moving a finger by some ten nanometres."""
 HALVINGS = 6
 """Times that the way from the last hypothesis to the next one is halved where no equilibrium is found."""
 
@@ -131,7 +133,7 @@ class ResponseModel:
             balance = load - linearised.force
             step = linearised.solve(balance[None])[0]
             state = state + step
-            work = max(abs(float((load * state).sum())), 1e-30)
+            work = max(abs(float((load * state).sum())), REST)
             size = float(np.sqrt(abs((step * balance).sum()) / work)) if balance.any() else 0.0
             if not np.isfinite(size) or size > max(2 * before, 1.0):
                 return None

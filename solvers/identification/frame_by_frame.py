@@ -1,0 +1,292 @@
+"""The force of the indenter in one frame after another, from the tracked markers.
+
+A frame's unknowns are those of the whole inverse problem: the contact's place, width and force, and the finger's
+walls, clamp and Poisson's ratio. With the markers linearised about an equilibrium, y + A (z - z0) over the
+standard deviations, the estimate is that of `solvers.assimilation.estimation`,
+
+    (A^T A / φ² + P) (z - m) = A^T (d - y + A (z0 - m)) / φ²
+
+The equilibrium is kept until the markers have moved away from it, so that most frames of a slow motion cost no
+factorisation. The finger does not change, and the frame with the largest motion tells most about it: in frames
+with less motion, P and m are the covariance and the values of the finger in that frame. The contact has its own
+prior in every frame, because it may move.
+"""
+
+import time
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import chi2, norm, t
+
+from geometry.arrays import BoolArray, FloatArray
+from geometry.errors import ShapeError, UserError
+from solvers.assimilation.estimation import LEVEL, degrees_of_freedom, inflation_of
+from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, Misfit
+from solvers.identification.hypothesis import CONTACT
+from solvers.identification.response import MarkerModel, Response, ResponseModel
+
+FEWEST = 3
+"""Markers that a frame must show: six numbers for the four of the contact."""
+NEAR = 0.3
+"""Motion of a marker, mm, over which the markers are linear: a curvature of one in some 30 mm, the thickness of
+a finger, leaves 0.002 mm."""
+STRIDE = 3.0
+"""Longest motion of a marker in one step of the search, mm."""
+MOST = 16
+"""Equilibria that are looked for in one frame, enough for a jump from rest by forty millimetres."""
+TOLERANCE = 0.02
+"""Relative size, in the energy norm, of the Newton step after which an equilibrium is taken: what it leaves is the
+square of that, less than what `NEAR` leaves. One step is enough along a slow motion."""
+HALVINGS = 4
+"""Times that a step is halved where it has no equilibrium."""
+GROWTH = 1.02
+"""Motion of the markers, over the largest so far, from which a frame tells about the finger on its own."""
+ROUNDS = 20
+"""Rounds for φ at most; it is known to a thousandth much earlier."""
+
+
+@dataclass(frozen=True, eq=False)
+class ForceReading:
+    """The force in a frame, with intervals of `LEVEL`.
+
+    Attributes:
+        force: Of the indenter on the finger per depth, shape (2,), N/mm; nan without an estimate.
+        size: Its norm.
+        low, high: The interval of the size; from zero where the force may be none, open without an estimate.
+        position: Abscissa of the contact's middle on the drawn front, mm.
+        position_low, position_high: Its interval; without a force that of the prior.
+        inflation: φ; above one, neither the finger nor noise explains the markers.
+        evaluations: Equilibria that were computed.
+        seconds: Time that the estimate took.
+        status: Remarks in words; empty if there are none.
+    """
+
+    force: FloatArray
+    size: float
+    low: float
+    high: float
+    position: float
+    position_low: float
+    position_high: float
+    inflation: float
+    evaluations: int
+    seconds: float
+    status: str
+
+
+class _Linearised(NamedTuple):
+    """The markers about an equilibrium: z (p,), displacements (2 m,), mm, and their derivatives (2 m, p)."""
+
+    z: FloatArray
+    predicted: FloatArray
+    slopes: FloatArray
+    response: Response
+
+
+class _Prior(NamedTuple):
+    """Mean, shape (p,), and precision, (p, p), of z."""
+
+    mean: FloatArray
+    precision: FloatArray
+
+
+class _Posterior(NamedTuple):
+    """Estimate of z, shape (p,), its covariance, φ, and half an interval over the standard deviation."""
+
+    z: FloatArray
+    covariance: FloatArray
+    inflation: float
+    quantile: float
+
+
+class ForceTracker:
+    """Estimates the force in one frame after another; every frame starts from the last one.
+
+    Args:
+        model: The finger, with `normal_force` and `position` among its unknowns.
+        points: The m markers at rest, shape (m, 2), mm, in the drawn body.
+        radius: Of the discs over which their displacement is averaged, mm.
+        prior: Factor of the standard deviations of the priors.
+
+    Raises:
+        UserError: If the unknowns lack the force or its place.
+    """
+
+    def __init__(
+        self, model: ResponseModel, points: FloatArray, radius: float, *, prior: float = 1.0
+    ) -> None:
+        unknowns = model.unknowns
+        if missing := {"normal_force", "position"} - set(unknowns.names):
+            raise UserError(f"a force is followed with {' and '.join(sorted(missing))} among the unknowns")
+        self._model = model
+        self._parameters = unknowns.parameters(model.flexibility(), prior)
+        self._bounds = np.array([parameter.bounds for parameter in self._parameters]).T
+        still = np.zeros_like(points)
+        self._markers = MarkerModel.of(model.body, unknowns, Misfit(points, still, still, radius))
+        self._of_finger = np.array([name not in CONTACT for name in unknowns.names])
+        self._drawn = _Prior(np.zeros(len(unknowns.names)), np.eye(len(unknowns.names)))
+        self._known, self._largest = self._drawn, 0.0
+        rest = self._linearised(np.zeros(len(unknowns.names)))
+        if rest is None:
+            raise UserError("the finger has no equilibrium at rest")
+        self._last = rest
+
+    def update(
+        self, displacements: FloatArray, deviations: FloatArray, visible: BoolArray
+    ) -> ForceReading:
+        """The force in a frame.
+
+        Args:
+            displacements: Of the markers since rest, shape (m, 2), mm; any value where one is hidden.
+            deviations: Their standard deviations, shape (m, 2), mm; at least `MIN_STANDARD_DEVIATION` is taken.
+            visible: Mask of the markers that were seen, shape (m,).
+
+        Raises:
+            ShapeError: If the arrays are not those of m markers.
+        """
+        started, count = time.perf_counter(), len(self._markers.centres)
+        if displacements.shape != (count, 2) or deviations.shape != (count, 2) or visible.shape != (count,):
+            raise ShapeError(
+                f"a frame has displacements and deviations of shape {(count, 2)} and a mask of shape "
+                f"{(count,)}, got {displacements.shape}, {deviations.shape} and {visible.shape}"
+            )
+        if (seen := int(visible.sum())) < FEWEST:
+            said = f"{seen} of {count} markers are seen, too few for a force"
+            return self._unknown(said, 0, started)
+        rows = np.repeat(visible, 2)
+        observed = displacements.ravel()[rows]
+        noise = np.maximum(deviations.ravel()[rows], MIN_STANDARD_DEVIATION)
+        moved = float(np.sqrt((displacements[visible] ** 2).sum(axis=1).mean()))
+        grown = moved > GROWTH * self._largest
+        found, evaluations, settled = self._searched(
+            self._drawn if grown else self._known, rows, observed, noise
+        )
+        if not settled:
+            return self._unknown("no equilibrium of the finger is near the markers", evaluations, started)
+        if grown:
+            self._known, self._largest = self._prior_of(found), moved
+        hidden = [str(number + 1) for number in np.flatnonzero(~visible)]
+        remarks = [f"hidden: marker {', '.join(hidden)}"] if hidden else []
+        if found.inflation > 1:
+            remarks.append(f"the markers are {found.inflation:.2g} times as far off as noise explains")
+        return self._reading(found, evaluations, started, "; ".join(remarks))
+
+    def _searched(
+        self, prior: _Prior, rows: BoolArray, observed: FloatArray, noise: FloatArray
+    ) -> tuple[_Posterior, int, bool]:
+        """The estimate, the number of equilibria on the way, and whether it was found."""
+        for evaluations in range(MOST + 1):
+            last = self._last
+            slopes = last.slopes[rows] / noise[:, None]
+            found = self._posterior(prior, slopes, (last.predicted[rows] - observed) / noise)
+            motion = (last.slopes @ (found.z - last.z)).reshape(-1, 2)
+            longest = float(np.linalg.norm(motion, axis=1).max())
+            if longest <= NEAR:
+                return found, evaluations, True
+            share = min(1.0, STRIDE / longest)
+            for _ in range(HALVINGS):
+                if (reached := self._linearised(last.z + share * (found.z - last.z))) is not None:
+                    self._last = reached
+                    break
+                share /= 2
+            else:
+                break
+        return found, evaluations, False
+
+    def _posterior(self, prior: _Prior, slopes: FloatArray, residuals: FloatArray) -> _Posterior:
+        """The minimum for residuals (n,) over σ at the last equilibrium and their derivatives (n, p)."""
+        z, inflation = self._last.z, 1.0
+        spread = np.linalg.inv(np.linalg.cholesky(prior.precision)).T
+        for _ in range(ROUNDS):
+            a, r = slopes / inflation, residuals / inflation
+            curvature = a.T @ a + prior.precision
+            found = self._bounded(z, curvature, a.T @ r + prior.precision @ (z - prior.mean))
+            freedom = degrees_of_freedom(a @ spread)
+            used, inflation = inflation, inflation_of(residuals + slopes @ (found - z), freedom)
+            if abs(inflation / used - 1) < 1e-3:
+                break
+        upper = (1 + LEVEL) / 2
+        quantile = float(norm.ppf(upper) if used == 1 else t.ppf(upper, freedom))
+        return _Posterior(found, np.linalg.inv(curvature), used, quantile)
+
+    def _bounded(self, z: FloatArray, curvature: FloatArray, gradient: FloatArray) -> FloatArray:
+        """Minimum of a quadratic within the bounds: what leaves them is held there, and the rest follows."""
+        low, high = self._bounds
+        free = np.ones(len(z), dtype=bool)
+        found = z.copy()
+        for _ in z:
+            held = np.where(free, 0.0, found - z)
+            pulled = -gradient - curvature @ held
+            found[free] = z[free] + np.linalg.solve(curvature[np.ix_(free, free)], pulled[free])
+            outside = (found < low) | (found > high)
+            if not outside.any():
+                break
+            found = np.clip(found, low, high)
+            free &= ~outside
+        return found
+
+    def _linearised(self, z: FloatArray) -> _Linearised | None:
+        """The markers about the equilibrium at z; None if there is none."""
+        pairs = list(zip(self._parameters, z.tolist(), strict=True))
+        response = self._model.response(np.array([float(u.value(place)) for u, place in pairs]), TOLERANCE)
+        if response is None:
+            return None
+        predicted, slopes = self._markers.predicted(response)
+        return _Linearised(z, predicted, slopes * [u.derivative(place) for u, place in pairs], response)
+
+    def _prior_of(self, found: _Posterior) -> _Prior:
+        """What an estimate tells about the finger in other frames."""
+        finger = np.ix_(self._of_finger, self._of_finger)
+        precision = self._drawn.precision.copy()
+        precision[finger] = np.linalg.inv(found.covariance[finger])
+        return _Prior(np.where(self._of_finger, found.z, 0.0), precision)
+
+    def _reading(
+        self, found: _Posterior, evaluations: int, started: float, status: str
+    ) -> ForceReading:
+        names, pairs = self._model.unknowns.names, list(zip(self._parameters, found.z.tolist(), strict=True))
+        values = np.array([float(u.value(place)) for u, place in pairs])
+        directions = self._model.unknowns.force_slopes()
+        by_z = directions * np.array([u.derivative(place) for u, place in pairs])[:, None]
+        spread = by_z.T @ found.covariance @ by_z
+        force = values @ directions
+        size = float(np.linalg.norm(force))
+        along = force / size if size else self._model.unknowns.directions[0]
+        half = found.quantile * float(np.sqrt(along @ spread @ along))
+        wider = found.quantile / float(norm.ppf((1 + LEVEL) / 2))
+        may_be_none = force @ np.linalg.solve(spread, force) < wider**2 * chi2.ppf(LEVEL, len(force))
+        place = names.index("position")
+        around = found.quantile * np.sqrt(found.covariance[place, place]) * np.array([-1.0, 1.0])
+        parameter = self._parameters[place]
+        ends = np.clip(parameter.value(found.z[place] + around), parameter.low, parameter.high)
+        return ForceReading(
+            force=force,
+            size=size,
+            low=0.0 if may_be_none else max(size - half, 0.0),
+            high=size + half,
+            position=float(values[place]),
+            position_low=float(ends[0]),
+            position_high=float(ends[1]),
+            inflation=found.inflation,
+            evaluations=evaluations,
+            seconds=time.perf_counter() - started,
+            status=status,
+        )
+
+    def _unknown(self, status: str, evaluations: int, started: float) -> ForceReading:
+        """A reading without an estimate."""
+        low, high = self._model.unknowns.traction.ends
+        return ForceReading(
+            force=np.full(2, np.nan),
+            size=np.nan,
+            low=0.0,
+            high=np.inf,
+            position=np.nan,
+            position_low=low,
+            position_high=high,
+            inflation=np.nan,
+            evaluations=evaluations,
+            seconds=time.perf_counter() - started,
+            status=status,
+        )

@@ -1,0 +1,166 @@
+"""The force from frame to frame: a simulated loading and unloading, hidden markers, rest, jumps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.errors import ShapeError, UserError
+from solvers.fem.identification.body import FemBody
+from solvers.fem.identification.frames import fem_force_tracker
+from solvers.identification.frame_by_frame import ForceTracker
+from solvers.identification.hypothesis import DEFAULT, Unknowns
+from solvers.identification.response import EXACT, ResponseModel
+from solvers.lagrange import LagrangeSpace
+from solvers.problem import Load, Material, Problem
+
+NOISE, RADIUS = 0.005, 0.8
+FORCE, POSITION = (0.2, 0.03), 37.0
+SHARES = np.concatenate([np.zeros(3), np.linspace(0, 1, 13), np.ones(2), np.linspace(1, 0, 9)])
+PRINTED = {"front_thickness": 2.06, "back_thickness": 1.95, "rib_thickness": 2.05, "base_compliance": 0.05}
+"""Walls within one and a half standard deviations of their priors."""
+
+
+@pytest.fixture(scope="module")
+def problem(coarse_mesh):
+    return Problem(coarse_mesh, Material(law="neo-hookean"), Load(displacement=(None, -6.0)))
+
+
+@pytest.fixture(scope="module")
+def tracker_of(problem):
+    def made():
+        return fem_force_tracker(problem, problem.mesh.markers, RADIUS, degree=1)
+
+    return made
+
+
+def marker_path(problem, shares, finger):
+    """Displacements of the markers, (f, 9, 2), mm, and forces, (f, 2), N/mm, of a finger under shares."""
+    unknowns = Unknowns.of(problem, DEFAULT)
+    model = ResponseModel(FemBody(problem, LagrangeSpace(problem.mesh, 1), unknowns.motion), unknowns)
+    twin = ForceTracker(model, problem.mesh.markers, RADIUS)
+    drawn = {parameter.name: parameter.start for parameter in unknowns.parameters(1.0)}
+    places, forces = [], []
+    for share in shares:
+        forced = dict(zip(("normal_force", "tangential_force"), share * np.array(FORCE), strict=True))
+        changed = drawn | {"position": POSITION} | finger | forced
+        response = model.response(np.array([changed[name] for name in unknowns.names]), EXACT)
+        assert response is not None
+        places.append(twin._markers.predicted(response)[0].reshape(-1, 2))
+        forces.append(response.hypothesis.force)
+    model.body.close()
+    return np.array(places), np.array(forces)
+
+
+@pytest.fixture(scope="module")
+def drawn_path(problem):
+    return marker_path(problem, SHARES, {})
+
+
+@pytest.fixture(scope="module")
+def printed_path(problem):
+    return marker_path(problem, SHARES, PRINTED)
+
+
+def readings(tracker, places, seed=1, visible=None):
+    rng = np.random.default_rng(seed)
+    noisy = places + NOISE * rng.standard_normal(places.shape)
+    mask = np.ones(places.shape[:2], dtype=bool) if visible is None else visible
+    spread = np.full(places.shape[1:], NOISE)
+    return [tracker.update(each, spread, seen) for each, seen in zip(noisy, mask, strict=True)]
+
+
+def column(found, name):
+    return np.array([getattr(reading, name) for reading in found])
+
+
+def test_the_force_is_within_three_percent_on_the_way_up_and_down(drawn_path, tracker_of):
+    places, forces = drawn_path
+    found = readings(tracker_of(), places)
+    true = np.linalg.norm(forces, axis=1)
+    # The walls' priors and the noise leave 2.5 % of the full force in every single frame.
+    error = np.sqrt(np.mean((column(found, "size") - true) ** 2))
+    assert error < 0.03 * true.max()
+    large = true > 0.2 * true.max()
+    np.testing.assert_allclose(column(found, "position")[large], POSITION, atol=1.0)
+
+
+def test_intervals_hold_for_walls_that_are_not_those_drawn(printed_path, tracker_of):
+    places, forces = printed_path
+    found = readings(tracker_of(), places)
+    true = np.linalg.norm(forces, axis=1)
+    inside = (column(found, "low") <= true) & (true <= column(found, "high"))
+    assert inside.mean() > 0.9  # of 95 %
+    # The finger is known from its largest load on: the way down has narrower intervals at the same force.
+    widths = column(found, "high") - column(found, "low")
+    up, down = (np.flatnonzero(np.isclose(SHARES, 0.5))[end] for end in (0, -1))
+    assert widths[down] < widths[up]
+
+
+def test_an_unloaded_finger_may_have_no_force(drawn_path, tracker_of):
+    places, _ = drawn_path
+    for reading in readings(tracker_of(), places[:3]):
+        assert reading.low == 0
+        assert reading.size < 0.002
+        assert reading.position_low < POSITION < reading.position_high
+
+
+def test_frames_that_barely_move_cost_no_equilibrium(drawn_path, tracker_of):
+    places, _ = drawn_path
+    tracker = tracker_of()
+    found = readings(tracker, places)
+    still = readings(tracker, places[[-1, -1, -1]])
+    assert max(column(still, "evaluations")) == 0
+    assert column(found, "evaluations").sum() < 2 * len(found)
+
+
+def test_a_jump_to_the_full_load_is_followed(drawn_path, tracker_of):
+    places, forces = drawn_path
+    tracker = tracker_of()
+    readings(tracker, places[:1])
+    (found,) = readings(tracker, places[[15]])
+    assert found.size == pytest.approx(np.linalg.norm(forces[15]), rel=0.03)
+    assert found.evaluations > 2
+
+
+def test_hidden_markers_widen_the_interval_and_are_named(drawn_path, tracker_of):
+    places, forces = drawn_path
+    visible = np.ones((len(places), 9), dtype=bool)
+    visible[:, [2, 5, 7]] = False
+    whole, partial = (readings(tracker_of(), places, visible=seen)[15] for seen in (None, visible))
+    assert partial.status.startswith("hidden: marker 3, 6, 8")
+    assert partial.high - partial.low > whole.high - whole.low
+    assert partial.low < np.linalg.norm(forces[15]) < partial.high
+
+
+def test_too_few_markers_leave_the_interval_open_and_the_next_frame_goes_on(drawn_path, tracker_of):
+    places, forces = drawn_path
+    visible = np.ones((17, 9), dtype=bool)
+    visible[15, 2:] = False
+    found = readings(tracker_of(), places[:17], visible=visible)
+    assert found[15].status == "2 of 9 markers are seen, too few for a force"
+    assert (found[15].low, found[15].high) == (0, np.inf)
+    assert np.isnan(found[15].size)
+    assert found[16].size == pytest.approx(np.linalg.norm(forces[16]), rel=0.03)
+
+
+def test_markers_that_no_force_explains_are_told(drawn_path, tracker_of):
+    places, _ = drawn_path
+    off = places[:16].copy()
+    off[:, 4] += 0.5 * SHARES[:16, None]  # 100 standard deviations at the full load
+    found = readings(tracker_of(), off)[-1]
+    assert found.inflation > 5
+    assert "times as far off as noise explains" in found.status
+    assert found.high - found.low > 3 * (lambda r: r.high - r.low)(readings(tracker_of(), places[:16])[-1])
+
+
+def test_arrays_of_another_finger_are_refused(tracker_of):
+    with pytest.raises(ShapeError, match=r"shape \(9, 2\) and a mask of shape \(9,\), got \(8, 2\)"):
+        tracker_of().update(np.zeros((8, 2)), np.zeros((8, 2)), np.ones(8, dtype=bool))
+
+
+def test_a_force_without_its_place_cannot_be_followed(problem):
+    unknowns = Unknowns.of(replace(problem), ("normal_force",))
+    model = ResponseModel(FemBody(problem, LagrangeSpace(problem.mesh, 1), unknowns.motion), unknowns)
+    with pytest.raises(UserError, match="followed with position among the unknowns"):
+        ForceTracker(model, problem.mesh.markers, RADIUS)
