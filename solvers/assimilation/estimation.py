@@ -17,6 +17,7 @@ resolution); R. T. Birge, The calculation of errors by the method of least squar
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from math import log
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -72,7 +73,8 @@ class Parameter:
     def bounds(self) -> tuple[float, float]:
         """Bounds of z."""
         if self.logarithmic:
-            return -np.inf, np.inf
+            low, high = (log(end / self.start) if end > 0 else -np.inf for end in (self.low, self.high))
+            return low / self.scale, high / self.scale
         return (self.low - self.start) / self.scale, (self.high - self.start) / self.scale
 
 

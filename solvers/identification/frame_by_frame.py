@@ -1,15 +1,15 @@
 """The force of the indenter in one frame after another, from the tracked markers.
 
-A frame's unknowns are those of the whole inverse problem: the contact's place, width and force, and the finger's
-walls, clamp and Poisson's ratio. With the markers linearised about an equilibrium, y + A (z - z0) over the
-standard deviations, the estimate is that of `solvers.assimilation.estimation`,
+A frame's unknowns are those of the whole inverse problem: the contact's place, width and force, and the
+finger's walls, clamp and Poisson's ratio. With the markers linearised about an equilibrium, y + A (z - z0)
+over the standard deviations, the estimate is that of `solvers.assimilation.estimation`,
 
     (A^T A / φ² + P) (z - m) = A^T (d - y + A (z0 - m)) / φ²
 
-The equilibrium is kept until the markers have moved away from it, so that most frames of a slow motion cost no
-factorisation. The finger does not change, and the frame with the largest motion tells most about it: in frames
-with less motion, P and m are the covariance and the values of the finger in that frame. The contact has its own
-prior in every frame, because it may move.
+The equilibrium is kept until the markers have moved away from it, so that most frames of a slow motion cost
+no factorisation. The finger does not change, and the frame with the largest motion tells most about it: in
+frames with less motion, P and m are the covariance and the values of the finger in that frame. The contact
+has its own prior in every frame, because it may move.
 """
 
 import time
@@ -29,15 +29,17 @@ from solvers.identification.response import MarkerModel, Response, ResponseModel
 FEWEST = 3
 """Markers that a frame must show: six numbers for the four of the contact."""
 NEAR = 0.3
-"""Motion of a marker, mm, over which the markers are linear: a curvature of one in some 30 mm, the thickness of
-a finger, leaves 0.002 mm."""
+"""Motion of a marker, mm, over which the markers are linear: a curvature of one in some 30 mm, the thickness
+of a finger, leaves 0.002 mm."""
 STRIDE = 3.0
 """Longest motion of a marker in one step of the search, mm."""
 MOST = 16
 """Equilibria that are looked for in one frame, enough for a jump from rest by forty millimetres."""
 TOLERANCE = 0.02
-"""Relative size, in the energy norm, of the Newton step after which an equilibrium is taken: what it leaves is the
-square of that, less than what `NEAR` leaves. One step is enough along a slow motion."""
+"""Relative size, in the energy norm, of the Newton step after which an equilibrium is taken.
+
+What it leaves is about the square of that, no more than what `NEAR` leaves; one does for a slow motion.
+"""
 HALVINGS = 4
 """Times that a step is halved where it has no equilibrium."""
 GROWTH = 1.02
@@ -132,14 +134,12 @@ class ForceTracker:
             raise UserError("the finger has no equilibrium at rest")
         self._last = rest
 
-    def update(
-        self, displacements: FloatArray, deviations: FloatArray, visible: BoolArray
-    ) -> ForceReading:
+    def update(self, displacements: FloatArray, deviations: FloatArray, visible: BoolArray) -> ForceReading:
         """The force in a frame.
 
         Args:
             displacements: Of the markers since rest, shape (m, 2), mm; any value where one is hidden.
-            deviations: Their standard deviations, shape (m, 2), mm; at least `MIN_STANDARD_DEVIATION` is taken.
+            deviations: Their standard deviations, shape (m, 2), mm; `MIN_STANDARD_DEVIATION` at least.
             visible: Mask of the markers that were seen, shape (m,).
 
         Raises:
@@ -201,7 +201,8 @@ class ForceTracker:
         for _ in range(ROUNDS):
             a, r = slopes / inflation, residuals / inflation
             curvature = a.T @ a + prior.precision
-            found = self._bounded(z, curvature, a.T @ r + prior.precision @ (z - prior.mean))
+            gradient = np.asarray(a.T @ r + prior.precision @ (z - prior.mean), dtype=np.float64)
+            found = self._bounded(z, curvature, gradient)
             freedom = degrees_of_freedom(a @ spread)
             used, inflation = inflation, inflation_of(residuals + slopes @ (found - z), freedom)
             if abs(inflation / used - 1) < 1e-3:
@@ -242,9 +243,7 @@ class ForceTracker:
         precision[finger] = np.linalg.inv(found.covariance[finger])
         return _Prior(np.where(self._of_finger, found.z, 0.0), precision)
 
-    def _reading(
-        self, found: _Posterior, evaluations: int, started: float, status: str
-    ) -> ForceReading:
+    def _reading(self, found: _Posterior, evaluations: int, started: float, status: str) -> ForceReading:
         names, pairs = self._model.unknowns.names, list(zip(self._parameters, found.z.tolist(), strict=True))
         values = np.array([float(u.value(place)) for u, place in pairs])
         directions = self._model.unknowns.force_slopes()

@@ -37,6 +37,8 @@ PLACE = 0.05
 """Standard deviation of the contact's place over the front's length."""
 WIDTHS = log(2.5)
 """Standard deviation of the logarithm of the contact's width."""
+NARROW = 0.5
+"""Least width of the contact over the longest edge of the front, so that it has points of quadrature."""
 REACH = 0.5
 """Displacement of the contact over the front's length, of which the force is the prior's deviation."""
 TANGENTIAL = 1.0
@@ -118,10 +120,11 @@ class Unknowns:
         middle, width = self.place
         low, high = self.traction.ends
         size = REACH * self.traction.length / flexibility
+        least = NARROW * self.traction.resolution
         thickness = dict(zip(self.motion.names, self.motion.thickness.tolist(), strict=True))
         known = {
             "position": Parameter("position", "mm", middle, PLACE * self.traction.length * prior, low, high),
-            "width": Parameter("width", "mm", width, WIDTHS * prior, logarithmic=True),
+            "width": Parameter("width", "mm", width, WIDTHS * prior, least, logarithmic=True),
             "normal_force": Parameter("normal_force", "N/mm", 0.0, size * prior),
             "tangential_force": Parameter("tangential_force", "N/mm", 0.0, TANGENTIAL * size * prior),
             "base_compliance": Parameter(
