@@ -10,6 +10,9 @@ from petsc4py import PETSc
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
 
+SPARE_WORKSPACE = 14, 200
+"""MUMPS' option for the workspace beyond its estimate, %: indefinite tangents delay many pivots."""
+
 
 @dataclass(frozen=True, eq=False)
 class BlockMatrix:
@@ -69,6 +72,8 @@ class BlockMatrix:
             preconditioner.setOperators(stored)
             preconditioner.setType(PETSc.PC.Type.CHOLESKY)
             preconditioner.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+            preconditioner.setFactorSetUpSolverType()
+            preconditioner.getFactorMatrix().setMumpsIcntl(*SPARE_WORKSPACE)
             preconditioner.setUp()
             failed = preconditioner.getFactorMatrix().getMumpsInfog(1) < 0
         except PETSc.Error:

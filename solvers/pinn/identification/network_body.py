@@ -28,7 +28,7 @@ from solvers.problem import Problem
 
 TOLERANCE = 1e-4
 """Relative error of a solve in the energy norm, by which a Newton step shrinks what is left."""
-MOST_ITERATIONS = 10
+MOST_ITERATIONS = 8
 """Iterations of conjugate gradients that cost less than factors of the tangent at hand."""
 TRIAL = 2
 """Iterations after which their number is foreseen."""
