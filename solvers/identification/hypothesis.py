@@ -19,6 +19,7 @@ MEANINGS = {
     "width": "length of the contact along the finger",
     "normal_force": "force of the indenter into the front face, per depth",
     "tangential_force": "force of the indenter along the front face, toward the tip, per depth",
+    "eccentricity": "distance of the normal force from the contact's middle, toward the tip",
     "front_thickness": "thickness of the front wall",
     "back_thickness": "thickness of the back wall",
     "rib_thickness": "thickness of the ribs",
@@ -29,7 +30,7 @@ MEANINGS = {
 }
 """Every unknown, with its description."""
 
-CONTACT = ("position", "width", "normal_force", "tangential_force")
+CONTACT = ("position", "width", "normal_force", "tangential_force", "eccentricity")
 WALLS = ("front_thickness", "back_thickness", "rib_thickness", "base_thickness")
 DEFAULT = (*CONTACT, *WALLS, "base_compliance", "poisson")
 
@@ -43,6 +44,8 @@ REACH = 0.5
 """Displacement of the contact over the front's length, of which the force is the prior's deviation."""
 TANGENTIAL = 1.0
 """Standard deviation of the tangential force over that of the normal one."""
+ECCENTRICITY = 0.5
+"""Standard deviation of the eccentricity over the drawn contact's width."""
 PRINT = 0.05
 """Standard deviation of a printed wall's thickness over its drawn one."""
 CLAMP = 0.25
@@ -61,6 +64,7 @@ class Hypothesis:
         position: Abscissa of the contact's middle, mm.
         width: Its length along x, mm.
         force: Of the indenter per depth, shape (2,), N/mm.
+        couple: Normal force times its eccentricity, shape (2,), N: the dipole of the traction.
         lame: Lamé constants, MPa.
         changes: Of the walls' thickness, shape (k,), mm.
         softness: Compliance of the base over Young's modulus, mm/MPa.
@@ -69,6 +73,7 @@ class Hypothesis:
     position: float
     width: float
     force: FloatArray
+    couple: FloatArray
     lame: Lame
     changes: FloatArray
     softness: float
@@ -127,6 +132,7 @@ class Unknowns:
             "width": Parameter("width", "mm", width, WIDTHS * prior, least, logarithmic=True),
             "normal_force": Parameter("normal_force", "N/mm", 0.0, size * prior),
             "tangential_force": Parameter("tangential_force", "N/mm", 0.0, TANGENTIAL * size * prior),
+            "eccentricity": Parameter("eccentricity", "mm", 0.0, ECCENTRICITY * width * prior),
             "base_compliance": Parameter(
                 "base_compliance", "mm", COMPLIANCE, COMPLIANCES * prior, logarithmic=True
             ),
@@ -147,6 +153,7 @@ class Unknowns:
             position=named.get("position", middle),
             width=named.get("width", width),
             force=np.array(sizes) @ self.directions,
+            couple=named.get("eccentricity", 0.0) * sizes[0] * self.directions[0],
             lame=material.lame,
             changes=self.motion.changes(named),
             softness=named.get("base_compliance", 0.0) / material.young,
@@ -164,6 +171,15 @@ class Unknowns:
         for name, direction in zip(("normal_force", "tangential_force"), self.directions, strict=True):
             if name in self.names:
                 found[self.names.index(name)] = direction
+        return found
+
+    def couple_slopes(self, values: FloatArray) -> FloatArray:
+        """Derivatives of the couple by the unknowns, shape (p, 2)."""
+        named, found = self._named(values), np.zeros((len(self.names), 2))
+        if "eccentricity" in self.names:
+            into = self.directions[0]
+            found[self.names.index("eccentricity")] = named["normal_force"] * into
+            found[self.names.index("normal_force")] = named["eccentricity"] * into
         return found
 
     def moduli_slopes(self, values: FloatArray) -> FloatArray:

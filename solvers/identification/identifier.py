@@ -41,7 +41,7 @@ PROBABLE = 0.01
 """Least probability of a law whose field is kept."""
 AWAY = (-2.0, 2.0)
 """Places of the contact from which the search starts again, in standard deviations of its prior."""
-UNEXPLAINED = 2.0
+UNEXPLAINED = 10.0
 """φ from which on the search is started again."""
 
 
@@ -214,6 +214,7 @@ class Identifier:
         for law in self._laws[1:]:
             near = self._known.get(law) or fit
             fits.append(self._settled(law, fit.reading, near, progress))
+        fits = [self._reconsidered(fit, fits, progress) for fit in fits]
         for fit in fits:
             self._known.setdefault(fit.law, fit)
         fits.sort(key=lambda fit: -fit.log_evidence)
@@ -233,6 +234,14 @@ class Identifier:
             best = max(best, other, key=lambda fit: fit.log_evidence)
         return best
 
+    def _reconsidered(self, fit: Fit, fits: Sequence[Fit], progress: Progress) -> Fit:
+        """A fit that explains less than another law's, sought again from there; else itself."""
+        other = max(fits, key=lambda each: each.log_evidence)
+        if other is fit or fit.estimate.inflation == 1:
+            return fit
+        again = self._fit(fit.law, fit.reading, other, progress)
+        return max(fit, again, key=lambda each: each.log_evidence)
+
     @property
     def _names(self) -> tuple[str, ...]:
         return self.models[self._laws[0]].unknowns.names
@@ -247,8 +256,7 @@ class Identifier:
     ) -> Fit:
         model = self.models[law]
         markers = MarkerModel.of(model.body, model.unknowns, reading.misfit)
-        same = near is not None and near.law == law
-        model.restart(near.response if near is not None and same else None)
+        model.restart(None if near is None else near.response)
 
         def predict(values: FloatArray) -> Prediction | None:
             force = np.linalg.norm(model.unknowns.hypothesis(values).force)
@@ -256,7 +264,10 @@ class Identifier:
             found = model.response(values)
             return None if found is None else reading.predicted(markers, found)
 
-        start = near.estimate.z if near is not None else start
+        if near is not None:
+            start = near.estimate.z
+        elif start is None:
+            start = self._pressed(model, markers, reading)
         found = estimate(predict, reading.observed, reading.noise, self.parameters, start)
         response = model.response(found.values, EXACT)
         exact = response is not None
@@ -267,6 +278,18 @@ class Identifier:
                 f"no equilibrium of the {law} law was found near the markers; take a smaller prior"
             )
         return Fit(law, found, response, markers, reading, exact)
+
+    def _pressed(self, model: ResponseModel, markers: MarkerModel, reading: Reading) -> FloatArray:
+        """Standardised values with the normal force that the linear finger would need, the rest as expected."""
+        z = np.zeros(len(self._names))
+        drawn = np.array([float(parameter.value(0.0)) for parameter in self.parameters])
+        at_rest = model.response(drawn)
+        if at_rest is not None:
+            which = self._names.index("normal_force")
+            slope = reading.predicted(markers, at_rest)[1][:, which] / reading.noise
+            force = float(slope @ (reading.observed / reading.noise) / (slope @ slope))
+            z[which] = force / self.parameters[which].scale
+        return z
 
     def _believed(self, fit: Fit, progress: Progress) -> tuple[Fit, dict[int, FloatArray]]:
         """The fit without markers that contradict the others, and by how much they are off, mm."""

@@ -1,8 +1,9 @@
 """Equilibria of a finger under a hypothesis, the markers there, and exact derivatives by the unknowns.
 
-With the traction's rows b and the force f, equilibrium is F(c, θ) = f · b(θ); with the tangent K there,
+With the traction's rows b, the force f and the couple m, equilibrium is F(c, θ) = f · b + m · ∂b/∂x, where x
+is the place of the contact; with the tangent K there,
 
-    K c' = (f · b)' - ∂F/∂θ
+    K c' = (f · b + m · ∂b/∂x)' - ∂F/∂θ
 
 A marker is at a fixed place P of the drawn body; where the walls have moved by W, the material there was
 drawn at P - W, so that it moves by u(P) - ∇u(P) W(P) to first order in W, and with the clamp on top.
@@ -25,7 +26,7 @@ ROUGH, EXACT = 2e-3, 1e-6
 """Relative size of the last Newton step, in the energy norm, while unknowns are sought and at the end."""
 REST = 1e-10
 """Least work of a load to compare a step with, N mm/mm: that of moving a finger by some ten nanometres."""
-HALVINGS = 6
+HALVINGS = 4
 """Times that the way from the last hypothesis to the next one is halved where no equilibrium is found."""
 
 
@@ -125,6 +126,7 @@ class ResponseModel:
             state = self._last.state + np.tensordot(values - self._last.values, self._last.slopes, axes=1)
         traction = self._traction(hypothesis.position, hypothesis.width)
         load = np.tensordot(hypothesis.force, traction[0], axes=1)
+        load += np.tensordot(hypothesis.couple, traction[1], axes=1)
         before = np.inf
         for _ in range(MAX_ITERATIONS):
             linearised = self.body.linearised(state, hypothesis.lame, hypothesis.changes)
@@ -153,9 +155,11 @@ class ResponseModel:
         unknowns, names = self.unknowns, self.unknowns.names
         force_slopes = unknowns.force_slopes()
         right = np.tensordot(force_slopes, traction[0], axes=1)
-        for name, moved in zip(("position", "width"), traction[1:], strict=True):
+        right += np.tensordot(unknowns.couple_slopes(values), traction[1], axes=1)
+        for name, moved, turned in zip(("position", "width"), traction[1:3], traction[3:], strict=True):
             if name in names:
                 right[names.index(name)] += np.tensordot(hypothesis.force, moved, axes=1)
+                right[names.index(name)] += np.tensordot(hypothesis.couple, turned, axes=1)
         of_walls, of_moduli = self.body.force_slopes(state, hypothesis.lame, hypothesis.changes)
         for name, slope in zip(unknowns.motion.names, of_walls, strict=True):
             if name in names:
@@ -178,7 +182,7 @@ class ResponseModel:
         )
 
     def _traction(self, position: float, width: float) -> FloatArray:
-        """Rows (3, 2, *shape) of the traction and its derivatives by position and width."""
+        """Rows (5, 2, *shape) of the traction and its derivatives, as `FrontTraction.weights` has them."""
         front = self.unknowns.traction
         return self.body.displacement_rows(front.points, front.weights(position, width))
 
@@ -188,7 +192,7 @@ class ResponseModel:
         """Mean displacement of the contact, (2,), mm, and its derivatives (p, 2)."""
         axes = tuple(range(2, traction.ndim))
         inner = tuple(range(state.ndim))
-        mean, by_position, by_width = np.tensordot(traction, state, axes=(axes, inner))
+        mean, by_position, by_width = np.tensordot(traction[:3], state, axes=(axes, inner))
         each = tuple(axis + 1 for axis in inner)
         found = np.tensordot(slopes, traction[0], axes=(each, each))
         for name, change in (("position", by_position), ("width", by_width)):

@@ -46,19 +46,31 @@ class FrontTraction:
         return float(self.points[:, 0].min()), float(self.points[:, 0].max())
 
     def weights(self, position: float, width: float) -> FloatArray:
-        """Weights (3, q) of the traction and their derivatives by position and width, 1/mm.
+        """Weights (5, q) of the traction w, 1/mm, and of its derivatives by position x and width b.
 
-        The first row sums to one.
+        The rows are w, which sums to one, dw/dx, dw/db, d²w/dx² and d²w/dx db.
         """
         offset = self.points[:, 0] - position
-        phase = 2 * np.pi * offset / width
         inside = np.abs(offset) < 0.5 * width
-        density = np.where(inside, 1 + np.cos(phase), 0.0) * self.lengths
-        turned = np.where(inside, 2 * np.pi / width * np.sin(phase), 0.0) * self.lengths
-        rows = np.stack([density, turned, turned * offset / width])
-        total = rows.sum(axis=1)
-        normalised = rows[0] / total[0]
-        return np.stack([normalised, *((rows[1:] - total[1:, None] * normalised) / total[0])])
+        wave = 2 * np.pi / width
+        stretch = offset / width
+        cosine, sine = np.cos(wave * offset), np.sin(wave * offset)
+        rows = np.stack(
+            [
+                1 + cosine,
+                wave * sine,
+                wave * sine * stretch,
+                -(wave**2) * cosine,
+                -(wave**2) * cosine * stretch - wave * sine / width,
+            ]
+        )
+        rows = np.where(inside, rows, 0.0) * self.lengths
+        total, by_x, by_b, by_xx, by_xb = rows.sum(axis=1)
+        w = rows[0] / total
+        w_x, w_b = (rows[1] - by_x * w) / total, (rows[2] - by_b * w) / total
+        w_xx = (rows[3] - by_xx * w - 2 * by_x * w_x) / total
+        w_xb = (rows[4] - by_xb * w - by_x * w_b - by_b * w_x) / total
+        return np.stack([w, w_x, w_b, w_xx, w_xb])
 
     def tangent(self, position: float) -> FloatArray:
         """Unit vector along the front toward greater x at an abscissa, mm, shape (2,)."""

@@ -10,7 +10,7 @@ from geometry.mesh.quadrature import body_quadrature
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification.body import FemBody
 from solvers.fem.identification.solver import FemIdSolver
-from solvers.identification.hypothesis import DEFAULT, Unknowns
+from solvers.identification.hypothesis import CONTACT, DEFAULT, Unknowns
 from solvers.identification.response import EXACT, MarkerModel, ResponseModel
 from solvers.identification.settings import IdentificationSettings
 from solvers.lagrange import LagrangeSpace
@@ -24,6 +24,7 @@ VALUES = {
     "width": 5.0,
     "normal_force": 0.16,
     "tangential_force": 0.02,
+    "eccentricity": 0.4,
     "front_thickness": 2.1,
     "back_thickness": 1.92,
     "rib_thickness": 2.05,
@@ -95,7 +96,7 @@ def test_moved_walls_are_a_moved_mesh(problem):
     assert response is not None
     moved_mesh = replace(problem.mesh, points=here.unknowns.motion.moved(response.hypothesis.changes))
     there = model_of(replace(problem, mesh=moved_mesh), DEFAULT)
-    as_drawn = {name: VALUES[name] for name in ("position", "width", "normal_force", "tangential_force")}
+    as_drawn = {name: VALUES[name] for name in CONTACT}
     again = there.response(
         values_of(there.unknowns, as_drawn | {"poisson": 0.43, "base_compliance": 1e-9}), EXACT
     )
