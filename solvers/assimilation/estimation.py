@@ -16,7 +16,7 @@ resolution); R. T. Birge, The calculation of errors by the method of least squar
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property
 from math import log
 
 import numpy as np
@@ -191,7 +191,7 @@ def estimate(
         start: Standardised values z from which the search starts, shape (p,); None: the priors' middles.
     """
 
-    @lru_cache(maxsize=8)  # least_squares asks for residuals and derivatives separately
+    @cache  # least_squares asks for residuals and derivatives separately
     def evaluated(z: tuple[float, ...]) -> Prediction:
         pairs = list(zip(parameters, z, strict=True))
         found = model(np.array([float(u.value(place)) for u, place in pairs]))
@@ -208,6 +208,8 @@ def estimate(
     count, one = len(parameters), np.eye(len(parameters))
     bounds = np.array([parameter.bounds for parameter in parameters]).T
     z = np.clip(np.zeros(count) if start is None else start, *bounds)
+    if not np.isfinite(whitened(z)[0]).all():
+        z = np.clip(np.zeros(count), *bounds)
     inflation = 1.0  # a larger one from the start could leave the search where the priors are
     for _ in range(MAX_ROUNDS):
         weight = 1 / inflation

@@ -151,6 +151,14 @@ class Identified:
     probabilities: FloatArray
     doubtful: Mapping[int, FloatArray]
 
+    @classmethod
+    def ranked(cls, fits: Sequence[Fit], doubtful: Mapping[int, FloatArray]) -> "Identified":
+        """Of the fits in any order."""
+        ordered = sorted(fits, key=lambda fit: -fit.log_evidence)
+        logs = np.array([fit.log_evidence for fit in ordered])
+        weights = np.exp(logs - logs.max())
+        return cls(ordered, weights / weights.sum(), doubtful)
+
     @property
     def best(self) -> Fit:
         """The fit of the most probable law."""
@@ -206,8 +214,7 @@ class Identifier:
         Raises:
             UserError: If there are no markers, or the finger has no equilibrium near rest.
         """
-        first = self.models[self._laws[0]]
-        reading = Reading.of(first.unknowns.problem, observations, self._radius, reaction)
+        reading = Reading.of(self._problem, observations, self._radius, reaction)
         fit = self._settled(self._laws[0], reading, self._known.get(self._laws[0]), progress)
         fit, doubtful = self._believed(fit, progress)
         fits = [fit]
@@ -217,10 +224,55 @@ class Identifier:
         fits = [self._reconsidered(fit, fits, progress) for fit in fits]
         for fit in fits:
             self._known.setdefault(fit.law, fit)
-        fits.sort(key=lambda fit: -fit.log_evidence)
-        logs = np.array([fit.log_evidence for fit in fits])
-        weights = np.exp(logs - logs.max())
-        return Identified(fits, weights / weights.sum(), doubtful)
+        return Identified.ranked(fits, doubtful)
+
+    def continued(
+        self, found: Identified, carried: Callable[[Fit], Response], progress: Progress = silent
+    ) -> Identified:
+        """The fits of another discretisation, taken over for the laws that this one has.
+
+        Args:
+            found: The fits; markers that were not believed there are not used here.
+            carried: The response of a fit with the state of this discretisation.
+            progress: Told of the values that are tried.
+        """
+        fits = [
+            self._fit(fit.law, fit.reading, fit._replace(response=carried(fit)), progress)
+            for fit in found.fits
+            if fit.law in self.models
+        ]
+        return Identified.ranked(fits, found.doubtful)
+
+    def updated(
+        self, found: Identified, observations: Observations, reaction: tuple[float, float] | None = None
+    ) -> Identified:
+        """The unknowns for other observations, to first order about fits: no equilibrium is solved.
+
+        Args:
+            found: The fits.
+            observations: Near those of the fits, in noise or in which markers were seen.
+            reaction: As in `identify`.
+        """
+        reading = Reading.of(self._problem, observations, self._radius, reaction)
+        return Identified.ranked([self._shifted(fit, reading) for fit in found.fits], {})
+
+    def _shifted(self, fit: Fit, reading: Reading) -> Fit:
+        model, about = self.models[fit.law], fit.response
+        markers = MarkerModel.of(model.body, model.unknowns, reading.misfit)
+        predicted, slopes = reading.predicted(markers, about)
+        found = estimate(
+            lambda values: (predicted + slopes @ (values - about.values), slopes),
+            reading.observed,
+            reading.noise,
+            self.parameters,
+            fit.estimate.z,
+        )
+        response = model.extrapolated(about, found.values)
+        return Fit(fit.law, found, response, markers, reading, fit.exact)
+
+    @property
+    def _problem(self) -> Problem:
+        return self.models[self._laws[0]].unknowns.problem
 
     def _settled(self, law: LawName, reading: Reading, near: Fit | None, progress: Progress) -> Fit:
         """A fit; where it explains little, the best of several that start at other places of the contact."""
@@ -280,7 +332,7 @@ class Identifier:
         return Fit(law, found, response, markers, reading, exact)
 
     def _pressed(self, model: ResponseModel, markers: MarkerModel, reading: Reading) -> FloatArray:
-        """Standardised values with the normal force that the linear finger would need, the rest as expected."""
+        """Standardised values with the normal force that a linear finger would need, the rest as expected."""
         z = np.zeros(len(self._names))
         drawn = np.array([float(parameter.value(0.0)) for parameter in self.parameters])
         at_rest = model.response(drawn)

@@ -9,7 +9,7 @@ A marker is at a fixed place P of the drawn body; where the walls have moved by 
 drawn at P - W, so that it moves by u(P) - ∇u(P) W(P) to first order in W, and with the clamp on top.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -98,6 +98,24 @@ class ResponseModel:
     def restart(self, response: Response | None) -> None:
         """Start the next response from this one; None: from rest."""
         self._last = response
+
+    def extrapolated(self, about: Response, values: FloatArray) -> Response:
+        """The response at values of the unknowns, shape (p,), to first order about another one."""
+        step = values - about.values
+        shifts, turns = about.motion_slopes
+        motion = replace(
+            about.motion,
+            shift=about.motion.shift + step @ shifts,
+            turn=about.motion.turn + float(step @ turns),
+        )
+        return replace(
+            about,
+            values=values.copy(),
+            hypothesis=self.unknowns.hypothesis(values),
+            state=about.state + np.tensordot(step, about.slopes, axes=1),
+            motion=motion,
+            contact=about.contact + step @ about.contact_slopes,
+        )
 
     def _reached(self, values: FloatArray, tolerance: float, halvings: int) -> Response | None:
         found = self._near(values, tolerance)

@@ -72,7 +72,10 @@ class IdentificationSettings:
         """The reaction with its standard deviation, N/mm."""
         return None if self.reaction is None else (self.reaction, self.reaction_error * abs(self.reaction))
 
-    def identifier(self, problem: Problem, body: Callable[[Unknowns], Body]) -> Identifier:
-        """The search for a problem."""
-        laws = LAWS if self.law == "evidence" else (problem.material.law,)
+    def identifier(
+        self, problem: Problem, body: Callable[[Unknowns], Body], laws: Sequence[LawName] | None = None
+    ) -> Identifier:
+        """The search for a problem, among the laws that the setting allows unless they are given."""
+        if laws is None:
+            laws = LAWS if self.law == "evidence" else (problem.material.law,)
         return Identifier(problem, self.unknowns, laws, body, prior=self.prior, radius=self.marker_radius)

@@ -78,19 +78,13 @@ def _member(identifier: Identifier, fit: Fit, probability: float, problem: Probl
 
     def snapshot(error: FloatArray) -> Snapshot:
         """The finger with values that differ by (p,), to first order."""
-        values = response.values + error
-        shifts, turns = response.motion_slopes
-        motion = replace(
-            response.motion,
-            shift=response.motion.shift + error @ shifts,
-            turn=response.motion.turn + float(error @ turns),
-        )
+        there = model.extrapolated(response, response.values + error)
         return Snapshot(
-            problem=_with_values(unknowns, values, problem),
+            problem=_with_values(unknowns, there.values, problem),
             walls=unknowns.motion,
-            changes=unknowns.hypothesis(values).changes,
-            clamp=motion,
-            drawn=model.body.field(response.state + np.tensordot(error, response.slopes, axes=1)),
+            changes=there.hypothesis.changes,
+            clamp=there.motion,
+            drawn=model.body.field(there.state),
         )
 
     errors = STEP * standard_errors(fit.estimate)

@@ -1,0 +1,160 @@
+"""`pinn-id`: contact, walls and law from the markers, by the network of `pinn-std`."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from geometry.errors import UserError
+from geometry.observations import Observations
+from solvers.elasticity import LawName
+from solvers.identification.hypothesis import Unknowns
+from solvers.identification.identifier import PROBABLE, Fit, Identified, Identifier
+from solvers.identification.response import Response
+from solvers.identification.settings import IdentificationSettings
+from solvers.identification.solution import identified_solution
+from solvers.identification.transfer import transferred
+from solvers.pinn.finite_basis.standard import PinnStdSolver
+from solvers.pinn.identification.network_body import NetworkBody
+from solvers.problem import Problem
+from solvers.solution import Solution, Status
+from solvers.solver import Progress, check_problem, silent
+
+NEAR = 0.2
+"""Largest change of a marker for which a refit is of first order, mm."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PinnIdSolver(IdentificationSettings):
+    """The network of `pinn-std` at finite strain, whose contact, walls and law are found from the markers.
+
+    All laws are fitted on a coarse level of the network; those that are probable are carried to a fine one
+    and fitted again there. Refits to other observations of the same markers are of first order about that.
+
+    Attributes:
+        coarse: Spacing of the windows on the coarse level over that of `pinn-std`.
+        fine: The same on the fine level.
+        seed: Of the random numbers.
+    """
+
+    coarse: float = 2.2
+    fine: float = 1.3
+    seed: int = 0
+    name: ClassVar[str] = "pinn-id"
+    laws: ClassVar[tuple[str, ...]] = ("neo-hookean", "st-venant-kirchhoff")
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
+
+    def __post_init__(self) -> None:
+        if not 0 < self.fine <= self.coarse:
+            raise UserError(f"pinn-id needs 0 < fine <= coarse, got {self.fine} and {self.coarse}")
+        if self.seed < 0:
+            raise UserError(f"pinn-id: the seed must be zero or more, got {self.seed}")
+        self.check(self.unknowns)
+
+    def settings(self) -> dict[str, object]:
+        """What is sought, the priors and the network."""
+        return asdict(self)
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        """Find the parameters and solve with them; see `Solver`. Without observations it is `pinn-std`."""
+        check_problem(self, problem)
+        if problem.observations is None:
+            plain = PinnStdSolver(seed=self.seed).solve(problem, progress)
+            said = f"without markers, this is pinn-std: {plain.status.message}"
+            return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
+        return self._solved(problem, problem.observations, progress)[0]
+
+    def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
+        """A function that finds the parameters for other observations; see `Refittable`.
+
+        Where the same markers have moved by less than `NEAR` from those that were fitted first, it is of
+        first order about them.
+        """
+        kept: list[tuple[Observations, Identifier, Identified]] = []
+
+        def refit(observations: Observations) -> Solution:
+            if kept and _near(observations, kept[0][0]):
+                started = time.perf_counter()
+                _, identifier, found = kept[0]
+                again = identifier.updated(found, observations, self.measured_reaction)
+                own = replace(problem, observations=observations)
+                return self._solution(own, identifier, again, started, 0.0)
+            solution, identifier, found = self._solved(problem, observations, silent)
+            if observations.visible.all() and not found.doubtful:
+                kept[:] = [(observations, identifier, found)]
+            return solution
+
+        return refit
+
+    def transferred(self, solution: Solution, problem: Problem, other: Problem) -> Solution:
+        """The solution at another load with the finger of a solution; see `transfer`."""
+        return transferred(solution, problem, other)
+
+    def _solved(
+        self, problem: Problem, observations: Observations, progress: Progress
+    ) -> tuple[Solution, Identifier, Identified]:
+        started = time.perf_counter()
+        problem = replace(problem, observations=observations)
+        coarse = self._identifier(problem, self.coarse)
+        first = coarse.identify(
+            observations, self.measured_reaction, lambda share, text: progress(0.5 * share, text)
+        )
+        coarse_seconds = time.perf_counter() - started
+        laws = [
+            fit.law
+            for fit, probability in zip(first.fits, first.probabilities, strict=True)
+            if probability >= PROBABLE
+        ]
+        fine = self._identifier(problem, self.fine, laws)
+
+        def carried(fit: Fit) -> Response:
+            """The coarse response with the fine network's state."""
+            here, there = coarse.models[fit.law].body, fine.models[fit.law].body
+            if not (isinstance(here, NetworkBody) and isinstance(there, NetworkBody)):
+                raise TypeError("the bodies of pinn-id are networks")
+            hypothesis = fit.response.hypothesis
+            state = there.projected(here, fit.response.state, hypothesis.lame, hypothesis.changes)
+            slopes = np.zeros((len(fit.response.values), *state.shape))
+            return replace(fit.response, state=state, slopes=slopes)
+
+        found = fine.continued(first, carried, lambda share, text: progress(0.5 + 0.5 * share, text))
+        return self._solution(problem, fine, found, started, coarse_seconds), fine, found
+
+    def _solution(
+        self,
+        problem: Problem,
+        identifier: Identifier,
+        found: Identified,
+        started: float,
+        coarse_seconds: float,
+    ) -> Solution:
+        stats: dict[str, float | int | str] = {
+            "seconds": time.perf_counter() - started,
+            "coarse_seconds": coarse_seconds,
+            "unknowns": found.best.response.state.size,
+            "windows": len(found.best.response.state),
+            "seed": self.seed,
+            "device": "cpu",
+        }
+        return identified_solution(self.name, problem, identifier, found, stats)
+
+    def _identifier(
+        self, problem: Problem, scale: float, laws: Sequence[LawName] | None = None
+    ) -> Identifier:
+        network = PinnStdSolver(seed=self.seed)
+
+        def body(unknowns: Unknowns) -> NetworkBody:
+            return NetworkBody.of(network, unknowns.problem, unknowns.motion, scale)
+
+        return self.identifier(problem, body, laws)
+
+
+def _near(observations: Observations, first: Observations) -> bool:
+    """Whether the same markers, or some of them, have moved by nearly the same."""
+    if not np.array_equal(observations.points, first.points):
+        return False
+    seen = observations.visible
+    moved = observations.displacements[seen] - first.displacements[seen]
+    return bool(np.abs(moved).max(initial=0.0) < NEAR)
