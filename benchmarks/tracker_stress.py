@@ -32,6 +32,7 @@ from vision.discs.disc_detector import METHODS, DetectionMethod
 from vision.frames.frame import Frames
 from vision.frames.sources import open_frames
 from vision.rig.bench import BENCH, Bench
+from vision.rig.course import Course
 from vision.rig.exposure import Exposure
 from vision.rig.motion import Motion
 from vision.rig.occluders import cable, cables
@@ -60,7 +61,9 @@ def nothing(recording: Recording) -> Callable[[int], Sequence[Shape]]:
 
 def covered(shares: Mapping[int, float], paint: str = "dark") -> Hide:
     """Cables over shares of the diameters of markers, which are counted from 1, in all frames."""
-    return lambda film: cables(film.bench, film.displacement, film.motion, shares, paint=paint)
+    return lambda film: cables(
+        film.bench, Course.proportional(film.displacement), film.motion, shares, paint=paint
+    )
 
 
 def fiducials(*numbers: int) -> Hide:

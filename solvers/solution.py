@@ -1,7 +1,7 @@
 """The solution that every solver returns, with strain and stress derived from the displacement gradient."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
@@ -86,6 +86,7 @@ class Solution:
         status: Outcome of the solve.
         stats: Numbers that describe the solve: `seconds`, `unknowns`, ...
         history: Columns of the training or load-stepping record, all of one length; empty for a direct solve.
+        states: The displacement field at every row of the history, from a solver that follows the load.
         error: The discretisation error, where the solver estimates it.
         left_out: From a solver that assimilates: the displacement of each observed marker as predicted
             without it, shape (m, 2), mm; NaN where it was not seen.
@@ -99,6 +100,7 @@ class Solution:
     status: Status
     stats: Mapping[str, float | int | str]
     history: Mapping[str, FloatArray] = dataclasses.field(default_factory=dict)
+    states: Sequence[DisplacementField] = ()
     error: ErrorEstimate | None = None
     left_out: FloatArray | None = None
 

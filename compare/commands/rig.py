@@ -28,9 +28,9 @@ def rig(
 ) -> int:
     """Render a film of a pressed finger, and write the true marker positions beside it.
 
-    Writes a video, the true positions of the markers in every frame, the camera, the workspace, and
+    Writes a video, the true marker positions and indenter's force in every frame, camera, workspace, and
     photographs of a calibration board with --boards: everything needed to track the markers and to score the
-    tracking. --seed also seeds the noise. Examples:
+    tracking. Every frame is an equilibrium of the solver. --seed also seeds the noise. Examples:
 
     - pinnray rig --tilt 3 --noise 2 --blur 0.8 --seed 1
     - pinnray rig --boards 20 --board 9x6 --square 8
@@ -41,11 +41,13 @@ def rig(
         codec: ffv1 or png (lossless), mjpg or mp4v.
         out: Output folder.
     """
+    from compare.camera.filmed_force import LONGEST_STEP, filmed_course, true_forces
     from compare.evaluation.shared_mesh import shared_mesh
     from compare.evaluation.virtual_experiment import experiment_source, simulate
     from compare.runtime.output_folder import check_output, replaced_folder, write_run
     from compare.runtime.provenance import machine, package_versions
     from compare.runtime.stages import Stages
+    from compare.runtime.tables import write_csv
     from solvers.problem import Problem
     from solvers.solver import with_law
     from vision.rig.bench import Bench
@@ -71,7 +73,7 @@ def rig(
         if filmed is None:
             problem = Problem(mesh, material, load)
             with stages.stage("virtual experiment") as progress:
-                solution = simulate(problem, progress)
+                solution = simulate(problem, progress, max_step=LONGEST_STEP)
             source = experiment_source(problem)
         else:
             with stages.stage(filmed.name) as progress:
@@ -80,6 +82,7 @@ def rig(
                 raise UserError(f"{filmed.name} {solution.status.message}; its displacements are not filmed")
             source = f"displacements of {filmed.name}, rendered by the virtual rig; no camera was involved"
         displacement = solution.displacement(mesh.at_nodes())
+        course = filmed_course(solution)
         bench = Bench(mesh, design, workspace, scene.paint)
         recording = Recording(
             bench=bench,
@@ -88,14 +91,14 @@ def rig(
             pose=pose,
             exposure=exposure,
             motion=motion,
-            occluders=cables(
-                bench, displacement, motion, covered, scene.cover_during, paint=scene.cover_paint
-            ),
+            occluders=cables(bench, course, motion, covered, scene.cover_during, paint=scene.cover_paint),
             seed=options.seed,
+            course=course,
         )
         with replaced_folder(out) as folder:
             with stages.stage("film") as progress:
                 record(recording, folder, source=source, codec=codec, progress=progress)
+            write_csv(folder / "truth_force.csv", true_forces(solution, recording, design.depth))
             if boards.boards:
                 with stages.stage("boards") as progress:
                     poses = board_poses(board, camera, boards.boards, seed=options.seed)

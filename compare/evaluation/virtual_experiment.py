@@ -5,7 +5,9 @@ judged by it, and whose distance from them is known to be of the size and patter
 simulation and experiment.
 """
 
+from collections.abc import Mapping
 from contextlib import suppress
+from types import MappingProxyType
 from zipfile import BadZipFile
 
 import numpy as np
@@ -84,18 +86,21 @@ def _truth(problem: Problem, progress: Progress) -> Evaluation:
     return evaluation
 
 
-def simulate(problem: Problem, progress: Progress = silent, truth: Truth = SLIDING) -> Solution:
+def simulate(
+    problem: Problem, progress: Progress = silent, truth: Truth = SLIDING, **settings: object
+) -> Solution:
     """The solution behind `virtual_experiment`, solved anew.
 
     Args:
         problem: The finger, with the walls of the truth, and its load.
         progress: Told how far the simulation is.
         truth: Gives law and kind of load.
+        settings: Of `fem-nonlinear`.
 
     Raises:
         UserError: If it cannot be run or does not reach the full load.
     """
-    return _solved(*_richer(problem, truth), progress)
+    return _solved(*_richer(problem, truth, settings), progress)
 
 
 def experiment_source(problem: Problem, truth: Truth = SLIDING) -> str:
@@ -110,7 +115,9 @@ def _solved(solver: Solver, richer: Problem, progress: Progress) -> Solution:
     return solution
 
 
-def _richer(problem: Problem, truth: Truth = SLIDING) -> tuple[Solver, Problem]:
+def _richer(
+    problem: Problem, truth: Truth = SLIDING, settings: Mapping[str, object] = MappingProxyType({})
+) -> tuple[Solver, Problem]:
     """The finite-strain solver and its problem."""
     normal = problem.load.displacement[1]
     if normal is None:
@@ -121,7 +128,7 @@ def _richer(problem: Problem, truth: Truth = SLIDING) -> tuple[Solver, Problem]:
             "contact_position there"
         )
     try:
-        solver = make_solver("fem-nonlinear")
+        solver = make_solver("fem-nonlinear", **settings)
     except ImportError as error:
         raise UserError(f"the virtual experiment: {error}") from None
     richer = Problem(

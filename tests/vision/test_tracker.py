@@ -10,6 +10,7 @@ from geometry.errors import UserError
 from geometry.finger.design import Design
 from tests.vision.films import CAMERA, DESIGN, WORKSPACE, bent, frames_of, images, recording
 from vision.calibration.camera import Camera
+from vision.rig.course import Course
 from vision.rig.motion import Motion
 from vision.rig.occluders import cables
 from vision.tracking.scene import FilmedScene
@@ -91,7 +92,7 @@ def test_a_marker_that_jumps_partly_behind_a_cable_is_found():
     film = replace(
         film,
         motion=Motion(rest=1, moving=0, held=2),
-        occluders=cables(film.bench, film.displacement, film.motion, {5: 0.35}),
+        occluders=cables(film.bench, Course.proportional(film.displacement), film.motion, {5: 0.35}),
     )
     observations = tracked([image for image, _ in film.frames()]).observations("rig")
     assert observations.visible.all()

@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from vision.calibration.camera import Camera, Pose
 from vision.rig.bench import Bench
+from vision.rig.course import Course
 from vision.rig.motion import Motion
 from vision.rig.render import pixel_coverage
 from vision.rig.shapes import Paint, Shape, area, closed, seen_edges
@@ -51,7 +51,7 @@ def cable(
 
 def cables(
     bench: Bench,
-    displacement: FloatArray,
+    course: Course,
     motion: Motion,
     shares: Mapping[int, float],
     during: str = "all",
@@ -62,7 +62,7 @@ def cables(
 
     Args:
         bench: With the markers, from 1 on.
-        displacement: Of the mesh's nodes under the whole load, shape (n, 2), mm.
+        course: Displacements of the finger.
         motion: Whose frames they are.
         shares: By the number of the marker.
         during: One of `motion.parts`.
@@ -83,7 +83,7 @@ def cables(
 
     @cache
     def at(load: float) -> tuple[Shape, ...]:
-        centres = bench.markers(load * displacement)
+        centres = bench.markers(course.at(load))
         radius = bench.finger.marker_radius
         return tuple(
             cable(centres[number - 1, :2], radius, share, z=bench.workspace.marker_plane, paint=paint)

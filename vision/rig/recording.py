@@ -13,6 +13,7 @@ from geometry.observations import Observations
 from vision.calibration.camera import Camera, Pose
 from vision.frames.frame import Image
 from vision.rig.bench import Bench
+from vision.rig.course import Course
 from vision.rig.exposure import Exposure, Light
 from vision.rig.motion import Motion
 from vision.rig.occluders import share_seen
@@ -50,9 +51,10 @@ class Recording:
     Attributes:
         bench: The finger and what is around it.
         displacement: Of the mesh's nodes under the whole load, shape (n, 2), mm.
-        camera, pose, exposure, motion: Of the film; displacements are proportional to the load.
+        camera, pose, exposure, motion: Of the film.
         occluders: Shapes in front of the finger in a frame.
         seed: Of the noise.
+        course: Displacements on the way to the whole load; None: in proportion to the load.
     """
 
     bench: Bench
@@ -63,6 +65,15 @@ class Recording:
     motion: Motion = Motion()
     occluders: Callable[[int], Sequence[Shape]] = lambda frame: ()
     seed: int = 0
+    course: Course | None = None
+
+    def displaced(self, load: float) -> FloatArray:
+        """Displacement of the mesh's nodes under a share of the load, shape (n, 2), mm."""
+        return load * self.displacement if self.course is None else self.course.at(load)
+
+    def load(self, number: int) -> float:
+        """Mean share of the load while a frame is exposed."""
+        return float(np.mean(self._state(number)[0]))
 
     def frames(self) -> Iterator[tuple[Image, FrameTruth]]:
         """The frames in order, each with its truth."""
@@ -111,13 +122,13 @@ class Recording:
     def _path(self) -> float:
         """The longest displacement of a marker in the image, pixels."""
         start, end = (
-            self.camera.project(self.bench.markers(load * self.displacement), self.pose) for load in (0, 1)
+            self.camera.project(self.bench.markers(self.displaced(load)), self.pose) for load in (0, 1)
         )
         return float(np.linalg.norm(end - start, axis=1).max())
 
     def _seen(self, loads: Sequence[float], occluders: Sequence[Shape]) -> tuple[Light, FrameTruth]:
         """Mean light of the states with these shares of the load, and their truth."""
-        states = [load * self.displacement for load in loads]
+        states = [self.displaced(load) for load in loads]
         scenes = [self.bench.scene(state, occluders) for state in states]
         light = mean_light(scenes, self.camera, self.pose, self.exposure.blur)
         worlds = [self.bench.markers(state) for state in states]

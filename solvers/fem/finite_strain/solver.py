@@ -117,8 +117,10 @@ class FemNonlinearSolver:
                 "energy": np.array(energies),
                 "reaction_x": reactions[:, 0],
                 "reaction_y": reactions[:, 1],
+                **_place_history(path),
                 **_contact_history(path, regions),
             },
+            states=[LagrangeField(space, point.nodal) for point in points],
             error=error,
         )
 
@@ -157,6 +159,16 @@ def _status(path: LoadPath, regions: Sequence[ContactRegion | None], remarks: st
         parts = f" in {region.parts} parts" if region.parts > 1 else ""
         taken += f"; contact from x = {region.start:.4g} to {region.end:.4g} mm{parts}"
     return Status(True, "; ".join(filter(None, [taken, remarks])))
+
+
+def _place_history(path: LoadPath) -> dict[str, FloatArray]:
+    """The force's abscissa, mm; without a force, at rest, that of the next equilibrium with one."""
+    found = [path.force_abscissa(point) for point in path.points]
+    known = [number for number, abscissa in enumerate(found) if abscissa is not None]
+    if not known:
+        return {}
+    nearest = np.array(known)[np.searchsorted(known, np.arange(len(found))).clip(max=len(known) - 1)]
+    return {"force_abscissa_mm": np.array([found[number] for number in nearest], dtype=np.float64)}
 
 
 def _contact_history(path: LoadPath, regions: Sequence[ContactRegion | None]) -> dict[str, FloatArray]:
