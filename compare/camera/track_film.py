@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from compare.camera.film import Film
+from compare.camera.force_estimate import LiveForce
 from compare.evaluation.number_format import NONE
 from compare.figures import Picture
 from compare.runtime.tables import Cell, terminal_table, write_csv
@@ -128,18 +129,26 @@ def track_summary(tracking: Tracking, observations: Observations) -> dict[str, A
     }
 
 
-def displacement_line(live: Live) -> Callable[[Frame, FrameDetections], None]:
-    """A function that shows the displacements, mm, since its first frame; a dash for an invisible marker."""
+def displacement_line(live: Live, force: LiveForce | None = None) -> Callable[[Frame, FrameDetections], None]:
+    """A function that shows the displacements, mm, since its first frame; a dash for an invisible marker.
+
+    Args:
+        live: Where they are shown.
+        force: Follows the force, which is shown below them.
+    """
     start: FloatArray | None = None
 
     def show(frame: Frame, detections: FrameDetections) -> None:
         nonlocal start
         if start is None:
             start = detections.places
+        if force is not None:
+            force.watch(frame, detections)
         moved = (detections.places - start).tolist()
         seen = np.isfinite(detections.markers.radii)
         cells = [f"{u:+.2f},{v:+.2f}" if known else "–" for (u, v), known in zip(moved, seen, strict=True)]
-        live.update(Text(f"{frame.time:8.2f} s  {'  '.join(cells)}", no_wrap=True, overflow="ellipsis"))
+        lines = [f"{frame.time:8.2f} s  {'  '.join(cells)}", *([force.line()] if force else [])]
+        live.update(Text("\n".join(lines), no_wrap=True, overflow="ellipsis"))
 
     return show
 

@@ -6,10 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from cyclopts import Group, Parameter
+from pydantic import ValidationError
 
 from compare.camera.film import Film
-from compare.commands.options import Repeated, existing
+from compare.commands.options import Flag, Repeated, existing
 from geometry.errors import UserError
+from solvers.problem import Material
 from vision.tracking.workspace import Workspace
 
 if TYPE_CHECKING:  # OpenCV comes with them, and `--help` has to be quick
@@ -17,6 +19,7 @@ if TYPE_CHECKING:  # OpenCV comes with them, and `--help` has to be quick
     from vision.calibration.chessboard import Board
 
 CAMERA = Group("Camera", sort_key=4)
+FORCE = Group("Force", sort_key=5)
 EXPOSURE = Group("Exposure", sort_key=5)
 MOTION = Group("Motion", sort_key=6)
 SCENE = Group("Scene", sort_key=7)
@@ -56,6 +59,43 @@ class FilmOptions:
             colour=self.colour,
             method=self.method,
         )
+
+
+@Parameter(name="*", group=FORCE)
+@dataclass(frozen=True, kw_only=True)
+class ForceOptions:
+    """The force from the markers.
+
+    Attributes:
+        force: Estimate the indenter's force and its place in every frame; with --live in the newest one.
+        young: Young's modulus for --force, MPa, default 11.4; the force is in proportion to it.
+        poisson: Poisson's ratio for --force, default 0.45; the markers correct it.
+        law: Material law for --force, default neo-hookean.
+    """
+
+    force: Flag = False
+    young: float | None = None
+    poisson: float | None = None
+    law: Literal["neo-hookean", "st-venant-kirchhoff"] | None = None
+
+    def read(self) -> Material | None:
+        """The material; None without --force.
+
+        Raises:
+            UserError: If a constant is out of its range or given without --force.
+        """
+        given: dict[str, object] = {
+            name: value for name in ("young", "poisson", "law") if (value := getattr(self, name)) is not None
+        }
+        if given and not self.force:
+            raise UserError(f"--{next(iter(given))} is for --force")
+        if not self.force:
+            return None
+        try:
+            return Material.model_validate({"law": "neo-hookean"} | given)
+        except ValidationError as error:
+            first = error.errors()[0]
+            raise UserError(f"--{first['loc'][0]} {first['input']}: {first['msg'].lower()}") from None
 
 
 @Parameter(name="*", group=CAMERA)

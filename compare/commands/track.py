@@ -8,7 +8,7 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.live import Live
 
-from compare.commands.camera_options import FilmOptions
+from compare.commands.camera_options import FilmOptions, ForceOptions
 from compare.commands.options import FingerOptions, Flag, OutputFlag, OutputPath
 from compare.runtime.exits import say
 
@@ -17,6 +17,7 @@ def track(
     source: Annotated[str, Parameter(allow_leading_hyphen=True)],
     finger: FingerOptions = FingerOptions(),
     options: FilmOptions = FilmOptions(),
+    force: ForceOptions = ForceOptions(),
     *,
     live: Flag = False,
     without_video: OutputFlag = False,
@@ -25,11 +26,12 @@ def track(
     """Measure marker displacements from a video that shows the finger at rest, pressed, and held.
 
     Writes the displacements with standard deviations for `compare --measurements`, the trajectory of every
-    marker, and annotated pictures to check by eye. Ctrl-C ends a camera or a pipe. Examples:
+    marker, and annotated pictures to check by eye; with --force also the indenter's force and its place in every
+    frame, with intervals. Ctrl-C ends a camera or a pipe. Examples:
 
     - pinnray track video.mkv --camera camera.json
     - pinnray track frames/ --camera camera.json --workspace workspace.json --design slender
-    - pinnray track 0 --camera camera.json --live
+    - pinnray track 0 --camera camera.json --live --force --young 11.4
 
     Args:
         source: Video, folder or glob of pictures, number of a camera, or - for a pipe.
@@ -37,28 +39,61 @@ def track(
         without_video: Write no annotated video.
         out: Output folder.
     """
+    from compare.camera.force_estimate import (
+        MESH_SIZE,
+        LiveForce,
+        force_table,
+        force_tracker,
+        forces_of,
+        write_forces,
+    )
     from compare.camera.track_film import displacement_line, track_film, track_table
+    from compare.evaluation.shared_mesh import shared_mesh
     from compare.runtime.output_folder import check_output, replaced_folder, write_run
     from compare.runtime.provenance import machine, package_versions
     from compare.runtime.stages import Stages
 
-    design, _ = finger.read()
-    film = options.film(source)
+    design, settings = finger.read()
+    if finger.mesh_size is None:
+        settings = settings.model_copy(update={"size": MESH_SIZE})
+    film, material = options.film(source), force.read()
     check_output(out)
     console = Console(stderr=True)
+    forces, passed_over = [], 0
     with replaced_folder(out) as folder:
         with Stages(console, quiet=live) as stages, ExitStack() as stack:
+            mesh = shared_mesh(design, settings, stages)[0] if material else None
+            following = None
+            if mesh is not None and material and live:
+                tracker = force_tracker(mesh, material, design.markers, design.marker_radius)
+                following = stack.enter_context(LiveForce(tracker, design.depth))
             line = stack.enter_context(Live(console=console, refresh_per_second=10)) if live else None
-            watch = displacement_line(line) if line else None
+            watch = displacement_line(line, following) if line else None
             report = stack.enter_context(stages.stage("track"))
             tracking, observations = track_film(
                 film, design, folder, report, video=not without_video, watch=watch
             )
+            if following is not None:
+                forces, passed_over = following.finish(), following.passed_over
+        if mesh is not None and material and not live:
+            with Stages(console) as more, more.stage("force") as report:
+                tracker = force_tracker(mesh, material, observations.points, design.marker_radius)
+                forces = forces_of(tracking, tracker, report)
         provenance = {"design": design.definition(), "versions": package_versions(), "machine": machine()}
+        if mesh is not None and material:
+            write_forces(folder, forces, design.depth)
+            provenance["force"] = {
+                "material": material.model_dump(),
+                "mesh": settings.model_dump(),
+                "frames": len(forces),
+                "frames_passed_over": passed_over,
+            }
         write_run(folder, provenance | {"seconds": stages.seconds})
     for warning in tracking.warnings:
         say(f"warning: {warning}")
     Console().print(track_table(tracking, observations))
+    if forces:
+        Console().print(force_table(forces, design.depth, passed_over))
     for path in sorted(out.iterdir()):
         print(path)
     return 0
