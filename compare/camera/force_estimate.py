@@ -247,8 +247,8 @@ def force_table(forces: Sequence[FrameForce], depth: float, passed_over: int = 0
     unexplained = sum(force.reading.inflation > 1 for force in known)
     parts = [
         "in brackets: intervals of 95 %, for Young's modulus as given and the walls as drawn within their "
-        f"tolerances; {len(known)} of {len(forces)} frames have a force, in {unexplained} of them the markers "
-        "are farther off than noise explains",
+        f"tolerances; {len(known)} of {len(forces)} frames have a force, in {unexplained} of them the "
+        "markers are farther off than noise explains",
         f"{1000 * seconds.mean():.0f} ms a frame, at most {1000 * seconds.max():.0f}",
     ]
     if passed_over:

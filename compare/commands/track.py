@@ -26,8 +26,8 @@ def track(
     """Measure marker displacements from a video that shows the finger at rest, pressed, and held.
 
     Writes the displacements with standard deviations for `compare --measurements`, the trajectory of every
-    marker, and annotated pictures to check by eye; with --force also the indenter's force and its place in every
-    frame, with intervals. Ctrl-C ends a camera or a pipe. Examples:
+    marker, and annotated pictures to check by eye; with --force also the indenter's force and its place in
+    every frame, with intervals. Ctrl-C ends a camera or a pipe. Examples:
 
     - pinnray track video.mkv --camera camera.json
     - pinnray track frames/ --camera camera.json --workspace workspace.json --design slender

@@ -56,7 +56,7 @@ class ForceReading:
         force: Of the indenter on the finger per depth, shape (2,), N/mm; nan without an estimate.
         size: Its norm.
         low, high: The interval of the size; from zero where the force may be none, open without an estimate.
-        position: Abscissa of the contact's middle on the drawn front, mm.
+        position: Abscissa on the drawn front at which the force acts, mm: contact's middle plus eccentricity.
         position_low, position_high: Its interval; without a force that of the prior.
         inflation: φ; above one, neither the finger nor noise explains the markers.
         evaluations: Equilibria that were computed.
@@ -247,7 +247,8 @@ class ForceTracker:
         names, pairs = self._model.unknowns.names, list(zip(self._parameters, found.z.tolist(), strict=True))
         values = np.array([float(u.value(place)) for u, place in pairs])
         directions = self._model.unknowns.force_slopes()
-        by_z = directions * np.array([u.derivative(place) for u, place in pairs])[:, None]
+        derivatives = np.array([u.derivative(place) for u, place in pairs])
+        by_z = directions * derivatives[:, None]
         spread = by_z.T @ found.covariance @ by_z
         force = values @ directions
         size = float(np.linalg.norm(force))
@@ -255,16 +256,18 @@ class ForceTracker:
         half = found.quantile * float(np.sqrt(along @ spread @ along))
         wider = found.quantile / float(norm.ppf((1 + LEVEL) / 2))
         may_be_none = force @ np.linalg.solve(spread, force) < wider**2 * chi2.ppf(LEVEL, len(force))
-        place = names.index("position")
-        around = found.quantile * np.sqrt(found.covariance[place, place]) * np.array([-1.0, 1.0])
-        parameter = self._parameters[place]
-        ends = np.clip(parameter.value(found.z[place] + around), parameter.low, parameter.high)
+        of_place = np.array([name in ("position", "eccentricity") for name in names], dtype=np.float64)
+        place = float(of_place @ values)
+        around = found.quantile * np.sqrt(
+            (of_place * derivatives) @ found.covariance @ (of_place * derivatives)
+        )
+        ends = np.clip(place + around * np.array([-1.0, 1.0]), *self._model.unknowns.traction.ends)
         return ForceReading(
             force=force,
             size=size,
             low=0.0 if may_be_none else max(size - half, 0.0),
             high=size + half,
-            position=float(values[place]),
+            position=place,
             position_low=float(ends[0]),
             position_high=float(ends[1]),
             inflation=found.inflation,
