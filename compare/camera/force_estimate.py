@@ -90,6 +90,18 @@ def forces_of(tracking: Tracking, tracker: ForceTracker, progress: Progress) -> 
     return found
 
 
+class LiveRate(NamedTuple):
+    """The pace of a live estimate.
+
+    Attributes:
+        passed_over: Number of frames that came before the force of an earlier one was found, and have none.
+        rate: Forces a second.
+    """
+
+    passed_over: int
+    rate: float
+
+
 class _Markers(NamedTuple):
     """The markers of a live frame: what `ForceTracker.update` takes, and when they were tracked, s."""
 
@@ -118,6 +130,7 @@ class LiveForce:
         self._tracker, self._depth = tracker, depth
         self.forces: list[FrameForce] = []
         self._newest = NewestOnly(self._answer)
+        self._answered: list[float] = []
         self._still: list[FloatArray] = []
         self._moves = False
 
@@ -135,9 +148,11 @@ class LiveForce:
         return self.forces
 
     @property
-    def passed_over(self) -> int:
-        """Number of frames that came before the force of an earlier one was found, and have none."""
-        return self._newest.passed_over
+    def live_rate(self) -> LiveRate:
+        """How it kept up with the film."""
+        spent = self._answered[-1] - self._answered[0] if self._answered else 0.0
+        rate = (len(self._answered) - 1) / spent if spent else 0.0
+        return LiveRate(self._newest.passed_over, rate)
 
     def watch(self, frame: Frame, detections: FrameDetections) -> None:
         """Take a frame; see `vision.tracking.tracker.track`."""
@@ -168,6 +183,7 @@ class LiveForce:
         reading = self._tracker.update(markers.displacements, markers.deviations, markers.visible)
         delay = time.perf_counter() - markers.tracked
         self.forces.append(FrameForce(markers.frame, markers.time, reading, delay))
+        self._answered.append(markers.tracked + delay)
 
 
 def _mean(places: Sequence[FloatArray]) -> FloatArray:
@@ -229,13 +245,13 @@ def write_forces(folder: Path, forces: Sequence[FrameForce], depth: float) -> No
     draw_force_track(times, sizes * depth, places, depth=depth).save(folder / "force.png")
 
 
-def force_table(forces: Sequence[FrameForce], depth: float, passed_over: int = 0) -> Table:
+def force_table(forces: Sequence[FrameForce], depth: float, live: LiveRate | None = None) -> Table:
     """The largest and the last force, for the terminal.
 
     Args:
         forces: At least one.
         depth: Of the finger, mm.
-        passed_over: Number of frames that were passed over live.
+        live: The pace, if they were found live.
     """
     known = [force for force in forces if np.isfinite(force.reading.size)]
     rows = []
@@ -249,12 +265,12 @@ def force_table(forces: Sequence[FrameForce], depth: float, passed_over: int = 0
         "in brackets: intervals of 95 %, for Young's modulus as given and the walls as drawn within their "
         f"tolerances; {len(known)} of {len(forces)} frames have a force, in {unexplained} of them the "
         "markers are farther off than noise explains",
-        f"{1000 * seconds.mean():.0f} ms a frame, at most {1000 * seconds.max():.0f}",
+        f"{1000 * seconds.mean():.0f} ms a frame, at most {1000 * seconds.max():.0f} ms",
     ]
-    if passed_over:
+    if live:
         parts.append(
-            f"{passed_over} frames passed over; delay {1000 * delays.mean():.0f} ms, at most "
-            f"{1000 * delays.max():.0f}"
+            f"live: {live.rate:.3g} a second, {live.passed_over} frames passed over; delay "
+            f"{1000 * delays.mean():.0f} ms, at most {1000 * delays.max():.0f} ms"
         )
     headings = ("", "time, s", "force, N", "N/mm", "contact, x in mm")
     return terminal_table(

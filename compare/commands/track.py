@@ -59,7 +59,7 @@ def track(
     film, material = options.film(source), force.read()
     check_output(out)
     console = Console(stderr=True)
-    forces, passed_over = [], 0
+    forces, pace = [], None
     with replaced_folder(out) as folder:
         with Stages(console, quiet=live) as stages, ExitStack() as stack:
             mesh = shared_mesh(design, settings, stages)[0] if material else None
@@ -74,7 +74,7 @@ def track(
                 film, design, folder, report, video=not without_video, watch=watch
             )
             if following is not None:
-                forces, passed_over = following.finish(), following.passed_over
+                forces, pace = following.finish(), following.live_rate
         if mesh is not None and material and not live:
             with Stages(console) as more, more.stage("force") as report:
                 tracker = force_tracker(mesh, material, observations.points, design.marker_radius)
@@ -86,14 +86,14 @@ def track(
                 "material": material.model_dump(),
                 "mesh": settings.model_dump(),
                 "frames": len(forces),
-                "frames_passed_over": passed_over,
+                "live": pace and pace._asdict(),
             }
         write_run(folder, provenance | {"seconds": stages.seconds})
     for warning in tracking.warnings:
         say(f"warning: {warning}")
     Console().print(track_table(tracking, observations))
     if forces:
-        Console().print(force_table(forces, design.depth, passed_over))
+        Console().print(force_table(forces, design.depth, pace))
     for path in sorted(out.iterdir()):
         print(path)
     return 0
