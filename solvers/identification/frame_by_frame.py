@@ -7,8 +7,8 @@ over the standard deviations, the estimate is that of `solvers.assimilation.esti
     (A^T A / φ² + P) (z - m) = A^T (d - y + A (z0 - m)) / φ²
 
 The equilibrium is kept until the markers have moved away from it, so that most frames of a slow motion cost
-no factorisation. The finger does not change, and the frame with the largest motion tells most about it: in
-frames with less motion, P and m are the covariance and the values of the finger in that frame. The contact
+no factorisation. The finger does not change, and the frames with the largest motion tell most about it: in
+frames with less motion, m is the mean of the finger in those and P its precision in one of them. The contact
 has its own prior in every frame, because it may move.
 """
 
@@ -43,7 +43,10 @@ What it leaves is about the square of that, no more than what `NEAR` leaves; one
 HALVINGS = 4
 """Times that a step is halved where it has no equilibrium."""
 GROWTH = 1.02
-"""Motion of the markers, over the largest so far, from which a frame tells about the finger on its own."""
+"""Motion of the markers, over the largest so far, from which a frame replaces what is known of the finger.
+
+Frames with less, down to the inverse of this, join the mean.
+"""
 ROUNDS = 20
 """Rounds for φ at most; it is known to a thousandth much earlier."""
 
@@ -128,7 +131,7 @@ class ForceTracker:
         self._markers = MarkerModel.of(model.body, unknowns, Misfit(points, still, still, radius))
         self._of_finger = np.array([name not in CONTACT for name in unknowns.names])
         self._drawn = _Prior(np.zeros(len(unknowns.names)), np.eye(len(unknowns.names)))
-        self._known, self._largest = self._drawn, 0.0
+        self._known, self._largest, self._learnt = self._drawn, 0.0, 0
         rest = self._linearised(np.zeros(len(unknowns.names)))
         if rest is None:
             raise UserError("the finger has no equilibrium at rest")
@@ -158,14 +161,18 @@ class ForceTracker:
         observed = displacements.ravel()[rows]
         noise = np.maximum(deviations.ravel()[rows], MIN_STANDARD_DEVIATION)
         moved = float(np.sqrt((displacements[visible] ** 2).sum(axis=1).mean()))
-        grown = moved > GROWTH * self._largest
-        found, evaluations, settled = self._searched(
-            self._drawn if grown else self._known, rows, observed, noise
-        )
+        grown, near = moved > GROWTH * self._largest, GROWTH * moved > self._largest
+        prior = self._drawn if near else self._known
+        found, evaluations, settled = self._searched(prior, rows, observed, noise)
+        if settled and near:
+            self._learn(found, anew=grown)
+            if grown:
+                self._largest = moved
+            else:
+                found, more, settled = self._searched(self._known, rows, observed, noise)
+                evaluations += more
         if not settled:
             return self._unknown("no equilibrium of the finger is near the markers", evaluations, started)
-        if grown:
-            self._known, self._largest = self._prior_of(found), moved
         hidden = [str(number + 1) for number in np.flatnonzero(~visible)]
         remarks = [f"hidden: marker {', '.join(hidden)}"] if hidden else []
         if found.inflation > 1:
@@ -236,12 +243,21 @@ class ForceTracker:
         predicted, slopes = self._markers.predicted(response)
         return _Linearised(z, predicted, slopes * [u.derivative(place) for u, place in pairs], response)
 
-    def _prior_of(self, found: _Posterior) -> _Prior:
-        """What an estimate tells about the finger in other frames."""
+    def _learn(self, found: _Posterior, *, anew: bool) -> None:
+        """Take the finger in a frame for the prior of other frames, or into the mean of such frames.
+
+        The covariance stays that of one frame: the errors of a camera and of the model are common to all.
+        """
         finger = np.ix_(self._of_finger, self._of_finger)
-        precision = self._drawn.precision.copy()
-        precision[finger] = np.linalg.inv(found.covariance[finger])
-        return _Prior(np.where(self._of_finger, found.z, 0.0), precision)
+        self._learnt = 1 if anew else self._learnt + 1
+        mean = np.where(self._of_finger, found.z, 0.0)
+        if anew:
+            precision = self._drawn.precision.copy()
+            precision[finger] = np.linalg.inv(found.covariance[finger])
+            self._known = _Prior(mean, precision)
+        else:
+            step = (mean - self._known.mean) / self._learnt
+            self._known = _Prior(self._known.mean + step, self._known.precision)
 
     def _reading(self, found: _Posterior, evaluations: int, started: float, status: str) -> ForceReading:
         names, pairs = self._model.unknowns.names, list(zip(self._parameters, found.z.tolist(), strict=True))
