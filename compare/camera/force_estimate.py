@@ -13,16 +13,17 @@ from compare.runtime.newest import NewestOnly
 from compare.runtime.tables import Cell, terminal_table, write_csv
 from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
+from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.identification.frame_by_frame import ForceReading, ForceTracker
+from solvers.identification.frame_by_frame import ForceReading, LawTracker
 from solvers.problem import Material, Problem
 from solvers.solver import Progress
 from vision.frames.frame import Frame
 from vision.tracking.frame_tracker import FrameDetections
 from vision.tracking.trajectories import Tracking
 
-MESH_SIZE = 1.0
-"""Largest elements, mm: a force differs by less than a thousandth from that of elements half as large."""
+MESH = MeshSettings(size=1.0, corner_size=0.2)
+"""Elements: the default finger is a thousandth stiffer with them than with those of 0.25 mm."""
 STILL = 5.0
 """Distance of a marker from its mean so far, in standard deviations, within which the finger is at rest."""
 LEAST = 0.02
@@ -45,12 +46,12 @@ class FrameForce(NamedTuple):
     delay: float
 
 
-def force_tracker(mesh: TriangleMesh, material: Material, points: FloatArray, radius: float) -> ForceTracker:
+def force_tracker(mesh: TriangleMesh, material: Material, points: FloatArray, radius: float) -> LawTracker:
     """The force tracker of a finger.
 
     Args:
         mesh: Of the finger.
-        material: With a law of finite strain.
+        material: If its law is the linear one, the law of finite strain that the markers tell is taken.
         points: Markers at rest, shape (m, 2), mm.
         radius: Of the markers, mm.
 
@@ -58,13 +59,16 @@ def force_tracker(mesh: TriangleMesh, material: Material, points: FloatArray, ra
         UserError: If DOLFINx is missing.
     """
     try:
-        from solvers.fem.identification.frames import fem_force_tracker
+        from solvers.fem.identification.frames import fem_law_tracker
     except ImportError as error:
         raise UserError(f"--force needs DOLFINx: {error}") from None
-    return fem_force_tracker(Problem(mesh, material), points, radius)
+    problem = Problem(mesh, material)
+    if material.law == "linear":
+        return fem_law_tracker(problem, points, radius)
+    return fem_law_tracker(problem, points, radius, [material.law])
 
 
-def forces_of(tracking: Tracking, tracker: ForceTracker, progress: Progress) -> list[FrameForce]:
+def forces_of(tracking: Tracking, tracker: LawTracker, progress: Progress) -> list[FrameForce]:
     """The force in every frame of a track, against the mean of its frames at rest.
 
     Args:
@@ -103,7 +107,7 @@ class LiveRate(NamedTuple):
 
 
 class _Markers(NamedTuple):
-    """The markers of a live frame: what `ForceTracker.update` takes, and when they were tracked, s."""
+    """The markers of a live frame: what `LawTracker.update` takes, and when they were tracked, s."""
 
     frame: int
     time: float
@@ -126,7 +130,7 @@ class LiveForce:
         forces: What was found so far.
     """
 
-    def __init__(self, tracker: ForceTracker, depth: float) -> None:
+    def __init__(self, tracker: LawTracker, depth: float) -> None:
         self._tracker, self._depth = tracker, depth
         self.forces: list[FrameForce] = []
         self._newest = NewestOnly(self._answer)

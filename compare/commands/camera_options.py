@@ -70,7 +70,7 @@ class ForceOptions:
         force: Estimate the indenter's force and its place in every frame; with --live in the newest one.
         young: Young's modulus for --force, MPa, default 11.4; the force is in proportion to it.
         poisson: Poisson's ratio for --force, default 0.45; the markers correct it.
-        law: Material law for --force, default neo-hookean.
+        law: Material law for --force; default: the more probable one by the markers.
     """
 
     force: Flag = False
@@ -92,7 +92,7 @@ class ForceOptions:
         if not self.force:
             return None
         try:
-            return Material.model_validate({"law": "neo-hookean"} | given)
+            return Material.model_validate(given)
         except ValidationError as error:
             first = error.errors()[0]
             raise UserError(f"--{first['loc'][0]} {first['input']}: {first['msg'].lower()}") from None

@@ -40,7 +40,7 @@ def track(
         out: Output folder.
     """
     from compare.camera.force_estimate import (
-        MESH_SIZE,
+        MESH,
         LiveForce,
         force_table,
         force_tracker,
@@ -55,7 +55,7 @@ def track(
 
     design, settings = finger.read()
     if finger.mesh_size is None:
-        settings = settings.model_copy(update={"size": MESH_SIZE})
+        settings = MESH
     film, material = options.film(source), force.read()
     check_output(out)
     console = Console(stderr=True)
@@ -63,7 +63,7 @@ def track(
     with replaced_folder(out) as folder:
         with Stages(console, quiet=live) as stages, ExitStack() as stack:
             mesh = shared_mesh(design, settings, stages)[0] if material else None
-            following = None
+            following = tracker = None
             if mesh is not None and material and live:
                 tracker = force_tracker(mesh, material, design.markers, design.marker_radius)
                 following = stack.enter_context(LiveForce(tracker, design.depth))
@@ -80,10 +80,11 @@ def track(
                 tracker = force_tracker(mesh, material, observations.points, design.marker_radius)
                 forces = forces_of(tracking, tracker, report)
         provenance = {"design": design.definition(), "versions": package_versions(), "machine": machine()}
-        if mesh is not None and material:
+        if tracker is not None and material:
             write_forces(folder, forces, design.depth)
             provenance["force"] = {
-                "material": material.model_dump(),
+                "material": material.model_dump() | {"law": tracker.laws[0]},
+                "laws_not_excluded": tracker.laws,
                 "mesh": settings.model_dump(),
                 "frames": len(forces),
                 "live": pace and pace._asdict(),

@@ -13,7 +13,8 @@ has its own prior in every frame, because it may move.
 """
 
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import ShapeError, UserError
 from solvers.assimilation.estimation import LEVEL, degrees_of_freedom, inflation_of
 from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, Misfit
+from solvers.elasticity import LawName
 from solvers.identification.hypothesis import CONTACT
 from solvers.identification.response import MarkerModel, Response, ResponseModel
 
@@ -47,6 +49,10 @@ GROWTH = 1.02
 
 Frames with less, down to the inverse of this, join the mean.
 """
+CLEAR = 7.0
+"""Logarithm of the ratio of evidences, about a thousand, from which the less probable law is dropped."""
+RECHECK = 1.25
+"""Motion of the markers over that of the last comparison of the laws from which they are compared again."""
 ROUNDS = 20
 """Rounds for φ at most; it is known to a thousandth much earlier."""
 
@@ -97,12 +103,13 @@ class _Prior(NamedTuple):
 
 
 class _Posterior(NamedTuple):
-    """Estimate of z, shape (p,), its covariance, φ, and half an interval over the standard deviation."""
+    """Estimate of z, shape (p,), its covariance, φ, half an interval over its deviation, log evidence."""
 
     z: FloatArray
     covariance: FloatArray
     inflation: float
     quantile: float
+    log_evidence: float
 
 
 class ForceTracker:
@@ -113,6 +120,11 @@ class ForceTracker:
         points: The m markers at rest, shape (m, 2), mm, in the drawn body.
         radius: Of the discs over which their displacement is averaged, mm.
         prior: Factor of the standard deviations of the priors.
+
+    Attributes:
+        largest: Root mean square motion of the markers, mm, in the frame with the largest one so far.
+        log_evidence: Logarithm of the evidence for the law in the frame with the largest motion so far, up to
+            what all laws share (`Fit.log_evidence`).
 
     Raises:
         UserError: If the unknowns lack the force or its place.
@@ -131,7 +143,8 @@ class ForceTracker:
         self._markers = MarkerModel.of(model.body, unknowns, Misfit(points, still, still, radius))
         self._of_finger = np.array([name not in CONTACT for name in unknowns.names])
         self._drawn = _Prior(np.zeros(len(unknowns.names)), np.eye(len(unknowns.names)))
-        self._known, self._largest, self._learnt = self._drawn, 0.0, 0
+        self._known, self.largest, self._learnt = self._drawn, 0.0, 0
+        self.log_evidence = 0.0
         rest = self._linearised(np.zeros(len(unknowns.names)))
         if rest is None:
             raise UserError("the finger has no equilibrium at rest")
@@ -161,13 +174,13 @@ class ForceTracker:
         observed = displacements.ravel()[rows]
         noise = np.maximum(deviations.ravel()[rows], MIN_STANDARD_DEVIATION)
         moved = float(np.sqrt((displacements[visible] ** 2).sum(axis=1).mean()))
-        grown, near = moved > GROWTH * self._largest, GROWTH * moved > self._largest
+        grown, near = moved > GROWTH * self.largest, GROWTH * moved > self.largest
         prior = self._drawn if near else self._known
         found, evaluations, settled = self._searched(prior, rows, observed, noise)
         if settled and near:
             self._learn(found, anew=grown)
             if grown:
-                self._largest = moved
+                self.largest, self.log_evidence = moved, found.log_evidence
             else:
                 found, more, settled = self._searched(self._known, rows, observed, noise)
                 evaluations += more
@@ -216,7 +229,11 @@ class ForceTracker:
                 break
         upper = (1 + LEVEL) / 2
         quantile = float(norm.ppf(upper) if used == 1 else t.ppf(upper, freedom))
-        return _Posterior(found, np.linalg.inv(curvature), used, quantile)
+        left, away = (residuals + slopes @ (found - z)) / used, found - prior.mean
+        misfit = float(left @ left + away @ prior.precision @ away)
+        volume = np.linalg.slogdet(curvature)[1] - np.linalg.slogdet(prior.precision)[1]
+        log_evidence = -len(left) * float(np.log(used)) - 0.5 * (misfit + float(volume))
+        return _Posterior(found, np.linalg.inv(curvature), used, quantile, log_evidence)
 
     def _bounded(self, z: FloatArray, curvature: FloatArray, gradient: FloatArray) -> FloatArray:
         """Minimum of a quadratic within the bounds: what leaves them is held there, and the rest follows."""
@@ -308,3 +325,38 @@ class ForceTracker:
             seconds=time.perf_counter() - started,
             status=status,
         )
+
+
+class LawTracker:
+    """Estimates the force in one frame after another by the law that the markers tell.
+
+    All laws are compared whenever the markers have moved by `RECHECK` farther than before; in between only
+    the most probable one is followed. A law is dropped once its evidence is less than another's by `CLEAR`.
+
+    Args:
+        trackers: By the name of the law; the first is taken before there is a motion.
+    """
+
+    def __init__(self, trackers: Mapping[LawName, ForceTracker]) -> None:
+        self._trackers = dict(trackers)
+        self._compared = 0.0
+        self.laws: tuple[LawName, ...] = tuple(trackers)
+        """Those that are not excluded, the most probable first."""
+
+    def update(self, displacements: FloatArray, deviations: FloatArray, visible: BoolArray) -> ForceReading:
+        """The force in a frame by the most probable law; see `ForceTracker.update`."""
+        started = time.perf_counter()
+        first = self._trackers[self.laws[0]].update(displacements, deviations, visible)
+        found = {self.laws[0]: first}
+        if (
+            len(self.laws) > 1
+            and (largest := self._trackers[self.laws[0]].largest) > self._compared * RECHECK
+        ):
+            self._compared = largest
+            for law in self.laws[1:]:
+                found[law] = self._trackers[law].update(displacements, deviations, visible)
+            evidence = {law: self._trackers[law].log_evidence for law in self.laws}
+            order = sorted(evidence, key=lambda law: -evidence[law])
+            self.laws = tuple(law for law in order if evidence[law] >= evidence[order[0]] - CLEAR)
+        evaluations = sum(reading.evaluations for reading in found.values())
+        return replace(found[self.laws[0]], evaluations=evaluations, seconds=time.perf_counter() - started)

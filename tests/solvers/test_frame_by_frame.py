@@ -8,9 +8,10 @@ import pytest
 from geometry.errors import ShapeError, UserError
 from solvers.fem.identification.body import FemBody
 from solvers.fem.identification.frames import fem_force_tracker
-from solvers.identification.frame_by_frame import ForceTracker
+from solvers.identification.frame_by_frame import ForceTracker, LawTracker
 from solvers.identification.hypothesis import DEFAULT, Unknowns
 from solvers.identification.response import EXACT, ResponseModel
+from solvers.identification.settings import LAWS
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
 
@@ -30,6 +31,18 @@ def problem(coarse_mesh):
 def tracker_of(problem):
     def made():
         return fem_force_tracker(problem, problem.mesh.markers, RADIUS, degree=1)
+
+    return made
+
+
+@pytest.fixture(scope="module")
+def tracker_of_laws(problem):
+    def made():
+        trackers = {}
+        for law in LAWS:
+            own = replace(problem, material=Material(law=law))
+            trackers[law] = fem_force_tracker(own, problem.mesh.markers, RADIUS, degree=1)
+        return LawTracker(trackers)
 
     return made
 
@@ -152,6 +165,17 @@ def test_markers_that_no_force_explains_are_told(drawn_path, tracker_of):
     assert found.inflation > 5
     assert "times as far off as noise explains" in found.status
     assert found.high - found.low > 3 * (lambda r: r.high - r.low)(readings(tracker_of(), places[:16])[-1])
+
+
+@pytest.mark.parametrize("law", ["neo-hookean", "st-venant-kirchhoff"])
+def test_the_law_is_that_of_the_finger(problem, tracker_of_laws, law):
+    own = replace(problem, material=Material(law=law))
+    places, forces = marker_path(own, SHARES[:18], {})
+    tracker = tracker_of_laws()
+    found = readings(tracker, places)
+    assert tracker.laws == (law,)
+    true = np.linalg.norm(forces, axis=1)
+    assert np.sqrt(np.mean((column(found, "size") - true) ** 2)) < 0.03 * true.max()
 
 
 def test_arrays_of_another_finger_are_refused(tracker_of):
