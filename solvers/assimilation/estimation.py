@@ -31,7 +31,7 @@ LEVEL = 0.95
 MIN_RESOLUTION = 0.5
 """Minimum resolution for a parameter to count as determined by the data."""
 
-MAX_ROUNDS, INFLATION_CHANGE = 20, 0.01
+MAX_ROUNDS, INFLATION_CHANGE = 8, 0.01
 """Least-squares fits at most, and the relative change of φ below which it has converged."""
 
 MAX_STEPS, COST_CHANGE = 12, 1e-4
@@ -179,6 +179,10 @@ def estimate(
     deviations: FloatArray,
     parameters: Sequence[Parameter],
     start: FloatArray | None = None,
+    *,
+    rounds: int = MAX_ROUNDS,
+    steps: int = MAX_STEPS,
+    cost_change: float = COST_CHANGE,
 ) -> Estimate:
     """Find the parameters by Gauss-Newton steps in a trust region.
 
@@ -189,6 +193,9 @@ def estimate(
         deviations: Their standard deviations σ, shape (n,), all positive.
         parameters: The p parameters.
         start: Standardised values z from which the search starts, shape (p,); None: the priors' middles.
+        rounds: Fits at most, each with the last one's φ.
+        steps: Steps of one fit at most.
+        cost_change: Relative change of the cost below which a fit has converged.
     """
 
     @cache  # least_squares asks for residuals and derivatives separately
@@ -211,7 +218,7 @@ def estimate(
     if not np.isfinite(whitened(z)[0]).all():
         z = np.clip(np.zeros(count), *bounds)
     inflation = 1.0  # a larger one from the start could leave the search where the priors are
-    for _ in range(MAX_ROUNDS):
+    for _ in range(rounds):
         weight = 1 / inflation
         fit = least_squares(
             lambda z, weight=weight: np.concatenate([weight * whitened(z)[0], z]),
@@ -219,14 +226,15 @@ def estimate(
             lambda z, weight=weight: np.concatenate([weight * whitened(z)[1], one]),
             bounds=bounds,
             xtol=1e-6,
-            ftol=COST_CHANGE,
-            max_nfev=MAX_STEPS,
+            ftol=cost_change,
+            max_nfev=steps,
             gtol=1e-8,
         )
         z = fit.x
         residuals, derivatives = whitened(z)
         used, inflation = inflation, _linear_inflation(residuals, derivatives, z, inflation)
-        if settled := abs(inflation / used - 1) < INFLATION_CHANGE:
+        settled = abs(inflation / used - 1) < INFLATION_CHANGE
+        if settled and fit.success:
             break
     return Estimate(
         parameters=parameters,

@@ -19,7 +19,7 @@ import numpy as np
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.assimilation.estimation import Estimate, Prediction, estimate
+from solvers.assimilation.estimation import COST_CHANGE, MAX_ROUNDS, MAX_STEPS, Estimate, Prediction, estimate
 from solvers.assimilation.misfit import MarkerSettings, Misfit, misfit_of, standard_deviations
 from solvers.elasticity import LawName
 from solvers.identification.body import Body
@@ -41,6 +41,8 @@ PROBABLE = 0.01
 """Least probability of a law whose field is kept."""
 AWAY = (-2.0, 2.0)
 """Places of the contact from which the search starts again, in standard deviations of its prior."""
+QUICK, MARGIN = 4, 15.0
+"""Steps in which a law is judged first, and how much less its log evidence may be for it to be fitted on."""
 UNEXPLAINED = 10.0
 """φ from which on the search is started again."""
 
@@ -175,6 +177,7 @@ class Identifier:
         body: Makes the discretised finger of a problem, whose law is set, and the unknowns.
         prior: Factor of the standard deviations of the priors.
         radius: Of the markers, mm; None: the observations'.
+        cost_change: Relative change of the cost below which a search has converged.
     """
 
     def __init__(
@@ -186,8 +189,9 @@ class Identifier:
         *,
         prior: float = 1.0,
         radius: float | None = None,
+        cost_change: float = COST_CHANGE,
     ) -> None:
-        self._laws, self._radius = tuple(laws), radius
+        self._laws, self._radius, self._cost_change = tuple(laws), radius, cost_change
         self.models: dict[LawName, ResponseModel] = {}
         for law in self._laws:
             own = replace(problem, material=problem.material.model_copy(update={"law": law}))
@@ -215,33 +219,28 @@ class Identifier:
             UserError: If there are no markers, or the finger has no equilibrium near rest.
         """
         reading = Reading.of(self._problem, observations, self._radius, reaction)
-        fit = self._settled(self._laws[0], reading, self._known.get(self._laws[0]), progress)
-        fit, doubtful = self._believed(fit, progress)
+        rough = self._rough(reading, progress)
+        best = max(rough, key=lambda fit: fit.log_evidence)
+        fit, doubtful = self._believed(self._settled(best, progress), progress)
         fits = [fit]
-        for law in self._laws[1:]:
-            near = self._known.get(law) or fit
-            fits.append(self._settled(law, fit.reading, near, progress))
-        fits = [self._reconsidered(fit, fits, progress) for fit in fits]
-        for fit in fits:
-            self._known.setdefault(fit.law, fit)
+        for other in rough:
+            if other.law == fit.law:
+                continue
+            if doubtful:
+                other = self._fit(other.law, fit.reading, fit, progress, rounds=1, steps=QUICK)
+            if other.log_evidence > fit.log_evidence - MARGIN:
+                other = self._fit(other.law, fit.reading, other, progress)
+            if fit.estimate.inflation > 1:
+                again = self._fit(other.law, fit.reading, fit, progress)
+                other = max(other, again, key=lambda each: each.log_evidence)
+            fits.append(other)
+        for each in fits:
+            self._known.setdefault(each.law, each)
         return Identified.ranked(fits, doubtful)
 
-    def continued(
-        self, found: Identified, carried: Callable[[Fit], Response], progress: Progress = silent
-    ) -> Identified:
-        """The fits of another discretisation, taken over for the laws that this one has.
-
-        Args:
-            found: The fits; markers that were not believed there are not used here.
-            carried: The response of a fit with the state of this discretisation.
-            progress: Told of the values that are tried.
-        """
-        fits = [
-            self._fit(fit.law, fit.reading, fit._replace(response=carried(fit)), progress)
-            for fit in found.fits
-            if fit.law in self.models
-        ]
-        return Identified.ranked(fits, found.doubtful)
+    def start_from(self, fit: Fit) -> None:
+        """Start the next search from a fit, whose response has a state of this discretisation."""
+        self._known[fit.law] = fit
 
     def updated(
         self, found: Identified, observations: Observations, reaction: tuple[float, float] | None = None
@@ -274,25 +273,28 @@ class Identifier:
     def _problem(self) -> Problem:
         return self.models[self._laws[0]].unknowns.problem
 
-    def _settled(self, law: LawName, reading: Reading, near: Fit | None, progress: Progress) -> Fit:
-        """A fit; where it explains little, the best of several that start at other places of the contact."""
-        best = self._fit(law, reading, near, progress)
-        if best.estimate.inflation < UNEXPLAINED or "position" not in self._names:
+    def _rough(self, reading: Reading, progress: Progress) -> list[Fit]:
+        """A fit of every law with φ = 1, but for the first one in a few steps from that."""
+        law, *others = self._laws
+        fits = [self._fit(law, reading, self._known.get(law), progress, rounds=1)]
+        for law in others:
+            near = self._known.get(law, fits[0])
+            fits.append(self._fit(law, reading, near, progress, rounds=1, steps=QUICK))
+        return fits
+
+    def _settled(self, rough: Fit, progress: Progress) -> Fit:
+        """The fit of a law; where it explains little, the best of several from other places of the contact."""
+        if rough.estimate.converged:
+            return rough
+        best = self._fit(rough.law, rough.reading, rough, progress)
+        if best.estimate.inflation < UNEXPLAINED or "position" not in self._names or self._known:
             return best
-        for away in AWAY if near is None else ():
+        for away in AWAY:
             start = np.zeros(len(self._names))
             start[self._names.index("position")] = away
-            other = self._fit(law, reading, None, progress, start)
+            other = self._fit(rough.law, rough.reading, None, progress, start)
             best = max(best, other, key=lambda fit: fit.log_evidence)
         return best
-
-    def _reconsidered(self, fit: Fit, fits: Sequence[Fit], progress: Progress) -> Fit:
-        """A fit that explains less than another law's, sought again from there; else itself."""
-        other = max(fits, key=lambda each: each.log_evidence)
-        if other is fit or fit.estimate.inflation == 1:
-            return fit
-        again = self._fit(fit.law, fit.reading, other, progress)
-        return max(fit, again, key=lambda each: each.log_evidence)
 
     @property
     def _names(self) -> tuple[str, ...]:
@@ -305,6 +307,9 @@ class Identifier:
         near: Fit | None,
         progress: Progress,
         start: FloatArray | None = None,
+        *,
+        rounds: int = MAX_ROUNDS,
+        steps: int = MAX_STEPS,
     ) -> Fit:
         model = self.models[law]
         markers = MarkerModel.of(model.body, model.unknowns, reading.misfit)
@@ -320,7 +325,16 @@ class Identifier:
             start = near.estimate.z
         elif start is None:
             start = self._pressed(model, markers, reading)
-        found = estimate(predict, reading.observed, reading.noise, self.parameters, start)
+        found = estimate(
+            predict,
+            reading.observed,
+            reading.noise,
+            self.parameters,
+            start,
+            rounds=rounds,
+            steps=steps,
+            cost_change=self._cost_change,
+        )
         response = model.response(found.values, EXACT)
         exact = response is not None
         if response is None:
@@ -354,7 +368,7 @@ class Identifier:
             if drops[worst] < DOUBTFUL:
                 break
             reading = fit.reading.without(worst)
-            without = self._settled(fit.law, reading, fit, progress)
+            without = self._fit(fit.law, reading, fit, progress)
             if without.estimate.inflation * CLEARER > fit.estimate.inflation:
                 break
             doubtful[int(fit.reading.kept[worst])] = self._missed(without, fit.reading, worst)

@@ -7,6 +7,7 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 
 from geometry.errors import UserError
+from solvers.assimilation.estimation import COST_CHANGE
 from solvers.elasticity import LawName
 from solvers.identification.body import Body
 from solvers.identification.hypothesis import DEFAULT, Unknowns, parse_unknowns
@@ -73,9 +74,21 @@ class IdentificationSettings:
         return None if self.reaction is None else (self.reaction, self.reaction_error * abs(self.reaction))
 
     def identifier(
-        self, problem: Problem, body: Callable[[Unknowns], Body], laws: Sequence[LawName] | None = None
+        self,
+        problem: Problem,
+        body: Callable[[Unknowns], Body],
+        laws: Sequence[LawName] | None = None,
+        cost_change: float = COST_CHANGE,
     ) -> Identifier:
         """The search for a problem, among the laws that the setting allows unless they are given."""
         if laws is None:
             laws = LAWS if self.law == "evidence" else (problem.material.law,)
-        return Identifier(problem, self.unknowns, laws, body, prior=self.prior, radius=self.marker_radius)
+        return Identifier(
+            problem,
+            self.unknowns,
+            laws,
+            body,
+            prior=self.prior,
+            radius=self.marker_radius,
+            cost_change=cost_change,
+        )

@@ -1,4 +1,4 @@
-"""`pinn-id`: contact, walls and law from the markers, by the network of `pinn-std`."""
+"""`pinn-id`: contact, walls and law from the markers, by the network of `pinn-local`."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -11,36 +11,39 @@ from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.elasticity import LawName
 from solvers.identification.hypothesis import Unknowns
-from solvers.identification.identifier import PROBABLE, Fit, Identified, Identifier
-from solvers.identification.response import Response
-from solvers.identification.settings import IdentificationSettings
+from solvers.identification.identifier import Identified, Identifier
+from solvers.identification.settings import LAWS, IdentificationSettings
 from solvers.identification.solution import identified_solution
 from solvers.identification.transfer import transferred
-from solvers.pinn.finite_basis.standard import PinnStdSolver
+from solvers.pinn.finite_basis.local import PinnLocalSolver
 from solvers.pinn.identification.network_body import NetworkBody
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, check_problem, silent
 
+COST_CHANGE = 1e-3
+"""Relative change of the cost at which a search ends: its derivatives are known to that by iteration."""
+ROUGH = 0.005
+"""Error of the coarse level over the largest displacement of a marker."""
 NEAR = 0.2
 """Largest change of a marker for which a refit is of first order, mm."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PinnIdSolver(IdentificationSettings):
-    """The network of `pinn-std` at finite strain, whose contact, walls and law are found from the markers.
+    """The network of `pinn-local` at finite strain, whose contact, walls and law are found from the markers.
 
-    All laws are fitted on a coarse level of the network; those that are probable are carried to a fine one
-    and fitted again there. Refits to other observations of the same markers are of first order about that.
+    One law is fitted on a coarse level of the network, whose error counts as the markers'; from there all
+    laws on a fine one. Refits to other observations of the same markers are of first order about that.
 
     Attributes:
-        coarse: Spacing of the windows on the coarse level over that of `pinn-std`.
+        coarse: Spacing of the windows on the coarse level over that of `pinn-local`.
         fine: The same on the fine level.
         seed: Of the random numbers.
     """
 
     coarse: float = 2.2
-    fine: float = 1.3
+    fine: float = 1.5
     seed: int = 0
     name: ClassVar[str] = "pinn-id"
     laws: ClassVar[tuple[str, ...]] = ("neo-hookean", "st-venant-kirchhoff")
@@ -58,11 +61,11 @@ class PinnIdSolver(IdentificationSettings):
         return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
-        """Find the parameters and solve with them; see `Solver`. Without observations it is `pinn-std`."""
+        """Find the parameters and solve with them; see `Solver`. Without observations it is `pinn-local`."""
         check_problem(self, problem)
         if problem.observations is None:
-            plain = PinnStdSolver(seed=self.seed).solve(problem, progress)
-            said = f"without markers, this is pinn-std: {plain.status.message}"
+            plain = PinnLocalSolver(seed=self.seed).solve(problem, progress)
+            said = f"without markers, this is pinn-local: {plain.status.message}"
             return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
         return self._solved(problem, problem.observations, progress)[0]
 
@@ -97,29 +100,24 @@ class PinnIdSolver(IdentificationSettings):
     ) -> tuple[Solution, Identifier, Identified]:
         started = time.perf_counter()
         problem = replace(problem, observations=observations)
-        coarse = self._identifier(problem, self.coarse)
+        law: LawName = LAWS[0] if self.law == "evidence" else problem.material.law
+        coarse, fine = self._identifier(problem, self.coarse, [law]), self._identifier(problem, self.fine)
+        least = ROUGH * float(np.abs(observations.displacements[observations.visible]).max(initial=0.0))
+        rough = replace(observations, standard_deviations=np.maximum(observations.standard_deviations, least))
         first = coarse.identify(
-            observations, self.measured_reaction, lambda share, text: progress(0.5 * share, text)
-        )
+            rough, self.measured_reaction, lambda share, text: progress(0.5 * share, text)
+        ).best
         coarse_seconds = time.perf_counter() - started
-        laws = [
-            fit.law
-            for fit, probability in zip(first.fits, first.probabilities, strict=True)
-            if probability >= PROBABLE
-        ]
-        fine = self._identifier(problem, self.fine, laws)
-
-        def carried(fit: Fit) -> Response:
-            """The coarse response with the fine network's state."""
-            here, there = coarse.models[fit.law].body, fine.models[fit.law].body
-            if not (isinstance(here, NetworkBody) and isinstance(there, NetworkBody)):
-                raise TypeError("the bodies of pinn-id are networks")
-            hypothesis = fit.response.hypothesis
-            state = there.projected(here, fit.response.state, hypothesis.lame, hypothesis.changes)
-            slopes = np.zeros((len(fit.response.values), *state.shape))
-            return replace(fit.response, state=state, slopes=slopes)
-
-        found = fine.continued(first, carried, lambda share, text: progress(0.5 + 0.5 * share, text))
+        here, there = coarse.models[law].body, fine.models[law].body
+        if not (isinstance(here, NetworkBody) and isinstance(there, NetworkBody)):
+            raise TypeError("the bodies of pinn-id are networks")
+        hypothesis = first.response.hypothesis
+        state = there.projected(here, first.response.state, hypothesis.lame, hypothesis.changes)
+        slopes = np.zeros((len(first.response.values), *state.shape))
+        fine.start_from(first._replace(response=replace(first.response, state=state, slopes=slopes)))
+        found = fine.identify(
+            observations, self.measured_reaction, lambda share, text: progress(0.5 + 0.5 * share, text)
+        )
         return self._solution(problem, fine, found, started, coarse_seconds), fine, found
 
     def _solution(
@@ -143,12 +141,12 @@ class PinnIdSolver(IdentificationSettings):
     def _identifier(
         self, problem: Problem, scale: float, laws: Sequence[LawName] | None = None
     ) -> Identifier:
-        network = PinnStdSolver(seed=self.seed)
+        network = PinnLocalSolver(cell=0.6, corner_spacing=0.02, seed=self.seed)
 
         def body(unknowns: Unknowns) -> NetworkBody:
             return NetworkBody.of(network, unknowns.problem, unknowns.motion, scale)
 
-        return self.identifier(problem, body, laws)
+        return self.identifier(problem, body, laws, COST_CHANGE)
 
 
 def _near(observations: Observations, first: Observations) -> bool:
