@@ -40,6 +40,7 @@ BUILT_IN = {
     "pinn-std": PRESETS["pinn-std"]["fast"],
     "pinn-local": "solvers.pinn.finite_basis.local:PinnLocalSolver",
     "pinn-asm": PRESETS["pinn-asm"]["fast"],
+    "pinn-id": "solvers.pinn.identification.solver:PinnIdSolver",
     "pinn-local-asm": "solvers.pinn.assimilating:PinnLocalAsmSolver",
 }
 

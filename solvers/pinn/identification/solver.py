@@ -23,6 +23,8 @@ from solvers.solver import Progress, check_problem, silent
 
 COST_CHANGE = 1e-3
 """Relative change of the cost at which a search ends: its derivatives are known to that by iteration."""
+PLAIN = 0.02
+"""Tolerance of the network without markers."""
 ROUGH = 0.005
 """Error of the coarse level over the largest displacement of a marker."""
 NEAR = 0.2
@@ -64,7 +66,15 @@ class PinnIdSolver(IdentificationSettings):
         """Find the parameters and solve with them; see `Solver`. Without observations it is `pinn-local`."""
         check_problem(self, problem)
         if problem.observations is None:
-            plain = PinnLocalSolver(seed=self.seed).solve(problem, progress)
+            network = self._network
+            level = replace(
+                network,
+                wall_spacing=self.fine * network.wall_spacing,
+                corner_spacing=self.fine * network.corner_spacing,
+                growth=self.fine * network.growth,
+                tolerance=PLAIN,
+            )
+            plain = level.solve(problem, progress)
             said = f"without markers, this is pinn-local: {plain.status.message}"
             return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
         return self._solved(problem, problem.observations, progress)[0]
@@ -138,10 +148,15 @@ class PinnIdSolver(IdentificationSettings):
         }
         return identified_solution(self.name, problem, identifier, found, stats)
 
+    @property
+    def _network(self) -> PinnLocalSolver:
+        """Fewer quadrature points and windows at corners than `pinn-local` has: four times as fast."""
+        return PinnLocalSolver(cell=0.6, corner_spacing=0.02, seed=self.seed)
+
     def _identifier(
         self, problem: Problem, scale: float, laws: Sequence[LawName] | None = None
     ) -> Identifier:
-        network = PinnLocalSolver(cell=0.6, corner_spacing=0.02, seed=self.seed)
+        network = self._network
 
         def body(unknowns: Unknowns) -> NetworkBody:
             return NetworkBody.of(network, unknowns.problem, unknowns.motion, scale)
