@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import (
     MEANS,
+    force_error,
     held_out_errors,
     marker_errors,
     reference_differences,
@@ -95,6 +96,9 @@ class Comparison:
             for name in ("displacement", "von_mises"):
                 difference = getattr(differences, name, None)
                 row[f"{kind}_{name}_rel_l2"] = getattr(difference, "rel_l2", float("nan"))
+        row["to_truth_force_rel"] = (
+            float("nan") if self.truth is None else force_error(evaluation, self.truth)
+        )
         row |= {"energy_N_mm_per_mm": evaluation.energy}
         row |= {f"reaction_{axis}_N_per_mm": float(evaluation.reaction[n]) for n, axis in enumerate("uv")}
         return row | {"seconds_s": evaluation.stats.get("seconds", float("nan"))}

@@ -111,7 +111,7 @@ class Evaluation:
                 for name, value in solution.stats.items()
             },
             history={name: np.asarray(column) for name, column in solution.history.items()},
-            marker_displacement=solution.displacement(mesh.markers if markers is None else markers),
+            marker_displacement=solution.displacement_in_space(mesh.markers if markers is None else markers),
             node_displacement=displacement[: len(mesh.points)],
             edge_displacement=displacement[len(mesh.points) :],
             weights=quadrature.weights,

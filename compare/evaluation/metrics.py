@@ -116,6 +116,12 @@ def truth_differences(evaluation: Evaluation, truth: Evaluation) -> TruthDiffere
     return TruthDifferences(*map(differ, TruthDifferences._fields))
 
 
+def force_error(evaluation: Evaluation, truth: Evaluation) -> float:
+    """Relative error of the size of the indenter's force; positive where it is too large."""
+    size, true = (float(np.linalg.norm(each.reaction)) for each in (evaluation, truth))
+    return size / true - 1
+
+
 def pick_reference(evaluations: Sequence[Evaluation], wanted: str | None = None) -> Evaluation:
     """The evaluation called `wanted`, else `fem`, else the first."""
     named = {evaluation.solver: evaluation for evaluation in evaluations}

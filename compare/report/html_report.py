@@ -5,7 +5,7 @@ from pathlib import Path
 
 from compare.evaluation.comparison import Comparison, left_out_remarks
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import indistinct, reference_differences, truth_differences
+from compare.evaluation.metrics import force_error, indistinct, reference_differences, truth_differences
 from compare.evaluation.number_format import distance, number, percent
 from compare.evaluation.regions import NEAR
 from compare.figures import Picture
@@ -84,6 +84,7 @@ def _entry(evaluation: Evaluation, comparison: Comparison) -> dict[str, object]:
         "is_reference": evaluation is reference,
         "evaluation": evaluation,
         "to_truth": None if truth is None else truth_differences(evaluation, truth),
+        "force_to_truth": None if truth is None else force_error(evaluation, truth),
         "differences": differences,
         "indistinct": text.indistinct_sentence(
             evaluation.label,

@@ -10,6 +10,7 @@ from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import (
     MEANS,
     MarkerErrors,
+    force_error,
     held_out_errors,
     marker_errors,
     reference_differences,
@@ -70,6 +71,7 @@ def _solver(evaluation: Evaluation, comparison: Comparison) -> dict[str, Any]:
         "to_reference": _differences(differences)
         | {"reference_uncertainty": reference.uncertainty and _differences(reference.uncertainty)},
         "to_truth": None if truth is None else _by_component(truth_differences(evaluation, truth)._asdict()),
+        "force_to_truth_rel": None if truth is None else force_error(evaluation, truth),
     }
 
 

@@ -4,7 +4,7 @@ from compare.evaluation.certificate import Certificate
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.convergence import CERTIFIED_LAW
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import truth_differences
+from compare.evaluation.metrics import force_error, truth_differences
 from compare.evaluation.number_format import distance, percent
 from compare.evaluation.regions import REGIONS
 
@@ -78,13 +78,15 @@ def truth_sentences(comparison: Comparison) -> list[str]:
         for field, before in plain.items()
     }
     answer = f"Nearer than {label} in displacement: {nearer['displacement']}. "
-    return [*sentences, f"{answer}Nearer in von Mises stress: {nearer['von Mises stress']}."]
+    answer += f"Nearer in von Mises stress: {nearer['von Mises stress']}. "
+    return [*sentences, f"{answer}Nearer in the indenter's force: {nearer['force']}."]
 
 
 def _distances(evaluation: Evaluation, truth: Evaluation) -> dict[str, float]:
-    """Relative L2 distances from the truth by field."""
+    """Relative L2 distances from the truth by field, and the relative error of the force."""
     differences = truth_differences(evaluation, truth)
     return {
         "displacement": differences.displacement.rel_l2,
         "von Mises stress": differences.von_mises.rel_l2,
+        "force": abs(force_error(evaluation, truth)),
     }

@@ -14,6 +14,7 @@ from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import (
     MEANS,
     TruthDifferences,
+    force_error,
     held_out_errors,
     marker_errors,
     reference_differences,
@@ -149,6 +150,7 @@ def _summary(evaluation: Evaluation, comparison: Comparison) -> dict[str, Cell]:
     true = None if truth is None else truth_differences(evaluation, truth)
     for name in TruthDifferences._fields:
         row[f"to_truth_{name}_rel_l2"] = getattr(true, name).rel_l2 if true else ""
+    row["to_truth_force_rel"] = "" if truth is None else force_error(evaluation, truth)
     row |= {"energy_N_mm_per_mm": evaluation.energy}
     row |= _certificate(evaluation.certificate)
     row |= {f"reaction_{axis}_N_per_mm": float(evaluation.reaction[n]) for n, axis in enumerate("uv")}

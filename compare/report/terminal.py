@@ -5,7 +5,7 @@ from rich.table import Table
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import reference_differences, truth_differences
+from compare.evaluation.metrics import force_error, reference_differences, truth_differences
 from compare.evaluation.number_format import NONE, percent
 from compare.report.tables import PAPER, Row, millimetres, printed_rows, seconds, table_one
 
@@ -36,7 +36,7 @@ def marker_table(comparison: Comparison) -> Table:
 
 
 def body_table(comparison: Comparison) -> Table:
-    """Distances over the body, energy and time."""
+    """Distances over the body, error of the force, and time."""
     evaluations, reference, truth = comparison.evaluations, comparison.reference, comparison.truth
     label = reference.label
     lines = [f"from {label}: relative L² difference of the displacement."]
@@ -44,19 +44,21 @@ def body_table(comparison: Comparison) -> Table:
         lines.append(f"±: error of {label} itself, estimated; a smaller difference says nothing.")
     lines.append("above fem: energy of the displacement on fem's elements above the least there.")
     if truth is not None:
-        lines.append("truth: relative L² difference from the simulated finger, of finite strain.")
+        lines.append("truth: relative L² difference from the simulated finger, of finite strain, and")
+        lines.append("error of the size of the indenter's force.")
     table = _table("Over the whole body", "\n".join(lines))
-    headings = [f"from {reference.solver}\n%", "energy\nN mm/mm", "above fem\n%"]
-    headings += ["truth\ndispl., %", "\nv. Mises, %"] * (truth is not None)
+    headings = [f"from {reference.solver}\n%", "above fem\n%"]
+    headings += ["truth\ndispl.", "\nv. Mises", "\nforce, %"] * (truth is not None)
     for heading in [*headings, "time\ns"]:
         table.add_column(heading, justify="right", no_wrap=True)
     for evaluation in evaluations:
         distance = reference_differences(evaluation, reference).displacement.rel_l2
         cells = [NONE if evaluation is reference else _with_own_error(distance, reference)]
-        cells += [f"{evaluation.energy:.4g}", above_fem(evaluation)]
+        cells.append(above_fem(evaluation))
         if truth is not None:
             found = truth_differences(evaluation, truth)
-            cells += [percent(field.rel_l2, 2, sign=False) for field in (found.displacement, found.von_mises)]
+            fields = found.displacement.rel_l2, found.von_mises.rel_l2
+            cells += [percent(value, 2, sign=False) for value in (*fields, force_error(evaluation, truth))]
         style = None if evaluation.converged else "yellow"
         table.add_row(_name(evaluation), *cells, seconds(evaluation), style=style)
     return table

@@ -283,7 +283,7 @@ class Identifier:
         return fits
 
     def _settled(self, rough: Fit, progress: Progress) -> Fit:
-        """The fit of a law; where it explains little, the best of several from other places of the contact."""
+        """The fit of a law; where it explains little, the best of several from other places of contact."""
         if rough.estimate.converged:
             return rough
         best = self._fit(rough.law, rough.reading, rough, progress)

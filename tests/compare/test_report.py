@@ -179,7 +179,7 @@ def test_stress_is_held_against_the_truth_only_where_that_is_known(
     truth = pinn if simulated else None
     page = Page(render(replace(content, evaluations=[fem, given], truth=truth)))
     assert ("truth" in page.values("id")) is simulated
-    assert ("fem 9.09 9.09 9.09 no pinn-std 0.00 0.00 0.00 yes" in page.text) is simulated
+    assert ("fem 9.09 9.09 9.09 −9.09 no pinn-std 0.00 0.00 0.00 0.00 yes" in page.text) is simulated
     assert ("Nearer in von Mises stress: pinn-std." in page.text) is simulated
 
 

@@ -23,6 +23,7 @@ QUICK = {
     "pinn-local": {"wall_spacing": 0.8, "corner_spacing": 0.2, "neurons": 4},
     "pinn-asm": {"wall_spacing": 1.0, "corner_spacing": 0.2, "neurons": 4, "tolerance": 1.0},
     "pinn-local-asm": {"wall_spacing": 0.9, "corner_spacing": 0.3, "neurons": 4, "tolerance": 1.0},
+    "pinn-id": {"coarse": 3.0, "fine": 3.0},
 }
 """Settings that make a solver quick enough for the tests."""
 
@@ -46,7 +47,7 @@ ACCURACY = {
     "statfem": 1e-8,
     "fem-id": 1e-8,
     "skfem-p1": 1e-8,
-} | dict.fromkeys(("pinn-std", "pinn-local", "pinn-asm", "pinn-local-asm"), 0.02)
+} | dict.fromkeys(("pinn-std", "pinn-local", "pinn-asm", "pinn-local-asm", "pinn-id"), 0.02)
 """Relative difference that two solutions of one problem may have: rounding, Newton's tolerance, training.
 
 A solver that is not listed gets 0.01."""

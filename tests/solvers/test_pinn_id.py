@@ -1,0 +1,86 @@
+"""`pinn-id` against its twin in finite elements, and its refits of first order."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.cache import finger_mesh
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.mesh.quadrature import body_quadrature
+from geometry.mesh.settings import MeshSettings
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
+from solvers.fem.identification.solver import FemIdSolver
+from solvers.pinn.identification.solver import PinnIdSolver
+from solvers.problem import Load, Material, Problem
+from tests.solvers.conftest import observed_at
+
+NOISE = 0.01
+SETTINGS = {"coarse": 2.2, "fine": 1.6}
+
+
+@pytest.fixture(scope="module")
+def problem():
+    """A short finger with one rib, and its markers under a sliding patch, with noise."""
+    design = Design(height=50, rib_count=1, tip_length=12, contact_position=20)
+    mesh = finger_mesh(design, settings=MeshSettings(size=0.5))
+    material = Material(law="neo-hookean")
+    truth = FemNonlinearSolver().solve(Problem(mesh, material, Load(kind="patch", displacement=(None, -4.0))))
+    moved = truth.displacement(mesh.markers)
+    moved = moved + NOISE * np.random.default_rng(2).normal(size=moved.shape)
+    observed = observed_at(mesh.markers, moved, NOISE)
+    return Problem(mesh, material, Load(displacement=(None, -4.0)), observed)
+
+
+@pytest.fixture(scope="module")
+def refit(problem):
+    return PinnIdSolver(**SETTINGS).refitter(replace(problem, observations=None))
+
+
+@pytest.fixture(scope="module")
+def found(refit, problem):
+    return refit(problem.observations)
+
+
+@pytest.mark.slow
+def test_it_is_near_its_twin(problem, found):
+    """Within 0.5 % in displacement; the force within a fifth of its own interval."""
+    twin = FemIdSolver().solve(problem)
+    rule = body_quadrature(problem.mesh)
+    ours, theirs = (each.displacement(rule.location) for each in (found, twin))
+    norm = [np.sqrt((rule.weights[:, None] * values**2).sum()) for values in (ours - theirs, theirs)]
+    assert norm[0] < 0.005 * norm[1]
+    assert found.stats["law"] == twin.stats["law"]
+    width = twin.stats["force_high"] - twin.stats["force_low"]
+    assert abs(found.stats["force"] - twin.stats["force"]) < 0.2 * width
+    assert found.status.converged
+
+
+@pytest.mark.slow
+def test_a_refit_of_first_order_is_a_fit_for_what_a_marker_left_out_changes(problem, found, refit):
+    """The prediction of the marker by the others, to half of the noise."""
+    observed = problem.observations
+    visible = np.arange(len(observed.points)) != 1
+    without = replace(observed, visible=visible)
+    quick = refit(without)
+    whole = PinnIdSolver(**SETTINGS).solve(replace(problem, observations=without))
+    marker = problem.mesh.markers[[1]]
+    predicted = [each.displacement_in_space(marker)[0] for each in (quick, whole)]
+    np.testing.assert_allclose(predicted[0], predicted[1], atol=0.5 * NOISE)
+    np.testing.assert_allclose(found.left_out[1], predicted[1], atol=0.5 * NOISE)
+    assert quick.stats["seconds"] < 0.2 * whole.stats["seconds"]
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"coarse": 1.0, "fine": 2.0}, "0 < fine <= coarse, got 2.0 and 1.0"),
+        ({"seed": -1}, "the seed must be zero or more, got -1"),
+        ({"parameters": "position"}, "pinn-id finds a force: give normal_force"),
+        ({"prior": 0.0}, "pinn-id: prior must be positive"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(settings, said):
+    with pytest.raises(UserError, match=said):
+        PinnIdSolver(**settings)
