@@ -319,12 +319,16 @@ class Identifier:
             force = np.linalg.norm(model.unknowns.hypothesis(values).force)
             progress(0.5, f"{law}: force {force:.4g} N/mm")
             found = model.response(values)
+            if found is None and model.evaluations == first:  # the start is too far from that of another law
+                model.restart(None)
+                found = model.response(values)
             return None if found is None else reading.predicted(markers, found)
 
         if near is not None:
             start = near.estimate.z
         elif start is None:
             start = self._pressed(model, markers, reading)
+        first = model.evaluations + 1
         found = estimate(
             predict,
             reading.observed,
