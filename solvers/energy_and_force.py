@@ -1,4 +1,4 @@
-"""Energy and force of a displacement field of the linear law, by quadrature in the elements."""
+"""Energy and force of a displacement field, by quadrature in the elements."""
 
 import numpy as np
 from scipy.sparse import diags
@@ -8,10 +8,10 @@ from geometry.arrays import FloatArray
 from geometry.mesh.boundary import mean_thickness
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
-from solvers.elasticity import linear_energy_density, linear_stress
+from solvers.elasticity import deformation_jacobian
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem, contact_ends, contact_nodes
-from solvers.solution import DisplacementField
+from solvers.solution import DisplacementField, State
 
 PLATEAU = 0.1
 """Part of the harmonic function's range that is cut off at base and contact, where the stress is singular."""
@@ -25,19 +25,22 @@ def energy_and_force(problem: Problem, field: DisplacementField, degree: int = 2
     base to a unit translation at the contact. It is zero for a component that is free.
 
     Args:
-        problem: A problem of the linear law.
+        problem: Its law gives the stress.
         field: The displacement.
         degree: Of the quadrature.
     """
     rule = body_quadrature(problem.mesh, degree)
-    gradient, lame = field.gradient(rule.location), problem.material.lame
-    energy = float((rule.weights * linear_energy_density(gradient, lame)).sum())
-    slope = section_slope(problem, rule.location)
-    stress, force = linear_stress(gradient, lame), np.zeros(2)
-    rows = ((stress.xx, stress.xy), (stress.xy, stress.yy))
-    for axis in problem.load.prescribed:
-        traction = rows[axis][0] * slope[:, 0] + rows[axis][1] * slope[:, 1]
-        force[axis] = (rule.weights * traction).sum()
+    gradient = field.gradient(rule.location)
+    state = State.from_gradient(gradient, problem)
+    energy = float((rule.weights * state.energy_density).sum())
+    stress = state.stress
+    if problem.material.law != "linear":  # per undeformed area: P = J σ F⁻ᵀ
+        deformation = np.eye(2) + gradient
+        jacobian = deformation_jacobian(gradient)[:, None, None]
+        stress = jacobian * stress @ np.linalg.inv(deformation).transpose(0, 2, 1)
+    traction = np.einsum("nij,nj->ni", stress, section_slope(problem, rule.location))
+    force = np.zeros(2)
+    force[problem.load.prescribed] = (rule.weights @ traction)[problem.load.prescribed]
     return energy, force
 
 

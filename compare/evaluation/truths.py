@@ -164,6 +164,14 @@ TRUTHS: Mapping[str, Truth] = {
             ),
         ),
         Truth(
+            name="friction",
+            slope=-0.07,
+            description=(
+                "neo-Hookean, contact patch that is pressed in by {:.4g} mm and that friction "
+                "holds half way between sliding and sticking"
+            ),
+        ),
+        Truth(
             name="sticking",
             slope=0.0,
             description="neo-Hookean, contact patch that is pressed in by {:.4g} mm, sticks and cannot turn",

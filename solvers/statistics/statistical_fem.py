@@ -15,6 +15,9 @@ Source: M. Girolami, E. Febrianto, G. Yin, F. Cirak, The statistical finite elem
 coherent synthesis of observation data and model predictions, Comput. Methods Appl. Mech. Engrg. 375 (2021)
 113533: the model of the data, its conditioning and its marginal likelihood. There the source term is random;
 here it is the prescribed displacement.
+
+At finite strain u is linearised about the nominal load: the shape of its largest component is the
+secant from rest, the other is the tangent.
 """
 
 import time
@@ -29,12 +32,17 @@ from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.assimilation.misfit import leave_one_out_displacements, standard_deviations
 from solvers.energy_and_force import energy_and_force
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
+from solvers.lagrange import LagrangeField
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, check_problem, silent
 from solvers.statistics.kernel_field import Kernel
 from solvers.statistics.statistical_posterior import Posterior, StatFemData, StatFemField
+
+TANGENT_STEP = 0.1
+"""Change of a prescribed displacement for its tangent at finite strain, mm."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +59,7 @@ class StatFemSolver:
     stroke_deviation: float = 0.5
     kernel: Kernel = "matern52"
     name: ClassVar[str] = "statfem"
-    laws: ClassVar[tuple[str, ...]] = FemSolver.laws
+    laws: ClassVar[tuple[str, ...]] = (*FemSolver.laws, *FemNonlinearSolver.laws)
     loads: ClassVar[tuple[str, ...]] = FemSolver.loads
     assimilates: ClassVar[bool] = True
 
@@ -71,8 +79,10 @@ class StatFemSolver:
         """Condition on the problem's observations; see `Solver`. Without any it is `fem`."""
         check_problem(self, problem)
         if problem.observations is None:
-            plain = FemSolver(degree=self.degree, estimate=False).solve(problem, progress)
-            return replace(plain, solver=self.name, status=Status(True, "without markers this is fem"))
+            fem = self._fem(problem)
+            plain = fem.solve(problem, progress)
+            said = Status(plain.status.converged, f"without markers this is {fem.name}")
+            return replace(plain, solver=self.name, status=said)
         started = time.perf_counter()
         shapes = self._shapes(problem, progress)
         data = self._data(problem, problem.observations, shapes)
@@ -107,7 +117,9 @@ class StatFemSolver:
 
     def _shapes(self, problem: Problem, progress: Progress) -> list[Solution]:
         """Finite elements for a unit displacement of each prescribed component of the contact."""
-        fem = FemSolver(degree=self.degree, estimate=False)
+        fem = self._fem(problem)
+        if problem.material.law != "linear":
+            return _linearised_shapes(fem, replace(problem, observations=None), progress)
         shapes = []
         for axis in problem.load.prescribed:
             unit = [None if value is None else 0.0 for value in problem.load.displacement]
@@ -115,6 +127,12 @@ class StatFemSolver:
             load = problem.load.model_copy(update={"displacement": tuple(unit)})
             shapes.append(fem.solve(replace(problem, load=load, observations=None), progress))
         return shapes
+
+    def _fem(self, problem: Problem) -> FemSolver | FemNonlinearSolver:
+        """The model of the problem's law."""
+        if problem.material.law == "linear":
+            return FemSolver(degree=self.degree, estimate=False)
+        return FemNonlinearSolver(degree=self.degree)
 
     def _conditioned(self, problem: Problem, data: StatFemData, shapes: Sequence[Solution]) -> Solution:
         started = time.perf_counter()
@@ -132,9 +150,9 @@ class StatFemSolver:
             reaction=reaction,
             status=Status(
                 True,
-                f"fem times {constants.factor:.3g} plus a discrepancy of {discrepancy[0]:.2g} mm in u and "
-                f"{discrepancy[1]:.2g} mm in v over {constants.length:.3g} mm; its energy and force include "
-                "the discrepancy's",
+                f"{self._fem(problem).name} times {constants.factor:.3g} plus a discrepancy of "
+                f"{discrepancy[0]:.2g} mm in u and {discrepancy[1]:.2g} mm in v over "
+                f"{constants.length:.3g} mm; its energy and force include the discrepancy's",
             ),
             stats={
                 "seconds": time.perf_counter() - started,
@@ -151,6 +169,54 @@ class StatFemSolver:
                 for axis, value in zip(problem.load.prescribed, posterior.load, strict=True)
             },
         )
+
+
+def _linearised_shapes(
+    fem: FemSolver | FemNonlinearSolver, problem: Problem, progress: Progress
+) -> list[Solution]:
+    """Fields whose sum, times the nominal displacements, is the solution; a change of load adds tangents.
+
+    Raises:
+        UserError: If the finger has no equilibrium under the nominal load or near it.
+    """
+    values = problem.load.values
+    main = int(np.abs(values).argmax())
+    if not values[main]:
+        raise UserError("statfem at finite strain needs a load that moves the contact")
+    whole = _reached(fem, problem, progress)
+    shapes: list[Solution] = []
+    for number, axis in enumerate(problem.load.prescribed):
+        if number == main:
+            shapes.append(whole)
+            continue
+        moved = list(problem.load.displacement)
+        moved[axis] = values[number] + TANGENT_STEP
+        load = problem.load.model_copy(update={"displacement": tuple(moved)})
+        there = _reached(fem, replace(problem, load=load), progress)
+        shapes.append(
+            replace(whole, field=_combined([(there, 1 / TANGENT_STEP), (whole, -1 / TANGENT_STEP)]))
+        )
+    rest = [(shape, -value) for shape, value in zip(shapes, values, strict=True) if shape is not whole]
+    scaled = [(each, factor / values[main]) for each, factor in [(whole, 1.0), *rest]]
+    shapes[main] = replace(whole, field=_combined(scaled))
+    return shapes
+
+
+def _reached(fem: FemNonlinearSolver | FemSolver, problem: Problem, progress: Progress) -> Solution:
+    solution = fem.solve(problem, progress)
+    if not solution.status.converged:
+        raise UserError(f"statfem: {fem.name} {solution.status.message}")
+    return solution
+
+
+def _combined(parts: Sequence[tuple[Solution, float]]) -> LagrangeField:
+    """A sum of finite-element fields, each times a factor."""
+    fields = [(solution.field, factor) for solution, factor in parts]
+    nodal = [factor * field.values for field, factor in fields if isinstance(field, LagrangeField)]
+    first = fields[0][0]
+    if not isinstance(first, LagrangeField) or len(nodal) < len(fields):
+        raise TypeError("statfem adds fields of finite elements")
+    return LagrangeField(first.space, np.sum(nodal, axis=0))
 
 
 def _leave_one_out(data: StatFemData, progress: Progress) -> tuple[FloatArray, FloatArray]:

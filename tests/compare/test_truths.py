@@ -68,6 +68,7 @@ def test_laws_and_loads_are_those_of_the_names():
         "cylinder": cylinder,
         "oblique": {"kind": "cylinder", "displacement": (3.0, -10.0), "radius": 20.0},
         "mixed": cylinder,
+        "friction": {"kind": "patch", "displacement": (pytest.approx(-0.7), -10.0)},
         "sticking": {"kind": "patch", "displacement": (0.0, -10.0)},
     }
 
@@ -84,7 +85,7 @@ def test_the_source_names_law_and_load(mesh: TriangleMesh):
 def test_a_drawing_has_the_truths_that_keep_its_walls():
     drawn = beam()
     with pytest.raises(
-        UserError, match=r"it can have sliding, stvk, cylinder, oblique, sticking$"
+        UserError, match=r"it can have sliding, stvk, cylinder, oblique, friction, sticking$"
     ) as refused:
         TRUTHS["print"].finger(drawn)
     assert "\n" not in str(refused.value)

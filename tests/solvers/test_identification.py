@@ -327,3 +327,45 @@ def test_settings_that_make_no_sense_are_refused(settings, said):
     assert issubclass(FemIdSolver, IdentificationSettings)
     with pytest.raises(UserError, match=said):
         FemIdSolver(**settings)
+
+
+def under(problem, loads):
+    """Observations of a finger under several tractions: place, width, force along x and y, N/mm."""
+    model = model_of(problem, DEFAULT)
+    front, body = model.unknowns.traction, model.body
+    rows = [body.displacement_rows(front.points, front.weights(x, width)[:1])[0] for x, width, _, _ in loads]
+    total = sum(fx * row[0] + fy * row[1] for row, (_, _, fx, fy) in zip(rows, loads, strict=True))
+    state, still = np.zeros(body.shape), np.zeros(len(model.unknowns.motion.names))
+    for fraction in np.repeat(np.linspace(0.25, 1.0, 4), 6):
+        about = body.linearised(state, problem.material.lame, still)
+        assert about is not None
+        state = state + about.solve((fraction * total - about.force)[None])[0]
+    marked = MarkerModel.of(
+        body,
+        model.unknowns,
+        misfit(replace(problem, observations=observed_at(problem.mesh.markers, np.zeros((9, 2)), NOISE))),
+    )
+    moved = np.einsum("maxy,xy->ma", marked.rows, state)
+    moved = moved + NOISE * np.random.default_rng(4).normal(size=moved.shape)
+    return replace(problem, observations=observed_at(problem.mesh.markers, moved, NOISE))
+
+
+def test_two_contacts_are_said_to_be_something_else(problem):
+    """One contact cannot explain two that are 35 mm apart; the interval of their force opens and holds it."""
+    solution = FemIdSolver(degree=1).solve(under(problem, [(20, 4, 0, -0.15), (55, 4, 0, -0.1)]))
+    assert solution.stats["inflation"] > 3
+    assert "no values of these parameters explain them" in solution.status.message
+    assert solution.stats["force_low"] < 0.25 < solution.stats["force_high"]
+    assert solution.stats["force_high"] - solution.stats["force_low"] > 0.05
+
+
+@pytest.mark.parametrize(
+    ("load", "named"),
+    [((52, 4, 0.0, -0.15), "far from its drawn place"), ((35, 4, 0.07, -0.15), "with friction")],
+)
+def test_a_contact_elsewhere_or_with_friction_is_found(problem, load, named):
+    solution = FemIdSolver(degree=1).solve(under(problem, [load]))
+    assert solution.stats["position"] == pytest.approx(load[0], abs=1.5), named
+    size = np.hypot(load[2], load[3])
+    assert solution.stats["force_low"] < size < solution.stats["force_high"], named
+    np.testing.assert_allclose(solution.reaction, load[2:], atol=0.1 * size)

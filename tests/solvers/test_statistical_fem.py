@@ -7,8 +7,9 @@ import pytest
 
 from geometry.errors import UserError
 from geometry.observations import Observations
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Problem
+from solvers.problem import Load, Material, Problem
 from solvers.statistics.statistical_fem import StatFemSolver
 from tests.solvers.kernels import matern
 
@@ -151,3 +152,31 @@ def test_without_markers_it_is_fem(coarse_mesh):
 def test_settings_that_make_no_sense_are_refused(settings):
     with pytest.raises(UserError, match="statfem"):
         StatFemSolver(**settings)
+
+
+def test_at_finite_strain_its_own_model_is_reproduced(coarse_mesh):
+    """Markers of `fem-nonlinear` leave nothing for the discrepancy; the force is that of sections."""
+    material = Material(law="neo-hookean")
+    plain = Problem(coarse_mesh, material, Load(displacement=(-0.5, -5.0)))
+    exact = FemNonlinearSolver(degree=1).solve(plain)
+    moved = exact.displacement(coarse_mesh.markers)
+    observed = observing(coarse_mesh, moved, deviation=0.001).observations
+    solution = StatFemSolver(degree=1, stroke_deviation=0.01).solve(replace(plain, observations=observed))
+    inside = coarse_mesh.at_centroids()
+    # The load's prior and the noise leave some micrometres.
+    np.testing.assert_allclose(solution.displacement(inside), exact.displacement(inside), atol=0.01)
+    # Sections of linear elements transmit the force to some per cent.
+    np.testing.assert_allclose(solution.reaction, exact.reaction, atol=0.1 * np.linalg.norm(exact.reaction))
+    assert solution.energy == pytest.approx(exact.energy, rel=0.01)
+    assert solution.problem.material.law == "neo-hookean"
+
+
+def test_at_finite_strain_the_second_component_is_a_tangent(coarse_mesh):
+    """Half a millimetre along the finger more than the nominal load: found, to the square of it."""
+    material = Material(law="neo-hookean")
+    other = Problem(coarse_mesh, material, Load(displacement=(-0.5, -5.0)))
+    exact = FemNonlinearSolver(degree=1).solve(other)
+    observed = observing(coarse_mesh, exact.displacement(coarse_mesh.markers), deviation=0.001).observations
+    nominal = replace(other, load=Load(displacement=(0.0, -5.0)), observations=observed)
+    solution = StatFemSolver(degree=1).solve(nominal)
+    assert solution.stats["load_u"] * solution.stats["factor"] == pytest.approx(-0.5, abs=0.1)
