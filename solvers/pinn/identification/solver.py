@@ -25,8 +25,8 @@ COST_CHANGE = 1e-3
 """Relative change of the cost at which a search ends: its derivatives are known to that by iteration."""
 PLAIN = 0.02
 """Tolerance of the network without markers."""
-ROUGH = 0.005
-"""Error of the coarse level over the largest displacement of a marker."""
+COARSE_ERROR, FINE_ERROR = 0.005, 0.001
+"""Error of the network on each level over the largest displacement of a marker: it adds to the markers'."""
 NEAR = 0.2
 """Largest change of a marker for which a refit is of first order, mm."""
 
@@ -35,8 +35,8 @@ NEAR = 0.2
 class PinnIdSolver(IdentificationSettings):
     """The network of `pinn-local` at finite strain, whose contact, walls and law are found from the markers.
 
-    One law is fitted on a coarse level of the network, whose error counts as the markers'; from there all
-    laws on a fine one. Refits to other observations of the same markers are of first order about that.
+    One law is fitted on a coarse level of the network, from there all laws on a fine one; the network's error
+    on each counts as the markers'. Refits to other observations of the same markers are of first order.
 
     Attributes:
         coarse: Spacing of the windows on the coarse level over that of `pinn-local`.
@@ -91,7 +91,8 @@ class PinnIdSolver(IdentificationSettings):
             if kept and _near(observations, kept[0][0]):
                 started = time.perf_counter()
                 _, identifier, found = kept[0]
-                again = identifier.updated(found, observations, self.measured_reaction)
+                given = _with_error(observations, FINE_ERROR)
+                again = identifier.updated(found, given, self.measured_reaction)
                 own = replace(problem, observations=observations)
                 return self._solution(own, identifier, again, started, 0.0)
             solution, identifier, found = self._solved(problem, observations, silent)
@@ -112,10 +113,10 @@ class PinnIdSolver(IdentificationSettings):
         problem = replace(problem, observations=observations)
         law: LawName = LAWS[0] if self.law == "evidence" else problem.material.law
         coarse, fine = self._identifier(problem, self.coarse, [law]), self._identifier(problem, self.fine)
-        least = ROUGH * float(np.abs(observations.displacements[observations.visible]).max(initial=0.0))
-        rough = replace(observations, standard_deviations=np.maximum(observations.standard_deviations, least))
         first = coarse.identify(
-            rough, self.measured_reaction, lambda share, text: progress(0.5 * share, text)
+            _with_error(observations, COARSE_ERROR),
+            self.measured_reaction,
+            lambda share, text: progress(0.5 * share, text),
         ).best
         coarse_seconds = time.perf_counter() - started
         here, there = coarse.models[law].body, fine.models[law].body
@@ -126,7 +127,9 @@ class PinnIdSolver(IdentificationSettings):
         slopes = np.zeros((len(first.response.values), *state.shape))
         fine.start_from(first._replace(response=replace(first.response, state=state, slopes=slopes)))
         found = fine.identify(
-            observations, self.measured_reaction, lambda share, text: progress(0.5 + 0.5 * share, text)
+            _with_error(observations, FINE_ERROR),
+            self.measured_reaction,
+            lambda share, text: progress(0.5 + 0.5 * share, text),
         )
         return self._solution(problem, fine, found, started, coarse_seconds), fine, found
 
@@ -162,6 +165,12 @@ class PinnIdSolver(IdentificationSettings):
             return NetworkBody.of(network, unknowns.problem, unknowns.motion, scale)
 
         return self.identifier(problem, body, laws, COST_CHANGE)
+
+
+def _with_error(observations: Observations, share: float) -> Observations:
+    """The observations with an error more: a share of the largest displacement."""
+    size = share * float(np.abs(observations.displacements[observations.visible]).max(initial=0.0))
+    return replace(observations, standard_deviations=np.hypot(observations.standard_deviations, size))
 
 
 def _near(observations: Observations, first: Observations) -> bool:
