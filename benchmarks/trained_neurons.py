@@ -74,7 +74,8 @@ def lagrangian_gradient(
     material = level.energy.material
     for patch in level.energy.patches:
         _, gradient = _field_and_gradient(field, leaf, patch.points, patch.near)
-        (patch.weights @ energy_density(gradient, material.lame, material.law)).backward()
+        weights = level.energy.weights[patch.rows]
+        (weights @ energy_density(gradient, material.lame, material.law)).backward()
     conditions = load_conditions(problem)
     points = torch.from_numpy(conditions.points.copy())
     (near,) = field.basis.windows.near(boxes_around([points]))

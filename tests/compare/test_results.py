@@ -53,6 +53,7 @@ SOLVER = {
     "held_out": ERRORS,
     "uncertainty": UNCERTAINTY,
     "to_truth": (dict, type(None)),
+    "force_to_truth_rel": (Real, type(None)),
     "to_reference": {**DIFFERENCES, "reference_uncertainty": DIFFERENCES},
 }
 SCHEMA = {
