@@ -44,8 +44,8 @@ def body_table(comparison: Comparison) -> Table:
         lines.append(f"±: error of {label} itself, estimated; a smaller difference says nothing.")
     lines.append("above fem: energy of the displacement on fem's elements above the least there.")
     if truth is not None:
-        lines.append("truth: relative L² difference from the simulated finger, of finite strain, and")
-        lines.append("error of the size of the indenter's force.")
+        lines.append("truth: relative L² difference from the simulated finger of finite strain;")
+        lines.append("force: error of the size of the indenter's force.")
     table = _table("Over the whole body", "\n".join(lines))
     headings = [f"from {reference.solver}\n%", "above fem\n%"]
     headings += ["truth\ndispl.", "\nv. Mises", "\nforce, %"] * (truth is not None)
