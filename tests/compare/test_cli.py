@@ -116,8 +116,8 @@ BAD = [
     ("compare --plane stress --solvers fem-nonlinear", "fem-nonlinear: .* plane strain only"),
     ("compare --law hooke", 'Choose from: "linear", "neo-hookean", "st-venant-kirchhoff"'),
     (
-        "compare --solvers fem,statfem --law st-venant-kirchhoff",
-        r"none of the solvers has it \(fem has linear; statfem has linear\)",
+        "compare --solvers fem,gp --law st-venant-kirchhoff",
+        r"none of the solvers has it \(fem has linear; gp has linear\)",
     ),
     ("solve fem --law neo-hookean", r"--law neo-hookean: none of the solvers has it \(fem has linear\)"),
     ("gridsearch --law neo-hookean", r"--law neo-hookean: none of the solvers has it \(pinn-std has linear"),
