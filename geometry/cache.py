@@ -5,6 +5,7 @@ import os
 import warnings
 import zipfile
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -57,7 +58,7 @@ def finger_mesh(
         "settings": settings.model_dump(),
     }
     if isinstance(finger, DrawnFinger) and finger.mesh is not None and settings == MeshSettings():
-        return finger.mesh
+        return replace(finger.mesh, depth=finger.depth)
     task["finger"] = finger.definition()
     return _cached(finger.digest, task, ".npz", TriangleMesh.load, cache_dir, timeout_s)
 

@@ -6,16 +6,58 @@ finite-element solution is an array that outlives both, and no code depends on h
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from geometry.arrays import FloatArray, IntArray
+from geometry.arrays import BoolArray, FloatArray, IntArray
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 # Edge k joins the corners EDGES[k]; its node is number 3 + k of a quadratic element.
 EDGES = np.array([[0, 1], [1, 2], [2, 0]])
+
+
+class NodalSpace(Protocol):
+    """Scalar Lagrange elements on simplices in d = 2 or 3 dimensions, for a section or its extrusion."""
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """The mesh of the section."""
+
+    @property
+    def degree(self) -> int:
+        """Degree of the elements, 1 or 2."""
+
+    @property
+    def nodes(self) -> FloatArray:
+        """Node positions, shape (N, d), mm."""
+
+    @property
+    def cells(self) -> IntArray:
+        """Rows of `vertices` at the corners of every simplex, shape (c, d + 1)."""
+
+    @property
+    def vertices(self) -> IntArray:
+        """The nodes that are corners of simplices, shape (V,)."""
+
+    @property
+    def thickness(self) -> float:
+        """Extent out of the plane by which integrals are divided, mm; 1 for a section."""
+
+    @property
+    def mirrored(self) -> BoolArray:
+        """Components that symmetry holds at zero, mask of shape (N, d)."""
+
+    def boundary_nodes(self, name: str) -> IntArray:
+        """Nodes on a named boundary, each once."""
+
+    def edge_nodes(self, edges: IntArray) -> IntArray:
+        """Nodes in the middles of edges given as pairs of nodes, shape (..., 2), for degree 2."""
+
+    def mean_value(self, points: FloatArray, weights: FloatArray) -> FloatArray:
+        """Weights of the nodes in a weighted sum over points (q, 2) of the section, shape (N,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +79,26 @@ class LagrangeSpace:
             return self.mesh.points
         return np.concatenate([self.mesh.points, self.mesh.points[self.mesh.edges].mean(axis=1)])
 
+    @property
+    def cells(self) -> IntArray:
+        """Corners of every triangle, shape (t, 3)."""
+        return self.mesh.triangles
+
+    @property
+    def vertices(self) -> IntArray:
+        """The nodes that are corners, which come first, shape (V,)."""
+        return np.arange(len(self.mesh.points))
+
+    @property
+    def thickness(self) -> float:
+        """One: integrals over the section are per depth, mm."""
+        return 1.0
+
+    @property
+    def mirrored(self) -> BoolArray:
+        """Components that symmetry holds: none, mask of shape (N, 2)."""
+        return np.zeros((len(self.nodes), 2), dtype=bool)
+
     @cached_property
     def cell_nodes(self) -> IntArray:
         """Nodes of every element, shape (t, 3) or (t, 6)."""
@@ -55,6 +117,10 @@ class LagrangeSpace:
     def edge_nodes(self, edges: IntArray) -> IntArray:
         """Nodes in the middles of edges given as pairs of nodes, shape (..., 2), for degree 2."""
         return len(self.mesh.points) + self.mesh.edge_numbers(edges)
+
+    def mean_value(self, points: FloatArray, weights: FloatArray) -> FloatArray:
+        """Weights of the nodes in a weighted sum over points (q, 2), shape (N,)."""
+        return np.asarray(self.shape_functions(self.mesh.locate(points)).T @ weights)
 
     def at_nodes(self) -> LocatedPoints:
         """The location of every node, in the order of the nodes."""

@@ -47,6 +47,11 @@ class Material(BaseModel):
         """Lamé constants of the plane law, MPa."""
         return lame_constants(self.young, self.poisson, self.plane)
 
+    @property
+    def solid_lame(self) -> Lame:
+        """Lamé constants in three dimensions, MPa."""
+        return lame_constants(self.young, self.poisson, "strain")
+
 
 class Load(BaseModel):
     """Displacement that the indenter prescribes at the boundary `contact`; a component None is free of force.

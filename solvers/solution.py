@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +13,7 @@ from geometry.mesh.point_location import LocatedPoints
 from geometry.notebook import fact_table
 from solvers.elasticity import PlaneTensor, energy_density_of, strain_of, stress_of, von_mises
 from solvers.problem import Problem
+from solvers.solid_elasticity import solid_energy_density, solid_strain, solid_stress, solid_von_mises
 
 if TYPE_CHECKING:
     from geometry.figure import Figure
@@ -27,6 +28,15 @@ class DisplacementField(Protocol):
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient H[i, j] = du_i/dx_j at `location.points`, shape (n, 2, 2)."""
+        ...
+
+
+@runtime_checkable
+class SolidField(DisplacementField, Protocol):
+    """A plane, such as a side face, of a displacement in three dimensions."""
+
+    def solid_gradient(self, location: LocatedPoints) -> FloatArray:
+        """Displacement gradient du_i/dx_j at `location.points`, shape (n, 3, 3)."""
         ...
 
 
@@ -131,7 +141,10 @@ class Solution:
 
     def state(self, points: ArrayLike | LocatedPoints) -> "State":
         """Strain, stress and energy density at points of shape (n, 2), mm."""
-        return State.from_gradient(self.gradient(points), self.problem)
+        location = self._locate(points)
+        if isinstance(self.field, SolidField):
+            return State.from_solid_gradient(self.field.solid_gradient(location), self.problem)
+        return State.from_gradient(self.field.gradient(location), self.problem)
 
     def plot(
         self, quantity: Literal["displacement", "von_mises"] = "displacement", *, scale: float = 1.0
@@ -208,6 +221,20 @@ class State:
             stress_zz=np.asarray(stress.zz, dtype=np.float64),
             von_mises=von_mises(stress, np.sqrt),
             energy_density=energy_density_of(law, gradient, lame, np.log),
+        )
+
+    @classmethod
+    def from_solid_gradient(cls, gradient: FloatArray, problem: Problem) -> "State":
+        """The state at displacement gradients in three dimensions, shape (n, 3, 3); all of it counts."""
+        law, lame = problem.material.law, problem.material.solid_lame
+        stress = solid_stress(law, gradient, lame)
+        strain: FloatArray = np.moveaxis(np.array(solid_strain(law, gradient)), -1, 0)
+        return cls(
+            strain=strain[:, :2, :2],
+            stress=stress[:, :2, :2],
+            stress_zz=stress[:, 2, 2],
+            von_mises=solid_von_mises(stress),
+            energy_density=np.asarray(solid_energy_density(law, gradient, lame, np.log)),
         )
 
 

@@ -15,7 +15,8 @@ CERTIFIED_LAW = "linear"
 def with_certificates(evaluations: Sequence[Evaluation], problem: Problem) -> list[Evaluation]:
     """The evaluations, those of the linear law with a certificate and the verdict that follows from it.
 
-    A solver that was given observations pays energy for them, so that least energy does not judge it.
+    A solver that was given observations pays energy for them, and a body in three dimensions has another
+    energy, so that the least energy of the plane does not judge them.
     Without DOLFINx there are no certificates, and a warning says so.
 
     Args:
@@ -40,7 +41,7 @@ def with_certificates(evaluations: Sequence[Evaluation], problem: Problem) -> li
 
 
 def _certifiable(evaluation: Evaluation) -> bool:
-    return evaluation.law == CERTIFIED_LAW and not evaluation.in_sample
+    return evaluation.law == CERTIFIED_LAW and not evaluation.in_sample and not evaluation.solid
 
 
 def with_certificate(evaluation: Evaluation, certificate: Certificate | None) -> Evaluation:

@@ -21,7 +21,7 @@ from geometry.atomic import atomic_path
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.lagrange import LagrangeSpace
-from solvers.solution import Solution
+from solvers.solution import SolidField, Solution
 
 QUADRATURE_DEGREE = 2
 HISTORY_PREFIX = "history_"
@@ -58,6 +58,7 @@ class Evaluation:
         in_sample: Whether the solver was given the observations: its errors at them are training errors.
         left_out: What the solver says of each marker if it is not given that one, shape (m, 2), mm; None
             where it does not tell.
+        solid: Whether the field is a plane of a body in three dimensions.
         certificate: What the result is worth by the energy of finite elements; not part of the archive.
     """
 
@@ -83,6 +84,7 @@ class Evaluation:
     marker_uncertainty: FloatArray | None = None
     in_sample: bool = False
     left_out: FloatArray | None = None
+    solid: bool = False
     certificate: Certificate | None = None
 
     @classmethod
@@ -123,6 +125,7 @@ class Evaluation:
             energy_density=state.energy_density,
             in_sample=solution.problem.observations is not None,
             left_out=solution.left_out,
+            solid=isinstance(solution.field, SolidField),
         )
 
     @property

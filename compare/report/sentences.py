@@ -16,6 +16,8 @@ def certificate_sentences(evaluation: Evaluation) -> str:
         return f"{label} has no certificate: there is one for the {CERTIFIED_LAW} law only."
     if evaluation.in_sample:
         return f"{label} has no certificate: it pays energy for the markers that it was given."
+    if evaluation.solid:
+        return f"{label} has no certificate: the least energy of the plane says nothing of three dimensions."
     if certificate is None:
         reason = "DOLFINx, which makes it, is not installed" if evaluation.finite else "it is not finite"
         return f"{label} has no certificate: {reason}."

@@ -111,6 +111,7 @@ def _named(finger: Finger, found: Triangulation) -> TriangleMesh:
         boundaries=boundaries,
         marker_nodes=_nodes_at(points, finger.markers, "marker"),
         contact_node=contact_node,
+        depth=finger.depth,
     )
 
 

@@ -48,6 +48,7 @@ def refined(mesh: TriangleMesh, marked: BoolArray, section: Section | None = Non
         boundaries={name: _cut_edges(mesh, edges, middle) for name, edges in mesh.boundaries.items()},
         marker_nodes=mesh.marker_nodes,
         contact_node=mesh.contact_node,
+        depth=mesh.depth,
     )
 
 

@@ -37,6 +37,7 @@ class TriangleMesh:
             indenter touches).
         marker_nodes: The node of every marker, shape (m,), ordered from base to tip.
         contact_node: The node in the middle of `contact`, where a point load acts.
+        depth: Depth of the extruded body, out of the plane, mm; plane solvers need none.
 
     Raises:
         ShapeError: If an array has the wrong shape.
@@ -48,6 +49,7 @@ class TriangleMesh:
     boundaries: Mapping[str, IntArray]
     marker_nodes: IntArray
     contact_node: int
+    depth: float = 20.0
 
     def __post_init__(self) -> None:
         edges = {
@@ -62,8 +64,11 @@ class TriangleMesh:
             ),
             "boundaries": MappingProxyType(edges),
             "contact_node": int(self.contact_node),
+            "depth": float(self.depth),
         }.items():
             object.__setattr__(self, name, values)
+        if not 0 < self.depth < np.inf:
+            raise UserError(f"a body is {self.depth:g} mm deep; give a depth above 0 mm")
         numbers = [self.triangles, self.marker_nodes, np.array([self.contact_node]), *edges.values()]
         if any(nodes.size and (nodes.min() < 0 or nodes.max() >= len(self.points)) for nodes in numbers):
             raise UserError(f"the mesh names a node outside 0..{len(self.points) - 1}")
@@ -178,8 +183,8 @@ class TriangleMesh:
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle the arrays only, not the derived values."""
-        arrays = (self.points, self.triangles, dict(self.boundaries), self.marker_nodes, self.contact_node)
-        return TriangleMesh, arrays
+        numbers = self.marker_nodes, self.contact_node, self.depth
+        return TriangleMesh, (self.points, self.triangles, dict(self.boundaries), *numbers)
 
     def plot(self) -> "Figure":
         """Every triangle, the contact and the markers, as a matplotlib figure."""
@@ -217,6 +222,7 @@ class TriangleMesh:
                 },
                 marker_nodes=archive["marker_nodes"],
                 contact_node=int(archive["contact_node"]),
+                depth=float(archive["depth"]),
             )
 
     def _arrays(self) -> dict[str, FloatArray | IntArray]:
@@ -225,6 +231,7 @@ class TriangleMesh:
             "triangles": self.triangles,
             "marker_nodes": self.marker_nodes,
             "contact_node": np.asarray(self.contact_node),
+            "depth": np.asarray(self.depth),
         } | {BOUNDARY_PREFIX + name: nodes for name, nodes in sorted(self.boundaries.items())}
 
 

@@ -4,22 +4,22 @@ import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
 from solvers.assimilation.misfit import Misfit
-from solvers.lagrange import LagrangeSpace
+from solvers.lagrange import LagrangeSpace, NodalSpace
 from solvers.problem import Problem, contact_functional
 
 
-def dirichlet_mask(problem: Problem, space: LagrangeSpace) -> BoolArray:
-    """Mask (N, 2) of components with a Dirichlet condition: the base and, for a `patch`, the contact."""
-    held = np.zeros((len(space.nodes), 2), dtype=bool)
+def dirichlet_mask(problem: Problem, space: NodalSpace) -> BoolArray:
+    """Mask (N, d) of components with a Dirichlet condition: base, symmetry and, for a `patch`, contact."""
+    held = space.mirrored.copy()
     held[space.boundary_nodes("base")] = True
     if problem.load.kind == "patch":
         held[np.ix_(space.boundary_nodes("contact"), np.array(problem.load.prescribed))] = True
     return held
 
 
-def dirichlet_displacement(problem: Problem, space: LagrangeSpace) -> FloatArray:
-    """Nodal displacements that the Dirichlet conditions prescribe, zero elsewhere, shape (N, 2), mm."""
-    values = np.zeros((len(space.nodes), 2))
+def dirichlet_displacement(problem: Problem, space: NodalSpace) -> FloatArray:
+    """Nodal displacements that the Dirichlet conditions prescribe, zero elsewhere, shape (N, d), mm."""
+    values = np.zeros(space.nodes.shape)
     if problem.load.kind == "patch":
         nodes = space.boundary_nodes("contact")
         values[np.ix_(nodes, np.array(problem.load.prescribed))] = problem.load.values
@@ -31,13 +31,12 @@ def load_targets(problem: Problem) -> FloatArray:
     return problem.load.values if problem.load.kind in ("mean", "point") else np.zeros(0)
 
 
-def load_functionals(problem: Problem, space: LagrangeSpace) -> FloatArray:
-    """The functionals whose values a `mean` or `point` load prescribes, shape (k, N, 2); else none."""
+def load_functionals(problem: Problem, space: NodalSpace) -> FloatArray:
+    """The functionals whose values a `mean` or `point` load prescribes, shape (k, N, d); else none."""
     if problem.load.kind not in ("mean", "point"):
-        return np.zeros((0, len(space.nodes), 2))
-    points, weights = contact_functional(problem)
-    coefficients = space.shape_functions(problem.mesh.locate(points)).T @ weights
-    functionals = np.zeros((len(problem.load.prescribed), len(space.nodes), 2))
+        return np.zeros((0, *space.nodes.shape))
+    coefficients = space.mean_value(*contact_functional(problem))
+    functionals = np.zeros((len(problem.load.prescribed), *space.nodes.shape))
     for row, axis in enumerate(problem.load.prescribed):
         functionals[row, :, axis] = coefficients
     return functionals
@@ -50,7 +49,7 @@ def marker_functionals(misfit: Misfit, space: LagrangeSpace) -> FloatArray:
     return np.kron(sampling, np.eye(2)).reshape(-1, len(space.nodes), 2)
 
 
-def reaction_by_residual_work(space: LagrangeSpace, residual: FloatArray) -> FloatArray:
+def reaction_by_residual_work(space: NodalSpace, residual: FloatArray) -> FloatArray:
     """Force of the indenter on the finger, shape (2,), N/mm: the work of the residual on a unit translation.
 
     The translation is one everywhere but at the base, where the clamp's own force works. Exact for the
@@ -58,4 +57,4 @@ def reaction_by_residual_work(space: LagrangeSpace, residual: FloatArray) -> Flo
     """
     moved = np.ones(len(space.nodes), dtype=bool)
     moved[space.boundary_nodes("base")] = False
-    return np.asarray(residual[moved].sum(axis=0))
+    return np.asarray(residual[moved, :2].sum(axis=0))

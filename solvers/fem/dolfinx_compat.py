@@ -5,7 +5,7 @@ import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import dolfinx
 import dolfinx.fem.petsc
@@ -17,19 +17,20 @@ from petsc4py import PETSc
 from geometry.arrays import BoolArray, FloatArray, IntArray
 from solvers.elasticity import Lame
 from solvers.fem.ranks import communicator
-from solvers.lagrange import LagrangeSpace
+from solvers.lagrange import LagrangeSpace, NodalSpace
 
 
-def _vector_element() -> Any:
+def _vector_element(dimension: int) -> Any:
+    cell = SIMPLICES[dimension]
     if hasattr(ufl, "VectorElement"):  # until 0.6
-        return ufl.VectorElement("Lagrange", "triangle", 1)
+        return ufl.VectorElement("Lagrange", cell, 1)
     import basix.ufl
 
-    return basix.ufl.element("Lagrange", "triangle", 1, shape=(2,))
+    return basix.ufl.element("Lagrange", cell, 1, shape=(dimension,))
 
 
 def _create_mesh(comm: MPI.Comm, cells: IntArray, points: FloatArray) -> Any:
-    domain = ufl.Mesh(_vector_element())
+    domain = ufl.Mesh(_vector_element(points.shape[1]))
     names = inspect.signature(dolfinx.mesh.create_mesh).parameters
     return dolfinx.mesh.create_mesh(
         comm, cells=cells, x=points, **{"domain" if "domain" in names else "e": domain}
@@ -38,22 +39,22 @@ def _create_mesh(comm: MPI.Comm, cells: IntArray, points: FloatArray) -> Any:
 
 def _vector_space(mesh: Any, degree: int) -> Any:
     if hasattr(dolfinx.fem, "functionspace"):  # from 0.7
-        return dolfinx.fem.functionspace(mesh, ("Lagrange", degree, (2,)))
+        return dolfinx.fem.functionspace(mesh, ("Lagrange", degree, (mesh.geometry.dim,)))
     return dolfinx.fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
 
 
-def _nodes_of_dofs(space: LagrangeSpace, domain: Any, dolfinx_space: Any) -> IntArray:
-    """The node of the `LagrangeSpace` at every blocked degree of freedom of this rank.
+def _nodes_of_dofs(space: NodalSpace, domain: Any, dolfinx_space: Any) -> IntArray:
+    """The node of the `NodalSpace` at every blocked degree of freedom of this rank.
 
-    A cell of DOLFINx has its degrees of freedom at its corners and, for degree 2, at the middles of the edges
-    opposite to them, in the order of the corners.
+    A cell of DOLFINx has its degrees of freedom at its corners and, for degree 2, at the middles of `EDGES`.
     """
+    dimension = space.nodes.shape[1]
     geometry = domain.geometry
     table = geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap  # until 0.10
-    nodes = np.asarray(geometry.input_global_indices)[_rows(table, 3)]
+    nodes = space.vertices[np.asarray(geometry.input_global_indices)[_rows(table, dimension + 1)]]
     if space.degree == 2:
-        nodes = np.concatenate([nodes, space.edge_nodes(nodes[:, OPPOSITE])], axis=1)
-    positions = dolfinx_space.tabulate_dof_coordinates()[:, :2]
+        nodes = np.concatenate([nodes, space.edge_nodes(nodes[:, EDGES[dimension]])], axis=1)
+    positions = dolfinx_space.tabulate_dof_coordinates()[:, :dimension]
     node_of_dof = np.zeros(len(positions), dtype=np.int64)
     node_of_dof[_rows(dolfinx_space.dofmap.list, nodes.shape[1])] = nodes
     if not np.allclose(space.nodes[node_of_dof], positions, rtol=0, atol=1e-9):
@@ -77,25 +78,33 @@ def _quiet_compiler() -> Iterator[None]:
         logging.disable(before)
 
 
-OPPOSITE = np.array([[1, 2], [0, 2], [0, 1]])
-"""The corners that the edge opposite to each corner joins."""
+SIMPLICES = {2: "triangle", 3: "tetrahedron"}
+
+EDGES = {
+    2: np.array([[1, 2], [0, 2], [0, 1]]),
+    3: np.array([[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]]),
+}
+"""The corners that each edge of a simplex joins, in the order of DOLFINx."""
+
+SpaceT = TypeVar("SpaceT", bound=NodalSpace)
 
 
-class DistributedSpace:
-    """A DOLFINx vector space on the shared mesh, distributed over ranks.
+class DistributedSpace(Generic[SpaceT]):
+    """A DOLFINx vector space on the shared mesh, or its extrusion, distributed over ranks.
 
-    Nodal arrays of shape (N, 2), in the numbering of the `LagrangeSpace`, are the same on every rank.
+    Nodal arrays of shape (N, d), in the numbering of the `NodalSpace`, are the same on every rank.
 
     Attributes:
         space: The elements in NumPy.
         comm: The ranks.
+        dimension: d, 2 or 3.
         function: The DOLFINx function that forms are written with.
     """
 
-    def __init__(self, space: LagrangeSpace) -> None:
-        mesh, self.space, self.comm = space.mesh, space, communicator()
+    def __init__(self, space: SpaceT) -> None:
+        self.space, self.comm, self.dimension = space, communicator(), space.nodes.shape[1]
         share = slice(None) if self.comm.rank == 0 else slice(0, 0)
-        self.domain = _create_mesh(self.comm, mesh.triangles[share], np.array(mesh.points[share]))
+        self.domain = _create_mesh(self.comm, space.cells[share], space.nodes[space.vertices][share])
         with _quiet_compiler():
             self.dolfinx_space = _vector_space(self.domain, space.degree)
         self.function = dolfinx.fem.Function(self.dolfinx_space)
@@ -119,11 +128,11 @@ class DistributedSpace:
         return self.form(force), self.form(ufl.derivative(force, self.function, ufl.TrialFunction(space)))
 
     def clamp(self, clamped: BoolArray) -> list[Any]:
-        """Homogeneous Dirichlet conditions on the components of a mask of shape (N, 2)."""
+        """Homogeneous Dirichlet conditions on the components of a mask of shape (N, d)."""
         zero, conditions = PETSc.ScalarType(0.0), []
         for axis, held in enumerate(clamped[self._node_of_dof].T):
             # A sub-space numbers its degrees of freedom within the blocked parent.
-            dofs = (2 * np.flatnonzero(held) + axis).astype(np.int32)
+            dofs = (self.dimension * np.flatnonzero(held) + axis).astype(np.int32)
             conditions.append(dolfinx.fem.dirichletbc(zero, dofs, self.dolfinx_space.sub(axis)))
         return conditions
 
@@ -145,7 +154,7 @@ class DistributedSpace:
         return matrix
 
     def add_blocks(self, matrix: PETSc.Mat, nodes: IntArray, blocks: FloatArray) -> None:
-        """Add blocks of shape (m, 2, 2) to a matrix, each on the diagonal of one of m different nodes."""
+        """Add blocks of shape (m, d, d) to a matrix, each on the diagonal of one of m different nodes."""
         row_of_node = np.full(len(self.space.nodes), -1, dtype=np.int32)
         row_of_node[self._node_of_dof[: self._owned]] = np.arange(self._owned)
         for row, block in zip(row_of_node[nodes], blocks, strict=True):
@@ -154,7 +163,7 @@ class DistributedSpace:
         matrix.assemble()
 
     def assemble_nodal(self, form: Any) -> FloatArray:
-        """A linear form on every shape function, shape (N, 2)."""
+        """A linear form on every shape function, shape (N, d)."""
         vector = dolfinx.fem.petsc.assemble_vector(form)
         vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         return self.gather(vector)
@@ -171,17 +180,17 @@ class DistributedSpace:
         return NodeFunction(dolfinx.fem.Function(space), nodes)
 
     def set_function(self, values: FloatArray) -> None:
-        """Give `function` nodal values of shape (N, 2)."""
+        """Give `function` nodal values of shape (N, d)."""
         self.function.x.array[:] = values[self._node_of_dof].ravel()
 
     def distribute(self, values: FloatArray, vector: PETSc.Vec) -> None:
-        """Fill a PETSc vector from nodal values of shape (N, 2)."""
+        """Fill a PETSc vector from nodal values of shape (N, d)."""
         vector.array[:] = values[self._node_of_dof[: self._owned]].ravel()
 
     def gather(self, vector: PETSc.Vec) -> FloatArray:
-        """Nodal values of shape (N, 2) of a PETSc vector, the same on every rank."""
-        values = np.zeros((len(self.space.nodes), 2))
-        values[self._node_of_dof[: self._owned]] = vector.array.reshape(-1, 2)
+        """Nodal values of shape (N, d) of a PETSc vector, the same on every rank."""
+        values = np.zeros(self.space.nodes.shape)
+        values[self._node_of_dof[: self._owned]] = vector.array.reshape(-1, self.dimension)
         if self.comm.size > 1:
             self.comm.Allreduce(MPI.IN_PLACE, values, op=MPI.SUM)
         return values

@@ -44,7 +44,7 @@ class LinearElasticity:
     """
 
     problem: Problem
-    distributed: DistributedSpace
+    distributed: DistributedSpace[LagrangeSpace]
     force: Any
     stiffness: Any
     iterative: bool

@@ -1,6 +1,6 @@
 """Solutions of the stiffness: factors by MUMPS, or multigrid for large matrices in little memory."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from petsc4py import PETSc
@@ -21,16 +21,16 @@ class StiffnessSolver:
     Args:
         space: The space of right-hand sides and solutions.
         matrix: The assembled matrix.
-        clamped: Mask of shape (N, 2): components whose right-hand side is set to zero.
+        clamped: Mask of shape (N, d): components whose right-hand side is set to zero.
     """
 
-    def __init__(self, space: DistributedSpace, matrix: PETSc.Mat, clamped: BoolArray) -> None:
+    def __init__(self, space: DistributedSpace[Any], matrix: PETSc.Mat, clamped: BoolArray) -> None:
         self._space, self._matrix, self._clamped = space, matrix, clamped
         self._ksp = PETSc.KSP().create(space.comm)
         self._ksp.setOperators(matrix)
 
     def solve(self, nodal: FloatArray) -> FloatArray:
-        """Solve for a right-hand side of shape (N, 2); the solution has the same shape."""
+        """Solve for a right-hand side of shape (N, d); the solution has the same shape."""
         right, solution = self._matrix.createVecs()
         self._space.distribute(np.where(self._clamped, 0.0, nodal), right)
         self._ksp.solve(right, solution)
@@ -60,7 +60,7 @@ class Factorisation(StiffnessSolver):
     stats: ClassVar[dict[str, float | int | str]] = {"linear_solver": "direct"}
 
     def __init__(
-        self, space: DistributedSpace, matrix: PETSc.Mat, clamped: BoolArray, *, positive_definite: bool
+        self, space: DistributedSpace[Any], matrix: PETSc.Mat, clamped: BoolArray, *, positive_definite: bool
     ) -> None:
         super().__init__(space, matrix, clamped)
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
@@ -85,7 +85,7 @@ class Factorisation(StiffnessSolver):
             ) from error
 
     def solve_all(self, nodal: FloatArray) -> FloatArray:
-        """Solve for several right-hand sides at once, shape (r, N, 2); the solutions have the same shape."""
+        """Solve for several right-hand sides at once, shape (r, N, d); the solutions have the same shape."""
         if self._space.comm.size > 1 or not len(nodal):
             return np.array([self.solve(each) for each in nodal]).reshape(nodal.shape)
         right = PETSc.Mat().createDense((nodal[0].size, len(nodal)), comm=self._space.comm)
@@ -118,7 +118,7 @@ class Multigrid(StiffnessSolver):
     Computing 56, 179-196).
     """
 
-    def __init__(self, space: DistributedSpace, matrix: PETSc.Mat, clamped: BoolArray) -> None:
+    def __init__(self, space: DistributedSpace[Any], matrix: PETSc.Mat, clamped: BoolArray) -> None:
         super().__init__(space, matrix, clamped)
         self._iterations: list[int] = []
         positions = matrix.createVecRight()
@@ -148,7 +148,7 @@ class Multigrid(StiffnessSolver):
         return {"linear_solver": "iterative", "iterations": sum(self._iterations)}
 
     def solve(self, nodal: FloatArray) -> FloatArray:
-        """Solve for a right-hand side of shape (N, 2); the solution has the same shape.
+        """Solve for a right-hand side of shape (N, d); the solution has the same shape.
 
         Raises:
             UserError: If the iteration does not converge.

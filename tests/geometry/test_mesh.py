@@ -40,6 +40,7 @@ def square(**changes: object) -> TriangleMesh:
         ({"contact_node": -1}, UserError, "outside 0..3"),
         ({"boundaries": {"base": [[0, 9]]}}, UserError, "outside 0..3"),
         ({"points": np.full((4, 2), np.nan)}, UserError, "not finite"),
+        ({"depth": 0.0}, UserError, "above 0 mm"),
     ],
 )
 def test_impossible_mesh_is_refused(changes: dict[str, object], kind: type[UserError], text: str) -> None:

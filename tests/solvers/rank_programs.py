@@ -68,6 +68,12 @@ def everywhere() -> None:
         print(json.dumps(report))
 
 
+def solid() -> int:
+    """`fem-3d` on all ranks."""
+    print(json.dumps({"solutions": [numbers(make_solver("fem-3d", layers=1).solve(STIFF))]}))
+    return 0
+
+
 def refused() -> int:
     make_solver("fem").solve(STIFF)
     return 0

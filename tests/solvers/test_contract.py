@@ -19,6 +19,7 @@ from tests.solvers.conftest import bar_mesh
 from tests.solvers.plugin.pinnray_skfem import SkfemSolver
 
 QUICK = {
+    "fem-3d": {"sides": "held", "layers": 1},  # in plane strain, as all other solvers here
     "pinn-std": {"wall_spacing": 1.0, "corner_spacing": 0.2, "neurons": 4},
     "pinn-local": {"wall_spacing": 0.8, "corner_spacing": 0.2, "neurons": 4},
     "pinn-asm": {"wall_spacing": 1.0, "corner_spacing": 0.2, "neurons": 4, "tolerance": 1.0},
@@ -29,6 +30,13 @@ QUICK = {
 
 WITHOUT_MECHANICS = {"gp"}
 """Solvers that have nothing to say without markers, and nothing that this suite could test."""
+
+MEANT_OVER_DEPTH = {"fem-3d": 5e-3}
+"""Solvers whose load and energy are means over the depth, and by how much those of their field may differ.
+
+Held side faces make a plane state of it but for the tetrahedra, which cut every prism differently at its two
+ends: 0.0002 mm of 2 mm, and 0.3 % of the energy, on this mesh.
+"""
 
 NAMES = [name for name in dict.fromkeys([*solver_names(), "skfem-p1"]) if name not in WITHOUT_MECHANICS]
 """Ours, those of the packages that are installed, and the package that lives in the tests."""
@@ -89,7 +97,8 @@ def test_the_load_is_met_and_the_base_is_at_rest(solution, coarse_mesh):
     from solvers.problem import contact_functional
 
     points, weights = contact_functional(solution.problem)
-    np.testing.assert_allclose(weights @ solution.displacement(points), [0.0, -2.0], atol=1e-6)
+    atol = MEANT_OVER_DEPTH.get(solution.solver, 1e-6)
+    np.testing.assert_allclose(weights @ solution.displacement(points), [0.0, -2.0], atol=atol)
     base = coarse_mesh.points[np.unique(coarse_mesh.boundary("base"))]
     assert np.abs(solution.displacement(base)).max() < 1e-12
 
@@ -110,7 +119,8 @@ def test_every_load_that_the_solver_has_is_met(solver, coarse_mesh, kind):
         assert np.abs(solution.displacement(contact) - [0.0, -2.0]).max() < 0.01
     else:
         points, weights = contact_functional(problem)
-        np.testing.assert_allclose(weights @ solution.displacement(points), [0.0, -2.0], atol=1e-6)
+        atol = MEANT_OVER_DEPTH.get(solver.name, 1e-6)
+        np.testing.assert_allclose(weights @ solution.displacement(points), [0.0, -2.0], atol=atol)
 
 
 def test_energy_is_the_integral_of_its_density(solution, coarse_mesh):
@@ -119,9 +129,8 @@ def test_energy_is_the_integral_of_its_density(solution, coarse_mesh):
     rule = body_quadrature(coarse_mesh, 4)
     total = (rule.weights * solution.state(rule.location).energy_density).sum()
     # The network's energy was integrated by a rule of degree 2.
-    assert total == pytest.approx(
-        solution.energy, rel=0.02 if "quadrature_points" in solution.stats else 1e-7
-    )
+    own = 0.02 if "quadrature_points" in solution.stats else 1e-7
+    assert total == pytest.approx(solution.energy, rel=MEANT_OVER_DEPTH.get(solution.solver, own))
 
 
 def test_reaction_does_the_work(solution):

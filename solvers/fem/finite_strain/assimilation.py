@@ -57,7 +57,7 @@ def assimilated(problem: Problem, weighting: MarkerWeighting, *, degree: int, pr
     residual = (springs.targets - springs.values(last.nodal)).reshape(-1, 2)
     energies = np.array([path.equilibrium.energy(point.nodal) for point in path.points])
     reaction = path.reaction(last) - forces.reshape(-1, 2).sum(axis=0)
-    left_out = _left_out(path, problem, springs, progress) if last.fraction == 1 else None
+    left_out = _left_out(path, problem, space, springs, progress) if last.fraction == 1 else None
     path.close()
     return Solution(
         solver=weighting.solver_name,
@@ -91,7 +91,11 @@ def _path(problem: Problem, space: LagrangeSpace, constraints: DisplacementConst
 
 
 def _left_out(
-    path: LoadPath, problem: Problem, springs: DisplacementConstraints, progress: Progress
+    path: LoadPath,
+    problem: Problem,
+    space: LagrangeSpace,
+    springs: DisplacementConstraints,
+    progress: Progress,
 ) -> FloatArray:
     """Residual of each marker without it, shape (m, 2), mm; NaN where no equilibrium is found."""
     count = len(springs.targets) // 2
@@ -102,16 +106,15 @@ def _left_out(
         own = slice(2 * marker, 2 * marker + 2)
         kept = np.ones(first + 2 * count, dtype=bool)
         kept[first:][own] = False
-        point = path.relaxed(kept) or _from_rest(path, problem, kept)
+        point = path.relaxed(kept) or _from_rest(path, problem, space, kept)
         if point is not None:
             missed[marker] = (springs.targets - springs.values(point.nodal))[own]
     return missed
 
 
-def _from_rest(path: LoadPath, problem: Problem, kept: BoolArray) -> LoadState | None:
+def _from_rest(path: LoadPath, problem: Problem, space: LagrangeSpace, kept: BoolArray) -> LoadState | None:
     """Equilibrium at the full load under some of a path's constraints; None if there is none."""
-    equilibrium = path.equilibrium
-    again = _path(problem, equilibrium.distributed.space, equilibrium.constraints.only(kept))
+    again = _path(problem, space, path.equilibrium.constraints.only(kept))
     again.follow(silent)
     again.close()
     return again.points[-1] if again.points[-1].fraction == 1 else None

@@ -7,7 +7,7 @@ import numpy as np
 from geometry.arrays import BoolArray, FloatArray
 from solvers.assimilation.misfit import Misfit
 from solvers.fem.boundary_conditions import load_functionals, load_targets, marker_functionals
-from solvers.lagrange import LagrangeSpace
+from solvers.lagrange import LagrangeSpace, NodalSpace
 from solvers.problem import Problem
 
 
@@ -17,7 +17,7 @@ class LoadState:
 
     Attributes:
         fraction: Fraction of the load.
-        nodal: Displacements, shape (N, 2), mm.
+        nodal: Displacements, shape (N, d), mm.
         forces: Multipliers of the constraints, shape (k,), N/mm.
         contact: Forces of the cylinder on the nodes of the front, shape (m,), N/mm; empty without one.
     """
@@ -33,7 +33,7 @@ class DisplacementConstraints:
     """Constraints b_k . c + s_k f_k = d_k on the displacements c, with forces f_k.
 
     Attributes:
-        functionals: b_k, shape (k, N, 2).
+        functionals: b_k, shape (k, N, d).
         targets: d_k under the full load, shape (k,), mm.
         slacks: s_k, shape (k,), mm per N/mm: zero where the value is prescribed, else the compliance of a
             spring between functional and value, whose energy is (d_k - b_k . c)^2 / (2 s_k).
@@ -44,7 +44,7 @@ class DisplacementConstraints:
     slacks: FloatArray
 
     @classmethod
-    def of(cls, problem: Problem, space: LagrangeSpace, slack: float = 0.0) -> "DisplacementConstraints":
+    def of(cls, problem: Problem, space: NodalSpace, slack: float = 0.0) -> "DisplacementConstraints":
         """The constraints of a `mean` or `point` load, all of one slack; else none."""
         targets = load_targets(problem)
         return cls(load_functionals(problem, space), targets, np.full(len(targets), slack))
@@ -67,11 +67,11 @@ class DisplacementConstraints:
         return DisplacementConstraints(self.functionals[kept], self.targets[kept], self.slacks[kept])
 
     def values(self, nodal: FloatArray) -> FloatArray:
-        """b_k . c of displacements of shape (N, 2), mm: shape (k,)."""
+        """b_k . c of displacements of shape (N, d), mm: shape (k,)."""
         return np.asarray(np.einsum("knx,nx->k", self.functionals, nodal))
 
     def at_nodes(self, forces: FloatArray) -> FloatArray:
-        """f_k b_k of forces of shape (k,), N/mm: shape (N, 2)."""
+        """f_k b_k of forces of shape (k,), N/mm: shape (N, d)."""
         return np.asarray(np.einsum("k,knx->nx", forces, self.functionals))
 
     def residual(self, nodal: FloatArray, forces: FloatArray, fraction: float) -> FloatArray:

@@ -13,7 +13,7 @@ import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
 from solvers.fem.finite_strain.constraints import LoadState
-from solvers.lagrange import LagrangeSpace
+from solvers.lagrange import NodalSpace
 from solvers.problem import Problem, contact_ends, front_points
 
 STIFFNESS = 10.0
@@ -44,7 +44,7 @@ class CylinderContact:
     edges: IntArray
 
     @classmethod
-    def of(cls, problem: Problem, space: LagrangeSpace) -> "CylinderContact":
+    def of(cls, problem: Problem, space: NodalSpace) -> "CylinderContact":
         """The contact of a problem whose load is a `cylinder`."""
         load, edges = problem.load, problem.mesh.boundary("front")
         nodes = space.boundary_nodes("front")

@@ -12,7 +12,6 @@ import numpy as np
 import ufl
 
 from geometry.arrays import BoolArray, FloatArray
-from geometry.mesh.quadrature import body_quadrature
 from solvers.constrained_elimination import ConstrainedElimination
 from solvers.elasticity import deformation_jacobian, energy_density_of
 from solvers.fem.boundary_conditions import dirichlet_displacement, dirichlet_mask
@@ -20,8 +19,9 @@ from solvers.fem.dolfinx_compat import DistributedSpace
 from solvers.fem.finite_strain.constraints import DisplacementConstraints, LoadState
 from solvers.fem.finite_strain.cylinder_contact import CylinderContact
 from solvers.fem.linear_solvers import Factorisation
-from solvers.lagrange import LagrangeSpace
+from solvers.lagrange import NodalSpace
 from solvers.problem import Problem
+from solvers.solid_elasticity import solid_energy_density, solid_jacobian
 
 QUADRATURE_DEGREE = 4
 """Exact for the quadratic part of the law on quadratic elements."""
@@ -30,19 +30,19 @@ PROBE = 1e-4
 
 
 class FiniteStrainEquilibrium:
-    """The discrete problem; nodal arrays of shape (N, 2) are the same on every rank.
+    """The discrete problem; nodal arrays of shape (N, d) are the same on every rank.
 
     Attributes:
         distributed: The elements in DOLFINx.
-        clamped: Mask of components with a Dirichlet condition, of shape (N, 2).
-        prescribed: Their displacement under the full load, shape (N, 2), mm.
+        clamped: Mask of components with a Dirichlet condition, of shape (N, d).
+        prescribed: Their displacement under the full load, shape (N, d), mm.
         constraints: On functionals of the displacements.
         elimination: Solves with the constraints and the last factorised tangent.
         contact: The cylinder, if there is one.
     """
 
     def __init__(
-        self, problem: Problem, space: LagrangeSpace, constraints: DisplacementConstraints | None = None
+        self, problem: Problem, space: NodalSpace, constraints: DisplacementConstraints | None = None
     ) -> None:
         """Compile the forms; the constraints are the load's unless others are given."""
         self.distributed = DistributedSpace(space)
@@ -50,12 +50,18 @@ class FiniteStrainEquilibrium:
         self.prescribed = dirichlet_displacement(problem, space)
         self.constraints = constraints or DisplacementConstraints.of(problem, space)
         self.contact = CylinderContact.of(problem, space) if problem.load.kind == "cylinder" else None
-        self._derivatives = space.shape_gradients(body_quadrature(problem.mesh, QUADRATURE_DEGREE).location)
-        constants = self.distributed.moduli(problem.material.lame)
-        gradient = ufl.grad(self.distributed.function)
+        material, gradient = problem.material, ufl.grad(self.distributed.function)
+        solid = self.distributed.dimension == 3
+        constants = self.distributed.moduli(material.solid_lame if solid else material.lame)
+        density = (solid_energy_density if solid else energy_density_of)(
+            material.law, gradient, constants, ufl.ln
+        )
         measure = ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
-        energy = energy_density_of(problem.material.law, gradient, constants, ufl.ln) * measure
+        energy = density / space.thickness * measure
         self._energy = self.distributed.form(energy)
+        jacobian = (solid_jacobian if solid else deformation_jacobian)(gradient)
+        inverted = ufl.conditional(ufl.gt(jacobian, 0), 0.0, 1.0)
+        self._inverted = self.distributed.form(inverted * measure)
         self._force, self._tangent = self.distributed.derivatives(energy)
         self._conditions = self.distributed.clamp(self.clamped)
         self.matrix = self.distributed.assemble_matrix(self._tangent, self._conditions)
@@ -68,12 +74,12 @@ class FiniteStrainEquilibrium:
         return self.distributed.assemble_scalar(self._energy)
 
     def internal_force(self, nodal: FloatArray) -> FloatArray:
-        """Derivative of the elastic energy, shape (N, 2), N/mm."""
+        """Derivative of the elastic energy, shape (N, d), N/mm."""
         self.distributed.set_function(nodal)
         return self.distributed.assemble_nodal(self._force)
 
     def residual(self, state: LoadState) -> tuple[FloatArray, float]:
-        """Residual force, shape (N, 2), N/mm, zero where clamped, and the largest internal force."""
+        """Residual force, shape (N, d), N/mm, zero where clamped, and the largest internal force."""
         internal = self.internal_force(state.nodal)
         balance = internal - self.constraints.at_nodes(state.forces)
         if self.contact is not None:
@@ -97,13 +103,15 @@ class FiniteStrainEquilibrium:
         )
 
     def response(self, force: FloatArray) -> FloatArray:
-        """Displacements, mm, under nodal forces, N/mm, by the factorised tangent: both (N, 2)."""
+        """Displacements, mm, under nodal forces, N/mm, by the factorised tangent: both (N, d)."""
         return self.elimination.solution(self.factors.solve(force))[0]
 
     def admissible(self, nodal: FloatArray) -> bool:
         """Whether the deformation turns no quadrature point inside out."""
-        gradient = np.stack([derivative @ nodal for derivative in self._derivatives], axis=-1)
-        return bool(np.isfinite(nodal).all() and (deformation_jacobian(gradient) > 0).all())
+        if not np.isfinite(nodal).all():
+            return False
+        self.distributed.set_function(nodal)
+        return self.distributed.assemble_scalar(self._inverted) == 0
 
     @property
     def rest(self) -> LoadState:

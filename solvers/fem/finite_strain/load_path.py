@@ -1,6 +1,7 @@
 """The load path from rest to the full load, in adaptive steps."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -12,7 +13,7 @@ from solvers.fem.finite_strain.constraints import DisplacementConstraints, LoadS
 from solvers.fem.finite_strain.cylinder_contact import ContactRegion
 from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
 from solvers.fem.finite_strain.newton import ConstrainedNewton
-from solvers.lagrange import LagrangeSpace
+from solvers.lagrange import NodalSpace
 from solvers.problem import Problem
 from solvers.solver import Progress
 
@@ -33,8 +34,9 @@ class LoadPath:
     Args:
         problem: With the full load.
         space: The elements.
-        constraints: Their targets grow with the load; the load's own if None. The rest are settings of
-            `FemNonlinearSolver`.
+        constraints: Their targets grow with the load; the load's own if None.
+        guide: States of a simpler model at fractions of the load: each step starts from the last state plus
+            the guide's change. The rest are settings of `FemNonlinearSolver`.
 
     Attributes:
         equilibrium: The discrete problem.
@@ -47,16 +49,17 @@ class LoadPath:
     def __init__(
         self,
         problem: Problem,
-        space: LagrangeSpace,
+        space: NodalSpace,
         constraints: DisplacementConstraints | None = None,
         *,
+        guide: Callable[[float], LoadState] | None = None,
         first_step: float,
         max_step: float,
         min_step: float,
         tolerance: float,
         max_iterations: int,
     ) -> None:
-        self._first_step, self._min_step, self._space = first_step, min_step, space
+        self._first_step, self._min_step, self._space, self._guide = first_step, min_step, space, guide
         self.equilibrium = FiniteStrainEquilibrium(problem, space, constraints)
         self._begin = partial(
             ConstrainedNewton,
@@ -129,13 +132,18 @@ class LoadPath:
         return None, hardest
 
     def _guess(self, fraction: float) -> LoadState:
-        """The state at a fraction of the load by extrapolation of the last two."""
-        if len(self.points) == 1:
+        """The state at a fraction of the load, by the guide or by extrapolation of the last two."""
+        last = self.points[-1]
+        if self._guide is not None:
+            before, after, times = self._guide(last.fraction), self._guide(fraction), 1.0
+        elif len(self.points) == 1:
             return self.equilibrium.linear_guess(fraction)
-        before, last = self.points[-2:]
-        times = (fraction - last.fraction) / (last.fraction - before.fraction)
-        nodal = last.nodal + times * (last.nodal - before.nodal)
-        return LoadState(fraction, nodal, last.forces + times * (last.forces - before.forces), last.contact)
+        else:
+            before, after = self.points[-2:]
+            times = (fraction - last.fraction) / (last.fraction - before.fraction)
+        nodal = last.nodal + times * (after.nodal - before.nodal)
+        forces = last.forces + times * (after.forces - before.forces)
+        return LoadState(fraction, nodal, forces, last.contact)
 
     def reaction(self, point: LoadState) -> FloatArray:
         """Force of the indenter on the finger, shape (2,), N/mm."""

@@ -1,0 +1,153 @@
+"""`fem-3d`: linear and finite-strain elasticity of the extruded finger with DOLFINx."""
+
+import time
+from dataclasses import asdict, dataclass
+from typing import ClassVar, Literal, get_args
+
+import numpy as np
+
+from geometry.errors import UserError
+from solvers.fem.finite_strain.load_path import LoadPath
+from solvers.fem.ranks import on_all_ranks
+from solvers.fem.solid.extrusion import ExtrudedSpace
+from solvers.fem.solid.plane_guide import PlaneGuide
+from solvers.fem.solid.side_face import Face, FaceField
+from solvers.problem import Problem
+from solvers.solution import Solution, Status
+from solvers.solver import Progress, check_problem, silent
+
+PLANE_SHARE = 0.1
+"""Share of the plane solution in the progress."""
+
+
+@dataclass(frozen=True)
+class Fem3dSolver:
+    """Quadratic tetrahedra on the shared mesh, extruded through half of the depth; symmetry gives the rest.
+
+    The field is that of the side face, which a camera sees. Energy and reaction are means over the depth.
+    Clamp and load are the same at every depth; a `mean` load prescribes the mean over the depth, too. At
+    finite strain Newton's method starts from the solution of plane strain.
+
+    Attributes:
+        layers: Layers of elements in half of the depth.
+        grading: Thickness of the layer at the side face over that at the middle plane.
+        face: Plane of the field: the "side" face or the "middle" plane.
+        sides: "free" side faces, or "held" ones, which cannot move along z: plane strain.
+        max_step: Largest fraction of the load in one step, at finite strain.
+        min_step: Fraction of the load below which the solver gives up.
+        tolerance: Newton stops when the residual force is below this fraction of the internal forces.
+        max_iterations: Newton iterations in one step.
+    """
+
+    layers: int = 4
+    grading: float = 0.25
+    face: Face = "side"
+    sides: Literal["free", "held"] = "free"
+    max_step: float = 1.0
+    min_step: float = 1e-2
+    tolerance: float = 1e-8
+    max_iterations: int = 20
+    name: ClassVar[str] = "fem-3d"
+    laws: ClassVar[tuple[str, ...]] = ("linear", "neo-hookean", "st-venant-kirchhoff")
+    loads: ClassVar[tuple[str, ...]] = ("mean", "patch")
+
+    def __post_init__(self) -> None:
+        if self.layers < 1:
+            raise UserError(f"fem-3d needs at least 1 layer in half of the depth, not {self.layers}")
+        if not 0 < self.grading <= 1:
+            raise UserError(
+                f"fem-3d has layers that get thinner outwards: 0 < grading <= 1, not {self.grading:g}"
+            )
+        if self.face not in get_args(Face):
+            raise UserError(f"fem-3d has the field of the faces side, middle, not {self.face!r}")
+        if self.sides not in ("free", "held"):
+            raise UserError(f"fem-3d has sides free or held, not {self.sides!r}")
+        if not 0 < self.min_step <= self.max_step <= 1:
+            raise UserError("fem-3d needs 0 < min_step <= max_step <= 1")
+
+    def settings(self) -> dict[str, object]:
+        """Layers, face and side faces, load steps and Newton's criteria."""
+        return asdict(self)
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        """Solve the problem in three dimensions; see `Solver`. The depth is that of the problem's mesh."""
+        check_problem(self, problem)
+        return on_all_ranks(self._solve, problem, progress)
+
+    def space(self, problem: Problem) -> ExtrudedSpace:
+        """The elements of a problem."""
+        return ExtrudedSpace.of(problem.mesh, self.layers, self.grading, self.sides == "held")
+
+    def _solve(self, problem: Problem, progress: Progress) -> Solution:
+        started = time.perf_counter()
+        space, linear = self.space(problem), problem.material.law == "linear"
+        progress(0.0, f"{space.nodes.size:,} unknowns")
+        guide = None
+        if not linear:
+            guide = PlaneGuide(
+                problem, space, lambda done, text: progress(PLANE_SHARE * done, f"plane: {text}")
+            )
+        step = 1.0 if linear else self.max_step
+        path = LoadPath(
+            problem,
+            space,
+            guide=guide,
+            first_step=step,
+            max_step=step,
+            min_step=self.min_step,
+            tolerance=self.tolerance,
+            max_iterations=self.max_iterations,
+        )
+        path.follow(lambda done, text: progress(PLANE_SHARE + (1 - PLANE_SHARE) * done, text))
+        points, last = path.points, path.points[-1]
+        energies = np.array([path.equilibrium.energy(point.nodal) for point in points])
+        reactions = np.array([path.reaction(point) for point in points])
+        ranks = path.equilibrium.distributed.comm.size
+        path.close()
+        return Solution(
+            solver=self.name,
+            problem=problem,
+            field=FaceField.of(space, last.nodal, self.face),
+            energy=float(energies[-1]),
+            reaction=reactions[-1],
+            status=self._status(path, linear),
+            stats={
+                "seconds": time.perf_counter() - started,
+                "unknowns": last.nodal.size,
+                "layers": self.layers,
+                "depth_mm": problem.mesh.depth,
+                "load_steps": len(points) - 1,
+                "halved_steps": path.halved,
+                "newton_iterations": path.iterations,
+                "ranks": ranks,
+            },
+            history={
+                "load_fraction": np.array([point.fraction for point in points]),
+                "energy": energies,
+                "reaction_x": reactions[:, 0],
+                "reaction_y": reactions[:, 1],
+            },
+            states=[FaceField.of(space, point.nodal, self.face) for point in points],
+        )
+
+    def _status(self, path: LoadPath, linear: bool) -> Status:
+        """Success at the full load, or advice."""
+        fraction = path.points[-1].fraction
+        if fraction < 1:
+            return Status(
+                False,
+                f"stopped at {fraction:.1%} of the load: Newton's method fails beyond ({path.reason}); "
+                "take a finer mesh, a wider contact or a smaller stroke",
+            )
+        place = "side face" if self.face == "side" else "middle plane"
+        how = (
+            "solved directly"
+            if linear
+            else (
+                f"all of the load applied in {len(path.points) - 1} steps, "
+                f"{path.iterations} Newton iterations"
+            )
+        )
+        return Status(
+            True, f"{how}; the field is that of the {place}; its discretisation error was not estimated"
+        )

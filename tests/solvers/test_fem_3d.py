@@ -1,0 +1,190 @@
+"""`fem-3d` against closed forms, plane strain, plane stress and its own energy."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compare.evaluation.convergence import with_certificates
+from compare.evaluation.evaluation import Evaluation
+from compare.report.sentences import certificate_sentences
+from geometry.cache import finger_mesh
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
+from solvers.fem.linear import FemSolver
+from solvers.fem.solid.extrusion import ExtrudedSpace
+from solvers.fem.solid.side_face import FaceField
+from solvers.fem.solid.solver import Fem3dSolver
+from solvers.problem import Load, Material, Problem
+from solvers.solution import State
+from tests.solvers.conftest import bar_mesh
+
+SLIDING = Load(kind="patch", displacement=(None, -4.0))
+
+
+@pytest.fixture(scope="module")
+def short_mesh():
+    """A short finger with one rib, 6 mm deep."""
+    design = Design(height=50, rib_count=1, tip_length=12, contact_position=20, depth=6.0)
+    return finger_mesh(design, settings=MeshSettings(size=1.0))
+
+
+def test_the_tetrahedra_fill_the_half_body(short_mesh):
+    space = ExtrudedSpace.of(short_mesh, 3, 0.25)
+    corners = space.nodes[space.vertices][space.cells]
+    volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
+    assert volumes.min() > 0
+    assert volumes.sum() == pytest.approx(3.0 * short_mesh.areas.sum(), rel=1e-12)
+    thickness = np.diff(space.faces)
+    assert thickness[-1] / thickness[0] == pytest.approx(0.25)
+
+
+def test_neighbouring_tetrahedra_share_whole_faces(short_mesh):
+    """Every face belongs to two tetrahedra, or lies on the outline or on one of the two end planes."""
+    space = ExtrudedSpace.of(short_mesh, 2, 0.5)
+    sides = np.sort(space.cells[:, [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]].reshape(-1, 3), axis=1)
+    _, counts = np.unique(sides, axis=0, return_counts=True)
+    rim = len(short_mesh.edges) * 2 - 3 * len(short_mesh.triangles)  # edges with one triangle
+    assert counts.max() == 2
+    assert (counts == 1).sum() == 2 * len(short_mesh.triangles) + 2 * 2 * rim
+
+
+def bent(nodes: np.ndarray, curvature: float, ν: float) -> np.ndarray:
+    """Displacement of a bar under end couples: Timoshenko, Goodier, Theory of Elasticity, article 102."""
+    x, y, z = nodes.T
+    across = -0.5 * curvature * (x**2 + ν * (y**2 - z**2))
+    return np.column_stack([curvature * x * y, across, -ν * curvature * y * z])
+
+
+def test_pure_bending_is_exact():
+    """Its displacement is quadratic, so that forces act on the two ends alone, and strain turns with y."""
+    mesh, curvature = replace(bar_mesh(10, 2, 10, 3, contact=(8, 10)), depth=3.0), 0.01
+    material = Material()
+    space = ExtrudedSpace.of(mesh, 2, 0.5)
+    equilibrium = FiniteStrainEquilibrium(Problem(mesh, material), space)
+    nodal = bent(space.nodes, curvature, material.poisson)
+    force = equilibrium.internal_force(nodal)
+    inside = (space.nodes[:, 0] > 0) & (space.nodes[:, 0] < 10)
+    assert np.abs(force[inside & ~space.mirrored.any(axis=1)]).max() < 1e-12 * np.abs(force).max()
+    # E κ² / 2 times the integral of y² over 10 mm by 0 to -2 mm
+    assert equilibrium.energy(nodal) == pytest.approx(0.5 * 11.4 * curvature**2 * 10 * 8 / 3, rel=1e-12)
+    equilibrium.factors.destroy()
+    location = mesh.at_centroids()
+    for face in ("side", "middle"):
+        gradient = FaceField.of(space, nodal, face).solid_gradient(location)
+        state = State.from_solid_gradient(gradient, Problem(mesh, material))
+        expected = 11.4 * curvature * location.points[:, 1]
+        np.testing.assert_allclose(state.stress[:, 0, 0], expected, atol=1e-12)
+        np.testing.assert_allclose(state.von_mises, np.abs(expected), atol=1e-12)
+
+
+def test_a_narrow_beam_bends_with_youngs_modulus():
+    """Tip force of Timoshenko's beam; the modulus of plane strain would be a tenth larger."""
+    length, height, middle = 40.0, 4.0, 39.0
+    mesh = replace(bar_mesh(length, height, 40, 4, contact=(38.0, 40.0)), depth=2.0)
+    material = Material(young=10.0, poisson=0.3)
+    problem = Problem(mesh, material, Load(displacement=(None, -0.1)))
+    solution = Fem3dSolver(layers=1).solve(problem)
+    shear = material.young / (2 * (1 + material.poisson))
+    compliance = middle**3 / (3 * material.young * height**3 / 12) + middle / (5 / 6 * shear * height)
+    assert solution.reaction[1] == pytest.approx(
+        -0.1 / compliance, rel=0.01
+    )  # the clamp stiffens it a little
+
+
+@pytest.mark.parametrize("law", ["linear", "neo-hookean", "st-venant-kirchhoff"])
+def test_held_side_faces_make_plane_strain(short_mesh, law):
+    problem = Problem(short_mesh, Material(law=law), SLIDING)
+    solid = Fem3dSolver(sides="held", layers=2).solve(problem)
+    plane = (FemSolver(estimate=False) if law == "linear" else FemNonlinearSolver()).solve(problem)
+    assert solid.status.converged
+    # More unknowns than in the plane, so less energy, by the error of elements of 1 mm.
+    assert 0.995 < solid.energy / plane.energy < 1
+    gap = solid.displacement(short_mesh.markers) - plane.displacement(short_mesh.markers)
+    assert np.abs(gap).max() < 0.005
+
+
+def test_a_thin_finger_is_in_plane_stress(short_mesh):
+    problem = Problem(
+        replace(short_mesh, depth=0.2), Material(), Load(kind="patch", displacement=(0.0, -2.0))
+    )
+    solid = Fem3dSolver(layers=1).solve(problem)
+    plane = FemSolver(estimate=False).solve(replace(problem, material=Material(plane="stress")))
+    strain = FemSolver(estimate=False).solve(problem)
+    assert solid.energy == pytest.approx(plane.energy, rel=0.01)  # the rest is at corners, clamp and patch
+    assert strain.energy > 1.2 * plane.energy
+    location = short_mesh.at_centroids()
+    ours, theirs = (each.state(location).von_mises for each in (solid, plane))
+    assert np.linalg.norm(ours - theirs) < 0.05 * np.linalg.norm(theirs)
+
+
+def test_the_side_face_carries_no_traction(short_mesh):
+    location, problem = short_mesh.at_centroids(), Problem(short_mesh, load=SLIDING)
+    across = {}
+    for face in ("side", "middle"):
+        solution = Fem3dSolver(layers=3, face=face).solve(problem)
+        across[face] = np.linalg.norm(solution.state(location).stress_zz)
+    assert across["side"] < 0.2 * across["middle"]  # the rest is near corners, clamp and patch
+
+
+def test_force_is_the_slope_of_the_energy(short_mesh):
+    """Of three equilibria at finite strain, by a central difference."""
+    energies = []
+    for stroke in (3.99, 4.0, 4.01):
+        load = Load(kind="patch", displacement=(None, -stroke))
+        solution = Fem3dSolver(layers=1).solve(Problem(short_mesh, Material(law="neo-hookean"), load))
+        energies.append(solution.energy)
+        if stroke == 4.0:
+            force = solution.reaction
+    assert (energies[2] - energies[0]) / 0.02 == pytest.approx(-force[1], rel=1e-4)
+    assert abs(force[0]) < 1e-8  # u is free
+
+
+def test_a_finger_of_other_depth_is_stiffer_where_it_is_deeper(short_mesh):
+    forces = [
+        Fem3dSolver(layers=2).solve(Problem(replace(short_mesh, depth=depth), load=SLIDING)).reaction[1]
+        for depth in (2.0, 20.0)
+    ]
+    assert forces[1] < 1.05 * forces[0] < 0
+
+
+def test_plane_strain_does_not_certify_it(short_mesh):
+    problem = Problem(short_mesh, load=Load(displacement=(0.0, -2.0)))
+    evaluation = Evaluation.of(Fem3dSolver(layers=1).solve(problem), short_mesh)
+    (judged,) = with_certificates([evaluation], problem)
+    assert judged.converged
+    assert judged.certificate is None
+    assert "three dimensions" in certificate_sentences(judged)
+
+
+@pytest.mark.parametrize(
+    ("settings", "text"),
+    [
+        ({"layers": 0}, "at least 1 layer"),
+        ({"grading": 0.0}, "0 < grading <= 1"),  # a layer without thickness
+        ({"grading": 2.0}, "0 < grading <= 1"),  # thicker where the stress changes
+        ({"face": "top"}, "side, middle"),
+        ({"sides": "loose"}, "free or held"),
+        ({"max_step": 0.0}, "min_step <= max_step"),
+    ],
+)
+def test_wrong_settings_are_refused(settings, text):
+    with pytest.raises(UserError, match=text):
+        Fem3dSolver(**settings)
+
+
+@pytest.mark.mpi
+def test_two_ranks_find_what_one_finds(start_ranks, short_mesh, tmp_path):
+    short_mesh.save(tmp_path / "mesh.npz")
+    process = start_ranks(2, "-m", "tests.solvers.rank_programs", "solid", str(tmp_path / "mesh.npz"))
+    output, errors = process.communicate()
+    assert process.returncode == 0, errors
+    ((energy, displacement),) = json.loads(output)["solutions"]
+    load = Load(displacement=(0.0, -2.0))
+    alone = Fem3dSolver(layers=1).solve(Problem(short_mesh, Material(law="neo-hookean"), load))
+    assert energy == pytest.approx(alone.energy, rel=1e-10)
+    np.testing.assert_allclose(displacement, alone.displacement(short_mesh.markers), rtol=0, atol=1e-8)
