@@ -23,6 +23,7 @@ BENCHMARKS = {
     "stress": "tracker_stress",
     "live": "live_tracking",
     "localisation": "localisation",
+    "validation": "validation.document",
     "readings": "readings",
 }
 """Names and modules; the modules' docstrings have descriptions and times."""

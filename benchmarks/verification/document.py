@@ -12,7 +12,7 @@ HEAD = """\
 
 All other results of this project are compared with `fem`. This page verifies `fem`, and for finite strain
 `fem-nonlinear`, on problems with known solutions, solved by their own code. [Theory](theory.md) has the
-equations. Whether the equations describe a printed finger is a question of validation, which needs a camera.
+equations. Whether the equations describe a real body is a question of [validation](validation.md).
 
 `make verification` repeats all of it in less than a minute and rewrites this page; `make test-all
 ARGS=tests/verification` fails if a number leaves its bounds or if the page is out of date. `Problem` has only
