@@ -151,8 +151,8 @@ The two columns with a law's name are on coarse quadratic tetrahedra ({boxes(1)}
 with the load on the edge itself. There the neo-Hookean law is within {away["neo-Hookean"]:.2f} mm of all 27
 numbers; St Venant-Kirchhoff's, which a linear elastic material with geometric nonlinearity would be, is up
 to {away["St Venant-Kirchhoff"]:.2f} mm away along the beam. The authors state neither law nor mesh,
-and this size of cells was taken because it matches: with half of it the largest difference is {off:.2f} mm. On
-the plane of symmetry COMSOL's places are up to {across:.2f} mm beside it.
+and this size of cells was taken because it matches: with half of it the largest difference is {off:.2f} mm.
+On the plane of symmetry COMSOL's places are up to {across:.2f} mm beside it.
 
 "Converged" is the neo-Hookean law on {boxes(FINEST)} hexahedra, with the same load spread over the upper 6 mm
 of the tip's face. It is up to {away["converged"]:.2f} mm away, at the first point. The reason is the
