@@ -13,6 +13,9 @@ def main() -> int:
     console = Console(highlight=False)
     missed = 0
     for case in CASES:
+        if not case.available:
+            console.print(f"{case.name}: left as it is on the page, because {case.needs} is not installed")
+            continue
         failed = [row for row in case.rows() if not row.passed]
         missed += len(failed)
         console.print(f"{case.name}: {len(case.rows()) - len(failed)} of {len(case.rows())} as expected")
@@ -20,7 +23,7 @@ def main() -> int:
             console.print(
                 f"  P{row.degree}, {row.plane}: {row.quantity}: {row.shown}, not {row.expected.words}"
             )
-    PAGE.write_text(page(CASES), encoding="utf-8")
+    PAGE.write_text(page(CASES, PAGE.read_text(encoding="utf-8")), encoding="utf-8")
     console.print(f"wrote {PAGE}")
     return 1 if missed else 0
 

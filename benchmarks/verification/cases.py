@@ -1,6 +1,7 @@
 """The cases, in the order of the page."""
 
 from benchmarks.verification.another_program import ANOTHER_PROGRAM
+from benchmarks.verification.calculix import CALCULIX
 from benchmarks.verification.cantilever import CANTILEVER
 from benchmarks.verification.cook import COOK
 from benchmarks.verification.finite_strain import FINITE_STRAIN
@@ -10,4 +11,15 @@ from benchmarks.verification.manufactured import MANUFACTURED
 from benchmarks.verification.patch import PATCH
 from benchmarks.verification.plate_with_hole import KIRSCH
 
-CASES = (PATCH, MANUFACTURED, CANTILEVER, COOK, KIRSCH, LOCKING, ANOTHER_PROGRAM, FINITE_STRAIN, HERTZ)
+CASES = (
+    PATCH,
+    MANUFACTURED,
+    CANTILEVER,
+    COOK,
+    KIRSCH,
+    LOCKING,
+    ANOTHER_PROGRAM,
+    FINITE_STRAIN,
+    CALCULIX,
+    HERTZ,
+)

@@ -32,15 +32,29 @@ triangle (`tests/verification/test_mistakes.py`).
 """
 
 
-def page(cases: Sequence[Case]) -> str:
-    """The whole page."""
-    return "\n".join([HEAD, overview(cases), *(section(case) for case in cases), TAIL])
+def page(cases: Sequence[Case], before: str) -> str:
+    """The whole page; a case whose program is not installed stays as it was on the page before."""
+    sections = (section(case) if case.available else kept_section(case, before) for case in cases)
+    return "\n".join([HEAD, overview(cases, before), *sections, TAIL])
 
 
-def overview(cases: Sequence[Case]) -> str:
+def kept_section(case: Case, before: str) -> str:
+    """The section of a case on an earlier page."""
+    return title(case) + before.partition(title(case))[2].partition("\n## ")[0]
+
+
+def title(case: Case) -> str:
+    """The line above a section."""
+    return f"## {case.name[0].upper()}{case.name[1:]}\n"
+
+
+def overview(cases: Sequence[Case], before: str) -> str:
     """One line a case."""
     lines = ["| case | answer | elements | plane states | numbers | |", "|---|---|---|---|---|---|"]
     for case in cases:
+        if not case.available:
+            lines += [line for line in before.splitlines() if line.startswith(f"| [{case.name}](")]
+            continue
         rows = case.rows()
         elements = ", ".join(f"P{degree}" for degree in sorted({row.degree for row in rows}))
         planes = ", ".join(sorted({row.plane for row in rows}))
@@ -57,7 +71,7 @@ def section(case: Case) -> str:
     header = ["| element | plane | quantity | measured | expected | |", "|---|---|---|---|---|---|"]
     return "\n".join(
         [
-            f"## {case.name[0].upper()}{case.name[1:]}\n",
+            title(case),
             case.text.strip() + "\n",
             f"Source: {case.source}.\n",
             *header,

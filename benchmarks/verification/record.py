@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from shutil import which
 
 import numpy as np
 
@@ -40,7 +41,7 @@ class Row:
         measured: The number.
         expected: Its bounds.
         degree: Of the elements.
-        plane: "strain" or "stress".
+        plane: "strain", "stress" or, for a body in three dimensions, "space".
         error: Relative error on the finest mesh, beside a slope.
     """
 
@@ -75,6 +76,7 @@ class Case:
         source: Reference of the answer.
         text: The problem and the reason of its bounds, in Markdown.
         measure: Solves it.
+        needs: Program that it runs, if any.
     """
 
     name: str
@@ -82,6 +84,12 @@ class Case:
     source: str
     text: str
     measure: Callable[[], tuple[Row, ...]]
+    needs: str = ""
+
+    @property
+    def available(self) -> bool:
+        """Whether the program that it needs is installed."""
+        return not self.needs or which(self.needs) is not None
 
     @cache  # noqa: B019 - a handful of cases that live as long as the program
     def rows(self) -> tuple[Row, ...]:

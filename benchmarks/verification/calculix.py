@@ -1,0 +1,170 @@
+"""`fem`, `fem-nonlinear` and `fem-3d` against CalculiX on the same mesh, where `ccx` is installed."""
+
+import subprocess
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.verification.record import Case, Row, at_most
+from geometry.arrays import FloatArray, IntArray
+from geometry.cache import finger_mesh
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from solvers.fem.boundary_conditions import dirichlet_displacement, dirichlet_mask
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
+from solvers.fem.linear import FemSolver
+from solvers.fem.solid.extrusion import ExtrudedSpace
+from solvers.fem.solid.solver import Fem3dSolver
+from solvers.lagrange import LagrangeSpace
+from solvers.problem import Load, Material, Problem
+
+PROGRAM = "ccx"
+SECONDS = 300.0
+"""Time after which a run of `ccx` is given up."""
+
+BOUNDS = {"linear": (2e-6, 2e-6), "st-venant-kirchhoff": (5e-5, 5e-4)}
+"""Of the differences of displacement and force; the first pair is that of seven printed digits."""
+
+TETRAHEDRON = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
+"""Corners that each edge of a quadratic tetrahedron joins, in the order of CalculiX."""
+
+
+class Answer(NamedTuple):
+    """Displacements of the nodes, shape (N, d), mm, and the force on the contact, shape (d,), N."""
+
+    displacement: FloatArray
+    force: FloatArray
+
+
+def calculix() -> tuple[Row, ...]:
+    """Differences of displacement and force, in the plane and in space, linear and at finite strain."""
+    # In space a short finger with one rib, because the other program's solver takes long.
+    short = Design(height=50, rib_count=1, tip_length=12, contact_position=20, depth=6.0)
+    plane, solid = (finger_mesh(design, settings=MeshSettings(size=1.0)) for design in (Design(), short))
+    rows = []
+    for law, bounds in BOUNDS.items():
+        in_plane = Problem(plane, Material(law=law), Load(kind="patch", displacement=(None, -10.0)))
+        in_space = Problem(solid, Material(law=law), Load(kind="patch", displacement=(None, -4.0)))
+        for place, differences in (
+            ("strain", plane_differences(in_plane)),
+            ("space", solid_differences(in_space)),
+        ):
+            for what, difference, bound in zip(("displacement", "force"), differences, bounds, strict=True):
+                rows.append(Row(f"difference of the {what}, {law}", difference, at_most(bound), 2, place))
+    return tuple(rows)
+
+
+def plane_differences(problem: Problem) -> tuple[float, float]:
+    """Relative differences of the displacement, max norm, and of the force in plane strain."""
+    linear = problem.material.law == "linear"
+    ours = (FemSolver(estimate=False) if linear else FemNonlinearSolver()).solve(problem)
+    space = LagrangeSpace(problem.mesh, 2)
+    theirs = solve(problem, space)
+    away = np.abs(ours.displacement(space.nodes) - theirs.displacement).max()
+    size = np.abs(theirs.displacement).max()
+    return float(away / size), float(abs(ours.reaction[1] / theirs.force[1] - 1))
+
+
+def solid_differences(problem: Problem) -> tuple[float, float]:
+    """The same for the side face and the force of `fem-3d`."""
+    solver = Fem3dSolver(layers=1)
+    ours, space = solver.solve(problem), solver.space(problem)
+    theirs = solve(problem, space)
+    side = space.at_level(theirs.displacement, -1)[:, :2]
+    away = np.abs(ours.displacement(space.section.nodes) - side).max() / np.abs(side).max()
+    return float(away), float(abs(ours.reaction[1] * space.thickness / theirs.force[1] - 1))
+
+
+def solve(problem: Problem, space: LagrangeSpace | ExtrudedSpace) -> Answer:
+    """Solution by `ccx` of a problem with a patch; elements, quadrature and solver are its own.
+
+    Raises:
+        UserError: If `ccx` does not finish.
+    """
+    with TemporaryDirectory() as folder:
+        (Path(folder) / "job.inp").write_text(deck(problem, space), encoding="ascii")
+        run = subprocess.run(
+            [PROGRAM, "-i", "job"], cwd=folder, capture_output=True, text=True, timeout=SECONDS, check=False
+        )
+        output = Path(folder) / "job.dat"
+        printed = output.read_text(encoding="ascii") if output.is_file() else ""
+    values = table(printed, "displacements")
+    if run.returncode or "*ERROR" in run.stdout or len(values) != len(space.nodes):
+        raise UserError(f"ccx has not solved the problem; its last words: {run.stdout.strip()[-200:]}")
+    dimension = space.nodes.shape[1]
+    return Answer(values[:, 1 : dimension + 1], table(printed, "total force")[0, :dimension])
+
+
+def table(printed: str, title: str) -> FloatArray:
+    """Numbers of the last table of a `.dat` file whose title begins so, one row a line."""
+    *_, last = printed.split(f" {title}") if f" {title}" in printed else ("",)
+    lines = last.partition("\n")[2].strip("\n").split("\n\n")[0].splitlines()
+    return np.array([[float(word) for word in line.split()] for line in lines if line.strip()])
+
+
+def deck(problem: Problem, space: LagrangeSpace | ExtrudedSpace) -> str:
+    """Input of `ccx`: nodes, quadratic elements, one step; plane elements are 1 mm deep."""
+    solid = isinstance(space, ExtrudedSpace)
+    held, values = dirichlet_mask(problem, space), dirichlet_displacement(problem, space)
+    conditions = [
+        f"{node + 1},{axis + 1},{axis + 1},{values[node, axis]:.12g}" for node, axis in np.argwhere(held)
+    ]
+    places = space.nodes if solid else np.pad(space.nodes, ((0, 0), (0, 1)))
+    return "\n".join(
+        [
+            "*NODE, NSET=ALL",
+            *(f"{number},{x:.12g},{y:.12g},{z:.12g}" for number, (x, y, z) in enumerate(places.tolist(), 1)),
+            f"*ELEMENT, TYPE={'C3D10' if solid else 'CPE6'}, ELSET=BODY",
+            *(",".join(map(str, [number, *(nodes + 1)])) for number, nodes in enumerate(cells(space), 1)),
+            "*NSET, NSET=CONTACT",
+            *(str(node + 1) for node in space.boundary_nodes("contact")),
+            "*MATERIAL, NAME=RUBBER",
+            "*ELASTIC",
+            f"{problem.material.young:.12g},{problem.material.poisson:.12g}",
+            "*SOLID SECTION, ELSET=BODY, MATERIAL=RUBBER",
+            *([] if solid else ["1."]),
+            "*STEP" if problem.material.law == "linear" else "*STEP, NLGEOM",
+            "*STATIC",
+            "*BOUNDARY",
+            *conditions,
+            "*NODE PRINT, NSET=ALL",
+            "U",
+            "*NODE PRINT, NSET=CONTACT, TOTALS=ONLY",
+            "RF",
+            "*END STEP",
+            "",
+        ]
+    )
+
+
+def cells(space: LagrangeSpace | ExtrudedSpace) -> IntArray:
+    """Nodes of every element in CalculiX's order: corners of positive volume, then middles of the edges."""
+    if isinstance(space, LagrangeSpace):
+        return space.cell_nodes
+    corners = space.vertices[space.cells]
+    places = space.nodes[corners]
+    inverted = np.linalg.det(places[:, 1:] - places[:, :1]) < 0
+    corners[inverted] = corners[inverted][:, [1, 0, 2, 3]]
+    return np.concatenate([corners, space.edge_nodes(corners[:, TETRAHEDRON])], axis=1)
+
+
+CALCULIX = Case(
+    name="CalculiX",
+    answer="that of CalculiX",
+    source="CalculiX CrunchiX 2.20 by G. Dhondt and K. Wittig, Debian's package calculix-ccx",
+    text="""
+The default finger with elements of 1 mm under the sliding patch, 10 mm deep, against CPE6 elements, and a
+short finger with one rib, 6 mm deep, by `fem-3d` with one layer in half of the depth, 4 mm deep, against
+C3D10 elements; there the displacement is that of the side face. CalculiX reads the nodes, the elements and
+the prescribed displacements, and has its own elements, quadrature and solver. At finite strain (NLGEOM) its
+elastic law is St Venant-Kirchhoff's. It prints seven digits: that is the difference of the linear law. At
+finite strain it integrates with three points a triangle and four a tetrahedron, fewer than `fem-nonlinear`
+and `fem-3d` do; with its number of points they agree to the printed digits, too
+(`tests/verification/test_calculix.py`). Measured where the program `ccx` is installed.
+""",
+    measure=calculix,
+    needs=PROGRAM,
+)
