@@ -16,6 +16,8 @@ from geometry.mesh.settings import MeshSettings
 from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
+from solvers.fem.linear_solvers import Multigrid
+from solvers.fem.solid.cost import affordable
 from solvers.fem.solid.extrusion import ExtrudedSpace
 from solvers.fem.solid.side_face import FaceField
 from solvers.fem.solid.solver import Fem3dSolver
@@ -169,6 +171,7 @@ def test_plane_strain_does_not_certify_it(short_mesh):
         ({"grading": 2.0}, "0 < grading <= 1"),  # thicker where the stress changes
         ({"face": "top"}, "side, middle"),
         ({"sides": "loose"}, "free or held"),
+        ({"linear_solver": "fast"}, "auto, direct, iterative"),
         ({"max_step": 0.0}, "min_step <= max_step"),
     ],
 )
@@ -188,3 +191,69 @@ def test_two_ranks_find_what_one_finds(start_ranks, short_mesh, tmp_path):
     alone = Fem3dSolver(layers=1).solve(Problem(short_mesh, Material(law="neo-hookean"), load))
     assert energy == pytest.approx(alone.energy, rel=1e-10)
     np.testing.assert_allclose(displacement, alone.displacement(short_mesh.markers), rtol=0, atol=1e-8)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("law", "load"),
+    [
+        ("linear", SLIDING),
+        ("linear", Load(displacement=(0.0, -4.0))),  # a mean: two more solves, for unit forces
+        ("neo-hookean", SLIDING),
+    ],
+)
+def test_multigrid_finds_what_factors_find(short_mesh, law, load):
+    problem = Problem(short_mesh, Material(law=law), load)
+    direct, iterative = (
+        Fem3dSolver(layers=1, linear_solver=method).solve(problem) for method in ("direct", "iterative")
+    )
+    assert iterative.status.converged
+    assert iterative.stats["iterations"] > 0
+    assert iterative.energy == pytest.approx(
+        direct.energy, rel=1e-7
+    )  # Newton's criterion is 1e-8 of the force
+    gap = iterative.displacement(short_mesh.markers) - direct.displacement(short_mesh.markers)
+    assert np.abs(gap).max() < 1e-5  # mm
+
+
+def test_an_indefinite_matrix_is_solved_by_minres(short_mesh):
+    """The stiffness minus 1e-5 of its diagonal has a negative eigenvalue."""
+    equilibrium = FiniteStrainEquilibrium(Problem(short_mesh), ExtrudedSpace.of(short_mesh, 1, 1.0))
+    system = equilibrium.distributed, equilibrium.matrix, equilibrium.clamped
+    multigrid = Multigrid(*system, tolerance=1e-6, tangent=True)
+    equilibrium.matrix.setDiagonal((1 - 1e-5) * equilibrium.matrix.getDiagonal())
+    equilibrium.matrix.assemble()
+    force = np.where(equilibrium.clamped, 0.0, 1.0)
+    equilibrium.factors.update()
+    exact = equilibrium.factors.solve(force)
+    assert (exact * force).sum() < 0  # it gives way against the force
+    multigrid.update()
+    found = multigrid.solve(force)
+    assert np.linalg.norm(found - exact) < 1e-4 * np.linalg.norm(exact)
+
+
+@pytest.mark.parametrize(
+    ("asked", "free", "iterative"),
+    [
+        ("auto", 40.0, False),  # factors fit
+        ("auto", 10.0, True),  # they do not, but coarser matrices do
+        ("direct", 40.0, False),
+        ("iterative", 40.0, True),
+    ],
+)
+def test_the_linear_solver_is_chosen_by_memory(asked, free, iterative):
+    cost = affordable(1_000_000, asked, free)
+    assert cost.iterative is iterative
+    assert cost.words.startswith("1,000,000 unknowns")
+
+
+@pytest.mark.parametrize(
+    ("asked", "free", "advice"),
+    [
+        ("auto", 2.0, "fewer layers"),  # not even multigrid fits
+        ("direct", 10.0, "linear_solver=iterative"),
+    ],
+)
+def test_too_little_memory_is_told_before_the_start(asked, free, advice):
+    with pytest.raises(UserError, match=advice):
+        affordable(1_000_000, asked, free)

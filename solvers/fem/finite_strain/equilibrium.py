@@ -18,13 +18,15 @@ from solvers.fem.boundary_conditions import dirichlet_displacement, dirichlet_ma
 from solvers.fem.dolfinx_compat import DistributedSpace
 from solvers.fem.finite_strain.constraints import DisplacementConstraints, LoadState
 from solvers.fem.finite_strain.cylinder_contact import CylinderContact
-from solvers.fem.linear_solvers import Factorisation
+from solvers.fem.linear_solvers import TOLERANCE, Factorisation, Multigrid
 from solvers.lagrange import NodalSpace
 from solvers.problem import Problem
 from solvers.solid_elasticity import solid_energy_density, solid_jacobian
 
 QUADRATURE_DEGREE = 4
 """Exact for the quadratic part of the law on quadratic elements."""
+NEWTON_TOLERANCE = 1e-4
+"""Residual of the iterations for one step of Newton's method, whose next step takes the rest."""
 PROBE = 1e-4
 """Fraction of the load in the finite difference of the internal forces at rest."""
 
@@ -42,9 +44,21 @@ class FiniteStrainEquilibrium:
     """
 
     def __init__(
-        self, problem: Problem, space: NodalSpace, constraints: DisplacementConstraints | None = None
+        self,
+        problem: Problem,
+        space: NodalSpace,
+        constraints: DisplacementConstraints | None = None,
+        *,
+        iterative: bool = False,
     ) -> None:
-        """Compile the forms; the constraints are the load's unless others are given."""
+        """Compile the forms.
+
+        Args:
+            problem: The problem.
+            space: The elements.
+            constraints: The load's if None.
+            iterative: Whether multigrid solves with the tangent, not factors.
+        """
         self.distributed = DistributedSpace(space)
         self.clamped: BoolArray = dirichlet_mask(problem, space)
         self.prescribed = dirichlet_displacement(problem, space)
@@ -65,7 +79,14 @@ class FiniteStrainEquilibrium:
         self._force, self._tangent = self.distributed.derivatives(energy)
         self._conditions = self.distributed.clamp(self.clamped)
         self.matrix = self.distributed.assemble_matrix(self._tangent, self._conditions)
-        self.factors = Factorisation(self.distributed, self.matrix, self.clamped, positive_definite=False)
+        system = self.distributed, self.matrix, self.clamped
+        self.factors: Factorisation | Multigrid = (
+            Multigrid(*system, tolerance=TOLERANCE)
+            if iterative and material.law == "linear"
+            else Multigrid(*system, tolerance=NEWTON_TOLERANCE, tangent=True)
+            if iterative
+            else Factorisation(*system, positive_definite=False)
+        )
         self.elimination = self._elimination()
 
     def energy(self, nodal: FloatArray) -> float:
@@ -94,7 +115,7 @@ class FiniteStrainEquilibrium:
             free = ~self.clamped[self.contact.nodes]
             blocks = self.contact.tangent(state) * (free[:, :, None] & free[:, None, :])
             self.distributed.add_blocks(self.matrix, self.contact.nodes, blocks)
-        self.factors.update()
+        self.factors.update(state.nodal)
         self.elimination = self._elimination()
 
     def _elimination(self) -> ConstrainedElimination:

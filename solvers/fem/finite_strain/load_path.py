@@ -36,7 +36,9 @@ class LoadPath:
         space: The elements.
         constraints: Their targets grow with the load; the load's own if None.
         guide: States of a simpler model at fractions of the load: each step starts from the last state plus
-            the guide's change. The rest are settings of `FemNonlinearSolver`.
+            the guide's change.
+        iterative: Whether multigrid solves with the tangent, not factors. The rest are settings of
+            `FemNonlinearSolver`.
 
     Attributes:
         equilibrium: The discrete problem.
@@ -53,6 +55,7 @@ class LoadPath:
         constraints: DisplacementConstraints | None = None,
         *,
         guide: Callable[[float], LoadState] | None = None,
+        iterative: bool = False,
         first_step: float,
         max_step: float,
         min_step: float,
@@ -60,7 +63,7 @@ class LoadPath:
         max_iterations: int,
     ) -> None:
         self._first_step, self._min_step, self._space, self._guide = first_step, min_step, space, guide
-        self.equilibrium = FiniteStrainEquilibrium(problem, space, constraints)
+        self.equilibrium = FiniteStrainEquilibrium(problem, space, constraints, iterative=iterative)
         self._begin = partial(
             ConstrainedNewton,
             self.equilibrium,

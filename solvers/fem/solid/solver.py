@@ -8,7 +8,8 @@ import numpy as np
 
 from geometry.errors import UserError
 from solvers.fem.finite_strain.load_path import LoadPath
-from solvers.fem.ranks import on_all_ranks
+from solvers.fem.ranks import communicator, on_all_ranks
+from solvers.fem.solid.cost import Cost, LinearSolver, affordable, free_memory_gb
 from solvers.fem.solid.extrusion import ExtrudedSpace
 from solvers.fem.solid.plane_guide import PlaneGuide
 from solvers.fem.solid.side_face import Face, FaceField
@@ -33,6 +34,8 @@ class Fem3dSolver:
         grading: Thickness of the layer at the side face over that at the middle plane.
         face: Plane of the field: the "side" face or the "middle" plane.
         sides: "free" side faces, or "held" ones, which cannot move along z: plane strain.
+        linear_solver: "direct" (MUMPS), "iterative" (conjugate gradients with algebraic multigrid) or "auto",
+            the former where memory allows it.
         max_step: Largest fraction of the load in one step, at finite strain.
         min_step: Fraction of the load below which the solver gives up.
         tolerance: Newton stops when the residual force is below this fraction of the internal forces.
@@ -43,6 +46,7 @@ class Fem3dSolver:
     grading: float = 0.25
     face: Face = "side"
     sides: Literal["free", "held"] = "free"
+    linear_solver: LinearSolver = "auto"
     max_step: float = 1.0
     min_step: float = 1e-2
     tolerance: float = 1e-8
@@ -62,15 +66,22 @@ class Fem3dSolver:
             raise UserError(f"fem-3d has the field of the faces side, middle, not {self.face!r}")
         if self.sides not in ("free", "held"):
             raise UserError(f"fem-3d has sides free or held, not {self.sides!r}")
+        if self.linear_solver not in get_args(LinearSolver):
+            known = ", ".join(get_args(LinearSolver))
+            raise UserError(f"fem-3d has the linear solvers {known}, not {self.linear_solver!r}")
         if not 0 < self.min_step <= self.max_step <= 1:
             raise UserError("fem-3d needs 0 < min_step <= max_step <= 1")
 
     def settings(self) -> dict[str, object]:
-        """Layers, face and side faces, load steps and Newton's criteria."""
+        """Layers, face and side faces, linear solver, load steps and Newton's criteria."""
         return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
-        """Solve the problem in three dimensions; see `Solver`. The depth is that of the problem's mesh."""
+        """Solve the problem in three dimensions; see `Solver`. The depth is that of the problem's mesh.
+
+        Raises:
+            UserError: If the machine has too little memory.
+        """
         check_problem(self, problem)
         return on_all_ranks(self._solve, problem, progress)
 
@@ -81,7 +92,9 @@ class Fem3dSolver:
     def _solve(self, problem: Problem, progress: Progress) -> Solution:
         started = time.perf_counter()
         space, linear = self.space(problem), problem.material.law == "linear"
-        progress(0.0, f"{space.nodes.size:,} unknowns")
+        free = communicator().bcast(free_memory_gb())
+        cost = affordable(space.nodes.size, self.linear_solver, free)
+        progress(0.0, cost.words)
         guide = None
         if not linear:
             guide = PlaneGuide(
@@ -92,6 +105,7 @@ class Fem3dSolver:
             problem,
             space,
             guide=guide,
+            iterative=cost.iterative,
             first_step=step,
             max_step=step,
             min_step=self.min_step,
@@ -110,7 +124,7 @@ class Fem3dSolver:
             field=FaceField.of(space, last.nodal, self.face),
             energy=float(energies[-1]),
             reaction=reactions[-1],
-            status=self._status(path, linear),
+            status=self._status(path, cost),
             stats={
                 "seconds": time.perf_counter() - started,
                 "unknowns": last.nodal.size,
@@ -119,6 +133,8 @@ class Fem3dSolver:
                 "load_steps": len(points) - 1,
                 "halved_steps": path.halved,
                 "newton_iterations": path.iterations,
+                **path.equilibrium.factors.stats,
+                "estimated_memory_GB": cost.memory_gb,
                 "ranks": ranks,
             },
             history={
@@ -130,7 +146,7 @@ class Fem3dSolver:
             states=[FaceField.of(space, point.nodal, self.face) for point in points],
         )
 
-    def _status(self, path: LoadPath, linear: bool) -> Status:
+    def _status(self, path: LoadPath, cost: Cost) -> Status:
         """Success at the full load, or advice."""
         fraction = path.points[-1].fraction
         if fraction < 1:
@@ -141,12 +157,8 @@ class Fem3dSolver:
             )
         place = "side face" if self.face == "side" else "middle plane"
         how = (
-            "solved directly"
-            if linear
-            else (
-                f"all of the load applied in {len(path.points) - 1} steps, "
-                f"{path.iterations} Newton iterations"
-            )
+            f"all of the load applied in {len(path.points) - 1} steps, {path.iterations} Newton iterations, "
+            f"{'by multigrid' if cost.iterative else 'solved directly'}"
         )
         return Status(
             True, f"{how}; the field is that of the {place}; its discretisation error was not estimated"
