@@ -47,6 +47,14 @@ class NodalSpace(Protocol):
         """Extent out of the plane by which integrals are divided, mm; 1 for a section."""
 
     @property
+    def section(self) -> "LagrangeSpace":
+        """The elements of the section."""
+
+    @property
+    def shares(self) -> FloatArray:
+        """Weights in a mean over the levels of an extrusion, shape (l,); the nodes come level by level."""
+
+    @property
     def mirrored(self) -> BoolArray:
         """Components that symmetry holds at zero, mask of shape (N, d)."""
 
@@ -93,6 +101,16 @@ class LagrangeSpace:
     def thickness(self) -> float:
         """One: integrals over the section are per depth, mm."""
         return 1.0
+
+    @property
+    def section(self) -> "LagrangeSpace":
+        """Itself."""
+        return self
+
+    @property
+    def shares(self) -> FloatArray:
+        """One level, shape (1,)."""
+        return np.ones(1)
 
     @property
     def mirrored(self) -> BoolArray:

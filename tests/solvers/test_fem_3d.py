@@ -77,7 +77,7 @@ def test_pure_bending_is_exact():
     equilibrium.factors.destroy()
     location = mesh.at_centroids()
     for face in ("side", "middle"):
-        gradient = FaceField.of(space, nodal, face).solid_gradient(location)
+        gradient = FaceField(space, nodal, face).solid_gradient(location)
         state = State.from_solid_gradient(gradient, Problem(mesh, material))
         expected = 11.4 * curvature * location.points[:, 1]
         np.testing.assert_allclose(state.stress[:, 0, 0], expected, atol=1e-12)
@@ -108,6 +108,19 @@ def test_held_side_faces_make_plane_strain(short_mesh, law):
     assert 0.995 < solid.energy / plane.energy < 1
     gap = solid.displacement(short_mesh.markers) - plane.displacement(short_mesh.markers)
     assert np.abs(gap).max() < 0.005
+
+
+def test_a_cylinder_between_held_side_faces_presses_as_in_the_plane(short_mesh):
+    load = Load(kind="cylinder", radius=5.0, displacement=(0.0, -2.0))
+    problem = Problem(short_mesh, Material(law="neo-hookean"), load)
+    solid, plane = Fem3dSolver(sides="held", layers=1).solve(problem), FemNonlinearSolver().solve(problem)
+    assert solid.status.converged
+    assert solid.energy == pytest.approx(plane.energy, rel=0.005)  # elements of 1 mm
+    assert solid.reaction[1] == pytest.approx(plane.reaction[1], rel=0.005)
+    for name in ("contact_start_mm", "contact_end_mm"):
+        assert solid.stats[name] == plane.stats[name]
+    assert solid.stats["contact_pressure_MPa"] == pytest.approx(plane.stats["contact_pressure_MPa"], rel=0.05)
+    assert solid.stats["penetration_mm"] < 1e-5
 
 
 def test_a_thin_finger_is_in_plane_stress(short_mesh):

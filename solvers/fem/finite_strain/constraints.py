@@ -19,7 +19,7 @@ class LoadState:
         fraction: Fraction of the load.
         nodal: Displacements, shape (N, d), mm.
         forces: Multipliers of the constraints, shape (k,), N/mm.
-        contact: Forces of the cylinder on the nodes of the front, shape (m,), N/mm; empty without one.
+        contact: Forces of the cylinder on the nodes of the front, shape (l m,), N/mm; empty without one.
     """
 
     fraction: float

@@ -5,6 +5,8 @@ edges of quadratic elements (of the trapezium rule on linear ones). With g the g
 the cylinder, and λ its multiplier, the nodal force is q = max(0, λ - k g): the augmented Lagrangian of
 J. C. Simo, T. A. Laursen, An augmented Lagrangian treatment of contact problems involving friction, Computers
 & Structures 42 (1992) 97-116, without friction. The contact is found, not given.
+
+In three dimensions the axis is along z, and k of a node is in proportion to its level's share of the depth.
 """
 
 from dataclasses import dataclass
@@ -22,17 +24,18 @@ STIFFNESS = 10.0
 
 @dataclass(frozen=True, eq=False)
 class CylinderContact:
-    """The cylinder and the m nodes of the front, in the order of x.
+    """The cylinder and the m nodes of the front at each of l levels, in the order of x; l = 1 in the plane.
 
     Attributes:
-        nodes: Numbers of the nodes, shape (m,).
-        positions: Their positions before the load, shape (m, 2), mm.
+        nodes: Numbers of the nodes, level by level, shape (l m,).
+        positions: Their positions in the plane before the load, the same at every level, shape (m, 2), mm.
         centre: Centre of the cylinder before the load, above the contact's middle, where it touches the front
             from outside, shape (2,), mm.
         travel: Displacement of the cylinder under the full load, shape (2,), mm.
         radius: mm.
-        stiffness: k, N/mm per mm.
-        edges: Rows of `nodes` along every edge, shape (e, degree + 1).
+        stiffness: k of a node, N/mm per mm, times its level's share.
+        edges: Rows of `positions` along every edge, shape (e, degree + 1).
+        shares: Weights of the levels in a mean over the depth, shape (l,).
     """
 
     nodes: IntArray
@@ -42,25 +45,29 @@ class CylinderContact:
     radius: float
     stiffness: float
     edges: IntArray
+    shares: FloatArray
 
     @classmethod
     def of(cls, problem: Problem, space: NodalSpace) -> "CylinderContact":
         """The contact of a problem whose load is a `cylinder`."""
         load, edges = problem.load, problem.mesh.boundary("front")
-        nodes = space.boundary_nodes("front")
-        nodes = nodes[np.argsort(space.nodes[nodes, 0])]
+        section = space.section
+        nodes = section.boundary_nodes("front")
+        nodes = nodes[np.argsort(section.nodes[nodes, 0])]
         columns = [edges[:, :1], edges[:, 1:]]
         if space.degree == 2:
-            columns.insert(1, space.edge_nodes(edges)[:, None])
+            columns.insert(1, section.edge_nodes(edges)[:, None])
+        starts = len(section.nodes) * np.arange(len(space.shares))
         order = np.argsort(nodes)
         return cls(
-            nodes=nodes,
-            positions=space.nodes[nodes],
+            nodes=(starts[:, None] + nodes).ravel(),
+            positions=section.nodes[nodes],
             centre=_touching_centre(problem),
             travel=load.values,
             radius=float(load.radius or 0),
             stiffness=STIFFNESS * problem.material.young,
             edges=order[np.searchsorted(nodes[order], np.concatenate(columns, axis=1))],
+            shares=space.shares,
         )
 
     @property
@@ -69,33 +76,50 @@ class CylinderContact:
         return float(0.5 * self.radius / np.linalg.norm(self.travel))
 
     def gaps(self, state: LoadState) -> tuple[FloatArray, FloatArray]:
-        """Distances g from the cylinder, shape (m,), mm, and its outer normals n there, shape (m, 2)."""
-        away = self.positions + state.nodal[self.nodes] - self.centre - state.fraction * self.travel
+        """Distances g from the cylinder, shape (l m,), mm, and its outer normals n there, shape (l m, 2)."""
+        away = self._places(state.nodal) - self.centre - state.fraction * self.travel
         distance = np.linalg.norm(away, axis=1)
         return distance - self.radius, away / distance[:, None]
 
     def forces(self, state: LoadState) -> FloatArray:
-        """Forces q along the outer normals, shape (m,), N/mm, never tension; λ is `state.contact`."""
-        return np.maximum(0.0, state.contact - self.stiffness * self.gaps(state)[0])
+        """Forces q along the outer normals, shape (l m,), N/mm, never tension; λ is `state.contact`."""
+        return np.maximum(0.0, state.contact - self._stiffness * self.gaps(state)[0])
 
     def gradient(self, state: LoadState) -> FloatArray:
-        """Residual force - q n of the contact, the derivative of Σ (q^2 - λ^2) / 2 k, shape (m, 2), N/mm."""
+        """Residual force - q n, the derivative of Σ (q^2 - λ^2) / 2 k, in the plane, shape (l m, 2), N/mm."""
         return -self.forces(state)[:, None] * self.gaps(state)[1]
 
     def tangent(self, state: LoadState) -> FloatArray:
-        """Derivative of the gradient, a block k n n^T - q (I - n n^T) / (g + radius) a node, (m, 2, 2)."""
+        """Derivative of the gradient, a block k n n^T - q (I - n n^T) / (g + radius) a node, (l m, 2, 2)."""
         (gap, normal), force = self.gaps(state), self.forces(state)
         across = np.einsum("mi,mj->mij", normal, normal)
         turning = (force / (gap + self.radius))[:, None, None] * (np.eye(2) - across)
-        return np.asarray((force > 0)[:, None, None] * self.stiffness * across - turning)
+        stiffness = (force > 0) * self._stiffness
+        return np.asarray(stiffness[:, None, None] * across - turning)
+
+    @property
+    def _stiffness(self) -> FloatArray:
+        return np.repeat(self.stiffness * self.shares, len(self.positions))
+
+    def _places(self, nodal: FloatArray) -> FloatArray:
+        """Places of the nodes in the plane, shape (l m, 2), mm."""
+        return np.tile(self.positions, (len(self.shares), 1)) + nodal[self.nodes, :2]
+
+    def front(self, nodal: FloatArray) -> FloatArray:
+        """The deformed front, meant over the depth, shape (m, 2), mm."""
+        return np.tensordot(self.shares, self._places(nodal).reshape(len(self.shares), -1, 2), axes=1)
+
+    def over_depth(self, forces: FloatArray) -> FloatArray:
+        """Sums over the levels, shape (m,), of forces of the nodes, shape (l m,), N/mm."""
+        return np.asarray(forces.reshape(len(self.shares), -1).sum(axis=0))
 
     def lengths(self, nodal: FloatArray) -> FloatArray:
-        """Weights of the nodes in an integral along the deformed front, shape (m,), mm."""
-        moved = (self.positions + nodal[self.nodes])[self.edges]
+        """Weights of the m places in an integral along the deformed front, shape (m,), mm."""
+        moved = self.front(nodal)[self.edges]
         lengths = np.linalg.norm(np.diff(moved, axis=1), axis=2).sum(axis=1)
         shares = {2: (1 / 2, 1 / 2), 3: (1 / 6, 4 / 6, 1 / 6)}[self.edges.shape[1]]
         weights = np.outer(lengths, shares)
-        return np.bincount(self.edges.ravel(), weights.ravel(), len(self.nodes)).astype(np.float64)
+        return np.bincount(self.edges.ravel(), weights.ravel(), len(self.positions)).astype(np.float64)
 
 
 def _touching_centre(problem: Problem) -> FloatArray:
@@ -150,17 +174,18 @@ class ContactRegion:
     def of(cls, contact: CylinderContact, state: LoadState) -> "ContactRegion | None":
         """The region in a state of equilibrium; none where the cylinder does not touch the finger.
 
-        Its ends are taken half way between a point that touches and the next one that does not.
+        Its ends are taken half way between a point that touches and the next one that does not. In three
+        dimensions a point touches if it does so anywhere along z, and the pressure is a mean over the depth.
         """
         gap, normal = contact.gaps(state)
-        nodal, force = state.nodal, state.contact
+        nodal, force = state.nodal, contact.over_depth(state.contact)
         touching = np.flatnonzero(force > 0)
         if not len(touching):
             return None
         first, last = int(touching[0]), int(touching[-1])
         x = contact.positions[:, 0]
         between = np.concatenate([x[:1], 0.5 * (x[1:] + x[:-1]), x[-1:]])
-        moved = contact.positions + nodal[contact.nodes]
+        moved = contact.front(nodal)
         halves = 0.5 * np.linalg.norm(np.diff(moved, axis=0), axis=1)
         shares = np.append(halves, 0.0) + np.insert(halves, 0, 0.0)
         return cls(
@@ -171,6 +196,6 @@ class ContactRegion:
             spacing=float(shares[touching].max()),
             pressure=float((force / contact.lengths(nodal)).max()),
             penetration=float(max(0.0, -gap.min())),
-            force=(float(force @ normal[:, 0]), float(force @ normal[:, 1])),
+            force=(float(state.contact @ normal[:, 0]), float(state.contact @ normal[:, 1])),
             at_end=first == 0 or last == len(x) - 1,
         )

@@ -104,7 +104,7 @@ class FiniteStrainEquilibrium:
         internal = self.internal_force(state.nodal)
         balance = internal - self.constraints.at_nodes(state.forces)
         if self.contact is not None:
-            balance[self.contact.nodes] += self.contact.gradient(state)
+            balance[self.contact.nodes, :2] += self.contact.gradient(state)
         return np.where(self.clamped, 0.0, balance), float(np.abs(internal).max())
 
     def factorise(self, state: LoadState) -> None:
@@ -113,7 +113,9 @@ class FiniteStrainEquilibrium:
         self.distributed.assemble_matrix(self._tangent, self._conditions, into=self.matrix)
         if self.contact is not None:
             free = ~self.clamped[self.contact.nodes]
-            blocks = self.contact.tangent(state) * (free[:, :, None] & free[:, None, :])
+            inner = self.contact.tangent(state)
+            blocks = np.pad(inner, ((0, 0), *2 * ((0, self.distributed.dimension - 2),)))
+            blocks *= free[:, :, None] & free[:, None, :]
             self.distributed.add_blocks(self.matrix, self.contact.nodes, blocks)
         self.factors.update(state.nodal)
         self.elimination = self._elimination()
@@ -144,7 +146,7 @@ class FiniteStrainEquilibrium:
     def linear_guess(self, fraction: float) -> LoadState:
         """The linear solution at a fraction of the load, by the undeformed tangent, which must be factorised.
 
-        A cylinder touches only the node nearest to it.
+        A cylinder touches only the node nearest to it, or the nodes at its place along z.
         """
         if self.contact is not None:
             return self._pressed_at_one_node(self.contact, fraction)
@@ -160,9 +162,10 @@ class FiniteStrainEquilibrium:
         rest = replace(self.rest, fraction=fraction)
         gap, normal = contact.gaps(rest)
         nearest = gap.argmin()
+        line = np.arange(nearest % len(contact.positions), len(gap), len(contact.positions))
         functional = np.zeros((1, *self.clamped.shape))
-        functional[0, contact.nodes[nearest]] = normal[nearest]
+        functional[0, contact.nodes[line], :2] = contact.shares[:, None] * normal[nearest]
         pressing = ConstrainedElimination.of(self.factors.solve, functional)
         nodal, force = pressing.solution(rest.nodal, np.maximum(-gap[[nearest]], 0.0))
-        rest.contact[nearest] = force[0]
+        rest.contact[line] = force[0] * contact.shares
         return replace(rest, nodal=nodal)

@@ -146,7 +146,7 @@ class LoadPath:
             times = (fraction - last.fraction) / (last.fraction - before.fraction)
         nodal = last.nodal + times * (after.nodal - before.nodal)
         forces = last.forces + times * (after.forces - before.forces)
-        return LoadState(fraction, nodal, forces, last.contact)
+        return LoadState(fraction, nodal, forces, last.contact if self._guide is None else after.contact)
 
     def reaction(self, point: LoadState) -> FloatArray:
         """Force of the indenter on the finger, shape (2,), N/mm."""

@@ -35,8 +35,14 @@ class PlaneGuide:
         share = (
             1.0 if last is first else min(1.0, (fraction - first.fraction) / (last.fraction - first.fraction))
         )
-        nodal, forces = (
-            share * there + (1 - share) * here
-            for here, there in ((first.nodal, last.nodal), (first.forces, last.forces))
+        nodal, forces, contact = (
+            share * getattr(last, name) + (1 - share) * getattr(first, name)
+            for name in ("nodal", "forces", "contact")
         )
-        return replace(last, fraction=fraction, nodal=self._space.extruded(nodal), forces=forces)
+        return replace(
+            last,
+            fraction=fraction,
+            nodal=self._space.extruded(nodal),
+            forces=forces,
+            contact=np.outer(self._space.shares, contact).ravel(),
+        )

@@ -1,6 +1,7 @@
 """The displacement of a side face, or of the middle plane, as a field on the shared mesh."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -8,7 +9,6 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from solvers.fem.solid.extrusion import ExtrudedSpace
-from solvers.lagrange import LagrangeSpace
 
 Face = Literal["side", "middle"]
 
@@ -18,33 +18,42 @@ class FaceField:
     """A plane z = constant of a displacement in three dimensions; it is a `SolidField`.
 
     Attributes:
-        space: Quadratic elements on the section.
-        values: Nodal displacements, shape (P, 3), mm.
-        slopes: Their derivatives along z, shape (P, 3).
+        space: Quadratic elements on half of the body.
+        nodal: Nodal displacements, shape (N, 3), mm.
+        face: The "side" face or the "middle" plane.
     """
 
-    space: LagrangeSpace
-    values: FloatArray
-    slopes: FloatArray
+    space: ExtrudedSpace
+    nodal: FloatArray
+    face: Face
 
-    @classmethod
-    def of(cls, space: ExtrudedSpace, nodal: FloatArray, face: Face) -> "FaceField":
-        """The field of a face, or of the middle plane, of nodal displacements (N, 3), mm.
+    @cached_property
+    def values(self) -> FloatArray:
+        """Displacements of the plane's nodes, shape (P, 3), mm."""
+        return self.space.at_level(self.nodal, -1 if self.face == "side" else 0)
 
-        The derivative along z is that of the parabola through the three nodes of a layer above each other. In
-        the middle plane symmetry leaves only that of u_z.
+    @cached_property
+    def slopes(self) -> FloatArray:
+        """Their derivatives along z, shape (P, 3).
+
+        That of the parabola through the three nodes of a layer above each other. In the middle plane symmetry
+        leaves only that of u_z.
         """
-        levels = [-1, -2, -3] if face == "side" else [0, 1, 2]
-        own, half, whole = (space.at_level(nodal, level) for level in levels)
-        height = space.levels[levels[2]] - space.levels[levels[0]]
+        levels = [-1, -2, -3] if self.face == "side" else [0, 1, 2]
+        own, half, whole = (self.space.at_level(self.nodal, level) for level in levels)
+        height = self.space.levels[levels[2]] - self.space.levels[levels[0]]
         slopes = (-3 * own + 4 * half - whole) / height
-        if face == "middle":
+        if self.face == "middle":
             slopes[:, :2] = 0.0
-        return cls(space.section, own, slopes)
+        return np.asarray(slopes)
+
+    def on(self, face: Face) -> "FaceField":
+        """Another plane of the same displacement."""
+        return replace(self, face=face)
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement in the plane, shape (n, 2), mm."""
-        return np.asarray(self.space.shape_functions(location) @ self.values[:, :2])
+        return np.asarray(self.space.section.shape_functions(location) @ self.values[:, :2])
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j in the plane, shape (n, 2, 2)."""
@@ -52,6 +61,6 @@ class FaceField:
 
     def solid_gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 3, 3)."""
-        dx, dy = self.space.shape_gradients(location)
-        dz = self.space.shape_functions(location) @ self.slopes
+        dx, dy = self.space.section.shape_gradients(location)
+        dz = self.space.section.shape_functions(location) @ self.slopes
         return np.stack([dx @ self.values, dy @ self.values, dz], axis=-1)

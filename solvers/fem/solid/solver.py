@@ -7,6 +7,7 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 
 from geometry.errors import UserError
+from solvers.fem.finite_strain.cylinder_contact import ContactRegion
 from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.ranks import communicator, on_all_ranks
 from solvers.fem.solid.cost import Cost, LinearSolver, affordable, free_memory_gb
@@ -53,7 +54,7 @@ class Fem3dSolver:
     max_iterations: int = 20
     name: ClassVar[str] = "fem-3d"
     laws: ClassVar[tuple[str, ...]] = ("linear", "neo-hookean", "st-venant-kirchhoff")
-    loads: ClassVar[tuple[str, ...]] = ("mean", "patch")
+    loads: ClassVar[tuple[str, ...]] = ("mean", "patch", "cylinder")
 
     def __post_init__(self) -> None:
         if self.layers < 1:
@@ -115,16 +116,17 @@ class Fem3dSolver:
         path.follow(lambda done, text: progress(PLANE_SHARE + (1 - PLANE_SHARE) * done, text))
         points, last = path.points, path.points[-1]
         energies = np.array([path.equilibrium.energy(point.nodal) for point in points])
+        region = path.region(last)
         reactions = np.array([path.reaction(point) for point in points])
         ranks = path.equilibrium.distributed.comm.size
         path.close()
         return Solution(
             solver=self.name,
             problem=problem,
-            field=FaceField.of(space, last.nodal, self.face),
+            field=FaceField(space, last.nodal, self.face),
             energy=float(energies[-1]),
             reaction=reactions[-1],
-            status=self._status(path, cost),
+            status=self._status(path, cost, region),
             stats={
                 "seconds": time.perf_counter() - started,
                 "unknowns": last.nodal.size,
@@ -134,6 +136,7 @@ class Fem3dSolver:
                 "halved_steps": path.halved,
                 "newton_iterations": path.iterations,
                 **path.equilibrium.factors.stats,
+                **(region.stats() if region else {}),
                 "estimated_memory_GB": cost.memory_gb,
                 "ranks": ranks,
             },
@@ -143,10 +146,10 @@ class Fem3dSolver:
                 "reaction_x": reactions[:, 0],
                 "reaction_y": reactions[:, 1],
             },
-            states=[FaceField.of(space, point.nodal, self.face) for point in points],
+            states=[FaceField(space, point.nodal, self.face) for point in points],
         )
 
-    def _status(self, path: LoadPath, cost: Cost) -> Status:
+    def _status(self, path: LoadPath, cost: Cost, region: ContactRegion | None) -> Status:
         """Success at the full load, or advice."""
         fraction = path.points[-1].fraction
         if fraction < 1:
@@ -154,6 +157,12 @@ class Fem3dSolver:
                 False,
                 f"stopped at {fraction:.1%} of the load: Newton's method fails beyond ({path.reason}); "
                 "take a finer mesh, a wider contact or a smaller stroke",
+            )
+        if region and region.at_end:
+            return Status(
+                False,
+                "the contact reaches an end of the front face, beyond which none is looked for; "
+                "press nearer to its middle or take a smaller stroke or radius",
             )
         place = "side face" if self.face == "side" else "middle plane"
         how = (
