@@ -20,7 +20,7 @@ from geometry.atomic import write_json
 from geometry.finger.finger import Finger
 from geometry.observations import Observations
 from solvers.solver import Progress
-from vision.frames.frame import Frame, Image
+from vision.frames.frame import RIG_MARK, Frame, Image
 from vision.frames.pictures import write_picture
 from vision.frames.sources import open_frames
 from vision.frames.video import video_writer
@@ -58,7 +58,14 @@ def track_film(
     with open_frames(film.source) as frames, ExitStack() as stack:
         write = None
         if video:
-            write = stack.enter_context(video_writer(folder / "annotated.mp4", frames.size, frames.rate))
+            write = stack.enter_context(
+                video_writer(
+                    folder / "annotated.mp4",
+                    frames.size,
+                    frames.rate,
+                    comment=RIG_MARK if frames.simulated else "",
+                )
+            )
 
         def see(frame: Frame, detections: FrameDetections) -> None:
             kept.setdefault("initial", (frame.image, detections))
@@ -91,8 +98,9 @@ def _sentence(film: Film, tracking: Tracking) -> str:
     initial, final = (len(end) for end in tracking.rest)
     deviations = np.sqrt(np.diag(tracking.displacement_covariance)) if tracking.visible.any() else np.zeros(1)
     camera = "a calibrated camera" if film.camera else "no calibrated camera"
+    origin = f"{RIG_MARK}, tracked" if tracking.simulated else "measured"
     return (
-        f"measured by pinnray track ({film.method}, {camera}) in {Path(film.source).name}, "
+        f"{origin} by pinnray track ({film.method}, {camera}) in {Path(film.source).name}, "
         f"means of {initial} and {final} frames at rest, standard deviations {deviations.min():.2g} to "
         f"{deviations.max():.2g} mm"
     )
@@ -117,6 +125,7 @@ def track_summary(tracking: Tracking, observations: Observations) -> dict[str, A
     initial, final = tracking.rest
     return {
         "schema": 1,
+        "simulated": tracking.simulated,
         "frames": len(tracking.times),
         "rest": {"initial": [initial.start, initial.stop - 1], "final": [final.start, final.stop - 1]},
         "fiducials_rms_mm": tracking.plane.residual,
@@ -166,7 +175,7 @@ def track_table(tracking: Tracking, observations: Observations) -> Table:
             cells = [f"{value:.3f} ±{deviation:.3f}" for value, deviation in pairs]
         rows.append([str(number + 1), f"{x:.3f}", f"{y:.3f}", *cells, str(frames[number])])
     return terminal_table(
-        "Displacements of the markers, mm",
+        f"Displacements of the markers, mm ({observations.label})",
         ("marker", "x", "y", "u", "v", "frames"),
         rows,
         caption="±: one standard deviation; frames: in which the marker was seen",
@@ -175,17 +184,19 @@ def track_table(tracking: Tracking, observations: Observations) -> Table:
 
 def track_figures(folder: Path, tracking: Tracking) -> list[Picture]:
     """The annotated pictures of a track, for a report."""
+    measured = "tracked in a simulated film" if tracking.simulated else "measured"
     seen, count = int(tracking.visible.sum()), len(tracking.visible)
+    camera = "virtual camera" if tracking.simulated else "camera"
     remarks = " ".join(f"{warning[:1].upper()}{warning[1:]}." for warning in tracking.warnings)
     return [
         Picture(
             folder / "initial.png",
-            "The finger at rest, as the camera saw it",
+            f"The finger at rest, as the {camera} saw it",
             "Green: the markers with their numbers; blue: the fiducials that give the plane.",
         ),
         Picture(
             folder / "final.png",
-            "The finger pressed, as the camera saw it",
-            f"Magenta: the marker trajectories. {seen} of {count} markers are measured. {remarks}".strip(),
+            f"The finger pressed, as the {camera} saw it",
+            f"Magenta: the marker trajectories. {seen} of {count} markers are {measured}. {remarks}".strip(),
         ),
     ]

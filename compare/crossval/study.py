@@ -151,6 +151,11 @@ class Study:
         layouts = self.layouts or (self.design.marker_layout,)
         return {layout: self._laid_out(layout).markers for layout in layouts}
 
+    @property
+    def simulated(self) -> bool:
+        """True if no camera was involved."""
+        return self.measurements is None or self.measurements.simulated
+
     def check(self) -> None:
         """Raise a `UserError` for what cannot be done, before anything is computed."""
         if self.layouts and self.measurements:

@@ -36,11 +36,17 @@ def test_a_video_becomes_measurements_within_hundredths_of_a_millimetre(film, tr
         read_measurements(path, marker_radius=0.8)
         for path in (tracked / "observations.csv", film / "observations_true.csv")
     )
-    assert found.label == "measured"
     assert found.visible.all()
     assert np.abs(found.displacements - true.displacements).sum(axis=1).mean() < 0.02
     np.testing.assert_allclose(found.points, true.points, rtol=0, atol=0.02)
     assert "means of 3 and 3 frames at rest, standard deviations" in found.source
+
+
+def test_what_is_tracked_in_a_film_of_the_rig_is_simulated(film, tracked):
+    assert (tracked / "observations.csv").read_text(encoding="utf-8").startswith("# simulated\n")
+    found = read_measurements(tracked / "observations.csv", marker_radius=0.8)
+    assert found.source.startswith("simulated by pinnray rig, tracked by pinnray track (precise, ")
+    assert json.loads((tracked / "track.json").read_text(encoding="utf-8"))["simulated"] is True
 
 
 def test_the_same_frames_come_through_a_pipe(film, tracked, tmp_path, monkeypatch, capsys):
@@ -51,6 +57,9 @@ def test_the_same_frames_come_through_a_pipe(film, tracked, tmp_path, monkeypatc
     with (tmp_path / "pictures").open() as pipe:
         monkeypatch.setattr("sys.stdin", pipe)
         assert main(["track", "-", *files, "--live", "--out", str(tmp_path / "out")]) == 0
+    # The pictures were encoded anew and lost the rig's mark, but its workspace has one, too.
+    assert "the workspace is that of a film of pinnray rig" in capsys.readouterr().err
+    assert (tmp_path / "out" / "observations.csv").read_text().startswith("# simulated\n")
     found, before = (
         read_measurements(folder / "observations.csv", marker_radius=0.8).displacements
         for folder in (tmp_path / "out", tracked)
@@ -160,13 +169,14 @@ def test_compare_goes_from_pixels_to_the_table(film, tmp_path, capsys):
     options = ["--solvers", "fem", "--mesh-size", "1", "--camera", str(film / "camera.json")]
     video = str(film / "video.mkv")
     assert main(["compare", *options, "--measurements", video, "--out", str(out)]) == 0
-    assert "Mean absolute error at 9 markers, mm (measured displacements)" in capsys.readouterr().out
-    assert read_measurements(out / "observations.csv", marker_radius=0.8).label == "measured"
+    assert "Mean absolute error at 9 markers, mm (simulated displacements)" in capsys.readouterr().out
+    assert read_measurements(out / "observations.csv", marker_radius=0.8).label == "simulated"
     metrics = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
-    assert metrics["measurements"]["source"] == "measured"
+    assert metrics["measurements"]["source"] == "simulated"
     assert "standard deviations" in metrics["measurements"]["description"]
     report = (out / "report.html").read_text(encoding="utf-8")
-    assert "The finger pressed, as the camera saw it" in report
+    assert "The finger pressed, as the virtual camera saw it" in report
+    assert "Measured by" not in report
     assert {path.name for path in (out / "track").iterdir()} >= {"initial.png", "final.png"}
     run = json.loads((out / "run.json").read_text(encoding="utf-8"))
     assert len(run["film"]["video_sha256"]) == 64

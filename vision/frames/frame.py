@@ -16,6 +16,8 @@ from geometry.errors import UserError
 Image = NDArray[np.uint8]
 GreyImage = NDArray[np.uint8]
 
+RIG_MARK = "simulated by pinnray rig"
+"""Mark of the virtual rig, in the metadata of its videos and pictures."""
 DEFAULT_RATE = 30.0
 MAX_RATE = 1000.0
 """Frames a second; a higher rate in a file is taken for an error."""
@@ -36,11 +38,12 @@ class Frame(NamedTuple):
 
 
 class CapturedImage(NamedTuple):
-    """An image from a source, its time, s, and its name in messages."""
+    """An image from a source, its time, s, its name in messages, and whether it carries `RIG_MARK`."""
 
     image: Image
     time: float
     name: str
+    simulated: bool = False
 
 
 ImageStream = Generator[CapturedImage, None, None]
@@ -55,6 +58,7 @@ class Frames:
         rate: Frames a second, from the source or the user.
         count: Number of frames by the source; None for a camera or a pipe. It can be wrong for a video with
             a variable rate.
+        simulated: True if the first frame carries `RIG_MARK`: no camera was involved.
 
     Raises:
         UserError: If the source has no frame; on iterating, if an image cannot be read or has another size.
@@ -67,7 +71,7 @@ class Frames:
         if first is None:
             raise UserError(f"{name} has no frame that can be read")
         self._first = first
-        self.size = _size(first.image)
+        self.size, self.simulated = _size(first.image), first.simulated
 
     def __iter__(self) -> Iterator[Frame]:
         yield Frame(0, 0.0, self._first.image)

@@ -2,6 +2,7 @@
 
 import re
 import warnings
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from glob import glob, has_magic
@@ -13,10 +14,12 @@ import numpy as np
 
 from geometry.atomic import atomic_path
 from geometry.errors import UserError
-from vision.frames.frame import CapturedImage, Image, ImageStream
+from vision.frames.frame import RIG_MARK, CapturedImage, Image, ImageStream
 
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm", ".jp2"})
 JPEG, PNG, PNG_END = b"\xff\xd8", b"\x89PNG\r\n\x1a\n", b"\0\0\0\0IEND\xaeB`\x82"
+PNG_HEADER = 33
+"""Length of a PNG's signature and first chunk, bytes."""
 DEPTHS = (10, 12, 14, 16)
 """Possible numbers of significant bits in 16-bit pictures."""
 
@@ -70,7 +73,9 @@ def images_of_files(paths: Sequence[Path], rate: float) -> ImageStream:
     """The images of picture files, decoded one by one to the same scale."""
     decode = Decoder()
     for number, path in enumerate(paths):
-        yield CapturedImage(decode.file(path), number / rate, path.name)
+        content = _content(path)
+        image = decode(content, f"the picture {path}")
+        yield CapturedImage(image, number / rate, path.name, is_marked(content))
 
 
 def images_of_pipe(read: Callable[[int], bytes], name: str, rate: float) -> ImageStream:
@@ -82,7 +87,7 @@ def images_of_pipe(read: Callable[[int], bytes], name: str, rate: float) -> Imag
     decode = Decoder()
     for number, content in enumerate(split(read, name)):
         label = f"picture {number + 1} of {name}"
-        yield CapturedImage(decode(content, label), number / rate, label)
+        yield CapturedImage(decode(content, label), number / rate, label, is_marked(content))
 
 
 class Decoder:
@@ -126,20 +131,37 @@ class Decoder:
         Raises:
             UserError: If the file cannot be read, is no whole picture, or has neither 8 nor 16 bits.
         """
-        try:
-            content = path.read_bytes()
-        except OSError as error:
-            raise UserError(f"cannot read the picture {path}: {error.strerror}") from None
-        return self(content, f"the picture {path}")
+        return self(_content(path), f"the picture {path}")
 
 
-def write_picture(path: Path, image: Image) -> None:
-    """Write a picture atomically, in the format of its suffix."""
-    done, content = cv2.imencode(path.suffix.lower(), image)
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise UserError(f"cannot read the picture {path}: {error.strerror}") from None
+
+
+def write_picture(path: Path, image: Image, *, comment: str = "") -> None:
+    """Write a picture atomically, in the format of its suffix; a PNG may have a comment in Latin letters."""
+    done, encoded = cv2.imencode(path.suffix.lower(), image)
     if not done:
         raise UserError(f"cannot write the picture {path}")
+    content = encoded.tobytes()
+    if comment:
+        content = content[:PNG_HEADER] + _text_chunk(comment) + content[PNG_HEADER:]
     with atomic_path(path) as partial:
-        partial.write_bytes(content.tobytes())
+        partial.write_bytes(content)
+
+
+def is_marked(content: bytes) -> bool:
+    """True for a PNG of the virtual rig, whose comment is `RIG_MARK`."""
+    return content.startswith(PNG) and content.startswith(_text_chunk(RIG_MARK), PNG_HEADER)
+
+
+def _text_chunk(comment: str) -> bytes:
+    """A comment as a chunk of a PNG. Source: PNG specification, third edition, sections 5.3 and 11.3.3.2."""
+    body = b"tEXtComment\0" + comment.encode("latin-1")
+    return (len(body) - 4).to_bytes(4, "big") + body + zlib.crc32(body).to_bytes(4, "big")
 
 
 def split(read: Callable[[int], bytes], name: str) -> Iterator[bytes]:

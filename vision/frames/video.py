@@ -21,7 +21,7 @@ from av.video.reformatter import Colorspace, Interpolation, VideoReformatter
 
 from geometry.atomic import atomic_path
 from geometry.errors import ShapeError, UserError
-from vision.frames.frame import MAX_RATE, CapturedImage, Frames, Image, ImageStream, plausible_rate
+from vision.frames.frame import MAX_RATE, RIG_MARK, CapturedImage, Frames, Image, ImageStream, plausible_rate
 
 MISSING_FRACTION = 0.02
 """Tolerance of a video's frame count, as a fraction: the number in its header may be that wrong."""
@@ -71,6 +71,7 @@ def _images_of_video(path: Path, container: InputContainer, rate: float, count: 
     """
     read, first, last = 0, math.nan, -math.inf
     reformatter, tick = VideoReformatter(), container.streams.video[0].time_base
+    simulated = RIG_MARK in container.metadata.values()
     with container:
         for frame in _decoded(container):
             time = -math.inf if frame.pts is None or tick is None else float(frame.pts * tick)
@@ -84,7 +85,8 @@ def _images_of_video(path: Path, container: InputContainer, rate: float, count: 
                 interpolation=Interpolation.BICUBIC,
                 threads=1,
             )
-            yield CapturedImage(np.ascontiguousarray(image.to_ndarray(), np.uint8), last, f"frame {read}")
+            array = np.ascontiguousarray(image.to_ndarray(), np.uint8)
+            yield CapturedImage(array, last, f"frame {read}", simulated)
             read += 1
     if not read:
         raise UserError(f"no frame of the video {path} can be read: it is damaged, or FFmpeg lacks its codec")
@@ -110,7 +112,7 @@ def _decoded(container: InputContainer) -> Iterator[av.VideoFrame]:
 
 @contextmanager
 def video_writer(
-    path: str | Path, size: tuple[int, int], rate: float, codec: str | None = None
+    path: str | Path, size: tuple[int, int], rate: float, codec: str | None = None, *, comment: str = ""
 ) -> Iterator[Callable[[Image], None]]:
     """Writes a video with the function that it gives: every call appends a frame, grey or coloured.
 
@@ -122,6 +124,7 @@ def video_writer(
         size: (width, height) of the frames, pixels.
         rate: Frames a second.
         codec: ffv1, mjpg or mp4v; that of `CODECS` if not given.
+        comment: Text in the file's metadata.
 
     Raises:
         UserError: If the suffix, size or rate is impossible, or no frame is given or can be written.
@@ -157,6 +160,8 @@ def video_writer(
     with atomic_path(path) as partial:
         try:
             with av.open(str(partial), "w") as container:
+                if comment:
+                    container.metadata["comment"] = comment
                 fraction = Fraction(rate).limit_denominator(int(MAX_TICKS / max(rate, 1)))
                 stream = cast(VideoStream, container.add_stream(encoder, fraction, {"qmin": MIN_QUANTISER}))
                 stream.width, stream.height = width + right, height + below

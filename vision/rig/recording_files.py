@@ -11,7 +11,7 @@ from geometry.atomic import write_json
 from geometry.errors import UserError
 from vision.calibration.camera import Pose
 from vision.calibration.camera_file import save_camera
-from vision.frames.frame import Image
+from vision.frames.frame import RIG_MARK, Image
 from vision.frames.pictures import write_picture
 from vision.frames.video import CODECS, video_writer
 from vision.measurements import write_measurements
@@ -41,7 +41,8 @@ def record(
 
     The frames (`FILES` by the codec); `truth.csv` with every marker in every frame; the true displacements of
     the markers' centres, `observations_true.csv`, and of their discs' middles, `observations_discs.csv`;
-    `camera.json`, `workspace.json`, `fiducials.svg` to print, and `truth.json` with the rest of the settings.
+    `camera.json`, `workspace.json`; `fiducials.svg` to print and their places, `fiducials.json`; `truth.json`
+    with the rest of the settings. Frames, photographs and `workspace.json` are marked as simulated.
 
     Args:
         recording: The film.
@@ -71,7 +72,9 @@ def record(
     write_measurements(folder / "observations_discs.csv", of_discs)
     save_camera(folder / "camera.json", recording.camera)
     bench = recording.bench
-    write_json(folder / "workspace.json", bench.workspace.model_dump(mode="json"))
+    for name, simulated in (("workspace.json", True), ("fiducials.json", False)):
+        workspace = bench.workspace.model_copy(update={"simulated": simulated})
+        write_json(folder / name, workspace.model_dump(mode="json"))
     sheet = workspace_svg(bench.workspace, bench.finger)
     (folder / "fiducials.svg").write_text(sheet, encoding="utf-8")
     write_json(folder / "truth.json", _settings(recording))
@@ -101,7 +104,7 @@ def photograph(
         image = render(
             scene, recording.camera, pose, recording.exposure, seed=recording.seed, frame=first + number
         )
-        write_picture(folder / f"{number:03d}.png", image)
+        write_picture(folder / f"{number:03d}.png", image, comment=RIG_MARK)
         progress((number + 1) / len(poses), f"{number + 1} of {len(poses)} photographs")
 
 
@@ -109,10 +112,10 @@ def _writer(recording: Recording, place: Path, stack: ExitStack) -> Callable[[Im
     """A function that appends a frame to the video or to the folder of pictures."""
     if place.suffix:
         size = (recording.camera.width, recording.camera.height)
-        return stack.enter_context(video_writer(place, size, recording.motion.rate))
+        return stack.enter_context(video_writer(place, size, recording.motion.rate, comment=RIG_MARK))
     place.mkdir()
     names = (place / f"{number:06d}.png" for number in range(len(recording.motion)))
-    return lambda image: write_picture(next(names), image)
+    return lambda image: write_picture(next(names), image, comment=RIG_MARK)
 
 
 def _settings(recording: Recording) -> dict[str, object]:

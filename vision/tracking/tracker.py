@@ -92,10 +92,17 @@ def track(
         initial=initial,
         final=final,
         method=scene.method,
+        simulated=frames.simulated or scene.workspace.simulated,
     )
     if motion is None:
         return _oriented_by_motion(scene, tracking)
-    return replace(tracking, warnings=tuple(_warnings(scene, tracking, after, motion)))
+    warnings = [*_warnings(scene, tracking, after, motion)]
+    if scene.workspace.simulated and not frames.simulated:
+        warnings.append(
+            "the workspace is that of a film of pinnray rig, so the displacements count as simulated; for a "
+            "film of a real finger give the rig's fiducials.json"
+        )
+    return replace(tracking, warnings=tuple(warnings))
 
 
 def _oriented_by_motion(scene: FilmedScene, tracking: Tracking) -> Tracking:

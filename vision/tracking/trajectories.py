@@ -28,6 +28,7 @@ class Tracking:
         initial, final: Means of the markers over those frames.
         method: How the markers were detected.
         warnings: For the user, one line each.
+        simulated: True if the film or its workspace is of the virtual rig.
     """
 
     design: Finger
@@ -41,6 +42,7 @@ class Tracking:
     final: DiscDetections
     method: DetectionMethod
     warnings: tuple[str, ...] = ()
+    simulated: bool = False
 
     @property
     def visible(self) -> BoolArray:
@@ -103,6 +105,6 @@ class Tracking:
             deviations,
             seen,
             source,
-            simulated=False,
+            simulated=self.simulated,
             marker_radius=self.design.marker_radius,
         )

@@ -33,6 +33,7 @@ class Workspace(BaseModel):
         fiducials: Centres of the fiducials, in the plane z = 0.
         fiducial_diameter: Diameter of every fiducial.
         marker_plane: z of the markers' plane, positive toward the camera; 0 if the fiducials lie in it.
+        simulated: True for the workspace of a film of `pinnray rig`: no camera was involved.
 
     Raises:
         UserError: If there are fewer than four fiducials or they nearly lie on one line.
@@ -43,6 +44,7 @@ class Workspace(BaseModel):
     fiducials: tuple[Point, ...]
     fiducial_diameter: float = Field(default=4.0, gt=0)
     marker_plane: float = 0.0
+    simulated: bool = False
 
     def __init__(self, **values: object) -> None:
         try:
