@@ -12,7 +12,8 @@ from compare.evaluation.convergence import with_certificates
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.force_displacement import force_curves, write_force_displacement
 from compare.evaluation.metrics import evaluated, pick_reference
-from compare.evaluation.shared_mesh import check_inside, shared_mesh, write_rounds
+from compare.evaluation.plausibility import check_positions, displacement_remarks
+from compare.evaluation.shared_mesh import shared_mesh, write_rounds
 from compare.evaluation.virtual_experiment import virtual_experiment
 from compare.figures import Picture, draw_all
 from compare.report.html_report import write_report
@@ -91,7 +92,7 @@ def run(job: Job, stages: Stages) -> Comparison:
     check_output(job.out)
     with replaced_folder(job.out, keep=job.names if job.resume else ()) as folder:
         photographs: list[Picture] = []
-        warnings: Sequence[str] = ()
+        tracked: Sequence[str] = ()
         measurements = job.measurements
         if isinstance(measurements, Film):
             from compare.camera.track_film import track_figures, track_film  # needs OpenCV
@@ -101,9 +102,9 @@ def run(job: Job, stages: Stages) -> Comparison:
                 tracking, measurements = track_film(
                     measurements, job.design, folder / TRACK, progress, video=False
                 )
-            photographs, warnings = track_figures(folder / TRACK, tracking), tracking.warnings
+            photographs, tracked = track_figures(folder / TRACK, tracking), tracking.warnings
         comparison = compute(replace(job, measurements=measurements), stages, folder)
-        comparison = replace(comparison, warnings=warnings)
+        comparison = replace(comparison, warnings=[*tracked, *comparison.warnings])
         write(folder, job, comparison, stages, photographs=photographs)
     return comparison
 
@@ -146,13 +147,14 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
         material=job.material,
         load=job.load,
         solvers=solvers,
-        check=partial(check_inside, given) if given else None,
+        check=partial(check_positions, given) if given else None,
     )
     problem = Problem(mesh, job.material, job.load)
     with stages.stage("measurements") as progress:
         observations, truth = (
             (given, None) if given else virtual_experiment(problem, job.design.marker_radius, progress)
         )
+        remarks = displacement_remarks(given, problem) if given else []
     evaluations: list[Evaluation] = []
     settings: dict[str, dict[str, object]] = {}
     for solver in solvers:
@@ -178,6 +180,7 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
         adaptation=adaptation,
         settings=settings,
         left_out=left_out,
+        warnings=remarks,
     )
 
 

@@ -4,7 +4,7 @@ from functools import partial
 from pathlib import Path
 
 from compare.commands.options import Adapt, FingerOptions, OutputPath, PhysicsOptions, SolverOptions, existing
-from compare.runtime.exits import NOT_CONVERGED
+from compare.runtime.exits import NOT_CONVERGED, say
 from geometry.errors import UserError
 
 
@@ -29,7 +29,8 @@ def solve(
     from compare.evaluation.convergence import with_certificates
     from compare.evaluation.force_displacement import force_curves, write_force_displacement
     from compare.evaluation.metrics import evaluated
-    from compare.evaluation.shared_mesh import check_inside, shared_mesh, tolerance_reached
+    from compare.evaluation.plausibility import check_positions, displacement_remarks
+    from compare.evaluation.shared_mesh import shared_mesh, tolerance_reached
     from compare.figures.force_chart import draw_force_displacement
     from compare.report.vtu_file import write_vtu
     from compare.runtime.stages import Stages
@@ -61,10 +62,12 @@ def solve(
             material=material,
             load=load,
             solvers=[made],
-            check=partial(check_inside, given) if given else None,
+            check=partial(check_positions, given) if given else None,
         )
         with stages.stage(made.name) as progress:
             problem = Problem(triangles, with_law(material, made), load, given)
+            for remark in displacement_remarks(given, problem) if given else ():
+                say(f"warning: {remark}")
             solution = made.solve(problem, progress)
         with stages.stage("certificate"):
             (evaluation,) = with_certificates([evaluated(solution, triangles)], problem)

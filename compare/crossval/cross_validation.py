@@ -1,5 +1,6 @@
 """Cross-validation: solvers scored at markers, loads and fields that they were not given."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from compare.crossval.solver_folds import SolverTask, run_folds
 from compare.crossval.study import MEASURED, Study, visible_markers
 from compare.crossval.true_fields import TrueField, TruthTask, simulate_truth
 from compare.crossval.weight_sweep import SWEPT, sweep_weights
-from compare.evaluation.shared_mesh import check_inside
+from compare.evaluation.plausibility import check_positions, displacement_remarks
 from compare.evaluation.virtual_experiment import experiment_source
 from compare.runtime.output_folder import locked
 from compare.runtime.processes import ProcessFailed, in_stages
@@ -50,8 +51,10 @@ def cross_validate(study: Study, stages: Stages | None = None) -> CrossvalResult
     with stages.stage("mesh"):
         mesh = finger_mesh(study.design, settings=study.mesh)
         if measured:
-            check_inside(measured, mesh)
+            check_positions(measured, mesh)
         problem = Problem(mesh, study.material, study.load)
+        for remark in displacement_remarks(measured, problem) if measured else ():
+            warnings.warn(remark, stacklevel=2)
     load_cases = load_cases_of(problem, others=LOAD in study.schemes and measured is None)
     study.out.mkdir(parents=True, exist_ok=True)
     with locked(study.out):

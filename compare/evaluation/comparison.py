@@ -41,7 +41,7 @@ class Comparison:
         adaptation: Rounds of mesh refinement, if it was asked for.
         settings: Settings of each solver, by its name.
         left_out: Reasons why solvers were left out, by their names.
-        warnings: Remarks of the marker tracking.
+        warnings: Remarks of the marker tracking and on unlikely measurements.
     """
 
     design: Finger
@@ -65,7 +65,7 @@ class Comparison:
 
     @property
     def remarks(self) -> list[str]:
-        """Solvers that were left out, with the reason, and remarks of the marker tracking."""
+        """Solvers that were left out, with the reason, and the warnings."""
         return [*left_out_remarks(self.left_out), *self.warnings]
 
     @property

@@ -7,11 +7,10 @@ from compare.runtime.exits import say
 from compare.runtime.stages import Stages
 from compare.runtime.tables import write_csv
 from geometry.cache import finger_mesh
-from geometry.errors import OutsideBodyError, UserError
+from geometry.errors import UserError
 from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
 from solvers.adaptation import Adaptation, check_adaptable
 from solvers.problem import Load, Material, Problem
 from solvers.solver import Solver
@@ -93,14 +92,3 @@ def tolerance_reached(adaptation: Adaptation | None) -> bool:
         return True
     say(f"error: --adapt {adaptation.tolerance:g}: {adaptation.message}")
     return False
-
-
-def check_inside(observations: Observations, mesh: TriangleMesh) -> None:
-    """Raise a `UserError` if a marker is not on the body."""
-    try:
-        mesh.locate(observations.points)
-    except OutsideBodyError as error:
-        raise UserError(
-            f"the measurements are not of this finger: {error}; "
-            "positions are those before loading, in the finger's frame"
-        ) from None

@@ -1,0 +1,149 @@
+"""Checks measured marker displacements against the finger, the indenter's travel and `fem`.
+
+What is impossible is refused; what is unlikely is warned of, with what it looks like.
+"""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.errors import OutsideBodyError, UserError
+from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.observations import Observations
+from solvers.problem import Load, Problem
+from solvers.registry import make_solver
+
+UNITS = {"metres": 1000.0, "inches": 25.4, "centimetres": 10.0, "micrometres": 0.001}
+"""Millimetres in other units."""
+IMPOSSIBLE_UNITS = ("metres", "micrometres")
+"""Units that no other stroke explains: no camera sees a stroke a thousand times smaller."""
+POSITION_MIXUPS: Mapping[str, Callable[[FloatArray], FloatArray]] = {
+    "x and y look swapped": lambda points: points[:, ::-1],
+    "y looks reversed (the body lies below the front face, y = 0)": lambda points: points * [1.0, -1.0],
+} | {f"these look like {unit}": lambda points, f=factor: points * f for unit, factor in UNITS.items()}
+DISPLACEMENT_MIXUPS: Mapping[str, Callable[[FloatArray], FloatArray]] = {
+    "the signs look reversed (u and v are final minus initial position)": lambda moved: -moved,
+    "the sign of v looks reversed (the indenter presses along -y)": lambda moved: moved * [1.0, -1.0],
+    "u and v look swapped": lambda moved: moved[:, ::-1],
+    "u and v look swapped and their signs reversed": lambda moved: -moved[:, ::-1],
+}
+ALIKE, UNLIKE = 0.85, 0.5
+"""Cosine between measured and linear displacements of all markers. At finite strain it is 0.92 or more on
+five designs with strokes up to 15 mm, and between -0.3 and 0.06 with u and v swapped."""
+OPPOSED = -0.7
+"""Cosine of u alone below which its sign looks reversed; at finite strain it falls to 0."""
+SIZES = 3.0
+"""Ratio of measured to linear displacements that is unlikely; at finite strain it is 0.86 to 1."""
+SMALL = 0.1
+"""Share of the stroke below which `fem`'s displacements at the markers say little of a direction."""
+
+
+def check_positions(observations: Observations, mesh: TriangleMesh) -> None:
+    """Raise a `UserError` if the markers are not on the body or all lie where their discs have no room."""
+    points = observations.points
+    try:
+        mesh.locate(points)
+    except OutsideBodyError as error:
+        looks = [said for said, undone in POSITION_MIXUPS.items() if _inside(mesh, undone(points))]
+        hint = f"; {looks[0]}" if looks else ""
+        raise UserError(
+            f"the measurements are not of this finger: {error}{hint}; "
+            "positions are those before loading, in the finger's frame, in mm"
+        ) from None
+    apart = np.linalg.norm(points[:, None] - points, axis=2)[np.triu_indices(len(points), 1)]
+    crowded = bool(len(apart)) and float(apart.min()) < 2 * observations.marker_radius
+    for unit, factor in UNITS.items():
+        if (crowded or unit == "metres") and factor > 1 and _inside(mesh, points * factor):
+            extent = float(np.abs(points).max())
+            raise UserError(
+                f"the measurements are not of this finger: all markers lie within {extent:.3g} mm of its "
+                f"frame's origin; these look like {unit}; give positions and displacements in mm"
+            )
+
+
+def displacement_remarks(observations: Observations, problem: Problem) -> list[str]:
+    """Remarks on unlikely displacements of the markers, a line each.
+
+    Args:
+        observations: The markers, all on the body.
+        problem: The finger and its load, which `fem` solves for comparison.
+
+    Raises:
+        UserError: If the displacements are impossible.
+    """
+    seen = observations.visible
+    points, moved = observations.points[seen], observations.displacements[seen]
+    length = float(np.ptp(problem.mesh.points, axis=0).max())
+    farthest = int(np.linalg.norm(moved, axis=1).argmax())
+    far, number = float(np.linalg.norm(moved[farthest])), int(np.flatnonzero(seen)[farthest]) + 1
+    if far > 2 * length:
+        raise UserError(
+            f"the measurements are impossible: marker {number} moved by {far:.4g} mm, and the finger is "
+            f"{length:.4g} mm long; give displacements in mm, final minus initial position"
+        )
+    if not moved.any():
+        return ["the measurements say that no marker moved"]
+    try:
+        expected = _expected(problem, points)
+    except ImportError as error:
+        return [f"the measurements were not checked against fem, which needs DOLFINx: {error}"]
+    stroke = float(np.abs(problem.load.values).max())
+    if float(np.sqrt((expected**2).sum(axis=1).mean())) < SMALL * stroke:
+        return []
+    return _compared(moved, expected, stroke, number)
+
+
+def _compared(moved: FloatArray, expected: FloatArray, stroke: float, number: int) -> list[str]:
+    """Remarks on displacements beside those of `fem`, shapes (m, 2), mm; marker `number` moved farthest."""
+    own = _cosine(moved, expected)
+    ratio = float(np.linalg.norm(moved) / np.linalg.norm(expected))
+    likeness = {said: _cosine(undone(moved), expected) for said, undone in DISPLACEMENT_MIXUPS.items()}
+    mixup = max(likeness, key=lambda said: likeness[said])
+    if own < UNLIKE and likeness[mixup] > ALIKE:
+        raise UserError(
+            f"the measurements do not fit the load: {mixup}; so changed they would be much like those of "
+            f"fem (cosine {likeness[mixup]:.2f}), as they are they are not ({own:.2f})"
+        )
+    sized = f"the measured displacements are {ratio:.3g} times those of fem for a stroke of {stroke:g} mm"
+    unit = next((unit for unit, factor in UNITS.items() if 1 / 1.5 < ratio * factor < 1.5), None)
+    if unit in IMPOSSIBLE_UNITS and own > UNLIKE:
+        raise UserError(f"{sized}; these look like {unit}; give mm")
+    remarks = []
+    if not 1 / SIZES < ratio < SIZES:
+        looks = f"these look like {unit}, or --stroke was another" if unit else "check unit and --stroke"
+        remarks.append(f"{sized}; {looks}")
+    elif (far := np.linalg.norm(moved, axis=1).max()) > SIZES * np.linalg.norm(expected, axis=1).max():
+        remarks.append(f"marker {number} moved by {far:.4g} mm, {SIZES:g} times farther than any in fem")
+    if own < UNLIKE:
+        remarks.append(
+            f"the measured displacements are unlike those of fem (cosine {own:.2f}); check markers, columns, "
+            "signs and load"
+        )
+    elif np.abs(moved[:, 0]).max() > SMALL * stroke and _cosine(moved[:, 0], expected[:, 0]) < OPPOSED:
+        remarks.append("u goes against that of fem: its sign looks reversed (u is positive towards the tip)")
+    return remarks
+
+
+def _expected(problem: Problem, points: FloatArray) -> FloatArray:
+    """Displacements of `fem` at points, shape (m, 2), mm; a cylinder is replaced by the mean load."""
+    load = problem.load
+    if load.kind == "cylinder":
+        load = Load(displacement=load.displacement, position=load.position)
+    linear = problem.material.model_copy(update={"law": "linear"})
+    fem = make_solver("fem", estimate=False)
+    return fem.solve(Problem(problem.mesh, linear, load)).displacement(points)
+
+
+def _cosine(one: FloatArray, other: FloatArray) -> float:
+    """Cosine of the angle between two arrays as vectors; 0 if one vanishes."""
+    sizes = float(np.linalg.norm(one) * np.linalg.norm(other))
+    return float((one * other).sum()) / sizes if sizes else 0.0
+
+
+def _inside(mesh: TriangleMesh, points: FloatArray) -> bool:
+    try:
+        mesh.locate(points)
+    except OutsideBodyError:
+        return False
+    return True

@@ -1,0 +1,115 @@
+"""Measurements that cannot be, or hardly, of the finger under its load; units mm."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compare.evaluation.plausibility import check_positions, displacement_remarks
+from compare.evaluation.virtual_experiment import virtual_experiment
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.observations import Observations
+from solvers.problem import Load, Material, Problem
+
+
+@pytest.fixture(scope="module")
+def problem(coarse_mesh: TriangleMesh) -> Problem:
+    return Problem(coarse_mesh, Material(), Load())
+
+
+@pytest.fixture(scope="module")
+def measured(problem: Problem) -> Observations:
+    """Displacements of finite strain, as unlike those of linear `fem` as a real finger's may be."""
+    return virtual_experiment(problem, 0.8)[0]
+
+
+def test_a_finger_at_finite_strain_is_plausible(measured: Observations, problem: Problem) -> None:
+    check_positions(measured, problem.mesh)
+    assert displacement_remarks(measured, problem) == []
+
+
+@pytest.mark.parametrize("scale", [0.5, 2.0])  # another stiffness of walls, another place of the contact
+def test_what_may_be_a_real_finger_is_not_warned_of(
+    measured: Observations, problem: Problem, scale: float
+) -> None:
+    other = replace(measured, displacements=scale * measured.displacements)
+    assert displacement_remarks(other, problem) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda points: points / 1000, "these look like metres"),
+        (lambda points: points / 10, "these look like centimetres"),
+        (lambda points: points / 25.4, "these look like inches"),
+        (lambda points: points * 1000, "these look like micrometres"),
+        (lambda points: points[:, ::-1], "x and y look swapped"),
+        (lambda points: points * [1, -1], "y looks reversed"),
+    ],
+)
+def test_positions_are_refused_with_what_they_look_like(
+    measured: Observations, problem: Problem, change: Callable[[FloatArray], FloatArray], said: str
+) -> None:
+    with pytest.raises(UserError, match=f"not of this finger: .*{said}"):
+        check_positions(replace(measured, points=change(measured.points)), problem.mesh)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            lambda moved: moved / 1000,
+            "times those of fem for a stroke of 10 mm; these look like metres; give mm",
+        ),
+        (lambda moved: moved * 1000, "impossible: marker . moved by .* mm, and the finger is 90 mm long"),
+        (lambda moved: np.vstack([[1000, 0], moved[1:]]), "marker 1 moved by 1000 mm"),  # one cell
+        (lambda moved: -moved, "signs look reversed .u and v are final minus initial"),
+        (lambda moved: moved * [1, -1], "the sign of v looks reversed"),  # the paper's convention
+        (lambda moved: moved[:, ::-1], "u and v look swapped; "),
+        (lambda moved: -moved[:, ::-1], "u and v look swapped and their signs reversed"),
+    ],
+)
+def test_impossible_displacements_are_refused(
+    measured: Observations, problem: Problem, change: Callable[[FloatArray], FloatArray], said: str
+) -> None:
+    with pytest.raises(UserError, match=said):
+        displacement_remarks(replace(measured, displacements=change(measured.displacements)), problem)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda moved: moved / 10, "look like centimetres, or --stroke was another"),
+        (lambda moved: moved / 5, "times those of fem for a stroke of 10 mm; check unit and --stroke"),
+        (lambda moved: np.vstack([[0, -60], moved[1:]]), "marker 1 moved by 60 mm, 3 times farther than any"),
+        (lambda moved: 0 * moved, "no marker moved"),
+        (lambda moved: moved * (-1) ** np.arange(9)[:, None], "unlike those of fem (cosine"),  # no pattern
+    ],
+)
+def test_unlikely_displacements_are_warned_of(
+    measured: Observations, problem: Problem, change: Callable[[FloatArray], FloatArray], said: str
+) -> None:
+    (remark, *_) = displacement_remarks(
+        replace(measured, displacements=change(measured.displacements)), problem
+    )
+    assert said in remark
+
+
+def test_a_reversed_u_is_warned_of_at_a_small_stroke(measured: Observations, problem: Problem) -> None:
+    """At a large one u of linear `fem` says nothing of its sign."""
+    small = replace(problem, load=Load(displacement=(0, -2)))
+    moved = virtual_experiment(small, 0.8)[0].displacements
+    (remark,) = displacement_remarks(replace(measured, displacements=moved * [-1, 1]), small)
+    assert "u goes against that of fem" in remark
+
+
+def test_markers_that_hardly_move_in_fem_say_nothing_of_directions(
+    measured: Observations, problem: Problem
+) -> None:
+    only = np.arange(len(measured.points)) == 0
+    reversed_ = replace(measured, displacements=-measured.displacements, visible=only)
+    beside_base = replace(reversed_, points=np.vstack([[2.0, -1.0], measured.points[1:]]))
+    assert displacement_remarks(beside_base, problem) == []
