@@ -25,6 +25,7 @@ BENCHMARKS = {
     "localisation": "localisation",
     "validation": "validation.document",
     "readings": "readings",
+    "plane_strain": "plane_strain",
 }
 """Names and modules; the modules' docstrings have descriptions and times."""
 

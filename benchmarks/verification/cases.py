@@ -10,6 +10,7 @@ from benchmarks.verification.locking import LOCKING
 from benchmarks.verification.manufactured import MANUFACTURED
 from benchmarks.verification.patch import PATCH
 from benchmarks.verification.plate_with_hole import KIRSCH
+from benchmarks.verification.solid import SOLID
 
 CASES = (
     PATCH,
@@ -22,4 +23,5 @@ CASES = (
     FINITE_STRAIN,
     CALCULIX,
     HERTZ,
+    SOLID,
 )

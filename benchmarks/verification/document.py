@@ -11,8 +11,9 @@ HEAD = """\
 # Verification of the finite elements
 
 All other results of this project are compared with `fem`. This page verifies `fem`, and for finite strain
-`fem-nonlinear`, on problems with known solutions, solved by their own code. [Theory](theory.md) has the
-equations. Whether the equations describe a real body is a question of [validation](validation.md).
+`fem-nonlinear` and in space `fem-3d`, on problems with known solutions, solved by their own code.
+[Theory](theory.md) has the equations. Whether they describe a real body is a question of
+[validation](validation.md).
 
 `make verification` repeats all of it in less than a minute and rewrites this page; `make test-all
 ARGS=tests/verification` fails if a number leaves its bounds or if the page is out of date. `Problem` has only
@@ -20,7 +21,7 @@ a clamp and an indenter, so body forces and tractions are applied below it: the 
 and factorised as for every finger, the nodal forces are integrated in NumPy by a separate rule of degree 7,
 and Hooke's law is implemented independently, from E and ν alone. P1 and P2 are linear and quadratic
 triangles. Slopes are orders of convergence in the element size, with the error on the finest mesh; errors are
-relative; "plane" is the plane state.
+relative; "plane" is the plane state, or "space".
 """
 
 TAIL = """\

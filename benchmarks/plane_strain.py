@@ -1,0 +1,298 @@
+"""Plane strain and plane stress against the finger in three dimensions, on its side face and in its middle.
+
+What a plane model leaves out, for the presets and over the depth of the default finger. Writes
+`docs/plane-strain.csv`, the tables of `docs/plane-strain.md` and their picture; 20 minutes.
+"""
+
+import csv
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from rich.table import Table
+
+from compare.evaluation.differences import field_difference
+from compare.figures.style import axes_at, heading
+from geometry.atomic import write_text
+from geometry.cache import finger_mesh
+from geometry.figure import INK, MUTED, Figure, figure
+from geometry.finger.presets import load_design
+from geometry.mesh.quadrature import body_quadrature
+from geometry.mesh.settings import MeshSettings
+from solvers.elasticity import LawName
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
+from solvers.fem.linear import FemSolver
+from solvers.fem.solid.side_face import Face, FaceField
+from solvers.fem.solid.solver import Fem3dSolver
+from solvers.problem import Load, Material, Problem
+from solvers.solution import Solution
+
+DOCS = Path(__file__).parents[1] / "docs"
+FIGURES, PAGE, PICTURE = (
+    DOCS / "plane-strain.csv",
+    DOCS / "plane-strain.md",
+    DOCS / "pictures" / "plane-strain.png",
+)
+
+DESIGNS = ("default", "slender", "stiff", "many-ribs", "csiro")
+LAWS: dict[LawName, tuple[str, ...]] = {
+    "linear": DESIGNS,
+    "neo-hookean": ("default", "stiff"),
+}
+"""Presets by law; the linear one with a sticking patch, neo-Hookean with a sliding one."""
+
+FACES: tuple[Face, ...] = ("side", "middle")
+LAYERS = {5.0: (3, 0.5), 10.0: (4, 0.4), 20.0: (4, 0.25), 40.0: (6, 0.12), 100.0: (8, 0.05)}
+"""Depths of the default finger, mm, with the layers in half of each and their grading."""
+
+FINE, COARSE = 1.0, 1.5
+"""Element sizes, mm; the coarse mesh has one layer less. Its change is the error that the page states."""
+
+SIDE, MIDDLE = "#d55e00", "#0072b2"
+
+FLOOR = 0.005
+"""Error of a marker's measured displacement, mm."""
+
+WALL = 2.0
+"""Thickness of the default finger's walls and ribs, mm."""
+
+BEGIN, END = "<!-- table of {} -->\n", "<!-- end of the table -->\n"
+
+
+class Case(NamedTuple):
+    """One finger, law and mesh."""
+
+    design: str
+    law: LawName
+    depth: float
+    size: float
+
+
+class Row(NamedTuple):
+    """A plane model against three dimensions: `side` or `middle` is the plane that is compared.
+
+    Attributes:
+        design: Preset.
+        law: Material law; the linear one with a sticking patch, neo-Hookean with a sliding one.
+        depth: mm.
+        size: Elements, mm.
+        model: Plane "strain" or "stress".
+        side_markers: Mean of |du| + |dv| at the markers, mm.
+        side_worst: Largest |(du, dv)| there, mm.
+        side_displacement: Relative L2 difference over the body.
+        side_von_mises: The same of the von Mises stress.
+        middle_markers: As on the side face.
+        middle_worst: As on the side face.
+        middle_displacement: As on the side face.
+        middle_von_mises: As on the side face.
+        force: Force per depth over that in three dimensions, less one.
+    """
+
+    design: str
+    law: str
+    depth: float
+    size: float
+    model: str
+    side_markers: float
+    side_worst: float
+    side_displacement: float
+    side_von_mises: float
+    middle_markers: float
+    middle_worst: float
+    middle_displacement: float
+    middle_von_mises: float
+    force: float
+
+    @property
+    def key(self) -> tuple[str | float, ...]:
+        """What the row is of."""
+        return self[:5]
+
+
+def main() -> Table:
+    """Compute every case, and write figures, page and picture."""
+    return written([row for case in cases() for row in measured(case)])
+
+
+def cases() -> Iterator[Case]:
+    """Every preset, and the default finger at other depths; each on two meshes."""
+    for size in (COARSE, FINE):
+        for law, designs in LAWS.items():
+            for design in designs:
+                yield Case(design, law, load_design(design).depth, size)
+        for depth in LAYERS:
+            if depth != load_design("default").depth:
+                yield Case("default", "linear", depth, size)
+
+
+def measured(case: Case) -> Iterator[Row]:
+    """The plane models of a case against three dimensions."""
+    design = load_design(case.design, {"depth": case.depth})
+    mesh = finger_mesh(design, settings=MeshSettings(size=case.size))
+    linear = case.law == "linear"
+    load = Load(kind="patch", displacement=(0.0 if linear else None, -10.0))
+    problem = Problem(mesh, Material(law=case.law), load)
+    layers, grading = LAYERS[case.depth]
+    solid = Fem3dSolver(layers=layers - (case.size == COARSE), grading=grading).solve(problem)
+    for model in ("strain", "stress") if linear else ("strain",):
+        flat = replace(problem, material=problem.material.model_copy(update={"plane": model}))
+        plane = (FemSolver(estimate=False) if linear else FemNonlinearSolver()).solve(flat)
+        yield Row(
+            *case,
+            model,
+            *(value for face in FACES for value in missed(plane, solid, face)),
+            force(plane, solid),
+        )
+
+
+def missed(plane: Solution, solid: Solution, face: Face) -> tuple[float, ...]:
+    """What a plane solution misses on a face: at the markers, mm, in displacement and von Mises stress."""
+    if not isinstance(solid.field, FaceField):
+        raise TypeError("the solution in three dimensions has no faces")
+    there, mesh = replace(solid, field=solid.field.on(face)), solid.problem.mesh
+    rule = body_quadrature(mesh)
+    gaps = plane.displacement(mesh.markers) - there.displacement(mesh.markers)
+    displacement = field_difference(
+        plane.displacement(rule.location), there.displacement(rule.location), rule.weights
+    )
+    stress = field_difference(
+        plane.state(rule.location).von_mises, there.state(rule.location).von_mises, rule.weights
+    )
+    markers, worst = np.abs(gaps).sum(axis=1).mean(), np.linalg.norm(gaps, axis=1).max()
+    return tuple(round(float(value), 5) for value in (markers, worst, displacement.rel_l2, stress.rel_l2))
+
+
+def force(plane: Solution, solid: Solution) -> float:
+    """Force of the indenter in the plane over that in three dimensions, less one."""
+    return round(float(np.linalg.norm(plane.reaction) / np.linalg.norm(solid.reaction)) - 1, 5)
+
+
+def written(rows: Sequence[Row]) -> Table:
+    """Write figures, tables and picture, and return the table of the presets for the terminal."""
+    write_text(FIGURES, "".join(f"{','.join(map(str, row))}\n" for row in (Row._fields, *rows)))
+    page = PAGE.read_text(encoding="utf-8")
+    for name, table in tables(rows).items():
+        before, begin, rest = page.partition(BEGIN.format(name))
+        page = before + begin + table + END + rest.partition(END)[2]
+    write_text(PAGE, page)
+    picture(rows).save(PICTURE)
+    shown = Table(title="plane models against three dimensions")
+    for name in HEADER:
+        shown.add_column(name, no_wrap=True)
+    for row in preset_rows(rows):
+        shown.add_row(*cells(row, rows))
+    return shown
+
+
+def kept_rows() -> list[Row]:
+    """The rows of `FIGURES`."""
+    with FIGURES.open(encoding="utf-8") as file:
+        return [
+            Row(
+                *(
+                    row[name] if name in ("design", "law", "model") else float(row[name])
+                    for name in Row._fields
+                )
+            )
+            for row in csv.DictReader(file)
+        ]
+
+
+HEADER = (
+    *("finger", "depth, mm", "law", "plane", "markers, side, mm", "worst", "markers, middle, mm"),
+    *("displ., side, %", "middle", "v. Mises, side, %", "middle", "force, %"),
+)
+
+
+def preset_rows(rows: Sequence[Row]) -> list[Row]:
+    """Rows of the presets on the fine mesh."""
+    return [row for row in rows if row.size == FINE and row.depth == load_design(row.design).depth]
+
+
+def depth_rows(rows: Sequence[Row]) -> list[Row]:
+    """Linear rows of the default finger in plane strain on the fine mesh, by depth."""
+    chosen = [row for row in rows if row.size == FINE and row.design == "default" and row.law == "linear"]
+    return sorted((row for row in chosen if row.model == "strain"), key=lambda row: row.depth)
+
+
+def tables(rows: Sequence[Row]) -> dict[str, str]:
+    """The page's tables in Markdown."""
+    lines = ("---",) * 4 + ("---:",) * (len(HEADER) - 4)
+    parts = {"presets": preset_rows(rows), "depths": depth_rows(rows)}
+    return {
+        name: "".join(
+            f"| {' | '.join(line)} |\n" for line in (HEADER, lines, *(cells(row, rows) for row in part))
+        )
+        for name, part in parts.items()
+    }
+
+
+def cells(row: Row, rows: Sequence[Row]) -> tuple[str, ...]:
+    """A row of the table: each number ± its change from the coarse mesh."""
+    coarse = next(each for each in rows if each.key == row._replace(size=COARSE).key)
+
+    def length(name: str) -> str:
+        value, other = getattr(row, name), getattr(coarse, name)
+        return f"{value:.3f} ± {max(abs(value - other), 0.001):.3f}"
+
+    def share(name: str, sign: str = "") -> str:
+        value, other = 100 * getattr(row, name), 100 * getattr(coarse, name)
+        return f"{value:{sign}.1f} ± {max(abs(value - other), 0.1):.1f}"
+
+    return (
+        *(row.design, f"{row.depth:g}", row.law, row.model),
+        *(length("side_markers"), f"{row.side_worst:.3f}", length("middle_markers")),
+        *map(share, ("side_displacement", "middle_displacement", "side_von_mises", "middle_von_mises")),
+        share("force", "+"),
+    )
+
+
+def picture(rows: Sequence[Row]) -> Figure:
+    """Errors of plane strain over the depth of the default finger."""
+    by_depth = depth_rows(rows)
+    ratio = [row.depth / WALL for row in by_depth]
+    marks = {"ms": 3.5, "lw": 1.2}
+    with figure(2.45) as drawn:
+        left, right = (axes_at(drawn, (start, 0.5, 2.15, 1.5)) for start in (0.55, 3.25))
+        side, middle = ([getattr(row, f"{face}_markers") for row in by_depth] for face in FACES)
+        left.plot(ratio, side, "o-", color=SIDE, **marks)
+        left.plot(ratio, middle, "s-", color=MIDDLE, **marks)
+        left.axhline(FLOOR, color=MUTED, lw=0.8, ls=":")
+        _label(left, "side face", (ratio[2], side[2]), SIDE, above=True)
+        _label(left, "middle plane", (1.2 * ratio[2], 0.92 * middle[2]), MIDDLE, above=False)
+        _label(left, "the tracker's own", (ratio[3], FLOOR), MUTED, above=True)
+        side, middle = ([100 * getattr(row, f"{face}_von_mises") for row in by_depth] for face in FACES)
+        forces = [100 * row.force for row in by_depth]
+        right.plot(ratio, side, "o-", color=SIDE, **marks)
+        right.plot(ratio, middle, "s-", color=MIDDLE, **marks)
+        right.plot(ratio, forces, "^--", color=INK, **marks)
+        _label(right, "von Mises, side face", (ratio[3], side[3]), SIDE, above=True)
+        _label(right, "von Mises,\nmiddle plane", (0.8 * ratio[1], 0.9 * middle[1]), MIDDLE, above=False)
+        _label(right, "force", (1.3 * ratio[1], forces[1]), INK, above=True)
+        left.set_ylabel("error at the markers, mm")
+        right.set_ylabel("error, %")
+        for axes in (left, right):
+            axes.set_xscale("log")
+            axes.set_xticks(ratio, [f"{value:g}" for value in ratio])
+            axes.minorticks_off()
+            axes.set_xlabel("depth over wall thickness")
+            axes.set_ylim(0, 1.13 * axes.get_ylim()[1])
+        heading(drawn, "Plane strain against three dimensions", "default finger, linear law, sticking patch")
+    return drawn
+
+
+def _label(axes: Axes, text: str, place: tuple[float, float], colour: str, *, above: bool) -> None:
+    """A line's name above or below a place of it."""
+    axes.annotate(
+        text,
+        place,
+        (0, 5 if above else -5),
+        textcoords="offset points",
+        ha="center",
+        va="bottom" if above else "top",
+        color=colour,
+        size=7.5,
+    )
