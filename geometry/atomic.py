@@ -1,31 +1,62 @@
-"""Atomic writing: a reader sees the old file or the new one, never a part of it."""
+"""Atomic writing: a reader sees the old file or the new one, never a part of it or an empty one.
+
+Libraries that write files themselves do not always say that a disk is full: VTK leaves an empty file or ends
+the process, and NumPy prints a traceback. Their bytes are made in memory and written here.
+"""
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from errno import EDQUOT, EFBIG, EIO, ENOSPC
+from io import BytesIO
 from math import isfinite
 from pathlib import Path
 from threading import get_native_id
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
-    """A path beside `path`, with its suffix, that takes its place if the block ends without an error."""
+    """A path beside `path`, with its suffix, that takes its place if the block ends without an error.
+
+    Raises:
+        OSError: With `path` as its file name: if the disk is full, or the block has written nothing.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.stem}.{get_native_id()}.partial{path.suffix}")  # unique to a thread
     try:
         yield partial
+        if not partial.exists() or not partial.stat().st_size:
+            raise OSError(EIO, "nothing was written; is the disk full?", str(path))
         os.replace(partial, path)
+    except OSError as error:
+        if error.errno in (ENOSPC, EDQUOT, EFBIG):
+            raise OSError(error.errno, os.strerror(error.errno), str(path)) from None
+        raise
     finally:
         partial.unlink(missing_ok=True)
 
 
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write bytes atomically."""
+    with atomic_path(path) as partial:
+        partial.write_bytes(content)
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text atomically."""
-    with atomic_path(path) as partial:
-        partial.write_text(text, encoding="utf-8")
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_arrays(path: Path, arrays: Mapping[str, ArrayLike]) -> None:
+    """Write a compressed NumPy archive atomically."""
+    buffer = BytesIO()
+    np.savez_compressed(buffer, **{name: np.asarray(array) for name, array in arrays.items()})
+    write_bytes(path, buffer.getvalue())
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:

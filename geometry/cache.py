@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
-from geometry.atomic import atomic_path
+from geometry.atomic import atomic_path, write_bytes
 from geometry.content_hash import content_hash, file_digest
 from geometry.drawing.description import Description
 from geometry.drawing.drawn_finger import DrawnFinger
@@ -127,8 +127,7 @@ def cad_files(
     task["finger"] = finger.definition()
     contents = _cached(finger.digest, task, ".zip", _unpack, cache_dir, timeout_s)
     for name, content in contents.items():
-        with atomic_path(folder / name) as partial:
-            partial.write_bytes(content)
+        write_bytes(folder / name, content)
     return [folder / name for name in contents]
 
 

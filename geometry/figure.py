@@ -14,7 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as MplFigure
 
 from geometry.arrays import FloatArray
-from geometry.atomic import atomic_path
+from geometry.atomic import write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
@@ -74,8 +74,10 @@ class Figure(MplFigure):
     def save(self, path: Path) -> Path:
         """Write the figure atomically, in the format of the path's suffix, and return the path."""
         quick = {"compress_level": 3} if path.suffix == ".png" else None
-        with mpl.rc_context(_RC), atomic_path(path) as partial:
-            self.savefig(partial, pil_kwargs=quick)
+        buffer = BytesIO()
+        with mpl.rc_context(_RC):
+            self.savefig(buffer, format=path.suffix.removeprefix("."), pil_kwargs=quick)
+        write_bytes(path, buffer.getvalue())
         return path
 
     def _repr_png_(self) -> bytes:

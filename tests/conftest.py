@@ -1,10 +1,12 @@
 """Fixtures that the tests of several folders share."""
 
 import os
+import resource
 import shutil
+import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -16,6 +18,16 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.worker import child_environment
 
 PLUGIN = Path(__file__).parent / "solvers" / "plugin"
+
+
+@pytest.fixture
+def full_disk() -> Iterator[None]:
+    """No file may become longer than 4096 bytes: writing fails as on a full disk, in libraries, too."""
+    before, handler = resource.getrlimit(resource.RLIMIT_FSIZE), signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    signal.signal(signal.SIGXFSZ, handler)
 
 
 @pytest.fixture(scope="session")

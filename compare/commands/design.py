@@ -24,7 +24,7 @@ def design(
         formats: File formats, separated by commas: step, stl, dxf, svg.
     """
     from compare.figures.design_drawing import draw_design
-    from geometry.atomic import atomic_path
+    from geometry.atomic import write_text
     from geometry.cache import cad_files
     from geometry.drawing.drawn_finger import DrawnFinger, description_lines
     from geometry.finger.design import Design
@@ -33,8 +33,7 @@ def design(
     paths = cad_files(chosen, out, formats=comma_list(formats))
     stem = Path(chosen.file).stem if isinstance(chosen, DrawnFinger) else STEP
     lines = out / f"{stem}.toml"
-    with atomic_path(lines) as partial:
-        partial.write_text(description_lines(chosen), encoding="utf-8")
+    write_text(lines, description_lines(chosen))
     drawn = draw_design(chosen) if isinstance(chosen, Design) else chosen.plot()
     picture = drawn.save(out / "design.png")
     for path in [*paths, lines, picture]:

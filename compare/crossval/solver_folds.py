@@ -15,7 +15,7 @@ from compare.crossval.scores import LEVEL
 from compare.crossval.study import SolverVariant, Study
 from compare.crossval.true_fields import FieldSampler, SampledField, TrueField
 from compare.evaluation.truths import SLIDING, Truth
-from geometry.atomic import atomic_path
+from geometry.atomic import write_bytes
 from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
@@ -120,8 +120,7 @@ class FoldRunner:
             progress(number / len(self._task.folds), f"{fold.scheme}: {fold.name}")
             if fold not in results:
                 results[fold] = self._result(self._task.observations[seed], fold)
-                with atomic_path(path) as partial:
-                    partial.write_bytes(_FILE.dump_json(_KeptFolds(settings, list(results.values()))))
+                write_bytes(path, _FILE.dump_json(_KeptFolds(settings, list(results.values()))))
         return [results[fold] for fold in self._task.folds]
 
     def _result(self, observations: Sequence[Observations], fold: Fold) -> FoldResult:

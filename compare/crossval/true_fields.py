@@ -14,7 +14,7 @@ from compare.evaluation.virtual_experiment import SOURCES, simulate
 from compare.runtime.provenance import package_versions, sources_digest
 from compare.runtime.tables import Cell
 from geometry.arrays import FloatArray
-from geometry.atomic import atomic_path
+from geometry.atomic import write_arrays
 from geometry.cache import cache_folder, finger_mesh
 from geometry.content_hash import content_hash
 from geometry.errors import UserError
@@ -199,8 +199,7 @@ class TrueField:
 
     def save(self, path: Path) -> None:
         """Write atomically."""
-        with atomic_path(path) as partial:
-            np.savez(partial, **vars(self.sampled), **vars(self.contact))
+        write_arrays(path, {**vars(self.sampled), **vars(self.contact)})
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from pydantic import TypeAdapter
 from compare.evaluation.certificate import Certificate
 from compare.evaluation.differences import ReferenceDifferences
 from geometry.arrays import FloatArray
-from geometry.atomic import atomic_path
+from geometry.atomic import write_arrays
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.lagrange import LagrangeSpace
@@ -162,8 +162,7 @@ class Evaluation:
             elif entry.name not in ("history", "certificate"):
                 header[entry.name] = dict(value) if isinstance(value, Mapping) else value
         arrays |= {HISTORY_PREFIX + name: column for name, column in self.history.items()}
-        with atomic_path(path) as partial:
-            np.savez_compressed(partial, header=np.array(json.dumps(header)), **arrays)
+        write_arrays(path, {"header": np.array(json.dumps(header)), **arrays})
 
     @classmethod
     def load(cls, path: Path, key: str) -> "Evaluation | None":

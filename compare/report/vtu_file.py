@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pyvista
+from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import COMPONENTS
-from geometry.atomic import atomic_path
+from geometry.atomic import write_text
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 SYMMETRIC = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
@@ -46,8 +47,7 @@ def write_vtu(path: Path, mesh: TriangleMesh, evaluation: Evaluation) -> None:
     grid.field_data["status"] = [_ascii(evaluation.message)]
     grid.field_data["energy_N_mm_per_mm"] = [evaluation.energy]
     grid.field_data["reaction_N_per_mm"] = evaluation.reaction[None]
-    with atomic_path(path) as partial:
-        grid.save(partial)
+    _write(path, grid)
 
 
 def _ascii(text: str) -> str:
@@ -64,8 +64,16 @@ def write_mesh(path: Path, mesh: TriangleMesh) -> None:
     marker = np.zeros(len(mesh.points), dtype=np.int32)
     marker[mesh.marker_nodes] = np.arange(1, len(mesh.marker_nodes) + 1)
     grid.point_data["marker"] = marker
-    with atomic_path(path) as partial:
-        grid.save(partial)
+    _write(path, grid)
+
+
+def _write(path: Path, grid: pyvista.UnstructuredGrid) -> None:
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetInputData(grid)
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    write_text(path, writer.GetOutputString())
 
 
 def _grid(mesh: TriangleMesh) -> pyvista.UnstructuredGrid:

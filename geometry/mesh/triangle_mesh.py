@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.arrays import FloatArray, IntArray, frozen_array
+from geometry.atomic import write_arrays
 from geometry.content_hash import content_hash
 from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints, Locator
@@ -205,8 +206,8 @@ class TriangleMesh:
         return fact_table("Triangle mesh", facts, png_image(self.plot()._repr_png_()))
 
     def save(self, path: Path) -> None:
-        """Write the mesh as a NumPy archive."""
-        np.savez_compressed(path, **self._arrays())
+        """Write the mesh as a NumPy archive, atomically."""
+        write_arrays(path, self._arrays())
 
     @classmethod
     def load(cls, path: Path) -> "TriangleMesh":

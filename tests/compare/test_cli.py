@@ -503,6 +503,25 @@ def test_one_solver_that_follows_the_load_has_its_forces_beside_the_fields(folde
     assert rows[-1]["travel_mm"] == "2.0"
 
 
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (["solve", "fem", "--out", "here/fem.vtu"], "error: here/fem.vtu: File too large"),
+        (["mesh", "--out", "here"], "error: here/mesh.vtu: File too large"),
+        (["design", "--out", "here"], "error: here/"),
+    ],
+)
+def test_a_full_disk_is_told_in_one_line_and_leaves_no_part_of_a_file(
+    command, said, folder, coarse_mesh, full_disk, capsys
+):
+    assert main([*command, "--mesh-size", "1.0"]) == BAD_INPUT
+    errors = [line for line in capsys.readouterr().err.splitlines() if not line.startswith(("mesh:", "fem:"))]
+    assert len(errors) == 1 + (command[0] == "solve")  # the stage of the certificate
+    assert errors[-1].startswith(said)
+    assert all(path.stat().st_size < 4096 for path in Path("here").iterdir())
+    assert not list(Path("here").glob(".*"))
+
+
 def test_the_mesh_alone(folder, capsys):
     assert main(["mesh", "--mesh-size", "1.0", "--out", "here"]) == 0
     assert "triangles, area" in capsys.readouterr().out

@@ -1,8 +1,11 @@
+import errno
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from geometry.atomic import atomic_path
+from geometry.atomic import atomic_path, write_arrays, write_text
 
 
 def test_the_new_file_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
@@ -31,5 +34,37 @@ def test_an_error_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
 def test_folders_are_made_and_the_suffix_is_kept_for_writers_that_look_at_it(tmp_path: Path) -> None:
     with atomic_path(tmp_path / "fields" / "fem.vtu") as partial:
         assert partial.suffix == ".vtu"
-        partial.touch()
+        partial.write_text("fields")
     assert (tmp_path / "fields" / "fem.vtu").exists()
+
+
+def test_a_writer_that_leaves_nothing_is_an_error_and_the_old_file_stays(tmp_path: Path) -> None:
+    """As VTK's does on a full disk."""
+    path = tmp_path / "fields.vtu"
+    path.write_text("old")
+    with (
+        pytest.raises(OSError, match="nothing was written; is the disk full") as error,
+        atomic_path(path) as part,
+    ):
+        part.touch()
+    assert error.value.filename == str(path)
+    assert [entry.read_text() for entry in tmp_path.iterdir()] == ["old"]
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        lambda path: write_text(path, "new" * 2000),
+        lambda path: write_arrays(path, {"noise": np.random.default_rng(0).random(9000)}),
+    ],
+    ids=["text", "arrays"],
+)
+def test_a_full_disk_names_the_file_and_leaves_the_old_one(
+    write: Callable[[Path], None], tmp_path: Path, full_disk: None
+) -> None:
+    path = tmp_path / "table.csv"
+    path.touch()
+    with pytest.raises(OSError, match="File too large") as error:
+        write(path)
+    assert (error.value.errno, error.value.filename) == (errno.EFBIG, str(path))
+    assert list(tmp_path.iterdir()) == [path]

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from geometry.arrays import FloatArray
-from geometry.atomic import atomic_path
+from geometry.atomic import write_text
 from geometry.errors import UserError
 from vision.calibration.camera import Camera
 from vision.calibration.camera_calibration import Calibration
@@ -107,8 +107,7 @@ def _write(path: Path, content: Mapping[str, Entry]) -> None:
     storage = cv2.FileStorage(path.suffix.lower(), cv2.FileStorage_WRITE | cv2.FileStorage_MEMORY)
     for name, value in content.items():
         storage.write(name, value)
-    with atomic_path(path) as partial:
-        partial.write_text(storage.releaseAndGetString(), encoding="utf-8")
+    write_text(path, storage.releaseAndGetString())
 
 
 def _covariance(storage: cv2.FileStorage, size: int, path: Path) -> tuple[tuple[float, ...], ...] | None:

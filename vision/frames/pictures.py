@@ -12,7 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from geometry.atomic import atomic_path
+from geometry.atomic import write_bytes
 from geometry.errors import UserError
 from vision.frames.frame import RIG_MARK, CapturedImage, Image, ImageStream
 
@@ -149,8 +149,7 @@ def write_picture(path: Path, image: Image, *, comment: str = "") -> None:
     content = encoded.tobytes()
     if comment:
         content = content[:PNG_HEADER] + _text_chunk(comment) + content[PNG_HEADER:]
-    with atomic_path(path) as partial:
-        partial.write_bytes(content)
+    write_bytes(path, content)
 
 
 def is_marked(content: bytes) -> bool:

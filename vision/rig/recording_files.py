@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry.atomic import write_json
+from geometry.atomic import atomic_path, write_json, write_text
 from geometry.errors import UserError
 from vision.calibration.camera import Pose
 from vision.calibration.camera_file import save_camera
@@ -58,7 +58,8 @@ def record(
     count, rate = len(recording.motion), recording.motion.rate
     with ExitStack() as stack:
         write = _writer(recording, folder / FILES[codec], stack)
-        file = stack.enter_context((folder / "truth.csv").open("w", newline="", encoding="utf-8"))
+        partial = stack.enter_context(atomic_path(folder / "truth.csv"))
+        file = stack.enter_context(partial.open("w", newline="", encoding="utf-8"))
         table = csv.writer(file, lineterminator="\n")
         table.writerow(TRUTH_COLUMNS)
         for number, (image, truth) in enumerate(recording.frames()):
@@ -76,7 +77,7 @@ def record(
         workspace = bench.workspace.model_copy(update={"simulated": simulated})
         write_json(folder / name, workspace.model_dump(mode="json"))
     sheet = workspace_svg(bench.workspace, bench.finger)
-    (folder / "fiducials.svg").write_text(sheet, encoding="utf-8")
+    write_text(folder / "fiducials.svg", sheet)
     write_json(folder / "truth.json", _settings(recording))
 
 
