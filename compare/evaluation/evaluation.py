@@ -5,6 +5,7 @@ solver.
 """
 
 import json
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -166,9 +167,19 @@ class Evaluation:
 
     @classmethod
     def load(cls, path: Path, key: str) -> "Evaluation | None":
-        """Read an evaluation, or None if there is none under that path and key."""
+        """Read an evaluation, or None if there is none under that path and key; warns of a damaged file."""
         if not path.exists():
             return None
+        try:
+            return cls._read(path, key)
+        except Exception as error:  # a damaged file can make the reader raise anything
+            warnings.warn(
+                f"{path} is damaged ({type(error).__name__}) and is made again", RuntimeWarning, stacklevel=2
+            )
+            return None
+
+    @classmethod
+    def _read(cls, path: Path, key: str) -> "Evaluation | None":
         with np.load(path) as archive:
             header = json.loads(str(archive["header"]))
             if header.pop("key") != key:

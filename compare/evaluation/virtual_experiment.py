@@ -6,9 +6,7 @@ simulation and experiment.
 """
 
 from collections.abc import Mapping
-from contextlib import suppress
 from types import MappingProxyType
-from zipfile import BadZipFile
 
 import numpy as np
 
@@ -74,10 +72,9 @@ def _truth(problem: Problem, progress: Progress) -> Evaluation:
         solver, richer = _richer(problem)
         key = _key(solver, richer)
         entry = cache_folder() / f"experiment-{key}.npz"
-        with suppress(OSError, ValueError, EOFError, LookupError, BadZipFile):  # damaged: made again
-            if (kept := Evaluation.load(entry, key)) is not None:
-                progress(1.0, "from the cache")
-                return kept
+        if (kept := Evaluation.load(entry, key)) is not None:
+            progress(1.0, "from the cache")
+            return kept
         solution = _solved(solver, richer, progress)
     except UserError as error:
         raise UserError(f"{error}; or give --measurements FILE.csv") from None

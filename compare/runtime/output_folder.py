@@ -1,7 +1,8 @@
 """The output folder: always one complete result, the last or the new one.
 
-A run writes into `NAME.partial`, which replaces the output folder `NAME` at the end. A killed run leaves
-there its finished solutions and the checkpoints of the solver in training, from which a resumed run goes on.
+A run writes into `NAME.partial`, which carries a mark and replaces the output folder `NAME` at the end. A
+killed run leaves there its finished solutions and the checkpoints of the solver in training, from which a
+resumed run goes on.
 """
 
 import fcntl
@@ -18,6 +19,8 @@ from geometry.content_hash import file_digest
 from geometry.errors import UserError
 
 RUN_FILE = "run.json"
+MARK = ".pinnray-unfinished"
+"""File in a folder that a run works in or removes; another folder is never replaced."""
 SOLUTIONS = "solutions"
 TRAINING = "training"
 
@@ -31,9 +34,15 @@ def check_output(out: Path) -> None:
             f"the output folder is replaced as a whole, so the program cannot run inside it ({out}); "
             "name another folder with --out"
         )
+    files = [path.relative_to(out) for path in out.rglob("[!.]*") if path.is_file()]
     ours = _written(out)
-    files = (path.relative_to(out) for path in out.rglob("[!.]*") if path.is_file())
-    if foreign := next((path for path in files if path.as_posix() not in ours), None):
+    if files and ours is None:
+        state = "is damaged" if (out / RUN_FILE).exists() else "is missing"
+        raise UserError(
+            f"the {RUN_FILE} of {out}, which lists the files that a run has written, {state}, so that files "
+            f"of yours ({min(files)}?) could be lost; move the folder, or name another one with --out"
+        )
+    if foreign := next((path for path in files if path.as_posix() not in (ours or ())), None):
         raise UserError(
             f"{out} holds {foreign}, which no run has written and which would be lost; "
             "move it, or name another folder with --out"
@@ -59,6 +68,12 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
     except OSError as error:
         raise UserError(f"cannot write to {partial}: {error.strerror}") from None
     with locked(partial):
+        if not (partial / MARK).exists() and any(partial.iterdir()):
+            raise UserError(
+                f"{partial} would be replaced, but it is not of an unfinished run; move it, or name another "
+                "folder with --out"
+            )
+        (partial / MARK).touch()
         _clear(partial, keep)
         try:
             yield partial
@@ -69,6 +84,7 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
                     with suppress(OSError):  # in use by another program
                         folder.rmdir()
             raise
+        (partial / MARK).unlink()
         _take_place(partial, out)
 
 
@@ -77,7 +93,7 @@ def write_run(folder: Path, provenance: Mapping[str, Any]) -> None:
     files = {
         path.relative_to(folder).as_posix(): file_digest(path)
         for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.name != RUN_FILE
+        if path.is_file() and path.name not in (RUN_FILE, MARK)
     }
     write_json(folder / RUN_FILE, {"schema": 1, **provenance, "files_sha256": files})
 
@@ -93,9 +109,13 @@ def take_training(name: str, source: Path, target: Path) -> None:
 
 def _take_place(partial: Path, out: Path) -> None:
     previous = out.with_name(f".{out.name}.previous")
-    shutil.rmtree(previous, ignore_errors=True)  # of a run that was killed right here
+    if previous.exists():
+        if not (previous / MARK).exists():
+            raise UserError(f"{previous} would be replaced, but no run has left it; move it")
+        shutil.rmtree(previous)  # of a run that was killed right here
     try:
         if out.exists():
+            (out / MARK).touch()
             out.replace(previous)
         partial.replace(out)
     except OSError as error:
@@ -105,18 +125,18 @@ def _take_place(partial: Path, out: Path) -> None:
     shutil.rmtree(previous, ignore_errors=True)
 
 
-def _written(out: Path) -> set[str]:
-    """The files that `run.json` lists."""
+def _written(out: Path) -> set[str] | None:
+    """The files that `run.json` lists, and itself; None if it is missing or damaged."""
     try:
         return {RUN_FILE, *json.loads((out / RUN_FILE).read_text(encoding="utf-8"))["files_sha256"]}
     except (OSError, ValueError, LookupError, TypeError):
-        return set()
+        return None
 
 
 def _clear(partial: Path, keep: Collection[str]) -> None:
     """Remove the files of an earlier run, except solutions and checkpoints that can be reused."""
     for path in partial.iterdir():
-        if path.name not in (SOLUTIONS, TRAINING):
+        if path.name not in (SOLUTIONS, TRAINING, MARK):
             _remove(path)
     for path in partial.glob(f"{SOLUTIONS}/*"):
         if path.suffix != ".npz" or path.stem not in keep:

@@ -6,14 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from compare.runtime.output_folder import check_output, replaced_folder, take_training
+from compare.runtime.output_folder import MARK, check_output, replaced_folder, take_training
 from geometry.errors import UserError
 
 
 def tree(folder: Path) -> dict[str, str]:
-    """Names and texts of all files under a folder."""
+    """Names and texts of all files under a folder, but for the mark of a run."""
     return {
-        path.relative_to(folder).as_posix(): path.read_text() for path in folder.rglob("*") if path.is_file()
+        path.relative_to(folder).as_posix(): path.read_text()
+        for path in folder.rglob("*")
+        if path.is_file() and path.name != MARK
     }
 
 
@@ -124,6 +126,7 @@ def test_two_runs_do_not_write_the_same_folder(out):
 def test_a_folder_left_between_two_renames_does_no_harm(out):
     out.with_name(".run.previous").mkdir()
     (out.with_name(".run.previous") / "half.txt").write_text("removed")
+    (out.with_name(".run.previous") / MARK).touch()
     attempt(out)
     assert tree(out.parent) == {"run/report.html": "new report"}
 
@@ -161,15 +164,42 @@ def test_our_own_result_an_empty_folder_and_none_may_be_replaced(out, tmp_path):
     [
         (lambda out: (out / "notes.txt").write_text("mine"), "holds notes.txt, which no run has written"),
         (lambda out: (out / "solutions" / "mine.npz").write_text(""), "holds solutions/mine.npz"),
-        (lambda out: (out / "run.json").write_text("{}"), "holds "),  # another program's run.json
-        (lambda out: (out / "run.json").write_text("[1]"), "holds "),
-        (lambda out: (out / "run.json").write_bytes(b"\xff"), "holds "),
+        (lambda out: (out / "run.json").write_text("{}"), "is damaged"),  # another program's run.json
+        (lambda out: (out / "run.json").write_text("[1]"), "is damaged"),
+        (lambda out: (out / "run.json").write_bytes(b"\xff"), "is damaged"),
+        (
+            lambda out: (out / "run.json").write_text('{"files_sha256": {'),
+            "is damaged, so that files of yours",
+        ),
+        (lambda out: (out / "run.json").unlink(), r"the run.json of .* is missing, .*solutions/fem.npz"),
     ],
 )
 def test_what_no_comparison_wrote_is_not_lost(out, spoil: Callable[[Path], object], message):
     spoil(out)
     with pytest.raises(UserError, match=message):
         check_output(out)
+
+
+def test_a_folder_called_partial_that_no_unfinished_run_has_left_is_not_lost(out):
+    """It may be the user's, or the result of a design called `run.partial`."""
+    partial = out.with_name("run.partial")
+    partial.mkdir()
+    (partial / "thesis.tex").write_text("mine")
+    before = tree(out.parent)
+    with pytest.raises(
+        UserError, match=r"run\.partial would be replaced, but it is not of an unfinished run"
+    ):
+        attempt(out)
+    assert tree(out.parent) == before
+
+
+def test_a_hidden_folder_of_the_user_is_not_lost(out):
+    previous = out.with_name(".run.previous")
+    previous.mkdir()
+    (previous / "thesis.tex").write_text("mine")
+    with pytest.raises(UserError, match=r"run\.previous"):
+        attempt(out)
+    assert (previous / "thesis.tex").read_text() == "mine"
 
 
 def test_a_file_is_not_replaced_by_a_folder(tmp_path):

@@ -347,6 +347,20 @@ def test_a_solver_that_is_not_asked_for_again_is_gone(job):
     assert [path.name for path in (again.out / "solutions").iterdir()] == ["first.npz"]
 
 
+@pytest.mark.parametrize(
+    "spoil", [lambda whole: whole[: len(whole) // 2], lambda whole: b"", lambda whole: b"x"]
+)
+def test_a_damaged_solution_is_solved_again(job, spoil):
+    first = Scripted("first")
+    whole = compare(job(first))
+    (file,) = (job(first).out / "solutions").iterdir()
+    file.write_bytes(spoil(file.read_bytes()))
+    with pytest.warns(RuntimeWarning, match=r"first\.npz is damaged .* and is made again"):
+        resumed = compare(job(first, resume=True))
+    assert first.calls == 2
+    assert without_times(metrics(resumed)) == without_times(metrics(whole))
+
+
 def test_without_resume_everything_is_solved_again(job):
     first = Scripted("first")
     compare(job(first))

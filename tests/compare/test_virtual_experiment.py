@@ -128,7 +128,8 @@ def test_a_damaged_file_in_the_cache_is_made_again(problem, solutions, cache, co
     virtual_experiment(problem, 0.8)
     (entry,) = cache.iterdir()
     entry.write_bytes(content)
-    virtual_experiment(problem, 0.8)
+    with pytest.warns(RuntimeWarning, match="is damaged .* and is made again"):
+        virtual_experiment(problem, 0.8)
     assert len(solutions) == 2
     assert virtual_experiment(problem, 0.8)[0].simulated
     assert len(solutions) == 2
