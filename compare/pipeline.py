@@ -39,7 +39,14 @@ from geometry.observations import Observations
 from solvers.adaptation import check_adaptable
 from solvers.assimilation.misfit import assimilates
 from solvers.problem import Load, Material, Problem
-from solvers.solver import Solver, TrainedSolver, TrainingContext, UnsupportedProblemError, with_law
+from solvers.solver import (
+    Solver,
+    TrainedSolver,
+    TrainingContext,
+    UnsupportedProblemError,
+    solved,
+    with_law,
+)
 from vision.measurements import read_measurements, write_measurements
 
 TRACK = "track"
@@ -149,7 +156,7 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
         solvers=solvers,
         check=partial(check_positions, given) if given else None,
     )
-    problem = Problem(mesh, job.material, job.load)
+    problem = Problem(mesh, job.material, job.load, finger=job.design)
     with stages.stage("measurements") as progress:
         observations, truth = (
             (given, None) if given else virtual_experiment(problem, job.design.marker_radius, progress)
@@ -229,7 +236,7 @@ def _provenance(folder: Path, job: Job, comparison: Comparison, stages: Stages) 
         **stages.record(),
         "design_sha256": job.design.digest,
         "mesh_sha256": comparison.mesh.digest,
-        "problem_sha256": Problem(comparison.mesh, job.material, job.load).digest,
+        "problem_sha256": Problem(comparison.mesh, job.material, job.load, finger=job.design).digest,
         "mesh": job.mesh.model_dump(),
         "adapt": adaptation and {"tolerance_mm": adaptation.tolerance, "end": adaptation.message},
         "material": job.material.model_dump(),
@@ -262,7 +269,7 @@ def _evaluate(
 ) -> Evaluation:
     """Solve and sample, or take over what an earlier run finished."""
     given = observations if assimilates(solver) else None
-    own = Problem(problem.mesh, with_law(job.material, solver), job.load, given)
+    own = replace(problem, material=with_law(job.material, solver), observations=given)
     key = _key(solver, own, observations)
     kept = folder / SOLUTIONS / f"{solver.name}.npz"
     with stages.stage(solver.name) as progress:
@@ -274,7 +281,7 @@ def _evaluate(
                     take_training(solver.name, place, folder)
                     return evaluation
         try:
-            solution = solver.solve(own, progress)
+            solution = solved(solver, own, progress)
         except Exception as error:  # its own fault goes on, with a word on what is left
             error.add_note(
                 f"solver {solver.name} failed; run again with --resume and without it for the rest"

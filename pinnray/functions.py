@@ -20,7 +20,7 @@ from pinnray.comparison import Comparison
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
 from solvers.solution import Solution
-from solvers.solver import Solver, with_law
+from solvers.solver import Solver, solved, with_law
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -101,12 +101,12 @@ def solve(
         finger = _design(problem)
         given = None if measurements is None else _observations(measurements, finger)
         triangles = mesh(finger, **({} if size is None else {"size": size}))
-        problem = Problem(triangles, material or Material(), load or Load(), given)
+        problem = Problem(triangles, material or Material(), load or Load(), given, finger)
     elif any(each is not None for each in (size, material, load, measurements)):
         raise UserError(
             "a Problem has its own mesh, material, load and observations; give a design to choose them"
         )
-    return chosen.solve(replace(problem, material=with_law(problem.material, chosen)))
+    return solved(chosen, replace(problem, material=with_law(problem.material, chosen)))
 
 
 def compare(

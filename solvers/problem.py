@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from geometry.arrays import FloatArray, IntArray
 from geometry.content_hash import content_hash
 from geometry.errors import UserError
+from geometry.finger.finger import Finger
 from geometry.mesh.quadrature import segment_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
@@ -111,6 +112,8 @@ class Problem:
         material: The elastic law.
         load: The indenter's action.
         observations: Marker displacements, for the solvers that assimilate them.
+        finger: The finger that the mesh is of, for solvers that need more than the mesh, such as the
+            thickness of a wall; None if only the mesh is known.
 
     Raises:
         UserError: If part of the mesh is not connected to the base, so that it could move freely, or if the
@@ -121,6 +124,7 @@ class Problem:
     material: Material = Material()
     load: Load = Load()
     observations: Observations | None = None
+    finger: Finger | None = None
 
     def __post_init__(self) -> None:
         count = len(self.mesh.points)
@@ -155,6 +159,8 @@ class Problem:
         if (seen := self.observations) is not None:
             content += [seen.points, seen.displacements, seen.standard_deviations, seen.visible]
             content.append(seen.marker_radius)
+        if self.finger is not None:
+            content.append(self.finger.digest)
         return content_hash(content)
 
 

@@ -5,12 +5,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
+import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.problem import Load, Material, Problem
-from solvers.solution import Solution
+from solvers.solution import Solution, Status
 
 Progress = Callable[[float, str], None]
 """Called with the fraction done (0 to 1) and a short text; a fast solver may ignore it."""
@@ -92,6 +94,51 @@ def with_law(material: Material, solver: Solver) -> Material:
         ) from None
 
 
+def solved(solver: Solver, problem: Problem, progress: Progress = silent) -> Solution:
+    """The solution of a solver, checked, so that a fault of a plug-in is not found far from it.
+
+    Raises:
+        UserError: If it is no `Solution`, or an array in it has another shape or is not finite.
+    """
+    solution = solver.solve(problem, progress)
+    for value, kind in ((solution, Solution), (getattr(solution, "status", None), Status)):
+        if not isinstance(value, kind):
+            said = f"{_named(value)} as its {kind.__name__}"
+            raise UserError(f"solver {solver.name} returned {said}; see docs/own-solver.md")
+    if fault := _fault(solution, problem):
+        raise UserError(f"solver {solver.name} returned a {fault}; see docs/own-solver.md")
+    return solution
+
+
+def _named(value: object) -> str:
+    return "None" if value is None else f"a {type(value).__name__}"
+
+
+def _fault(solution: Solution, problem: Problem) -> str | None:
+    """A number or array of a solution that cannot be, with the reason; None if there is none."""
+    mesh, markers = problem.mesh, len(problem.observations.points) if problem.observations else 0
+    nodes, middles = mesh.at_nodes(), mesh.at_centroids()
+    checks: list[tuple[str, ArrayLike | None, tuple[int, ...]]] = [
+        ("energy", solution.energy, ()),
+        ("reaction", solution.reaction, (2,)),
+        ("displacement", solution.field.displacement(nodes), (len(nodes.points), 2)),
+        ("gradient", solution.field.gradient(middles), (len(middles.points), 2, 2)),
+    ]
+    if solution.left_out is not None:
+        checks.append(("left_out", solution.left_out, (markers, 2)))
+    for name, given, shape in checks:
+        try:
+            values = np.asarray(given, dtype=np.float64)
+        except (TypeError, ValueError):
+            return f"{name} that is {_named(given)}, not numbers"
+        if values.shape != shape or given is None:
+            found = "that is None" if given is None else f"of shape {values.shape}"
+            return f"{name} {found}; it must have the shape {shape}"
+        if name in ("energy", "displacement", "gradient") and not np.isfinite(values).all():
+            return f"{name} that is not finite everywhere"
+    return None
+
+
 class TrainingDiverged(UserError):
     """The training diverged; the message says when, by which quantity, and what to try."""
 
@@ -142,4 +189,4 @@ def refitter(solver: Solver, problem: Problem) -> Callable[[Observations], Solut
     """A function that solves a problem for any observations, sharing work where the solver can."""
     if isinstance(solver, Refittable):
         return solver.refitter(problem)
-    return lambda observations: solver.solve(replace(problem, observations=observations))
+    return lambda observations: solved(solver, replace(problem, observations=observations))

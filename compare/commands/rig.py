@@ -49,7 +49,7 @@ def rig(
     from compare.runtime.stages import Stages
     from compare.runtime.tables import write_csv
     from solvers.problem import Problem
-    from solvers.solver import with_law
+    from solvers.solver import solved, with_law
     from vision.rig.bench import Bench
     from vision.rig.boards import board_poses, board_scene
     from vision.rig.occluders import cables
@@ -77,7 +77,8 @@ def rig(
             source = experiment_source(problem)
         else:
             with stages.stage(filmed.name) as progress:
-                solution = filmed.solve(Problem(mesh, with_law(material, filmed), load), progress)
+                problem = Problem(mesh, with_law(material, filmed), load, finger=design)
+                solution = solved(filmed, problem, progress)
             if not solution.status.converged:
                 raise UserError(f"{filmed.name} {solution.status.message}; its displacements are not filmed")
             source = f"displacements of {filmed.name}, rendered by the virtual rig; no camera was involved"

@@ -36,7 +36,7 @@ def solve(
     from compare.runtime.stages import Stages
     from solvers.assimilation.misfit import assimilates
     from solvers.problem import Problem
-    from solvers.solver import with_law
+    from solvers.solver import solved, with_law
     from vision.measurements import read_measurements
 
     chosen, settings = finger.read(options.preset)
@@ -65,10 +65,10 @@ def solve(
             check=partial(check_positions, given) if given else None,
         )
         with stages.stage(made.name) as progress:
-            problem = Problem(triangles, with_law(material, made), load, given)
+            problem = Problem(triangles, with_law(material, made), load, given, chosen)
             for remark in displacement_remarks(given, problem) if given else ():
                 say(f"warning: {remark}")
-            solution = made.solve(problem, progress)
+            solution = solved(made, problem, progress)
         with stages.stage("certificate"):
             (evaluation,) = with_certificates([evaluated(solution, triangles)], problem)
         write_vtu(out, triangles, evaluation)

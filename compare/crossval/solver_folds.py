@@ -22,7 +22,16 @@ from geometry.observations import Observations
 from solvers.assimilation.misfit import assimilates
 from solvers.problem import Problem
 from solvers.solution import Solution, State
-from solvers.solver import Progress, Solver, Transferable, UnsupportedProblemError, refitter, silent, with_law
+from solvers.solver import (
+    Progress,
+    Solver,
+    Transferable,
+    UnsupportedProblemError,
+    refitter,
+    silent,
+    solved,
+    with_law,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +110,8 @@ class FoldRunner:
     def __init__(self, task: SolverTask, solver: Solver) -> None:
         self._task, self._solver = task, solver
         mesh, material = TriangleMesh.load(task.study.mesh_file), task.study.material
-        self.problem = Problem(mesh, with_law(material, solver), task.load_cases[0].load)
+        load = task.load_cases[0].load
+        self.problem = Problem(mesh, with_law(material, solver), load, finger=task.study.design)
         self._true_law = replace(self.problem, material=(task.truth or SLIDING).material(material))
         markers = task.observations[0][0]
         self.sampler = FieldSampler.of(mesh, markers.points, markers.marker_radius)
@@ -215,7 +225,7 @@ class FoldRunner:
     def _without_markers(self, case: int) -> tuple[Solution, SampledField]:
         """The solver's solution without markers at a load case, and its field; solved once."""
         if case not in self._unassimilated:
-            solution = self._solver.solve(self._at(case))
+            solution = solved(self._solver, self._at(case))
             self._unassimilated[case] = solution, self.sampler.of_solution(solution, self.problem.mesh)
         return self._unassimilated[case]
 

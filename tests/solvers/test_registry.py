@@ -17,7 +17,7 @@ def test_settings_are_converted_from_text():
         ("fen", {}, r"no solver is called 'fen'; did you mean 'fem'\? \(there are: fem, "),
         ("comsol", {}, "no solver is called 'comsol' "),  # nothing near: no guess
         ("fem", {"order": 2}, "fem has no setting 'order'; it has degree"),
-        ("skfem-p1", {"mesh": 2}, "solver 'skfem-p1' cannot be made with "),  # no dataclass
+        ("skfem-p2", {"mesh": 2}, "solver 'skfem-p2' cannot be made with "),  # no dataclass
         ("fem", {"degree": "two"}, "fem: degree = 'two': input should be a valid integer"),
         ("pinn-std", {"ridges": 7}, "pinn-std: the setting 'ridges' is now called 'neurons'"),
         ("pinn-local-asm", {"slope": 0.4}, "pinn-local-asm: the setting 'slope' is now called 'steepness'"),
@@ -48,10 +48,10 @@ def test_the_first_preset_is_the_usual_one():
 
 
 def test_a_package_adds_a_solver_by_its_entry_point(plugin_folder, monkeypatch):
-    assert "skfem-p1" not in solver_names()
+    assert "skfem-p2" not in solver_names()
     monkeypatch.syspath_prepend(str(plugin_folder))
-    assert solver_names()[-1] == "skfem-p1"
-    assert make_solver("skfem-p1").name == "skfem-p1"
+    assert solver_names()[-1] == "skfem-p2"
+    assert make_solver("skfem-p2").name == "skfem-p2"
 
 
 def test_a_broken_package_warns_and_the_rest_goes_on(tmp_path, monkeypatch):

@@ -13,9 +13,9 @@ from solvers.solver import check_problem, silent
 
 
 class SkfemSolver:
-    """Linear triangles assembled by scikit-fem, the load by its two influence functions."""
+    """Quadratic triangles assembled by scikit-fem, the load by its two influence functions."""
 
-    name = "skfem-p1"
+    name = "skfem-p2"
     laws = ("linear",)
     loads = ("mean", "point")
 
@@ -26,16 +26,17 @@ class SkfemSolver:
         check_problem(self, problem)
         started = time.perf_counter()
         mesh, lame = problem.mesh, problem.material.lame
-        element = skfem.ElementVector(skfem.ElementTriP1())
+        element = skfem.ElementVector(skfem.ElementTriP2())
         basis = skfem.Basis(skfem.MeshTri(mesh.points.T.copy(), mesh.triangles.T.copy()), element)
         stiffness = skfem.asm(linear_elasticity(lame.λ, lame.μ), basis)
-        space = LagrangeSpace(mesh, 1)
+        dofs_of_nodes = np.hstack([basis.nodal_dofs, basis.facet_dofs])  # both number edges alike
+        space = LagrangeSpace(mesh, 2)
         points, weights = contact_functional(problem)
         at_nodes = space.shape_functions(mesh.locate(points)).T @ weights
         loads = np.zeros((stiffness.shape[0], len(problem.load.prescribed)))
         for column, axis in enumerate(problem.load.prescribed):
-            loads[basis.nodal_dofs[axis], column] = at_nodes
-        clamped = basis.nodal_dofs[:, np.unique(mesh.boundary("base"))].ravel()
+            loads[dofs_of_nodes[axis], column] = at_nodes
+        clamped = dofs_of_nodes[:, space.boundary_nodes("base")].ravel()
         influence = np.column_stack(
             [skfem.solve(*skfem.condense(stiffness, load, D=clamped)) for load in loads.T]
         )
@@ -46,7 +47,7 @@ class SkfemSolver:
         return Solution(
             solver=self.name,
             problem=problem,
-            field=LagrangeField(space, dofs[basis.nodal_dofs].T),
+            field=LagrangeField(space, dofs[dofs_of_nodes].T),
             energy=0.5 * float(dofs @ (stiffness @ dofs)),
             reaction=reaction,
             status=Status(True, "solved directly"),

@@ -1,0 +1,102 @@
+"""The border between the program and a solver of another package."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.mesh.point_location import LocatedPoints
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.problem import Problem
+from solvers.solution import Solution, Status
+from solvers.solver import Progress, silent, solved
+
+
+class Bending:
+    """v = -0.01 x²."""
+
+    def displacement(self, location: LocatedPoints) -> Any:
+        x = location.points[:, 0]
+        return np.column_stack([0 * x, -0.01 * x**2])
+
+    def gradient(self, location: LocatedPoints) -> Any:
+        gradient = np.zeros((len(location.points), 2, 2))
+        gradient[:, 1, 0] = -0.02 * location.points[:, 0]
+        return gradient
+
+
+class Field(Bending):
+    """The same with a fault."""
+
+    def __init__(self, **faulty: Callable[[Any], Any]) -> None:
+        for name, fault in faulty.items():
+            right = getattr(self, name)
+            setattr(self, name, lambda location, right=right, fault=fault: fault(right(location)))
+
+
+@dataclass
+class Beam:
+    """A solver whose answer is changed by a function."""
+
+    fault: Callable[[Solution], Any] = lambda solution: solution
+    name: str = "beam"
+    laws: tuple[str, ...] = ("linear",)
+    loads: tuple[str, ...] = ("mean",)
+
+    def settings(self) -> dict[str, object]:
+        return {}
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        status = Status(True, "by a formula")
+        return self.fault(Solution("beam", problem, Bending(), 1.0, np.zeros(2), status, {"seconds": 0.0}))
+
+
+def spoilt(array: Any) -> Any:
+    array[3] = np.nan
+    return array
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        (lambda solution: None, "beam returned None as its Solution"),
+        (lambda solution: {"energy": 1.0}, "beam returned a dict as its Solution"),
+        (lambda solution: replace(solution, status="converged"), "beam returned a str as its Status"),
+        (lambda solution: replace(solution, energy=None), "energy that is None"),
+        (lambda solution: replace(solution, energy=np.nan), "energy that is not finite"),
+        (lambda solution: replace(solution, energy=np.ones(3)), r"energy of shape \(3,\)"),
+        (lambda solution: replace(solution, reaction=4.0), r"reaction of shape \(\); it must have .* \(2,\)"),
+        (lambda solution: replace(solution, field=Field(displacement=np.transpose)), "displacement of shape"),
+        (
+            lambda solution: replace(solution, field=Field(displacement=lambda _: None)),
+            "displacement that is",
+        ),
+        (
+            lambda solution: replace(solution, field=Field(displacement=spoilt)),
+            "displacement that is not fin",
+        ),
+        (lambda solution: replace(solution, field=Field(gradient=lambda a: a[:, 0])), "gradient of shape"),
+        (lambda solution: replace(solution, field=Field(gradient=spoilt)), "gradient that is not finite"),
+        (lambda solution: replace(solution, left_out=np.zeros((9, 2))), r"left_out of shape \(9, 2\)"),
+    ],
+)
+def test_what_is_no_solution_is_refused_with_the_solvers_name(
+    fault: Callable[[Solution], Any], said: str, coarse_mesh: TriangleMesh
+) -> None:
+    with pytest.raises(UserError, match=f"solver beam .*{said}|solver {said}"):
+        solved(Beam(fault), Problem(coarse_mesh))
+
+
+def test_a_sound_solution_passes(coarse_mesh: TriangleMesh) -> None:
+    assert solved(Beam(), Problem(coarse_mesh)).energy == 1.0
+
+
+def test_a_beam_model_sees_the_thickness_of_a_wall(coarse_mesh: TriangleMesh) -> None:
+    thick = Design(front_thickness=2.2)
+    problem = Problem(coarse_mesh, finger=thick)
+    assert replace(problem, observations=None).finger.front_thickness == 2.2
+    assert problem.digest != Problem(coarse_mesh, finger=Design()).digest
