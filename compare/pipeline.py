@@ -236,7 +236,7 @@ def _provenance(folder: Path, job: Job, comparison: Comparison, stages: Stages) 
         **stages.record(),
         "design_sha256": job.design.digest,
         "mesh_sha256": comparison.mesh.digest,
-        "problem_sha256": Problem(comparison.mesh, job.material, job.load, finger=job.design).digest,
+        "problem_sha256": Problem(comparison.mesh, job.material, job.load).digest,
         "mesh": job.mesh.model_dump(),
         "adapt": adaptation and {"tolerance_mm": adaptation.tolerance, "end": adaptation.message},
         "material": job.material.model_dump(),
