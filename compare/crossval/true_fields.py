@@ -24,7 +24,7 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.mesh.wall_motion import WallMotion
 from solvers.assimilation.misfit import disc_quadrature, radius_within
 from solvers.problem import Load, Problem, contact_ends
-from solvers.solution import Solution, State
+from solvers.solution import SolidField, Solution, State
 from solvers.solver import Progress, silent
 
 FINER = 0.5
@@ -114,7 +114,15 @@ class FieldSampler:
             mesh: The shared mesh.
             changes: Wall thicknesses of the solution's finger minus those of the shared mesh, mm, by their
                 names in `Design`: the points of the body move with the walls, markers stay in space.
+
+        Raises:
+            UserError: If the solution is one in three dimensions.
         """
+        if isinstance(solution.field, SolidField):
+            raise UserError(
+                f"cross-validation reads stresses from plane displacements, and {solution.solver} has them "
+                "in space; take it with compare or solve"
+            )
         inside, discs = self.inside_of(solution, mesh, changes), self.discs
         if solution.problem.mesh is not mesh:  # a location belongs to its mesh
             discs = mesh.locate_on(solution.problem.mesh, discs.points)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from compare.crossval.true_fields import FieldSampler
 from compare.evaluation.convergence import with_certificates
 from compare.evaluation.evaluation import Evaluation
 from compare.report.sentences import certificate_sentences
@@ -176,6 +177,13 @@ def test_plane_strain_does_not_certify_it(short_mesh):
     assert "three dimensions" in certificate_sentences(judged)
 
 
+def test_cross_validation_does_not_read_its_stress_as_that_of_the_plane(short_mesh):
+    solution = Fem3dSolver(layers=1).solve(Problem(short_mesh, load=SLIDING))
+    sampler = FieldSampler.of(short_mesh, short_mesh.markers, 0.4)
+    with pytest.raises(UserError, match="in space"):
+        sampler.of_solution(solution, short_mesh)
+
+
 @pytest.mark.parametrize(
     ("settings", "text"),
     [
@@ -255,7 +263,7 @@ def test_an_indefinite_matrix_is_solved_by_minres(short_mesh):
     ],
 )
 def test_the_linear_solver_is_chosen_by_memory(asked, free, iterative):
-    cost = affordable(1_000_000, asked, free)
+    cost = affordable(1_000_000, 13, asked, free)
     assert cost.iterative is iterative
     assert cost.words.startswith("1,000,000 unknowns")
 
@@ -269,4 +277,4 @@ def test_the_linear_solver_is_chosen_by_memory(asked, free, iterative):
 )
 def test_too_little_memory_is_told_before_the_start(asked, free, advice):
     with pytest.raises(UserError, match=advice):
-        affordable(1_000_000, asked, free)
+        affordable(1_000_000, 13, asked, free)

@@ -1,7 +1,8 @@
 """Memory and time of a solution in three dimensions, told before it starts.
 
-Measured on the default finger with elements of 0.5 to 1 mm and 4 to 12 layers, on one core: MUMPS, 235,000 to
-812,000 unknowns, 0.92 to 6.6 GB and 6 to 80 s a factorisation; multigrid, 20 s a Newton step at 235,000.
+Fitted to the default finger with elements of 0.5 to 1 mm and 4 to 12 layers, on one core: factors by MUMPS of
+235,000 to 812,000 unknowns have 93 to 740 million entries and take 6 to 80 s; multigrid takes 20 s a Newton
+step at 235,000. Other bodies may differ by a factor of two.
 """
 
 import os
@@ -26,23 +27,31 @@ class Cost:
 
     Attributes:
         unknowns: Number of unknowns.
+        levels: Number of nodes above each other.
         iterative: Whether multigrid solves, not factors.
     """
 
     unknowns: int
+    levels: int
     iterative: bool
+
+    @property
+    def entries(self) -> float:
+        """Estimated entries of the factors."""
+        nodes = self.unknowns / (3 * self.levels)
+        return float(self.unknowns * (100 + 33 * self.levels) * (nodes / 8500) ** 0.25)
 
     @property
     def memory_gb(self) -> float:
         """Estimated memory, GB: matrix and vectors, and factors or the coarser matrices."""
-        million = 1e-6 * self.unknowns
-        return float(3.4 * million + (0 if self.iterative else 9.1 * million**1.58))
+        return 3.4e-6 * self.unknowns if self.iterative else 2.4e-6 * self.unknowns + 1e-8 * self.entries
 
     @property
     def step_seconds(self) -> float:
         """Estimated time of a Newton step on one core, s."""
-        million = 1e-6 * self.unknowns
-        return float(110 * million**1.17 if self.iterative else 20 * million + 110 * million**2.1)
+        if self.iterative:
+            return float(110 * (1e-6 * self.unknowns) ** 1.17)
+        return 2e-5 * self.unknowns + 1.3e-10 * self.entries**2 / self.unknowns
 
     @property
     def words(self) -> str:
@@ -53,13 +62,13 @@ class Cost:
         return f"{self.unknowns:,} unknowns, {how}: about {self.memory_gb:.1f} GB, {size} a Newton step"
 
 
-def affordable(unknowns: int, asked: LinearSolver, free_gb: float) -> Cost:
+def affordable(unknowns: int, levels: int, asked: LinearSolver, free_gb: float) -> Cost:
     """The linear solver that is asked for or, if "auto", direct where memory allows it.
 
     Raises:
         UserError: If the memory that is free does not suffice.
     """
-    costs = [Cost(unknowns, iterative) for iterative in METHODS[asked]]
+    costs = [Cost(unknowns, levels, iterative) for iterative in METHODS[asked]]
     for cost in costs:
         if cost.memory_gb <= USABLE * free_gb:
             return cost

@@ -94,7 +94,7 @@ class Fem3dSolver:
         started = time.perf_counter()
         space, linear = self.space(problem), problem.material.law == "linear"
         free = communicator().bcast(free_memory_gb())
-        cost = affordable(space.nodes.size, self.linear_solver, free)
+        cost = affordable(space.nodes.size, len(space.levels), self.linear_solver, free)
         progress(0.0, cost.words)
         guide = None
         if not linear:
