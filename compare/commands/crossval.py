@@ -11,7 +11,7 @@ from compare.commands.options import (
     PhysicsOptions,
     SolverOptions,
     comma_list,
-    existing,
+    existing_table,
     read_processes,
 )
 from compare.runtime.exits import NOT_CONVERGED, say
@@ -67,7 +67,7 @@ def crossval(
     if finger.mesh_size is None and options.preset is None:
         mesh = mesh.model_copy(update={"size": ELEMENT_SIZE})
     material, load = physics.read(options.preset)
-    file = existing(measurements)
+    file = existing_table(measurements)
     study = Study(
         design=design,
         mesh=mesh,

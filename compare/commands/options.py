@@ -2,7 +2,6 @@
 
 import json
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import cos, inf, radians, sin
@@ -21,6 +20,7 @@ from geometry.finger.design import Design
 from geometry.finger.finger import Finger
 from geometry.finger.presets import load_design, parse_overrides
 from geometry.mesh.settings import MeshSettings
+from geometry.text_files import parse_toml
 from solvers.elasticity import LawName
 from solvers.problem import Load, Material
 from solvers.registry import PRESETS, make_solver
@@ -106,8 +106,8 @@ class FingerOptions:
 def toml_value(text: str) -> str:
     """The text as a value of TOML: a number, list or quoted text as it is, any other in quotes."""
     try:
-        tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError:
+        parse_toml(f"value = {text}")
+    except ValueError:
         return json.dumps(text)
     return text
 
@@ -268,6 +268,16 @@ def read_processes(processes: int | None) -> int:
     if count < 1:
         raise UserError(f"--processes {count}: give a whole number from 1")
     return count
+
+
+def existing_table(path: Path | None) -> Path | None:
+    """The path, if it is None or a CSV file; else a `UserError`."""
+    if path is not None and path.suffix.lower() != ".csv":
+        raise UserError(
+            f"--measurements {path}: this command takes a CSV file of displacements, and no film; "
+            "`pinnray track` makes one from a film"
+        )
+    return existing(path)
 
 
 def existing(path: Path | None) -> Path | None:

@@ -3,7 +3,14 @@
 from functools import partial
 from pathlib import Path
 
-from compare.commands.options import Adapt, FingerOptions, OutputPath, PhysicsOptions, SolverOptions, existing
+from compare.commands.options import (
+    Adapt,
+    FingerOptions,
+    OutputPath,
+    PhysicsOptions,
+    SolverOptions,
+    existing_table,
+)
 from compare.runtime.exits import NOT_CONVERGED, say
 from geometry.errors import UserError
 
@@ -49,7 +56,7 @@ def solve(
     physics.check_law(chosen_solvers)
     (made,) = chosen_solvers
     given = None
-    if file := existing(measurements):
+    if file := existing_table(measurements):
         given = read_measurements(file, marker_radius=chosen.marker_radius)
     if given and not assimilates(made):
         raise UserError(f"{made.name} does not assimilate markers; `compare` compares it with --measurements")

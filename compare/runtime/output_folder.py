@@ -37,10 +37,10 @@ def check_output(out: Path) -> None:
     files = [path.relative_to(out) for path in out.rglob("[!.]*") if path.is_file()]
     ours = _written(out)
     if files and ours is None:
-        state = "is damaged" if (out / RUN_FILE).exists() else "is missing"
+        state = "its run.json is damaged" if (out / RUN_FILE).exists() else "it has no run.json"
         raise UserError(
-            f"the {RUN_FILE} of {out}, which lists the files that a run has written, {state}, so that files "
-            f"of yours ({min(files)}?) could be lost; move the folder, or name another one with --out"
+            f"{out} holds {min(files)}, and {state}, which lists the files that a run has written, so that "
+            "files of yours could be lost; move the folder, or name another one with --out"
         )
     if foreign := next((path for path in files if path.as_posix() not in (ours or ())), None):
         raise UserError(

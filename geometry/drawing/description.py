@@ -1,6 +1,5 @@
 """Clamp, contact and markers of a drawn finger: a small TOML file beside the drawing, or lines of one."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -9,6 +8,7 @@ from pydantic import Field, model_validator
 
 from geometry.errors import UserError
 from geometry.finger.parameters import CheckedModel, bounded
+from geometry.text_files import parse_toml, read_toml
 
 Point = tuple[float, float]
 """X and y in the file's coordinates."""
@@ -77,16 +77,11 @@ def load_description(path: Path | None, lines: Sequence[str] = ()) -> Descriptio
     """
     values: dict[str, Any] = {}
     if path is not None:
-        try:
-            values = tomllib.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise UserError(f"cannot read the description {path}: {error.strerror}") from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise UserError(f"cannot read the description {path}: {error}") from None
+        values = read_toml(path, "description")
     for text in lines:
         try:
-            values |= tomllib.loads(text)
-        except tomllib.TOMLDecodeError:
+            values |= parse_toml(text)
+        except ValueError:
             raise UserError(
                 f'cannot read {text!r}; write TOML, such as contact = [35, 0] or clamp = "base"'
             ) from None

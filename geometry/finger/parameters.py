@@ -24,6 +24,9 @@ def bounded(default: Any, low: float, high: float, unit: str, symbol: str, meani
     )
 
 
+NUMERIC = (int, float, int | None, float | None)
+
+
 class CheckedModel(BaseModel):
     """A frozen model that refuses invalid values in one line.
 
@@ -34,6 +37,10 @@ class CheckedModel(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     def __init__(self, **values: Any) -> None:
+        for name, value in values.items():
+            field = type(self).model_fields.get(name)
+            if isinstance(value, bool) and field and field.annotation in NUMERIC:
+                values[name] = str(value).lower()  # no number, though Python has it as 0 or 1
         try:
             super().__init__(**values)
         except ValidationError as error:

@@ -1,6 +1,5 @@
 """Designs from presets and TOML files, with single parameters changed."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -8,6 +7,7 @@ from typing import Any
 from geometry.errors import UserError
 from geometry.finger.design import Design, by_parameter_name
 from geometry.finger.parameters import SYMBOLS, Parameters, title, unknown_parameter
+from geometry.text_files import read_toml
 
 OPTIONAL = tuple(name for name, field in Parameters.model_fields.items() if field.default is None)
 """Parameters that may be None."""
@@ -34,12 +34,7 @@ def load_design(name_or_path: str | Path = "default", overrides: Mapping[str, An
         UserError: If there is no such preset or file, it cannot be read, or the design breaks a rule.
     """
     path = _path_of(name_or_path)
-    try:
-        with path.open("rb") as file:
-            values = by_parameter_name(tomllib.load(file))
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise UserError(f"cannot read design file {path}: {reason}") from None
+    values = by_parameter_name(read_toml(path, "design file"))
     changes = by_parameter_name(overrides or {})
     try:
         return Design(**{"name": path.stem, **values, **changes})

@@ -169,9 +169,9 @@ def test_our_own_result_an_empty_folder_and_none_may_be_replaced(out, tmp_path):
         (lambda out: (out / "run.json").write_bytes(b"\xff"), "is damaged"),
         (
             lambda out: (out / "run.json").write_text('{"files_sha256": {'),
-            "is damaged, so that files of yours",
+            "its run.json is damaged, .* files of yours",
         ),
-        (lambda out: (out / "run.json").unlink(), r"the run.json of .* is missing, .*solutions/fem.npz"),
+        (lambda out: (out / "run.json").unlink(), r"holds solutions/fem.npz, and it has no run.json"),
     ],
 )
 def test_what_no_comparison_wrote_is_not_lost(out, spoil: Callable[[Path], object], message):

@@ -171,3 +171,18 @@ def test_derivatives_are_those_of_differences(camera):
     for axis, shift in enumerate(1e-3 * np.eye(3)):
         difference = (camera.project(points + shift) - camera.project(points - shift)) / 2e-3
         np.testing.assert_allclose(seen.by_point[:, :, axis], difference, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("%YAML:1.0\n- 1\n", "it is not JSON or YAML as OpenCV writes it"),  # a list has no keys
+        ('{"a": ' + "[" * 100_000 + "]" * 100_000 + "}", "it is nested too deeply"),  # ends OpenCV's reader
+        ("%YAML:1.0\n---\na: " + "[" * 100_000 + "]" * 100_000, "it is nested too deeply"),
+    ],
+)
+def test_a_file_that_opencv_cannot_take_is_one_line(tmp_path, content, said):
+    path = tmp_path / ("camera.json" if content[0] == "{" else "camera.yml")
+    path.write_text(content)
+    with pytest.raises(UserError, match=f"cannot read the camera .*: {said}"):
+        load_camera(path)

@@ -2,7 +2,11 @@
 
 import io
 import os
+import struct
+import subprocess
+import sys
 import warnings
+import zlib
 from pathlib import Path
 
 import cv2
@@ -10,7 +14,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from vision.frames.pictures import Decoder, split
+from vision.frames.pictures import PNG, Decoder, split
 from vision.frames.sources import open_frames
 
 
@@ -80,7 +84,7 @@ def test_another_size_names_both_pictures(tmp_path):
     ("content", "message"),
     [
         (b"", "it is empty"),
-        (b"no picture", "it is damaged, or not one that OpenCV knows"),
+        (b"no picture", "it is damaged, too large, or not one that OpenCV knows"),
         (encoded(1, ".bmp")[:-9], "it is damaged"),
         (encoded(1)[:-12], "its end is missing"),
         (encoded(1, ".jpg")[:-2], "its end is missing"),
@@ -150,3 +154,31 @@ def test_a_note_to_turn_a_photograph_is_not_followed():
     turned = picture[:2] + b"\xff\xe1" + (len(turn) + 2).to_bytes(2, "big") + turn + picture[2:]
     assert cv2.imdecode(np.frombuffer(turned, np.uint8), cv2.IMREAD_COLOR).shape == (8, 6, 3)
     assert Decoder()(turned, "a").shape == (6, 8)
+
+
+def test_a_header_alone_does_not_take_gigabytes(tmp_path):
+    """A PNG of a kilobyte that says 25,000 x 25,000 pixels; OpenCV looks for its limit when it is loaded."""
+
+    def chunk(kind, body):
+        checksum = zlib.crc32(kind + body).to_bytes(4, "big")
+        return len(body).to_bytes(4, "big") + kind + body + checksum
+
+    header = struct.pack(">IIBBBBB", 25_000, 25_000, 8, 2, 0, 0, 0)
+    parts = [(b"IHDR", header), (b"IDAT", zlib.compress(bytes(1000))), (b"IEND", b"")]
+    path = tmp_path / "large.png"
+    path.write_bytes(PNG + b"".join(chunk(*part) for part in parts))
+    program = (
+        "import sys, resource\n"
+        "from pathlib import Path\n"
+        "from geometry.errors import UserError\n"
+        "from vision.frames.pictures import Decoder\n"
+        "try:\n"
+        "    Decoder().file(Path(sys.argv[1]))\n"
+        "except UserError as error:\n"
+        "    print(error, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(path)], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert "large.png: it is damaged, too large, or not one" in done.stdout
+    assert int(done.stdout.split()[-1]) < 600_000  # kilobytes; the picture has 1.9 million

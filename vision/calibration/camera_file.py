@@ -1,5 +1,6 @@
 """Camera files: JSON or YAML with the keys of OpenCV's calibration sample, readable by `cv2.FileStorage`."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,8 @@ from vision.calibration.camera_calibration import Calibration
 
 Entry = int | float | str | list[str] | FloatArray
 FORMATS = (".json", ".yml", ".yaml")
+DEEPEST = 100
+"""Depth of nested brackets in a camera file; its own have three."""
 
 
 def save_camera(path: Path, camera: Camera) -> None:
@@ -59,8 +62,11 @@ def load_camera(path: Path) -> Camera:
         UserError: If the file cannot be read, a key is missing or its value is of another kind.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
+        if _depth(text) > DEEPEST:  # OpenCV's reader ends the process
+            raise UserError(f"cannot read the camera {path}: it is nested too deeply")
         storage = cv2.FileStorage(text, cv2.FileStorage_READ | cv2.FileStorage_MEMORY)
+        storage.getNode("image_width")  # fails unless the file has keys
     except OSError as error:
         raise UserError(f"cannot read the camera {path}: {error.strerror}") from None
     except (UnicodeDecodeError, cv2.error, SystemError):
@@ -108,6 +114,14 @@ def _write(path: Path, content: Mapping[str, Entry]) -> None:
     for name, value in content.items():
         storage.write(name, value)
     write_text(path, storage.releaseAndGetString())
+
+
+def _depth(text: str) -> int:
+    """Number of brackets that are open at once, outside quoted texts."""
+    steps = [
+        1 if bracket in "[{" else -1 for bracket in re.findall(r"[\[\]{}]", re.sub(r'"[^"]*"', "", text))
+    ]
+    return int(np.cumsum([0, *steps]).max())
 
 
 def _covariance(storage: cv2.FileStorage, size: int, path: Path) -> tuple[tuple[float, ...], ...] | None:

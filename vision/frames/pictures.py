@@ -4,7 +4,7 @@ import re
 import warnings
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from glob import glob, has_magic
 from pathlib import Path
 from typing import Any
@@ -110,11 +110,13 @@ class Decoder:
             raise UserError(f"cannot read {label}: it is empty")
         if content.startswith((JPEG, PNG)) and picture_end(content) is None:
             raise UserError(f"cannot read {label}: its end is missing")
-        with silenced():
+        image = None
+        with silenced(), suppress(cv2.error):  # raised for more pixels than `vision.MOST_PIXELS`
             image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), _AS_STORED)
         if image is None:
             raise UserError(
-                f"cannot read {label}: it is damaged, or not one that OpenCV knows, such as PNG or JPEG"
+                f"cannot read {label}: it is damaged, too large, or not one that OpenCV knows, such as PNG "
+                "or JPEG"
             )
         if image.dtype == np.uint8:
             return np.asarray(image, dtype=np.uint8)

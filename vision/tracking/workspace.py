@@ -4,7 +4,6 @@ The fiducials are dark discs, printed or drilled, that do not move with the fing
 symmetry of rotation or reflection, so that their places identify them even if some are hidden. Units: mm.
 """
 
-import json
 from itertools import product
 from pathlib import Path
 from typing import Self
@@ -15,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
+from geometry.text_files import read_json
 
 MARGIN = 12.0
 """Distance of the fiducials from the finger's bounding box before loading."""
@@ -93,11 +93,7 @@ def load_workspace(path: Path) -> Workspace:
     Raises:
         UserError: If the file cannot be read or is no workspace.
     """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not JSON"
-        raise UserError(f"cannot read the workspace {path}: {reason}") from None
+    content = read_json(path, "workspace")
     if not isinstance(content, dict):
         raise UserError(f"{path}: a workspace has fiducials, fiducial_diameter and marker_plane")
     try:
