@@ -1,8 +1,12 @@
 """Runs a command, in one process or on the ranks of `mpirun`, and turns errors into exit codes."""
 
 import os
+import sys
 import warnings
 from collections.abc import Callable
+from io import TextIOWrapper
+from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 import pydantic
@@ -22,6 +26,8 @@ SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
 
 def launched(command: Callable[[], Any]) -> int:
     """Run a command and return its exit code; of several ranks one runs it, the others serve its solves."""
+    _write_any_letter()
+    _give_libraries_a_cache()
     alone = all(os.environ.get(name, "1") == "1" for name in SIZES)
     return guarded(command if alone else lambda: _on_ranks(command))
 
@@ -47,6 +53,27 @@ def guarded(command: Callable[[], Any]) -> int:
             say(f"interrupted; {interrupt}" if interrupt.args else "interrupted")
             return INTERRUPTED
     return BAD_INPUT
+
+
+def _write_any_letter() -> None:
+    """Let letters that the terminal lacks come out as question marks, not as an error after the work."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+def _give_libraries_a_cache() -> None:
+    """Let DOLFINx and matplotlib keep their files in `PINNRAY_CACHE` where the home cannot be written."""
+    cache, home = os.environ.get("PINNRAY_CACHE"), Path("~/.cache").expanduser()
+    if cache is None or "XDG_CACHE_HOME" in os.environ:
+        return
+    try:
+        home.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=home):
+            pass
+    except OSError:
+        os.environ["XDG_CACHE_HOME"] = cache
+        os.environ.setdefault("MPLCONFIGDIR", str(Path(cache) / "matplotlib"))
 
 
 def _on_ranks(command: Callable[[], Any]) -> int:

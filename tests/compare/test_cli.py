@@ -539,6 +539,42 @@ def test_the_design_alone(folder, capsys):
     assert all(Path(name).is_file() for name in listed)
 
 
+# Surroundings
+
+
+def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[bytes]:
+    return subprocess.run(
+        [sys.executable, "-m", "compare.cli", *arguments],
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+        capture_output=True,
+        check=False,
+    )
+
+
+def test_a_home_that_cannot_be_written_is_not_needed(folder, coarse_mesh, tmp_path_factory):
+    """Neither for the mesh nor for what DOLFINx compiles and matplotlib remembers."""
+    cache = tmp_path_factory.mktemp("cache")
+    place = {"HOME": "/proc/absent", "PINNRAY_CACHE": str(cache), "XDG_CACHE_HOME": ""}
+    del (rest := {**os.environ, "PYTHONPATH": str(ROOT), **place})["XDG_CACHE_HOME"]
+    done = subprocess.run(
+        [sys.executable, "-m", "compare.cli", "solve", "fem", "--mesh-size", "1.0", "--out", "here/fem.vtu"],
+        env=rest,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, "/proc/absent" in done.stderr) == (0, False), done.stderr
+    assert {path.name for path in cache.iterdir()} >= {"fenics"}
+
+
+def test_a_terminal_without_greek_letters_shows_the_tables(folder, coarse_mesh):
+    arguments = ("--solvers", "fem", "--mesh-size", "1.0", "--measurements", "good.csv", "--out", "here")
+    done = run("compare", *arguments, PYTHONIOENCODING="ascii", PYTHONUTF8="0")
+    assert done.returncode == 0, done.stderr
+    assert b"Mean absolute error at 1 marker" in done.stdout
+    assert b"?" in done.stdout
+
+
 # A solver of another package
 
 
