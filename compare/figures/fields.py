@@ -13,7 +13,7 @@ from compare.evaluation.metrics import COMPONENTS
 from compare.evaluation.number_format import percent, significant
 from compare.figures import body
 from compare.figures.canvas import Canvas
-from compare.figures.colours import PERCENT, Scale, sequential, symmetric
+from compare.figures.colours import PERCENT, Scale, diverging, sequential, symmetric
 from compare.figures.style import axes_at, heading
 from geometry.arrays import FloatArray
 from geometry.figure import MUTED, WIDTH, Figure, figure
@@ -87,18 +87,11 @@ def field_scale(quantity: Quantity, mesh: TriangleMesh, reference: Evaluation) -
 
 
 def difference_scale(
-    quantity: Quantity, mesh: TriangleMesh, evaluations: Sequence[Evaluation], reference: Evaluation
+    quantity: Quantity, mesh: TriangleMesh, evaluation: Evaluation, reference: Evaluation
 ) -> Scale:
-    """The scale of every difference: it covers the percentile in each solver that converged (or in all).
-
-    It ends at most where that of the field does, lest one solver that is far away takes all colours.
-    """
-    others = [evaluation for evaluation in evaluations if evaluation is not reference]
-    chosen = [evaluation for evaluation in others if evaluation.converged] or others
-    base = triangle_values(quantity, reference)
-    found = symmetric([triangle_values(quantity, evaluation) - base for evaluation in chosen], mesh.areas)
-    limit = min(found.high, field_scale(quantity, mesh, reference).high)
-    return found._replace(low=-limit, high=limit)
+    """The scale of a solver's difference, its own: beside one that is far away, a near one would be blank."""
+    difference = triangle_values(quantity, evaluation) - triangle_values(quantity, reference)
+    return symmetric([difference], mesh.areas)
 
 
 def draw_field(comparison: Comparison, quantity: Quantity) -> Figure:
@@ -110,7 +103,6 @@ def draw_field(comparison: Comparison, quantity: Quantity) -> Figure:
     extent = body.field_extent(mesh, width)
     height = width * extent.height / extent.width
     scale = field_scale(quantity, mesh, reference)
-    differences = difference_scale(quantity, mesh, ordered, reference)
     total = HEAD + len(ordered) * (PANEL_TITLE + height) + FOOT
     base = quantity.values(reference)
     size = f"$|{quantity.symbol}|$" if quantity.signed else f"${quantity.symbol}$"
@@ -127,18 +119,26 @@ def draw_field(comparison: Comparison, quantity: Quantity) -> Figure:
             beside = (2 * MARGIN + width, top, width, height)
             if evaluation is not reference:
                 axes = axes_at(drawn, beside)
-                colours = differences.paint(evaluation.per_triangle(values - base))
-                note = f"rel. $L^2$ {percent(field_difference(values, base, reference.weights).rel_l2)}"
+                own = difference_scale(quantity, mesh, evaluation, reference)
+                distance = percent(field_difference(values, base, reference.weights).rel_l2)
+                note = f"rel. $L^2$ {distance}; scale ±{significant(own.high, 2)} {quantity.unit}"
+                colours = own.paint(evaluation.per_triangle(values - base))
                 body.panel(axes, canvas, mesh, colours, f"minus {reference.label}", note, bold=False)
             elif columns == 2:
                 _explain(drawn, beside, reference)
         body.scale_bar(axes, extent)
-        bars = [(scale, f"${quantity.symbol}$"), (differences, f"difference of ${quantity.symbol}$")]
+        bars = [
+            (scale, f"${quantity.symbol}$, {quantity.unit}"),
+            (
+                Scale(-1.0, 1.0, diverging()),
+                f"difference of ${quantity.symbol}$, share of the panel's own scale",
+            ),
+        ]
         for column, (shared, title) in enumerate(bars[:columns]):
             left = MARGIN + column * (width + MARGIN) + 0.1 * width
             axes = axes_at(drawn, (left, total - FOOT + 0.1, 0.8 * width, 0.09))
             extend = "max" if column == 0 and not quantity.signed else "both"
-            body.colour_bar(axes, shared, f"{title}, {quantity.unit}", extend=extend)
+            body.colour_bar(axes, shared, title, extend=extend)
     return drawn
 
 
@@ -148,8 +148,8 @@ def _explain(drawn: Figure, box: tuple[float, float, float, float], reference: E
     text = (
         f"Reference: {reference.label}\n"
         f"Scales end at the {PERCENT:g} % point of the area\n"
-        "(left: of the reference; right: of differences,\nat most as left). Values beyond take the end\n"
-        "colours. Largest: of the means over a triangle."
+        "(left: of the reference; right: of each\ndifference, as stated). Values beyond take the\n"
+        "end colours. Largest: of the means over a triangle."
     )
     axes.text(0.02, 0.95, text, va="top", size=7, color=MUTED, linespacing=1.35, transform=axes.transAxes)
 

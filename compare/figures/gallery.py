@@ -76,9 +76,8 @@ def field(comparison: Comparison, quantity: Quantity) -> Drawing:
         else ""
     )
     beside = (
-        f" Right: the field minus that of {reference}, point by point; the scale ends "
-        f"at the same share of the area of the solver that is farthest from it, but not beyond the scale "
-        f"of the field itself: what is off by more takes the end colours."
+        f" Right: the field minus that of {reference}, point by point; each on a scale of its own, which "
+        f"ends at the same share of the area and is stated above the panel: compare numbers, not colours."
         if len(comparison.evaluations) > 1
         else ""
     )
