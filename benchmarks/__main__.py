@@ -4,7 +4,7 @@ import argparse
 import importlib
 import sys
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 
 BENCHMARKS = {
     "fem": "fem_against_scikit_fem",
@@ -29,8 +29,18 @@ BENCHMARKS = {
 }
 """Names and modules; the modules' docstrings have descriptions and times."""
 
+WIDEST = 400
+"""Columns of the widest table."""
 SHORT = ("fem", "pinn")
 TIMED = ("deepxde", "recipes")
+
+
+def show(table: RenderableType, console: Console | None = None) -> None:
+    """Print a table as wide as it is: a terminal of 80 columns would cut the headings of its columns."""
+    console = console or Console()
+    wide = console.measure(table, options=console.options.update(max_width=WIDEST)).maximum
+    console.width = max(console.width, wide)
+    console.print(table)
 
 
 def main() -> int:
@@ -48,7 +58,7 @@ def main() -> int:
         budget = {"seconds": arguments.seconds} if arguments.seconds and name in TIMED else {}
         try:
             module = importlib.import_module(f"benchmarks.{BENCHMARKS[name]}")
-            Console().print(module.main(**budget))
+            show(module.main(**budget))
         except ModuleNotFoundError as error:
             print(f"error: {name} needs {error.name}; pip install 'pinn-ray[bench]'", file=sys.stderr)
             return 2

@@ -16,16 +16,18 @@ from compare.commands.rig import rig
 from compare.commands.solve import solve
 from compare.commands.solvers import solvers
 from compare.commands.track import track
+from compare.runtime.provenance import program_version
 
 pinnray = App(
     name="pinnray",
+    version=program_version,
     help="Can a physics-informed neural network stand in for finite elements on a real Fin Ray finger?",
     help_epilogue=EXIT_CODES,
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
 for command in (compare, design, mesh, solve, gridsearch, crossval, solvers, calibrate, pick, rig, track):
-    pinnray.command(command, help_epilogue=EXIT_CODES)
+    pinnray.command(command, help_epilogue=EXIT_CODES, version=program_version)
 
 
 def main(arguments: list[str] | None = None) -> int:

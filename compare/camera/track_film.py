@@ -12,7 +12,7 @@ from rich.text import Text
 
 from compare.camera.film import Film
 from compare.camera.force_estimate import LiveForce
-from compare.evaluation.number_format import NONE
+from compare.evaluation.number_format import NONE, significant
 from compare.figures import Picture
 from compare.runtime.tables import Cell, terminal_table, write_csv
 from geometry.arrays import FloatArray
@@ -172,7 +172,7 @@ def track_table(tracking: Tracking, observations: Observations) -> Table:
             pairs = zip(
                 observations.displacements[number], observations.standard_deviations[number], strict=True
             )
-            cells = [f"{value:.3f} ±{deviation:.3f}" for value, deviation in pairs]
+            cells = [f"{value:.4f} ±{significant(deviation, 2)}" for value, deviation in pairs]
         rows.append([str(number + 1), f"{x:.3f}", f"{y:.3f}", *cells, str(frames[number])])
     return terminal_table(
         f"Displacements of the markers, mm ({observations.label})",

@@ -227,8 +227,16 @@ class SolverOptions:
             shared["device"] = self.device
         solvers = [_made(name, given[name], shared) for name in chosen]
         if "device" in shared and not any("device" in solver.settings() for solver in solvers):
-            raise UserError(f"--device {self.device}: none of the solvers {names} can choose a device")
+            able = {preset for name in chosen for preset in _presets_with_device(name)}
+            hint = f"; with --preset {' or '.join(sorted(able))} one can" if able else ""
+            raise UserError(f"--device {self.device}: none of the solvers {names} can choose a device{hint}")
         return solvers
+
+
+def _presets_with_device(name: str) -> list[str]:
+    """The presets of a solver that can choose a device."""
+    presets = PRESETS.get(name, ())
+    return [preset for preset in presets if "device" in make_solver(name, preset=preset).settings()]
 
 
 def _settings(names: list[str], texts: tuple[str, ...]) -> dict[str, dict[str, object]]:

@@ -77,7 +77,7 @@ def field(comparison: Comparison, quantity: Quantity) -> Drawing:
     )
     beside = (
         f" Right: the field minus that of {reference}, point by point; each on a scale of its own, which "
-        f"ends at the same share of the area and is stated above the panel: compare numbers, not colours."
+        f"ends at the same share of the area and is stated below the panel: compare numbers, not colours."
         if len(comparison.evaluations) > 1
         else ""
     )

@@ -38,6 +38,11 @@ def package_versions() -> dict[str, str]:
     return versions
 
 
+def program_version() -> str:
+    """Version of pinn-ray, as it is installed."""
+    return package_versions()["pinn-ray"]
+
+
 def machine() -> dict[str, str | int]:
     """The operating system, the processor and its cores."""
     return {

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -182,6 +183,8 @@ BAD = [
     ("solve ''", "name one solver"),
     ("crossval --measurements film.mkv", "takes a CSV file of displacements, .*pinnray track. makes one"),
     ("solve fem-asm --measurements film.mkv", "takes a CSV file of displacements, and no film"),
+    ("compare --solvers pinn-std --device cuda", "can choose a device; with --preset paper one can"),
+    ("compare --solvers fem --device cuda", "none of the solvers fem can choose a device"),
     ("solve fem --out fields.csv", "give a name that ends in .vtu"),
     ("gridsearch --learning-rates 1e-3;1e-2", "--learning-rates 1e-3;1e-2: give numbers with commas"),
     ("gridsearch --bc-weights 1,1.0", "--bc-weights 1,1.0: give different numbers above 0"),
@@ -605,6 +608,12 @@ def test_a_plug_in_runs_in_the_main_job(folder, plugin_folder):
 
 
 # Help
+
+
+@pytest.mark.parametrize("arguments", [["--version"], ["compare", "--version"], ["track", "--version"]])
+def test_the_version_is_that_of_this_program(arguments, capsys):
+    assert main(arguments) == 0
+    assert capsys.readouterr().out == f"{version('pinn-ray')}\n"
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 
 import cv2
 import numpy as np
@@ -65,6 +66,15 @@ def test_the_same_frames_come_through_a_pipe(film, tracked, tmp_path, monkeypatc
         for folder in (tmp_path / "out", tracked)
     )
     np.testing.assert_allclose(found, before, rtol=0, atol=0.001)  # live looks at fewer fiducials
+
+
+def test_the_table_shows_deviations_below_a_micrometre(film, tmp_path, capsys):
+    """They are 0.0002 to 0.0005 mm in this film."""
+    options = ["--camera", str(film / "camera.json"), "--without-video"]
+    assert main(["track", str(film / "video.mkv"), *options, "--out", str(tmp_path / "out")]) == 0
+    shown = [float(number) for number in re.findall(r"±([\d.]+)", capsys.readouterr().out)]
+    assert len(shown) == 18
+    assert min(shown) > 0
 
 
 def test_its_files_are_whole(tracked):
