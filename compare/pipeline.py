@@ -214,7 +214,7 @@ def write(
     with stages.stage("pictures") as progress:
         pictures = draw_all(folder / "figures", comparison, progress)
     with stages.stage("report"):
-        for evaluation in comparison.evaluations:
+        for evaluation in comparison.shown_fields:
             write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", comparison.mesh, evaluation)
         write_markers(folder / "markers.csv", comparison)
         write_table_one(folder / "table1.csv", comparison)

@@ -1,7 +1,7 @@
 """A finished comparison: one finger, one mesh, many solvers, one set of marker displacements."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from compare.evaluation.evaluation import Evaluation
@@ -23,6 +23,10 @@ from solvers.solver import Solver, UnsupportedProblemError, check_load, with_law
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+TRUTH = "truth"
+"""Name of the field of the virtual experiment."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +66,12 @@ class Comparison:
         if solver not in named:
             raise UserError(f"no solver of this comparison is called {solver!r}; it has {', '.join(named)}")
         return named[solver]
+
+    @property
+    def shown_fields(self) -> list[Evaluation]:
+        """The evaluations whose fields are drawn and written: all, and that of the truth, called `truth`."""
+        true = [] if self.truth is None else [replace(self.truth, solver=TRUTH)]
+        return [*self.evaluations, *true]
 
     @property
     def remarks(self) -> list[str]:

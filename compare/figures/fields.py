@@ -95,9 +95,12 @@ def difference_scale(
 
 
 def draw_field(comparison: Comparison, quantity: Quantity) -> Figure:
-    """Draw a quantity on the undeformed body: a row a solver, its difference from the reference beside it."""
+    """Draw a quantity on the undeformed body: a row a solver, its difference from the reference beside it.
+
+    The last row is the truth where the markers are simulated.
+    """
     mesh, reference = comparison.mesh, comparison.reference
-    ordered = [reference, *(each for each in comparison.evaluations if each is not reference)]
+    ordered = [reference, *(each for each in comparison.shown_fields if each is not reference)]
     columns = 1 if len(ordered) == 1 else 2
     width = (WIDTH - MARGIN * (columns + 1)) / columns
     extent = body.field_extent(mesh, width)

@@ -72,15 +72,17 @@ def field(comparison: Comparison, quantity: Quantity) -> Drawing:
     reference = comparison.reference.label
     mixed = (
         " The solvers have different laws: strain is Green-Lagrange where it is finite, stress is Cauchy."
-        if len({evaluation.law for evaluation in comparison.evaluations}) > 1
+        if len({evaluation.law for evaluation in comparison.shown_fields}) > 1
         else ""
     )
     beside = (
         f" Right: the field minus that of {reference}, point by point; each on a scale of its own, which "
         f"ends at the same share of the area and is stated below the panel: compare numbers, not colours."
-        if len(comparison.evaluations) > 1
+        if len(comparison.shown_fields) > 1
         else ""
     )
+    if comparison.truth is not None:
+        beside += " Truth: the simulated finger of the markers."
     return Drawing(
         draw_field(comparison, quantity),
         quantity.title,

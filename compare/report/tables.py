@@ -82,30 +82,37 @@ def millimetres(error: float, printed: bool = False) -> str:
 
 def write_table_one(path: Path, comparison: Comparison) -> None:
     """Write a row a solver, then `printed_rows`; what does not exist is empty."""
+    own = [(each.solver, int(each.converged)) for each in comparison.evaluations]
+    printed = printed_rows(comparison.design)
+    names: list[tuple[str, Cell]] = [*own, *((row.solver, "") for row in printed)]
     rows: list[dict[str, Cell]] = []
-    for row in (*table_one(comparison), *printed_rows(comparison.design)):
-        rows.append({"solver": row.solver, "observations": row.source})
+    for (name, converged), row in zip(names, (*table_one(comparison), *printed), strict=True):
+        rows.append({"solver": name, "converged": converged, "observations": row.source})
         for column, means in (("in_sample", row.given), ("held_out", row.held_out)):
-            for name, value in zip(MEANS, means or [None] * len(MEANS), strict=True):
-                rows[-1][f"{column}_{name}_mm"] = "" if value is None else value
+            for mean, value in zip(MEANS, means or [None] * len(MEANS), strict=True):
+                rows[-1][f"{column}_{mean}_mm"] = "" if value is None else value
     write_csv(path, rows)
 
 
 def write_markers(path: Path, comparison: Comparison) -> None:
     """Write a row a marker: where it was, how it moved, what each solver says and how far off that is.
 
-    The cells of observations and errors are empty at markers that were not seen.
+    The cells of observations and errors are empty at markers that were not seen; those of held-out errors
+    are also empty where a solver that was given the marker does not tell its prediction without it.
     """
     observations, evaluations = comparison.observations, comparison.evaluations
     rows: list[dict[str, Cell]] = []
-    errors = [marker_errors(evaluation, observations) for evaluation in evaluations]
+    errors = [
+        (marker_errors(evaluation, observations), held_out_errors(evaluation, observations))
+        for evaluation in evaluations
+    ]
     for marker, (x, y) in enumerate(observations.points):
         seen = bool(observations.visible[marker])
         u, v = observations.displacements[marker]
         row: dict[str, Cell] = {"marker": marker + 1, "x_mm": float(x), "y_mm": float(y)}
         row |= {"observations": observations.label, "visible": int(seen)}
         row |= {"observed_u_mm": float(u) if seen else "", "observed_v_mm": float(v) if seen else ""}
-        for evaluation, error in zip(evaluations, errors, strict=True):
+        for evaluation, (error, held_out) in zip(evaluations, errors, strict=True):
             name = evaluation.solver
             own_u, own_v = (float(value) for value in evaluation.marker_displacement[marker])
             row |= {
@@ -115,6 +122,9 @@ def write_markers(path: Path, comparison: Comparison) -> None:
             row |= {f"{name}_u_mm": own_u, f"{name}_v_mm": own_v}
             row[f"{name}_ae_u_mm"] = float(error.ae_u[marker]) if seen else ""
             row[f"{name}_ae_v_mm"] = float(error.ae_v[marker]) if seen else ""
+            for axis in "uv":
+                found = getattr(held_out, f"ae_{axis}")[marker] if held_out and seen else ""
+                row[f"{name}_held_out_ae_{axis}_mm"] = found if found == "" else float(found)
         rows.append(row)
     write_csv(path, rows)
 

@@ -225,3 +225,13 @@ def test_ticks_of_six_characters_leave_room_for_the_labels(
     assert page_of(draw(compared(near, replace(pinn, history=history)), "energy").figure).cut_off() == []
     follower = replace(pinn, history=followed, reaction=np.array([0.0, -0.0021]))
     assert page_of(draw(compared(follower), "force_displacement").figure).cut_off() == []
+
+
+def test_the_field_of_the_truth_is_drawn_where_it_is_known(
+    fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
+) -> None:
+    with_truth, without = (
+        page_of(draw(compared(fem, **known), "von_mises").figure).text for known in ({"truth": pinn}, {})
+    )
+    assert "truth" in with_truth
+    assert "truth" not in without

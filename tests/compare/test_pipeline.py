@@ -128,7 +128,13 @@ def test_every_file_of_the_design_is_there(finished):
         ]
         + ["force_displacement.csv"]
         + [f"figures/{name}.png" for name in pictures.split()]
-        + ["fields/fem.vtu", "fields/fem-nonlinear.vtu", "solutions/fem.npz", "solutions/fem-nonlinear.npz"]
+        + [
+            "fields/truth.vtu",
+            "fields/fem.vtu",
+            "fields/fem-nonlinear.vtu",
+            "solutions/fem.npz",
+            "solutions/fem-nonlinear.npz",
+        ]
     )
     assert not finished.with_name("run.partial").exists()
 

@@ -37,11 +37,16 @@ def test_the_file_has_this_run_and_the_paper(
     compared: Callable[..., Comparison],
     tmp_path: Path,
 ):
-    given = replace(pinn, in_sample=True, left_out=observations.displacements + 0.125)
+    given = replace(pinn, in_sample=True, left_out=observations.displacements + 0.125, converged=False)
     write_table_one(tmp_path / "t.csv", compared(fem, given))
     with (tmp_path / "t.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [row["observations"] for row in rows] == ["simulated"] * 2 + ["paper"] * 3
+    assert [(row["solver"], row["converged"]) for row in rows[:3]] == [
+        (fem.solver, "1"),
+        (pinn.solver, "0"),
+        ("FEM", ""),
+    ]
     assert [row["held_out_mae_v_mm"][:5] for row in rows] == ["0.400", "0.125", "0.39", "0.48", ""]
     assert [bool(row["in_sample_mae_v_mm"]) for row in rows] == [False, True, False, False, True]
 

@@ -64,9 +64,24 @@ def test_errors_are_against_the_observations(markers: Rows) -> None:
 
 def test_a_marker_that_was_not_seen_has_no_observation_and_no_error(markers: Rows) -> None:
     empty = {name for name, cell in markers[1].items() if cell == ""}
-    errors = {f"{solver}_ae_{axis}_mm" for solver in ("fem", "pinn-std") for axis in "uv"}
+    kinds = ("ae", "held_out_ae")
+    errors = {f"{name}_{kind}_{axis}_mm" for name in ("fem", "pinn-std") for kind in kinds for axis in "uv"}
     assert empty == errors | {"observed_u_mm", "observed_v_mm"}
     assert [row["visible"] for row in markers] == ["1", "0", "1"]
+
+
+def test_the_held_out_error_of_a_single_marker_is_there(
+    tmp_path: Path, fem: Evaluation, observations: Observations, compared: Comparing
+) -> None:
+    left_out = observations.displacements + np.array([[0.1, -0.2], [0.0, 0.0], [0.3, 0.4]])
+    asm = replace(fem, solver="fem-asm", in_sample=True, left_out=left_out)
+    silent = replace(asm, solver="silent", left_out=None)
+    write_markers(tmp_path / "markers.csv", compared(fem, asm, silent))
+    first, _, last = read(tmp_path / "markers.csv")
+    assert float(first["fem-asm_held_out_ae_v_mm"]) == pytest.approx(0.2)
+    assert float(last["fem-asm_held_out_ae_u_mm"]) == pytest.approx(0.3)
+    assert first["silent_held_out_ae_u_mm"] == ""
+    assert first["fem_held_out_ae_u_mm"] == first["fem_ae_u_mm"]  # it was given none
 
 
 def test_every_row_says_that_the_observations_are_simulated(markers: Rows, summary: Rows) -> None:
