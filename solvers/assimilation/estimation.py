@@ -38,7 +38,8 @@ MAX_STEPS, COST_CHANGE = 12, 1e-4
 """Steps of one fit at most, and the relative change of its cost below which it has converged.
 
 At the minimum the cost is about half the number of observations, so that for twenty of them the change is a
-thousandth: a few hundredths of a standard deviation.
+thousandth: a few hundredths of a standard deviation. As much is added to the cost, so that observations
+without noise, which leave less, are fitted no further.
 """
 
 Prediction = tuple[FloatArray, FloatArray]
@@ -213,6 +214,7 @@ def estimate(
         return evaluated(tuple(z.tolist()))
 
     count, one = len(parameters), np.eye(len(parameters))
+    expected, flat = np.sqrt(len(observed)), np.zeros(len(parameters))
     bounds = np.array([parameter.bounds for parameter in parameters]).T
     z = np.clip(np.zeros(count) if start is None else start, *bounds)
     if not np.isfinite(whitened(z)[0]).all():
@@ -221,9 +223,9 @@ def estimate(
     for _ in range(rounds):
         weight = 1 / inflation
         fit = least_squares(
-            lambda z, weight=weight: np.concatenate([weight * whitened(z)[0], z]),
+            lambda z, weight=weight: np.concatenate([weight * whitened(z)[0], z, [expected]]),
             z,
-            lambda z, weight=weight: np.concatenate([weight * whitened(z)[1], one]),
+            lambda z, weight=weight: np.concatenate([weight * whitened(z)[1], one, [flat]]),
             bounds=bounds,
             xtol=1e-6,
             ftol=cost_change,

@@ -70,6 +70,7 @@ class Member:
         steps: The same, `STEP` times each of p independent standard errors away.
         response: The equilibrium.
         model: The finger as a function of the unknowns.
+        coarser: The finger that a coarser discretisation finds, if there is one.
     """
 
     probability: float
@@ -77,11 +78,14 @@ class Member:
     steps: Sequence[Snapshot]
     response: Response
     model: ResponseModel
+    coarser: Snapshot | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedField:
-    """The displacement by the most probable law; its deviations include those of the other laws from it.
+    """The displacement by the most probable law.
+
+    Its deviations include those of the other laws from it, and of a coarser discretisation.
 
     Attributes:
         members: The most probable law first.
@@ -115,5 +119,7 @@ class IdentifiedField:
         for member in self.members:
             own = quantity(member.found)
             spread = sum(((quantity(step) - own) / STEP) ** 2 for step in member.steps)
+            if member.coarser is not None:
+                spread += (quantity(member.coarser) - own) ** 2
             variance += member.probability * (spread + (own - best) ** 2)
         return np.sqrt(variance)

@@ -1,30 +1,24 @@
-"""Contact, walls and law from the markers: the search, doubtful markers, and the evidence for each law.
+"""Contact, walls and law from the markers: the search, and doubtful markers.
 
-The evidence of a law is Laplace's approximation of the integral of likelihood times prior: with the
-residuals r over φ σ, the sensitivities A and the standardised values z of `Estimate`, for n observations
-
-    log Z = -n log φ - (r . r + z . z) / 2 - log det(A^T A + 1) / 2
-
-Sources: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415-447, for the evidence;
-R. D. Cook, S. Weisberg, Residuals and Influence in Regression, Chapman and Hall 1982, for the misfit without
-an observation.
+Source: R. D. Cook, S. Weisberg, Residuals and Influence in Regression, Chapman and Hall 1982, for the misfit
+without an observation.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from geometry.arrays import FloatArray, IntArray
+from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.assimilation.estimation import COST_CHANGE, MAX_ROUNDS, MAX_STEPS, Estimate, Prediction, estimate
-from solvers.assimilation.misfit import MarkerSettings, Misfit, misfit_of, standard_deviations
 from solvers.elasticity import LawName
 from solvers.identification.body import Body
+from solvers.identification.fit import Fit, Identified
 from solvers.identification.hypothesis import Unknowns
-from solvers.identification.response import EXACT, MarkerModel, Response, ResponseModel
+from solvers.identification.reading import Reading
+from solvers.identification.response import EXACT, MarkerModel, ResponseModel
 from solvers.problem import Problem
 from solvers.solver import Progress, silent
 
@@ -37,134 +31,12 @@ CLEARER = 2.0
 """Factor by which φ has to fall as well, so that a model that is wrong everywhere loses no marker."""
 MOST_DOUBTFUL = 1 / 3
 """Largest share of the markers that are left out as doubtful."""
-PROBABLE = 0.01
-"""Least probability of a law whose field is kept."""
 AWAY = (-2.0, 2.0)
 """Places of the contact from which the search starts again, in standard deviations of its prior."""
 QUICK, MARGIN = 4, 15.0
 """Steps in which a law is judged first, and how much less its log evidence may be for it to be fitted on."""
 UNEXPLAINED = 10.0
 """φ from which on the search is started again."""
-
-
-@dataclass(frozen=True, eq=False)
-class Reading:
-    """What was measured.
-
-    Attributes:
-        misfit: The markers that were seen and are believed.
-        deviations: Their standard deviations, shape (m, 2), mm.
-        kept: Which of the markers that were seen these are, shape (seen,).
-        reaction: Force of the indenter along y per depth, with its standard deviation, N/mm.
-    """
-
-    misfit: Misfit
-    deviations: FloatArray
-    kept: IntArray
-    reaction: tuple[float, float] | None = None
-
-    @classmethod
-    def of(
-        cls,
-        problem: Problem,
-        observations: Observations,
-        radius: float | None,
-        reaction: tuple[float, float] | None,
-    ) -> "Reading":
-        """All markers that were seen; see `MarkerSettings.marker_radius` for the radius, mm."""
-        settings = MarkerSettings(marker_radius=radius)
-        misfit = misfit_of(replace(problem, observations=observations), settings)
-        if misfit is None or not len(misfit.points):
-            raise UserError("there are no markers to find a force by")
-        return cls(misfit, standard_deviations(observations), np.arange(len(misfit.points)), reaction)
-
-    def without(self, marker: int) -> "Reading":
-        """The reading without one of its markers."""
-        return replace(
-            self,
-            misfit=self.misfit.without(marker),
-            deviations=np.delete(self.deviations, marker, axis=0),
-            kept=np.delete(self.kept, marker),
-        )
-
-    @property
-    def observed(self) -> FloatArray:
-        """Displacements u v u v ..., then the reaction if there is one."""
-        return self._joined(self.misfit.observed, 0)
-
-    @property
-    def noise(self) -> FloatArray:
-        """Standard deviations of `observed`."""
-        return self._joined(self.deviations, 1)
-
-    def _joined(self, values: FloatArray, which: int) -> FloatArray:
-        return np.append(values.ravel(), [] if self.reaction is None else [self.reaction[which]])
-
-    def predicted(self, markers: MarkerModel, response: Response) -> Prediction:
-        """Predictions of `observed`, with their derivatives."""
-        values, slopes = markers.predicted(response)
-        if self.reaction is None:
-            return values, slopes
-        along_y = markers.unknowns.force_slopes()[:, 1]
-        return np.append(values, response.hypothesis.force[1]), np.vstack([slopes, along_y])
-
-
-class Fit(NamedTuple):
-    """The best values of the unknowns under one law.
-
-    Attributes:
-        law: The law.
-        estimate: Values, covariance, residuals.
-        response: The equilibrium there.
-        markers: The marker displacements as a function of a response.
-        reading: The markers that were believed.
-        exact: Whether the equilibrium was found to the last digit.
-    """
-
-    law: LawName
-    estimate: Estimate
-    response: Response
-    markers: MarkerModel
-    reading: Reading
-    exact: bool
-
-    @property
-    def log_evidence(self) -> float:
-        """Logarithm of the evidence, up to what all laws share."""
-        found = self.estimate
-        a, r = found.sensitivities, found.residuals
-        _, volume = np.linalg.slogdet(a.T @ a + np.eye(a.shape[1]))
-        misfit = float(r @ r + found.z @ found.z)
-        return -len(r) * float(np.log(found.inflation)) - 0.5 * (misfit + float(volume))
-
-
-@dataclass(frozen=True, eq=False)
-class Identified:
-    """The fits of all laws to the same markers.
-
-    Attributes:
-        fits: The most probable law first.
-        probabilities: Of the laws, shape (number of fits,).
-        doubtful: Markers that contradict the others and were not used: number among those seen, and their
-            computed minus their observed displacement, shape (2,), mm.
-    """
-
-    fits: Sequence[Fit]
-    probabilities: FloatArray
-    doubtful: Mapping[int, FloatArray]
-
-    @classmethod
-    def ranked(cls, fits: Sequence[Fit], doubtful: Mapping[int, FloatArray]) -> "Identified":
-        """Of the fits in any order."""
-        ordered = sorted(fits, key=lambda fit: -fit.log_evidence)
-        logs = np.array([fit.log_evidence for fit in ordered])
-        weights = np.exp(logs - logs.max())
-        return cls(ordered, weights / weights.sum(), doubtful)
-
-    @property
-    def best(self) -> Fit:
-        """The fit of the most probable law."""
-        return self.fits[0]
 
 
 class Identifier:
@@ -242,6 +114,27 @@ class Identifier:
         """Start the next search from a fit, whose response has a state of this discretisation."""
         self._known[fit.law] = fit
 
+    def refined(self, fit: Fit, model: ResponseModel, state: FloatArray, observations: Observations) -> Fit:
+        """A fit by a finer discretisation: its equilibrium, and from there the unknowns to first order.
+
+        Args:
+            fit: By a coarser one.
+            model: The finger, of the same law, discretised more finely.
+            state: Of the finer discretisation, near equilibrium for the fit's values.
+            observations: Those of the fit, with the standard deviations for the finer discretisation.
+
+        Raises:
+            UserError: If no equilibrium is found there.
+        """
+        slopes = np.zeros((len(fit.response.values), *state.shape))
+        model.restart(replace(fit.response, state=state, slopes=slopes))
+        response = model.response(fit.response.values)
+        if response is None:
+            raise UserError(f"no equilibrium of the {fit.law} law was found by the finer discretisation")
+        about = fit._replace(model=model, response=response, coarser=None)
+        reading = Reading.of(self._problem, observations, self._radius, fit.reading.reaction)
+        return self.shifted(about, reading.only(fit.reading.kept))._replace(coarser=fit)
+
     def updated(
         self, found: Identified, observations: Observations, reaction: tuple[float, float] | None = None
     ) -> Identified:
@@ -253,10 +146,11 @@ class Identifier:
             reaction: As in `identify`.
         """
         reading = Reading.of(self._problem, observations, self._radius, reaction)
-        return Identified.ranked([self._shifted(fit, reading) for fit in found.fits], {})
+        return Identified.ranked([self.shifted(fit, reading) for fit in found.fits], {})
 
-    def _shifted(self, fit: Fit, reading: Reading) -> Fit:
-        model, about = self.models[fit.law], fit.response
+    def shifted(self, fit: Fit, reading: Reading) -> Fit:
+        """The fit to a reading, to first order about another fit."""
+        model, about = fit.model, fit.response
         markers = MarkerModel.of(model.body, model.unknowns, reading.misfit)
         predicted, slopes = reading.predicted(markers, about)
         found = estimate(
@@ -267,7 +161,8 @@ class Identifier:
             fit.estimate.z,
         )
         response = model.extrapolated(about, found.values)
-        return Fit(fit.law, found, response, markers, reading, fit.exact)
+        coarser = None if fit.coarser is None else self.shifted(fit.coarser, reading)
+        return Fit(model, found, response, markers, reading, fit.exact, coarser)
 
     @property
     def _problem(self) -> Problem:
@@ -347,7 +242,7 @@ class Identifier:
             raise UserError(
                 f"no equilibrium of the {law} law was found near the markers; take a smaller prior"
             )
-        return Fit(law, found, response, markers, reading, exact)
+        return Fit(model, found, response, markers, reading, exact)
 
     def _pressed(self, model: ResponseModel, markers: MarkerModel, reading: Reading) -> FloatArray:
         """Standardised values with the normal force that a linear finger would need, the rest as expected."""
@@ -381,8 +276,7 @@ class Identifier:
 
     def _missed(self, fit: Fit, reading: Reading, marker: int) -> FloatArray:
         """Computed by a fit without it minus observed displacement of a marker, shape (2,), mm."""
-        model = self.models[fit.law]
-        values, _ = MarkerModel.of(model.body, model.unknowns, reading.misfit).predicted(fit.response)
+        values, _ = MarkerModel.of(fit.model.body, fit.model.unknowns, reading.misfit).predicted(fit.response)
         return np.asarray(values.reshape(-1, 2)[marker] - reading.misfit.observed[marker])
 
 

@@ -24,6 +24,8 @@ MAX_ITERATIONS = 8
 """Newton iterations before a guess counts as too far away."""
 ROUGH, EXACT = 2e-3, 1e-6
 """Relative size of the last Newton step, in the energy norm, while unknowns are sought and at the end."""
+SHORTEST = 2.0**-6
+"""Fraction of a Newton step below which it is not shortened, lest it turn an element inside out."""
 REST = 1e-10
 """Least work of a load to compare a step with, N mm/mm: that of moving a finger by some ten nanometres."""
 HALVINGS = 4
@@ -145,20 +147,25 @@ class ResponseModel:
         traction = self._traction(hypothesis.position, hypothesis.width)
         load = np.tensordot(hypothesis.force, traction[0], axes=1)
         load += np.tensordot(hypothesis.couple, traction[1], axes=1)
-        before = np.inf
+        before, step = np.inf, np.zeros(self.body.shape)
         for _ in range(MAX_ITERATIONS):
-            linearised = self.body.linearised(state, hypothesis.lame, hypothesis.changes)
+            length = 1.0
+            while True:
+                linearised = self.body.linearised(state + length * step, hypothesis.lame, hypothesis.changes)
+                if linearised is not None or length < SHORTEST or not step.any():
+                    break
+                length /= 2
             if linearised is None:
                 return None
+            state = state + length * step
             balance = load - linearised.force
             step = linearised.solve(balance[None])[0]
-            state = state + step
             work = max(abs(float((load * state).sum())), REST)
             size = float(np.sqrt(abs((step * balance).sum()) / work)) if balance.any() else 0.0
             if not np.isfinite(size) or size > max(2 * before, 1.0):
                 return None
             if size < tolerance:
-                return self._with_slopes(values, hypothesis, state, linearised, traction)
+                return self._with_slopes(values, hypothesis, state + step, linearised, traction)
             before = size
         return None
 

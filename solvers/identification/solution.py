@@ -8,8 +8,8 @@ import numpy as np
 from geometry.arrays import FloatArray
 from solvers.assimilation.misfit import leave_one_out_displacements
 from solvers.identification.field import STEP, IdentifiedField, Member, Snapshot
+from solvers.identification.fit import PROBABLE, Fit, Identified
 from solvers.identification.hypothesis import Unknowns
-from solvers.identification.identifier import PROBABLE, Fit, Identified, Identifier
 from solvers.identification.summary import identified_sentence, identified_stats, standard_errors
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
@@ -18,7 +18,6 @@ from solvers.solution import Solution, Status
 def identified_solution(
     name: str,
     problem: Problem,
-    identifier: Identifier,
     found: Identified,
     stats: Mapping[str, float | int | str],
 ) -> Solution:
@@ -27,12 +26,10 @@ def identified_solution(
     Args:
         name: The solver's name.
         problem: As it was given, with its observations.
-        identifier: Holds the bodies.
         found: The fits.
         stats: Columns of the solution's `stats` beside those of the identification.
     """
     best = found.best
-    model = identifier.models[best.law]
     hypothesis = best.response.hypothesis
     missed, left_out = residuals_by_marker(found)
     return Solution(
@@ -40,12 +37,12 @@ def identified_solution(
         problem=_with_values(best.markers.unknowns, best.response.values, problem),
         field=IdentifiedField(
             [
-                _member(identifier, fit, float(probability), problem)
+                _member(fit, float(probability), problem)
                 for fit, probability in zip(found.fits, found.probabilities, strict=True)
                 if fit is best or probability >= PROBABLE
             ]
         ),
-        energy=model.body.energy(best.response.state, hypothesis.lame, hypothesis.changes),
+        energy=best.model.body.energy(best.response.state, hypothesis.lame, hypothesis.changes),
         reaction=hypothesis.force,
         status=Status(best.estimate.converged and best.exact, identified_sentence(found, missed)),
         stats={**stats, **identified_stats(found)},
@@ -72,25 +69,30 @@ def residuals_by_marker(found: Identified) -> tuple[FloatArray, FloatArray]:
     return missed, left_out
 
 
-def _member(identifier: Identifier, fit: Fit, probability: float, problem: Problem) -> Member:
+def _member(fit: Fit, probability: float, problem: Problem) -> Member:
     """The finger of a fit and its neighbours by a step of each independent standard error."""
-    response, model, unknowns = fit.response, identifier.models[fit.law], fit.markers.unknowns
-
-    def snapshot(error: FloatArray) -> Snapshot:
-        """The finger with values that differ by (p,), to first order."""
-        there = model.extrapolated(response, response.values + error)
-        return Snapshot(
-            problem=_with_values(unknowns, there.values, problem),
-            walls=unknowns.motion,
-            changes=there.hypothesis.changes,
-            clamp=there.motion,
-            drawn=model.body.field(there.state),
-        )
-
     errors = STEP * standard_errors(fit.estimate)
-    still = np.zeros(len(response.values))
-    steps = [snapshot(error) for error in errors.T]
-    return Member(probability, snapshot(still), steps, response, model)
+    return Member(
+        probability,
+        _snapshot(fit, problem),
+        [_snapshot(fit, problem, error) for error in errors.T],
+        fit.response,
+        fit.model,
+        None if fit.coarser is None else _snapshot(fit.coarser, problem),
+    )
+
+
+def _snapshot(fit: Fit, problem: Problem, error: FloatArray | float = 0.0) -> Snapshot:
+    """The finger with values that differ from those of a fit by (p,), to first order."""
+    model, unknowns = fit.model, fit.model.unknowns
+    there = model.extrapolated(fit.response, fit.response.values + error)
+    return Snapshot(
+        problem=_with_values(unknowns, there.values, problem),
+        walls=unknowns.motion,
+        changes=there.hypothesis.changes,
+        clamp=there.motion,
+        drawn=model.body.field(there.state),
+    )
 
 
 def _with_values(unknowns: Unknowns, values: FloatArray, problem: Problem) -> Problem:

@@ -5,7 +5,7 @@ from scipy.stats import norm, t
 
 from geometry.arrays import FloatArray
 from solvers.assimilation.estimation import LEVEL, Estimate, degrees_of_freedom
-from solvers.identification.identifier import Fit, Identified
+from solvers.identification.fit import Fit, Identified
 
 MENTIONED = 0.2
 """Least coefficient of a parameter named in a combination."""

@@ -97,7 +97,7 @@ class FemIdSolver(IdentificationSettings):
                 "triangles": len(problem.mesh.triangles),
                 "degree": self.degree,
             }
-            return identified_solution(self.name, own, identifier, found, stats)
+            return identified_solution(self.name, own, found, stats)
 
         return fitted
 

@@ -172,8 +172,14 @@ class FiniteBasisSolver(ABC):
             left_out=None if fit is None else leave_one_out_displacements(problem, fit.left_out),
         )
 
-    def level(self, problem: Problem, scale: float) -> ConstrainedNetwork:
-        """The network of a refinement level, with spacings of `scale` times the settings'."""
+    def level(self, problem: Problem, scale: float, single: float = 0.25) -> ConstrainedNetwork:
+        """The network of a refinement level, with spacings of `scale` times the settings'.
+
+        Args:
+            problem: The body and the load.
+            scale: Of the spacings.
+            single: Share of a quadrature cell below which an element of the mesh has one point.
+        """
         mesh = problem.mesh
         spacing = PointSpacing.of(
             problem,
@@ -193,7 +199,7 @@ class FiniteBasisSolver(ABC):
             constraint=HardConstraint.of(mesh, self.base_length),
             rng=rng,
         )
-        quadrature = graded_quadrature(triangles, spacing, self.cell)
+        quadrature = graded_quadrature(triangles, spacing, self.cell, single)
         return ConstrainedNetwork.of(basis, problem, *quadrature, self.weighting)
 
     def _status(

@@ -32,6 +32,8 @@ MOST_ITERATIONS = 8
 """Iterations of conjugate gradients that cost less than factors of the tangent at hand."""
 TRIAL = 2
 """Iterations after which their number is foreseen."""
+ADJUGATE = torch.tensor([[1.0, -1.0], [-1.0, 1.0]], dtype=torch.float64)
+"""Signs of the cofactors of a 2 x 2 matrix turned by 180 degrees."""
 INDEPENDENT = (Lame(1.0, 0.0, 1.0), Lame(0.0, 1.0, 0.0))
 """Both moduli, MPa, of which every law is a sum."""
 
@@ -79,13 +81,19 @@ class NetworkBody:
 
     def __init__(self, energy: NetworkEnergy, walls: FloatArray) -> None:
         self._energy, self._walls = energy, torch.from_numpy(walls)
+        self._operator = energy.gradient_operator()
         self._law = energy.material.law
         self._factors: Factors | None = None
         self.factorisations = 0
 
     @classmethod
     def of(
-        cls, solver: FiniteBasisSolver, problem: Problem, motion: WallMotion, scale: float = 1.0
+        cls,
+        solver: FiniteBasisSolver,
+        problem: Problem,
+        motion: WallMotion,
+        scale: float = 1.0,
+        single: float = 0.25,
     ) -> "NetworkBody":
         """The body by a refinement level of a solver.
 
@@ -94,8 +102,9 @@ class NetworkBody:
             problem: The body, its law, and the load at whose place the windows are denser.
             motion: Of the walls.
             scale: Of the spacings.
+            single: Share of a quadrature cell below which an element of the mesh has one point.
         """
-        energy = solver.level(problem, scale).energy
+        energy = solver.level(problem, scale, single).energy
         points = torch.cat([patch.points for patch in energy.patches]).numpy()
         return cls(energy, motion.gradients()[:, problem.mesh.locate(points).cells])
 
@@ -113,7 +122,7 @@ class NetworkBody:
             if not ((metric.volume > 0).all() and (deformation_jacobian(gradient) > 0).all()):
                 return None
             stress, tangent = piola_stress_and_tangent(gradient, lame, self._law)
-            force = self._energy.forces(_pulled_back(stress, metric)[None])[0]
+            force = self._forces(_pulled_back(stress, metric)[None])[0]
         return NetworkLinearisation(self, force.numpy(), _tangent_pulled_back(tangent, metric))
 
     def solved(self, tangent: torch.Tensor, right: FloatArray) -> FloatArray:
@@ -149,7 +158,7 @@ class NetworkBody:
             for moduli in INDEPENDENT:
                 part, _ = piola_stress_and_tangent(gradient, moduli, self._law)
                 slopes.append(_pulled_back(part, metric))
-            found = self._energy.forces(torch.stack(slopes)).numpy()
+            found = self._forces(torch.stack(slopes)).numpy()
         return found[:-2], found[-2:]
 
     def displacement_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
@@ -186,7 +195,7 @@ class NetworkBody:
             tangent = _tangent_pulled_back(tangent, metric)
             stress = torch.einsum("nijkl,nkl->nij", tangent, gradient)
             self._factorised(tangent)
-            found: FloatArray = self.solved(tangent, self._energy.forces(stress[None]).numpy())[0]
+            found: FloatArray = self.solved(tangent, self._forces(stress[None]).numpy())[0]
         return found
 
     def _both_components(self, rows: FloatArray) -> FloatArray:
@@ -196,13 +205,27 @@ class NetworkBody:
         return found
 
     def _gradient(self, state: FloatArray) -> torch.Tensor:
-        return self._energy.gradients(torch.from_numpy(state)[None])[0]
+        return self._gradients(torch.from_numpy(state)[None])[0]
+
+    def _gradients(self, states: torch.Tensor) -> torch.Tensor:
+        """∇u at the quadrature points, (s, q, 2, 2), of states (s, *shape)."""
+        columns = states.permute(1, 3, 0, 2).reshape(-1, 2 * len(states)).numpy()
+        found = torch.from_numpy(self._operator @ columns)
+        return found.view(-1, 2, len(states), 2).permute(2, 0, 3, 1)
+
+    def _forces(self, stresses: torch.Tensor) -> torch.Tensor:
+        """Forces (s, *shape), N/mm, of the stresses conjugate to ∇u, (s, q, 2, 2), MPa."""
+        weighted = (self._energy.weights[:, None, None] * stresses).permute(1, 3, 0, 2)
+        found = torch.from_numpy(self._operator.T @ weighted.reshape(self._operator.shape[0], -1).numpy())
+        windows, _, functions = self.shape
+        return found.view(windows, functions, len(stresses), 2).permute(2, 0, 3, 1).contiguous()
 
     def _metric(self, changes: FloatArray) -> WallMetric:
-        moved = torch.eye(2, dtype=torch.float64) + torch.einsum(
-            "k,knij->nij", torch.from_numpy(np.asarray(changes, dtype=np.float64)), self._walls
-        )
-        return WallMetric(torch.linalg.inv(moved), torch.linalg.det(moved))
+        by = torch.from_numpy(np.asarray(changes, dtype=np.float64))
+        motion = torch.tensordot(by, self._walls, dims=1)
+        volume = deformation_jacobian(motion)
+        turned = (torch.eye(2, dtype=torch.float64) + motion).flip(1, 2) * ADJUGATE
+        return WallMetric(turned.mT / volume[:, None, None], volume)
 
     def _factorised(self, tangent: torch.Tensor) -> Factors:
         if self._factors is not None:
@@ -213,9 +236,9 @@ class NetworkBody:
 
     def _product(self, factors: Factors, tangent: torch.Tensor, states: torch.Tensor) -> torch.Tensor:
         """The tangent's matrix, with the regularisation of factors, times states (r, *shape)."""
-        stresses = torch.einsum("nijkl,snkl->snij", tangent, self._energy.gradients(states))
+        stresses = torch.einsum("nijkl,snkl->snij", tangent, self._gradients(states))
         diagonal = torch.from_numpy(1 / factors.scale**2).view(self.shape)
-        return self._energy.forces(stresses) + REGULARISATION * diagonal * states
+        return self._forces(stresses) + REGULARISATION * diagonal * states
 
     def _iterated(self, factors: Factors, tangent: torch.Tensor, right: torch.Tensor) -> torch.Tensor | None:
         """Solutions by conjugate gradients, preconditioned by the factors of another tangent.
