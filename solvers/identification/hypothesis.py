@@ -214,12 +214,24 @@ def parse_unknowns(solver: str, text: str) -> tuple[str, ...]:
     Raises:
         UserError: If one is not known or is there twice, or there is no force among them.
     """
-    names = tuple(name.strip() for name in text.split(",") if name.strip())
-    for name in names:
-        if name not in MEANINGS:
-            raise UserError(f"{solver} has no parameter {name!r}; it has {', '.join(MEANINGS)}")
-        if names.count(name) > 1:
-            raise UserError(f"{solver}: the parameter {name!r} is there twice")
+    names = parse_names(solver, text, tuple(MEANINGS))
     if "normal_force" not in names:
         raise UserError(f"{solver} finds a force: give normal_force among the parameters")
+    return names
+
+
+def parse_names(solver: str, text: str, known: Sequence[str]) -> tuple[str, ...]:
+    """The names of parameters in a text such as `position,width`.
+
+    Raises:
+        UserError: If one is not known or is there twice, or there is none.
+    """
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    for name in names:
+        if name not in known:
+            raise UserError(f"{solver} has no parameter {name!r}; it has {', '.join(known)}")
+        if names.count(name) > 1:
+            raise UserError(f"{solver}: the parameter {name!r} is there twice")
+    if not names:
+        raise UserError(f"{solver} needs at least one parameter of {', '.join(known)}")
     return names

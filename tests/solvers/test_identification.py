@@ -11,6 +11,7 @@ from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification.body import FemBody
 from solvers.fem.identification.solver import FemIdSolver
 from solvers.identification.hypothesis import CONTACT, DEFAULT, Unknowns
+from solvers.identification.reading import Reading
 from solvers.identification.response import EXACT, MarkerModel, ResponseModel
 from solvers.identification.settings import IdentificationSettings
 from solvers.lagrange import LagrangeSpace
@@ -70,6 +71,18 @@ def misfit(problem):
 def values_of(unknowns, changed=VALUES):
     drawn = {parameter.name: parameter.start for parameter in unknowns.parameters(1.0)}
     return np.array([(drawn | changed)[name] for name in unknowns.names])
+
+
+def test_a_reading_of_some_markers_is_the_one_without_the_others(problem):
+    """A marker that was dropped as doubtful stays dropped where the fit goes on with other deviations."""
+    moved = np.arange(18.0).reshape(9, 2)
+    seen = np.arange(9) != 4
+    observed = replace(observed_at(problem.mesh.markers, moved, NOISE), visible=seen)
+    reading = Reading.of(problem, observed, None, None)
+    kept = np.array([0, 2, 3, 6, 7])
+    np.testing.assert_array_equal(reading.only(kept).kept, kept)
+    np.testing.assert_array_equal(reading.only(kept).misfit.observed, moved[seen][kept])
+    assert reading.only(kept).noise.shape == (10,)
 
 
 def test_a_force_holds_the_finger_where_a_prescribed_displacement_does(problem):

@@ -13,10 +13,10 @@ from solvers.fem.identification.linear_model import LinearModel
 from solvers.fem.identification.linear_parameters import (
     MEANINGS,
     parameters_of,
-    parse_parameters,
     problem_with,
 )
 from solvers.fem.linear import FemSolver
+from solvers.identification.hypothesis import parse_names
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Material, Problem
 from solvers.solution import State
@@ -160,7 +160,7 @@ def test_what_the_load_does_not_have_cannot_be_found(problem):
 )
 def test_parameters_that_are_none_are_refused(text, said):
     with pytest.raises(UserError, match=said):
-        parse_parameters("fem-id", text)
+        parse_names("fem-id", text, tuple(MEANINGS))
 
 
 def test_the_contact_stays_on_the_front_face(problem):

@@ -45,16 +45,33 @@ def found(refit, problem):
 
 @pytest.mark.slow
 def test_it_is_near_its_twin(problem, found):
-    """Within 0.5 % in displacement; the force within a fifth of its own interval."""
+    """Within 0.3 % in displacement, 7 % in stress; the force within a tenth of its own interval.
+
+    Measured: 0.16 %, 4.5 % and a thirtieth. Elements of 0.5 mm leave finite elements themselves some 4 % from
+    converged stress at the corners. Without the network of `pinn-std` at the end the stress is 6 % away from
+    what it is with it.
+    """
     twin = FemIdSolver().solve(problem)
     rule = body_quadrature(problem.mesh)
     ours, theirs = (each.displacement(rule.location) for each in (found, twin))
     norm = [np.sqrt((rule.weights[:, None] * values**2).sum()) for values in (ours - theirs, theirs)]
-    assert norm[0] < 0.005 * norm[1]
+    assert norm[0] < 0.003 * norm[1]
+    stresses = [each.state(rule.location).von_mises for each in (found, twin)]
+    off = np.sqrt(rule.weights @ (stresses[0] - stresses[1]) ** 2)
+    assert off < 0.07 * np.sqrt(rule.weights @ stresses[1] ** 2)
     assert found.stats["law"] == twin.stats["law"]
     width = twin.stats["force_high"] - twin.stats["force_low"]
-    assert abs(found.stats["force"] - twin.stats["force"]) < 0.2 * width
+    assert abs(found.stats["force"] - twin.stats["force"]) < 0.1 * width
     assert found.status.converged
+
+
+@pytest.mark.slow
+def test_the_change_from_the_search_to_the_final_network_is_in_the_deviations(problem, found):
+    location = body_quadrature(problem.mesh).location
+    best = found.field.members[0]
+    change = best.coarser.von_mises(location) - best.found.von_mises(location)
+    assert np.abs(change).max() > 0
+    assert (found.field.von_mises_deviation(location) >= (1 - 1e-9) * np.abs(change)).all()
 
 
 @pytest.mark.slow

@@ -124,6 +124,17 @@ def test_triangles_far_smaller_than_the_spacing_take_one_point(coarse_mesh, spac
     assert weights.sum() == pytest.approx(coarse_mesh.areas.sum(), rel=1e-12)
 
 
+def test_single_points_are_taken_up_to_the_share_of_a_cell(coarse_mesh, spacing):
+    triangles = graded_triangles(coarse_mesh, spacing, 0.6)
+    area = coarse_mesh.areas.sum()
+    counts = []
+    for single in (0.25, 0.5, 1.0):
+        points, weights = graded_quadrature(triangles, spacing, 0.6, single)
+        assert abs(weights.sum() - area) < 1e-9 * area
+        counts.append(len(points))
+    assert counts[0] > counts[1] > counts[2] == len(triangles)
+
+
 def test_spread_points_keep_their_distance_and_leave_no_hole(coarse_mesh, spacing):
     centres = spread_points(graded_triangles(coarse_mesh, spacing, 0.6), coarse_mesh, spacing, 0.75)
     gaps = np.linalg.norm(centres[:, None] - centres[None], axis=2) + 1e9 * np.eye(len(centres))
@@ -191,6 +202,23 @@ def test_hessian_is_the_derivative_of_the_slope_and_that_of_the_energy(basis, co
         if row != column:
             product[column] += block.T @ layer[row]
     np.testing.assert_allclose(product, change, atol=1e-6 * np.abs(change).max())
+
+
+def test_the_gradient_operator_gives_gradients_and_its_transpose_forces(basis, coarse_mesh):
+    """To rounding: the sums have the same terms in another order."""
+    rule = body_quadrature(coarse_mesh, 2)
+    energy = NetworkEnergy.of(basis, Material(), rule.location.points, rule.weights)
+    rng = np.random.default_rng(3)
+    output = torch.from_numpy(rng.normal(size=(basis.windows.count, 2, basis.per_window)))
+    operator = energy.gradient_operator()
+    columns = output.transpose(1, 2).flatten(0, 1).numpy()
+    gradient = energy.gradients(output[None])[0].numpy()
+    found = (operator @ columns).reshape(-1, 2, 2).transpose(0, 2, 1)
+    np.testing.assert_allclose(found, gradient, rtol=0, atol=1e-12 * np.abs(gradient).max())
+    force = energy.forces(torch.from_numpy(gradient)[None])[0].numpy()
+    weighted = energy.weights.numpy()[:, None, None] * gradient.transpose(0, 2, 1)
+    again = (operator.T @ weighted.reshape(-1, 2)).reshape(basis.windows.count, -1, 2).transpose(0, 2, 1)
+    np.testing.assert_allclose(again, force, rtol=0, atol=1e-12 * np.abs(force).max())
 
 
 def test_block_matrix_is_solved_as_the_dense_matrix():

@@ -28,23 +28,6 @@ STIFFNESS = {"front_stiffness": "front", "back_stiffness": "back", "rib_stiffnes
 """Part of the finger of each stiffness parameter."""
 
 
-def parse_parameters(solver: str, text: str) -> tuple[str, ...]:
-    """The names in a text such as `position,stroke_v`.
-
-    Raises:
-        UserError: If one is not known or is there twice, or there is none.
-    """
-    names = tuple(name.strip() for name in text.split(",") if name.strip())
-    for name in names:
-        if name not in MEANINGS:
-            raise UserError(f"{solver} has no parameter {name!r}; it has {', '.join(MEANINGS)}")
-        if names.count(name) > 1:
-            raise UserError(f"{solver}: the parameter {name!r} is there twice")
-    if not names:
-        raise UserError(f"{solver} needs at least one parameter of {', '.join(MEANINGS)}")
-    return names
-
-
 def parameters_of(problem: Problem, names: Sequence[str], width: float = 1.0) -> list[Parameter]:
     """The parameters with their priors.
 

@@ -10,9 +10,9 @@ from geometry.observations import Observations
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification.body import FemBody
 from solvers.fem.identification.linear_fit import LinearFit
-from solvers.fem.identification.linear_parameters import parse_parameters
+from solvers.fem.identification.linear_parameters import MEANINGS
 from solvers.fem.linear import FemSolver
-from solvers.identification.hypothesis import Unknowns
+from solvers.identification.hypothesis import Unknowns, parse_names
 from solvers.identification.identifier import Identifier
 from solvers.identification.settings import IdentificationSettings
 from solvers.identification.solution import identified_solution
@@ -110,7 +110,7 @@ class FemIdSolver(IdentificationSettings):
 
     @property
     def _linear_names(self) -> tuple[str, ...]:
-        return parse_parameters(self.name, self.parameters or "position,stroke_u,stroke_v")
+        return parse_names(self.name, self.parameters or "position,stroke_u,stroke_v", tuple(MEANINGS))
 
     def _linear(self, problem: Problem) -> LinearFit:
         return LinearFit.of(
