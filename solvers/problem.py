@@ -27,7 +27,7 @@ class Material(BaseModel):
         young: Young's modulus E, MPa.
         poisson: Poisson's ratio (the paper's μ).
         plane: Plane "strain" (thick finger) or plane "stress" (the equations that the paper prints).
-        law: "linear" (Hooke), or one of finite strain: "neo-hookean" or "st-venant-kirchhoff".
+        law: "linear" (Hooke), or one of finite strain: "neo-hookean", "st-venant-kirchhoff" or "gent".
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")

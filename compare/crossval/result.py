@@ -18,7 +18,7 @@ from compare.crossval.scores import (
     score,
 )
 from compare.crossval.study import SolverVariant, Study
-from compare.crossval.true_fields import FINER, TrueContact
+from compare.crossval.true_fields import TrueContact
 from compare.runtime.tables import Cell
 from geometry.observations import Observations
 from solvers.assimilation.misfit import assimilates
@@ -264,9 +264,9 @@ class CrossvalResult:
             "schema": 3,
             "seeds": self.study.seeds,
             "level": LEVEL,
-            "truth_mesh": f"elements of {FINER:g} times the size"
-            if self.study.measurements is None
-            else None,
+            "truth_mesh": None
+            if self.study.measurements is not None
+            else ", ".join(dict.fromkeys(each.simulation for each in self.study.chosen_truths.values())),
             "schemes": {scheme: SCHEMES[scheme] for scheme in self.schemes},
             "truths": {
                 truth: {

@@ -21,7 +21,7 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.assimilation.misfit import assimilates
 from solvers.problem import Problem
-from solvers.solution import Solution, State
+from solvers.solution import Solution
 from solvers.solver import (
     Progress,
     Solver,
@@ -185,10 +185,7 @@ class FoldRunner:
         stated = getattr(solution.field, "von_mises_deviation", None)
         if stated is not None:
             inside = self.sampler.inside_of(solution, self.problem.mesh)
-            errors = (
-                State.from_gradient(sampled.gradient, solution.problem).von_mises
-                - State.from_gradient(truth.sampled.gradient, self._true_law).von_mises
-            )
+            errors = sampled.state(solution.problem).von_mises - truth.sampled.state(self._true_law).von_mises
             within = np.abs(errors) <= norm.ppf((1 + LEVEL) / 2) * stated(inside)
             found["von_mises_coverage"] = float(np.average(within, weights=self.sampler.weights))
         return found

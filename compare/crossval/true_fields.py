@@ -27,9 +27,6 @@ from solvers.problem import Load, Problem, contact_ends
 from solvers.solution import SolidField, Solution, State
 from solvers.solver import Progress, silent
 
-FINER = 0.5
-"""Element size of the truth over that of the shared mesh."""
-
 
 @dataclass(frozen=True, eq=False)
 class SampledField:
@@ -38,7 +35,7 @@ class SampledField:
     Attributes:
         markers: Means over the markers' discs, shape (m, 2), mm.
         displacement: Shape (q, 2), mm.
-        gradient: du_i/dx_j, shape (q, 2, 2).
+        gradient: du_i/dx_j, shape (q, 2, 2); (q, 3, 3) on a face of a body in three dimensions.
     """
 
     markers: FloatArray
@@ -55,6 +52,11 @@ class SampledField:
     def __mul__(self, factor: float) -> "SampledField":
         return SampledField(factor * self.markers, factor * self.displacement, factor * self.gradient)
 
+    def state(self, problem: Problem) -> State:
+        """Strain and stress by the law of a problem."""
+        solid = self.gradient.shape[-1] == 3
+        return (State.from_solid_gradient if solid else State.from_gradient)(self.gradient, problem)
+
     def distances(
         self, truth: "SampledField", own: Problem, finite: Problem, weights: FloatArray
     ) -> dict[str, float]:
@@ -66,9 +68,9 @@ class SampledField:
             finite: Problem with the truth's law; it also gives this displacement's `von_mises_finite`.
             weights: Quadrature weights, shape (q,), mm².
         """
-        state, true = State.from_gradient(self.gradient, own), State.from_gradient(truth.gradient, finite)
+        state, true = self.state(own), truth.state(finite)
         with np.errstate(invalid="ignore"):  # an inverted element has no such stress
-            with_true_law = State.from_gradient(self.gradient, finite)
+            with_true_law = self.state(finite)
         flat = (len(weights), -1)
         pairs = {
             "displacement": (self.displacement, truth.displacement),
@@ -114,22 +116,18 @@ class FieldSampler:
             mesh: The shared mesh.
             changes: Wall thicknesses of the solution's finger minus those of the shared mesh, mm, by their
                 names in `Design`: the points of the body move with the walls, markers stay in space.
-
-        Raises:
-            UserError: If the solution is one in three dimensions.
         """
-        if isinstance(solution.field, SolidField):
-            raise UserError(
-                f"cross-validation reads stresses from plane displacements, and {solution.solver} has them "
-                "in space; take it with compare or solve"
-            )
         inside, discs = self.inside_of(solution, mesh, changes), self.discs
         if solution.problem.mesh is not mesh:  # a location belongs to its mesh
             discs = mesh.locate_on(solution.problem.mesh, discs.points)
         return SampledField(
             markers=self.means @ solution.displacement_in_space(discs),
             displacement=solution.field.displacement(inside),
-            gradient=solution.field.gradient(inside),
+            gradient=(
+                solution.field.solid_gradient(inside)
+                if isinstance(solution.field, SolidField)
+                else solution.field.gradient(inside)
+            ),
         )
 
     def inside_of(
@@ -240,7 +238,7 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Pa
         shared.digest,
         truth.material(study.material).model_dump(),
         truth.load(stroke).model_dump(),
-        FINER,
+        truth.finer,
         package_versions(),
         sources_digest(
             [*SOURCES, __name__, "compare.evaluation.truths", "compare.evaluation.virtual_experiment"]
@@ -254,7 +252,7 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Pa
     if not missing:
         progress(1.0, "from the cache")
         return files
-    finer = study.mesh.model_copy(update={"size": FINER * study.mesh.size})
+    finer = study.mesh.model_copy(update={"size": truth.finer * study.mesh.size})
     mesh = finger_mesh(design, settings=finer)
     problem = Problem(mesh, study.material, Load(displacement=(0.0, -stroke)))
     solution = simulate(problem, progress, truth)

@@ -7,7 +7,6 @@ from compare.crossval.grid import Grid
 from compare.crossval.result import CrossvalResult, LayoutResult, interval_cells
 from compare.crossval.scores import LEVEL, Score
 from compare.crossval.study import Study
-from compare.crossval.true_fields import FINER
 from compare.evaluation.number_format import NONE, distance, percent
 from compare.evaluation.truths import Truth
 from compare.runtime.tables import Cell
@@ -149,10 +148,11 @@ def _parts(labels: Sequence[str], columns: Mapping[str, Sequence[str]]) -> Itera
 def _caption(study: Study) -> str:
     """Explains the numbers and says what truths share with the solvers."""
     shared = "; ".join(shared_sentence(study, truth) for truth in study.chosen_truths.values())
+    simulations = ", ".join(dict.fromkeys(truth.simulation for truth in study.chosen_truths.values()))
     return (
         "Held-out error: mean |Δu| + |Δv|. Every marker given: relative L2 distance of the von Mises stress "
         "over the body, at points that move with the walls, and the reaction's size against the truth's. "
-        f"Every truth is a solution of fem-nonlinear on elements of {FINER:g} times the size. {shared}."
+        f"Truths are solutions of {simulations}. {shared}."
     )
 
 
@@ -176,6 +176,8 @@ def shared_sentence(study: Study, truth: Truth) -> str:
         parts.append("walls as drawn")
     if truth.load(stroke) == study.load:
         parts.append("same load as every solver")
+    if truth.solid:
+        parts.append("in three dimensions")
     return f"{truth.name}: {', '.join(parts) or 'other law, walls and load than every solver'}"
 
 

@@ -11,6 +11,9 @@ from geometry.finger.section import rib_feet, rib_pitch, rib_slope
 from solvers.elasticity import LawName
 from solvers.problem import Load, Material
 
+FINER, FINER_SOLID = 0.5, 1.5
+"""Element sizes of truths over that of the shared mesh: in the plane, and through the depth."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Truth:
@@ -25,6 +28,8 @@ class Truth:
         thicker: Additions to wall thicknesses, mm, by their names in `Design`.
         radius: Radius of a rigid cylinder without friction, mm; None for a patch of the contact's width.
         slope: Displacement of the indenter along the front over the stroke; None lets a patch slide.
+        solid: Whether the finger has its depth, with side faces free of traction, of which one is seen; else
+            it is in plane strain.
     """
 
     name: str
@@ -35,6 +40,22 @@ class Truth:
     thicker: Mapping[str, float] = field(default_factory=dict)
     radius: float | None = None
     slope: float | None = None
+    solid: bool = False
+
+    @property
+    def solver(self) -> str:
+        """The solver that simulates it."""
+        return "fem-3d" if self.solid else "fem-nonlinear"
+
+    @property
+    def finer(self) -> float:
+        """Element size over that of the shared mesh."""
+        return FINER_SOLID if self.solid else FINER
+
+    @property
+    def simulation(self) -> str:
+        """Solver and elements that simulate it, in words."""
+        return f"{self.solver} on elements of {self.finer:g} times the size"
 
     @property
     def keeps_walls(self) -> bool:
@@ -116,6 +137,13 @@ TRUTHS: Mapping[str, Truth] = {
             ),
         ),
         Truth(
+            name="gent",
+            law="gent",
+            description=(
+                "Gent, which stiffens, contact patch that is pressed in by {:.4g} mm and slides along x"
+            ),
+        ),
+        Truth(
             name="print",
             scaled=_PRINTED,
             description=(
@@ -169,6 +197,14 @@ TRUTHS: Mapping[str, Truth] = {
             description=(
                 "neo-Hookean, contact patch that is pressed in by {:.4g} mm and that friction "
                 "holds half way between sliding and sticking"
+            ),
+        ),
+        Truth(
+            name="3d",
+            solid=True,
+            description=(
+                "neo-Hookean finger in three dimensions, of which the side face is seen, contact patch that "
+                "is pressed in by {:.4g} mm and slides along x"
             ),
         ),
         Truth(

@@ -22,8 +22,8 @@ from solvers.registry import make_solver
 from solvers.solution import Solution
 from solvers.solver import Progress, Solver, silent
 
-SOURCE = "simulated by fem-nonlinear ({}); no camera was involved"
-"""Provenance that is shown with the numbers, around the description of the truth."""
+SOURCE = "simulated by {} ({}); no camera was involved"
+"""Provenance that is shown with the numbers, around solver and description of the truth."""
 
 SOURCES = (
     "compare.evaluation.evaluation",
@@ -31,6 +31,7 @@ SOURCES = (
     "solvers.elasticity",
     "solvers.fem",
     "solvers.problem",
+    "solvers.solid_elasticity",
     "solvers.solution",
 )
 """Modules whose change makes a new simulation."""
@@ -92,7 +93,7 @@ def simulate(
         problem: The finger, with the walls of the truth, and its load.
         progress: Told how far the simulation is.
         truth: Gives law and kind of load.
-        settings: Of `fem-nonlinear`.
+        settings: Of the solver that simulates it.
 
     Raises:
         UserError: If it cannot be run or does not reach the full load.
@@ -102,7 +103,7 @@ def simulate(
 
 def experiment_source(problem: Problem, truth: Truth = SLIDING) -> str:
     """Provenance of the simulated numbers, one sentence."""
-    return SOURCE.format(truth.description.format(-(problem.load.displacement[1] or 0.0)))
+    return SOURCE.format(truth.solver, truth.description.format(-(problem.load.displacement[1] or 0.0)))
 
 
 def _solved(solver: Solver, richer: Problem, progress: Progress) -> Solution:
@@ -125,7 +126,7 @@ def _richer(
             "contact_position there"
         )
     try:
-        solver = make_solver("fem-nonlinear", **settings)
+        solver = make_solver(truth.solver, **settings)
     except ImportError as error:
         raise UserError(f"the virtual experiment: {error}") from None
     richer = Problem(

@@ -17,6 +17,7 @@ LAWS = {
     "linear": "linear elastic (Hooke), infinitesimal strain",
     "neo-hookean": f"neo-Hookean, {FINITE_STRAIN}",
     "st-venant-kirchhoff": f"St Venant-Kirchhoff, {FINITE_STRAIN}",
+    "gent": f"Gent, {FINITE_STRAIN}",
 }
 
 

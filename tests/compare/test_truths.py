@@ -59,12 +59,13 @@ def test_laws_and_loads_are_those_of_the_names():
     laws = {name: (material.law, material.poisson) for name, (material, _) in problems.items()}
     assert {name: law for name, law in laws.items() if law != ("neo-hookean", 0.45)} == {
         "stvk": ("st-venant-kirchhoff", 0.45),
+        "gent": ("gent", 0.45),
         "mixed": ("st-venant-kirchhoff", 0.42),
     }
     sliding = {"kind": "patch", "displacement": (None, -10.0)}
     cylinder = {"kind": "cylinder", "displacement": (0.0, -10.0), "radius": 10.0}
     assert {name: load for name, (_, load) in problems.items()} == {
-        **dict.fromkeys(("sliding", "stvk", "print", "base"), sliding),
+        **dict.fromkeys(("sliding", "stvk", "gent", "print", "base", "3d"), sliding),
         "cylinder": cylinder,
         "oblique": {"kind": "cylinder", "displacement": (3.0, -10.0), "radius": 20.0},
         "mixed": cylinder,

@@ -17,7 +17,7 @@ from solvers.elasticity import (
 from solvers.problem import Material
 
 YOUNG, POISSON = 11.4, 0.45
-FINITE = ("neo-hookean", "st-venant-kirchhoff")
+FINITE = ("neo-hookean", "st-venant-kirchhoff", "gent")
 
 
 def rotation(angle: float) -> np.ndarray:
@@ -77,7 +77,7 @@ def test_finite_rotation_has_no_stress(law, angle):
 def test_rotated_state_has_the_same_energy_and_the_rotated_stress(law):
     """Objectivity: F -> Q F leaves ψ as it is and makes σ into Q σ Q^T."""
     lame, q = lame_constants(YOUNG, POISSON, "strain"), rotation(0.7)
-    deformation = np.eye(2) + np.random.default_rng(3).uniform(-0.3, 0.3, (20, 2, 2))
+    deformation = np.eye(2) + np.random.default_rng(3).uniform(-0.2, 0.2, (20, 2, 2))  # within Gent's limit
     before, after = deformation - np.eye(2), q @ deformation - np.eye(2)
     np.testing.assert_allclose(
         energy_density_of(law, after, lame, np.log), energy_density_of(law, before, lame, np.log), rtol=1e-12

@@ -44,7 +44,7 @@ class FemNonlinearSolver:
     tolerance: float = 1e-8
     max_iterations: int = 12
     name: ClassVar[str] = "fem-nonlinear"
-    laws: ClassVar[tuple[str, ...]] = ("neo-hookean", "st-venant-kirchhoff")
+    laws: ClassVar[tuple[str, ...]] = ("neo-hookean", "st-venant-kirchhoff", "gent")
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch", "cylinder")
 
     def __post_init__(self) -> None:

@@ -118,6 +118,7 @@ class Fem3dSolver:
         energies = np.array([path.equilibrium.energy(point.nodal) for point in points])
         region = path.region(last)
         reactions = np.array([path.reaction(point) for point in points])
+        abscissa = path.force_abscissa(last)
         ranks = path.equilibrium.distributed.comm.size
         path.close()
         return Solution(
@@ -138,6 +139,7 @@ class Fem3dSolver:
                 **path.equilibrium.factors.stats,
                 **(region.stats() if region else {}),
                 "estimated_memory_GB": cost.memory_gb,
+                **({} if abscissa is None else {"force_abscissa_mm": abscissa}),
                 "ranks": ranks,
             },
             history={

@@ -11,7 +11,7 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.elasticity import LawName
-from solvers.identification.fit import PROBABLE, Fit, Identified
+from solvers.identification.fit import Fit, Identified
 from solvers.identification.hypothesis import Unknowns
 from solvers.identification.identifier import Identifier
 from solvers.identification.response import ResponseModel
@@ -45,10 +45,10 @@ class PinnIdSolver(IdentificationSettings):
     """The network of `pinn-std` at finite strain, whose contact, walls and law are found from the markers.
 
     The search has the windows of `pinn-local`, which are quicker: one law is fitted on a coarse level, from
-    there all laws on a fine one; the network's error on each counts as the markers'. For every probable law
-    the equilibrium is then solved for with the windows of `pinn-std`, and the unknowns are improved to first
-    order; the change is part of the deviations. Refits to other observations of the same markers are of
-    first order.
+    there all laws on a fine one; the network's error on each counts as the markers'. The equilibrium of the
+    most probable law is then solved for with the windows of `pinn-std`, and the unknowns are improved to
+    first order; the change is part of the deviations. Refits to other observations of the same markers are
+    of first order.
 
     Attributes:
         coarse: Spacing of the windows on the coarse level over that of `pinn-local`.
@@ -139,11 +139,8 @@ class PinnIdSolver(IdentificationSettings):
         )
         progress(0.8, f"{found.best.law}: finer")
         given = _with_error(observations, FINEST_ERROR)
-        fits = [
-            self._refined(fine, fit, given) if fit is found.best or probability >= PROBABLE else fit
-            for fit, probability in zip(found.fits, found.probabilities, strict=True)
-        ]
-        found = replace(found, fits=fits)
+        best, *others = found.fits
+        found = replace(found, fits=[self._refined(fine, best, given), *others])
         return self._solution(problem, found, started, coarse_seconds), fine, found
 
     def _refined(self, identifier: Identifier, fit: Fit, observations: Observations) -> Fit:
