@@ -86,7 +86,7 @@ def test_the_source_names_law_and_load(mesh: TriangleMesh):
 def test_a_drawing_has_the_truths_that_keep_its_walls():
     drawn = beam()
     with pytest.raises(
-        UserError, match=r"it can have sliding, stvk, cylinder, oblique, friction, sticking$"
+        UserError, match=r"it can have sliding, stvk, gent, cylinder, oblique, friction, 3d, sticking$"
     ) as refused:
         TRUTHS["print"].finger(drawn)
     assert "\n" not in str(refused.value)
