@@ -14,6 +14,7 @@ from compare.evaluation.force_displacement import force_curves, write_force_disp
 from compare.evaluation.metrics import evaluated, pick_reference
 from compare.evaluation.plausibility import check_positions, displacement_remarks
 from compare.evaluation.shared_mesh import shared_mesh, write_rounds
+from compare.evaluation.truths import SLIDING, TRUTHS, check_truths, check_walls
 from compare.evaluation.virtual_experiment import virtual_experiment
 from compare.figures import Picture, draw_all
 from compare.report.html_report import write_report
@@ -66,6 +67,7 @@ class Job:
         material: The elastic constants; each solver takes the law that it has.
         load: What moves the finger.
         measurements: Marker displacements, their CSV file, or a film to track; None for a virtual experiment.
+        truth: What the virtual experiment simulates; a key of `TRUTHS`.
         reference: Name of the solver that the others are compared with; `fem`, else the first, if None.
         out: Output folder.
         resume: Whether to take over solutions that an earlier run of the same job finished.
@@ -79,6 +81,7 @@ class Job:
     material: Material = field(default_factory=Material)
     load: Load = field(default_factory=Load)
     measurements: Observations | Path | Film | None = None
+    truth: str = SLIDING.name
     reference: str | None = None
     out: Path = Path("out/default")
     resume: bool = False
@@ -126,6 +129,8 @@ def checked(job: Job) -> Job:
         check_adaptable(job.adapt, job.load)
     if job.reference is not None and job.reference not in job.names:
         raise UserError(f"the reference {job.reference!r} is not among the solvers {', '.join(job.names)}")
+    check_truths([job.truth], job.design)
+    check_walls(TRUTHS[job.truth])
     supported_solvers(job.solvers, job.spare, job.material, job.load)
     if isinstance(job.measurements, Path):
         radius = job.design.marker_radius
@@ -159,7 +164,9 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
     problem = Problem(mesh, job.material, job.load, finger=job.design)
     with stages.stage("measurements") as progress:
         observations, truth = (
-            (given, None) if given else virtual_experiment(problem, job.design.marker_radius, progress)
+            (given, None)
+            if given
+            else virtual_experiment(problem, job.design.marker_radius, progress, TRUTHS[job.truth])
         )
         remarks = displacement_remarks(given, problem) if given else []
     evaluations: list[Evaluation] = []

@@ -19,6 +19,7 @@ from compare.commands.options import (
     SolverOptions,
     existing,
 )
+from compare.evaluation.truths import SLIDING
 from compare.runtime.exits import NOT_CONVERGED, say
 from geometry.errors import UserError
 from solvers.solver import Solver
@@ -32,6 +33,7 @@ def compare(
     adapt: Adapt = None,
     solvers: str | None = None,
     measurements: str | None = None,
+    truth: str | None = None,
     film: FilmOptions = FilmOptions(),
     reference: str | None = None,
     out: OptionalOutputPath = None,
@@ -48,6 +50,7 @@ def compare(
     - compare --design slender --solvers fem
     - compare --set rib_count=6 --set height=110 --measurements markers.csv
     - compare --design default --measurements video.mkv --camera camera.json
+    - compare --truth cylinder
     - compare --preset paper --device cuda
 
     Args:
@@ -56,6 +59,8 @@ def compare(
             complete table that support the problem.
         measurements: CSV file of marker displacements (x_mm, y_mm, u_mm, v_mm), or a video, a folder or
             glob of pictures to track. Default: simulated by a finite-strain run, and labelled as such.
+        truth: What is simulated where nothing is measured: sliding (the default), stvk, gent, cylinder,
+            oblique, friction, 3d or sticking; see the guide.
         reference: Solver that the others are compared with; default fem, else the first.
         out: Output folder; default out/DESIGN.
         resume: Reuse solutions that an earlier run finished.
@@ -80,6 +85,7 @@ def compare(
         adapt=adapt,
         material=material,
         load=load,
+        truth=_truth(truth, measurements),
         measurements=_measurements(measurements, film),
         reference=reference,
         out=out or Path("out") / design.name,
@@ -113,6 +119,13 @@ def _optional_solvers(solvers: Sequence[Solver], options: SolverOptions, referen
     if options.preset is not None:
         asked |= {solver.name for solver in solvers if solver.settings().get("preset") == options.preset}
     return [solver.name for solver in solvers if solver.name not in asked]
+
+
+def _truth(name: str | None, measurements: str | None) -> str:
+    """The name of what is simulated; nothing is where there are measurements."""
+    if name is not None and measurements is not None:
+        raise UserError("--truth is for a simulated experiment; with --measurements leave it out")
+    return SLIDING.name if name is None else name
 
 
 def _measurements(source: str | None, options: FilmOptions) -> Path | Film | None:

@@ -46,8 +46,8 @@ def crossval(
         solvers: Names of solvers, separated by commas. One that can choose the weight of the markers runs in
             three variants (linear law).
         schemes: Hold-out schemes, separated by commas.
-        truth: Truths, separated by commas, or all: sliding, stvk, print, base, cylinder, oblique, mixed,
-            sticking.
+        truth: Truths, separated by commas, or all: sliding, stvk, gent, print, base, cylinder, oblique,
+            mixed, friction, 3d, sticking.
         layouts: Marker layouts at which the same truth is sampled, separated by commas; default: the
             design's own.
         seeds: Number of noise draws.

@@ -225,3 +225,13 @@ def check_truths(names: Sequence[str], drawn: Finger) -> None:
         raise UserError(f"--truth: name at least one of {', '.join(TRUTHS)}, none twice")
     for name in names:
         TRUTHS[name].finger(drawn)
+
+
+def check_walls(truth: Truth) -> None:
+    """Raise a `UserError` if a truth has other walls than the drawn finger."""
+    if not truth.keeps_walls:
+        possible = ", ".join(name for name, each in TRUTHS.items() if each.keeps_walls)
+        raise UserError(
+            f"--truth {truth.name}: its walls are not those of the drawing, so that fields cannot be "
+            f"compared point by point; take {possible}, or `pinnray crossval --truth {truth.name}`"
+        )

@@ -33,7 +33,7 @@ class Fit(NamedTuple):
         response: The equilibrium there.
         markers: The marker displacements as a function of a response.
         reading: The markers that were believed.
-        exact: Whether the equilibrium was found to the last digit.
+        exact: Whether the equilibrium was found to the last digit, and by the finest discretisation.
         coarser: The same fit by a coarser discretisation, whose difference estimates the error of this one.
     """
 

@@ -114,7 +114,9 @@ class Identifier:
         """Start the next search from a fit, whose response has a state of this discretisation."""
         self._known[fit.law] = fit
 
-    def refined(self, fit: Fit, model: ResponseModel, state: FloatArray, observations: Observations) -> Fit:
+    def refined(
+        self, fit: Fit, model: ResponseModel, state: FloatArray, observations: Observations
+    ) -> Fit | None:
         """A fit by a finer discretisation: its equilibrium, and from there the unknowns to first order.
 
         Args:
@@ -123,14 +125,13 @@ class Identifier:
             state: Of the finer discretisation, near equilibrium for the fit's values.
             observations: Those of the fit, with the standard deviations for the finer discretisation.
 
-        Raises:
-            UserError: If no equilibrium is found there.
+        Returns:
+            None if no equilibrium is found there.
         """
         slopes = np.zeros((len(fit.response.values), *state.shape))
-        model.restart(replace(fit.response, state=state, slopes=slopes))
-        response = model.response(fit.response.values)
+        response = model.equilibrium(replace(fit.response, state=state, slopes=slopes))
         if response is None:
-            raise UserError(f"no equilibrium of the {fit.law} law was found by the finer discretisation")
+            return None
         about = fit._replace(model=model, response=response, coarser=None)
         reading = Reading.of(self._problem, observations, self._radius, fit.reading.reaction)
         return self.shifted(about, reading.only(fit.reading.kept))._replace(coarser=fit)

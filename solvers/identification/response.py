@@ -22,6 +22,8 @@ from solvers.identification.hypothesis import Hypothesis, Unknowns
 
 MAX_ITERATIONS = 8
 """Newton iterations before a guess counts as too far away."""
+MOST_ITERATIONS = 20
+"""The same from the state of another body, beyond which there is no other way."""
 ROUGH, EXACT = 2e-3, 1e-6
 """Relative size of the last Newton step, in the energy norm, while unknowns are sought and at the end."""
 SHORTEST = 2.0**-6
@@ -97,6 +99,18 @@ class ResponseModel:
             self._last = found
         return found
 
+    def equilibrium(self, near: Response) -> Response | None:
+        """The response at another one's values, from its state alone, which may be that of another body.
+
+        Returns:
+            None if Newton's method does not converge in `MOST_ITERATIONS`.
+        """
+        self.evaluations += 1
+        self._last = near
+        found = self._near(near.values, ROUGH, MOST_ITERATIONS)
+        self._last = found or near
+        return found
+
     def restart(self, response: Response | None) -> None:
         """Start the next response from this one; None: from rest."""
         self._last = response
@@ -138,7 +152,9 @@ class ResponseModel:
         """Values without a force, shape (p,), other unknowns as expected."""
         return np.array([parameter.start for parameter in self.unknowns.parameters(1.0)])
 
-    def _near(self, values: FloatArray, tolerance: float) -> Response | None:
+    def _near(
+        self, values: FloatArray, tolerance: float, iterations: int = MAX_ITERATIONS
+    ) -> Response | None:
         """By Newton's method from the last response along its derivatives."""
         hypothesis = self.unknowns.hypothesis(values)
         state = np.zeros(self.body.shape)
@@ -148,7 +164,7 @@ class ResponseModel:
         load = np.tensordot(hypothesis.force, traction[0], axes=1)
         load += np.tensordot(hypothesis.couple, traction[1], axes=1)
         before, step = np.inf, np.zeros(self.body.shape)
-        for _ in range(MAX_ITERATIONS):
+        for _ in range(iterations):
             length = 1.0
             while True:
                 linearised = self.body.linearised(state + length * step, hypothesis.lame, hypothesis.changes)

@@ -136,11 +136,14 @@ def identified_sentence(found: Identified, missed: FloatArray) -> str:
     """
     best = found.best
     size, low, high = force_interval(found)
-    parts = [
-        ""
-        if best.estimate.converged and best.exact
-        else "the minimum was not found: take fewer parameters or a smaller prior"
-    ]
+    parts = []
+    if not best.estimate.converged:
+        parts.append("the minimum was not found: take fewer parameters or a smaller prior")
+    elif not best.exact:
+        parts.append(
+            "the equilibrium was not found to the last digit, or not by the finest discretisation: the field "
+            "is that of the search; take another mesh or fewer parameters"
+        )
     parts.append(f"force {size:.4g} ({low:.4g} to {high:.4g}) N/mm, intervals of {LEVEL:.0%}")
     columns = zip(best.estimate.parameters, best.estimate.values, best.estimate.intervals, strict=True)
     parts.append(

@@ -123,6 +123,9 @@ BAD = [
     ("solve fem --law neo-hookean", r"--law neo-hookean: none of the solvers has it \(fem has linear\)"),
     ("gridsearch --law neo-hookean", r"--law neo-hookean: none of the solvers has it \(pinn-std has linear"),
     ("compare --plane stress --law neo-hookean", "the neo-hookean law is given for plane strain only"),
+    ("compare --truth none", "--truth: there is no truth 'none'"),
+    ("compare --truth print", "--truth print: its walls are not those of the drawing"),
+    ("compare --truth stvk --measurements markers.csv", "--truth is for a simulated experiment"),
     # solvers and their settings
     ("compare --solvers fem,fem", "named twice: fem, fem"),
     ("compare --solvers fem --reference pinn-std", "reference 'pinn-std' is not among the solvers fem"),

@@ -6,8 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from compare.evaluation.truths import TRUTHS
 from compare.evaluation.virtual_experiment import virtual_experiment
+from geometry.cache import finger_mesh
 from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.problem import Load, Material, Problem
@@ -155,6 +159,38 @@ def test_an_experiment_that_stops_halfway_is_refused_and_not_kept(problem, cache
     with pytest.raises(UserError, match=r"experiment stopped at 50% of the load; or give --measurements"):
         virtual_experiment(problem, 0.8)
     assert not cache.exists()
+
+
+def test_another_truth_has_its_law_and_load(problem, solutions):
+    observations, _ = virtual_experiment(problem, 0.8, truth=TRUTHS["gent"])
+    assert solutions[0].problem.material.law == "gent"
+    assert "Gent, which stiffens" in observations.source
+    virtual_experiment(problem, 0.8)
+    assert len(solutions) == 2  # the cache tells them apart
+
+
+def test_a_truth_in_three_dimensions_is_that_of_the_side_face(problem, cache, monkeypatch):
+    """It is sampled on the shared mesh, and differs from plane strain as the depth makes it differ."""
+    monkeypatch.setattr("compare.evaluation.virtual_experiment.SOLID_SIZE", 2.5)
+    design = Design(height=40, rib_count=0, tip_length=12, contact_position=18)
+    short = finger_mesh(design, settings=MeshSettings(size=2.0))
+    known = Problem(short, load=Load(displacement=(0.0, -0.5)), finger=design)
+    plane, _ = virtual_experiment(known, 0.8)
+    seen, truth = virtual_experiment(known, 0.8, truth=TRUTHS["3d"])
+    assert truth.solid
+    assert truth.solver == "fem-3d"
+    assert "fem-3d" in seen.source
+    assert truth.von_mises.shape == truth.weights.shape
+    apart = np.abs(seen.displacements - plane.displacements).max()
+    assert 1e-4 < apart < 0.1 * np.abs(plane.displacements).max()
+
+
+def test_truths_that_the_problem_cannot_have_are_refused(problem, solutions):
+    with pytest.raises(UserError, match=r"--truth print: its walls are not those of the drawing"):
+        virtual_experiment(problem, 0.8, truth=TRUTHS["print"])
+    with pytest.raises(UserError, match=r"--truth 3d: the problem has to know its finger"):
+        virtual_experiment(problem, 0.8, truth=TRUTHS["3d"])
+    assert not solutions
 
 
 def test_without_a_prescribed_v_there_is_no_experiment(problem, solutions):

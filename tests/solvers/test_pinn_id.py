@@ -12,6 +12,7 @@ from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification.solver import FemIdSolver
+from solvers.identification.identifier import Identifier
 from solvers.pinn.identification.solver import PinnIdSolver
 from solvers.problem import Load, Material, Problem
 from tests.solvers.conftest import observed_at
@@ -72,6 +73,17 @@ def test_the_change_from_the_search_to_the_final_network_is_in_the_deviations(pr
     change = best.coarser.von_mises(location) - best.found.von_mises(location)
     assert np.abs(change).max() > 0
     assert (found.field.von_mises_deviation(location) >= (1 - 1e-9) * np.abs(change)).all()
+
+
+@pytest.mark.slow
+def test_where_the_final_network_finds_no_equilibrium_the_status_says_so(problem, monkeypatch):
+    """A law that gives way in compression may have none with windows as fine as those at corners."""
+    monkeypatch.setattr(Identifier, "refined", lambda *_: None)
+    solver = PinnIdSolver(coarse=3.0, fine=3.0, law="given", parameters="position,normal_force")
+    found = solver.solve(problem)
+    assert not found.status.converged
+    assert "not by the finest discretisation: the field is that of the search" in found.status.message
+    assert found.field.members[0].coarser is None
 
 
 @pytest.mark.slow

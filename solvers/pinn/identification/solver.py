@@ -144,11 +144,12 @@ class PinnIdSolver(IdentificationSettings):
         return self._solution(problem, found, started, coarse_seconds), fine, found
 
     def _refined(self, identifier: Identifier, fit: Fit, observations: Observations) -> Fit:
-        """A fit by the network of `pinn-std`."""
+        """A fit by the network of `pinn-std`; the same, marked as inexact, if that finds no equilibrium."""
         unknowns = fit.model.unknowns
         network = PinnStdSolver(seed=self.seed)
         model = ResponseModel(NetworkBody.of(network, unknowns.problem, unknowns.motion), unknowns)
-        return identifier.refined(fit, model, _projected(fit, model), observations)
+        refined = identifier.refined(fit, model, _projected(fit, model), observations)
+        return fit._replace(exact=False) if refined is None else refined
 
     def _solution(
         self, problem: Problem, found: Identified, started: float, coarse_seconds: float
