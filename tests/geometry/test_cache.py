@@ -112,9 +112,9 @@ def test_the_worker_stays_and_follows_a_change_of_folder(
 
 
 def test_crash_in_the_worker_gives_one_line(tmp_path: Path) -> None:
-    task = {"kind": "mesh", "what": "meshing", "settings": {}, "finger": {}}
+    task = {"kind": "mesh", "what": "meshing", "settings": {}, "finger": None}  # a fault of our own
     with pytest.raises(UserError, match=r"meshing failed \(exit code 1\)") as refused:
-        run_task({**task, "output": str(tmp_path / "missing" / "m.npz")}, 60)
+        run_task({**task, "output": str(tmp_path / "m.npz")}, 60)
     assert "\n" not in str(refused.value)
 
 

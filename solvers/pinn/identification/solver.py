@@ -38,7 +38,7 @@ FINEST = 1.2
 """Spacing of the final network over that of `pinn-std`.
 
 With 1 the von Mises stress on the default finger is 2.9 instead of 3.4 % from that of `fem-id`, in twice the
-time, but for three of eight truths Newton's method finds no equilibrium there.
+time, but Newton's method finds no equilibrium for three of eight truths, with this for one of them.
 """
 COARSE_ERROR, FINE_ERROR, FINEST_ERROR = 0.005, 0.001, 0.0003
 """Error of the network on each level over the largest displacement of a marker: it adds to the markers'."""
