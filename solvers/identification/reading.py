@@ -1,4 +1,4 @@
-"""What was measured: markers and, if known, the force."""
+"""The measurement that unknowns are sought from: markers and, if known, the force."""
 
 from dataclasses import dataclass, replace
 
@@ -15,7 +15,7 @@ from solvers.problem import Problem
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What was measured.
+    """A measurement of markers and, if known, of the force.
 
     Attributes:
         misfit: The markers that were seen and are believed.
