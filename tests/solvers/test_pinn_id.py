@@ -49,8 +49,7 @@ def test_it_is_near_its_twin(problem, found):
     """Within 0.3 % in displacement, 7 % in stress; the force within a tenth of its own interval.
 
     Measured: 0.16 %, 4.5 % and a thirtieth. Elements of 0.5 mm leave finite elements themselves some 4 % from
-    converged stress at the corners. Without the network of `pinn-std` at the end the stress is 6 % away from
-    what it is with it.
+    converged stress at the corners.
     """
     twin = FemIdSolver().solve(problem)
     rule = body_quadrature(problem.mesh)

@@ -1,4 +1,4 @@
-"""`pinn-id`: contact, walls and law from the markers, by the network of `pinn-local`."""
+"""`pinn-id`: contact, walls and law from the markers, by a finite-basis network."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -19,7 +19,6 @@ from solvers.identification.settings import LAWS, IdentificationSettings
 from solvers.identification.solution import identified_solution
 from solvers.identification.transfer import transferred
 from solvers.pinn.finite_basis.local import PinnLocalSolver
-from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.pinn.identification.network_body import NetworkBody
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
@@ -34,13 +33,14 @@ SINGLE = 0.5
 
 On the default mesh this halves the points, at no cost in displacement.
 """
-FINEST = 1.2
-"""Spacing of the final network over that of `pinn-std`.
+SEARCHED, SOLVED = 0.6, 0.45
+"""Cell of the quadrature, in window spacings, where the unknowns are sought and of the final network.
 
-With 1 the von Mises stress on the default finger is 2.9 instead of 3.4 % from that of `fem-id`, in twice the
-time, but Newton's method finds no equilibrium for three of eight truths, with this for one of them.
+On the default finger the von Mises stress of the final network is 3.2 % from that of `fem-id`, with the cell
+of the search 3.6 %; `fem` is itself 2.6 % from converged elements. With windows of `pinn-std` it is 2.9 %,
+but Newton's method then found no equilibrium for three of eight truths.
 """
-COARSE_ERROR, FINE_ERROR, FINEST_ERROR = 0.005, 0.001, 0.0003
+COARSE_ERROR, FINE_ERROR, FINAL_ERROR = 0.005, 0.001, 0.0003
 """Error of the network on each level over the largest displacement of a marker: it adds to the markers'."""
 NEAR = 0.2
 """Largest change of a marker for which a refit is of first order, mm."""
@@ -48,13 +48,12 @@ NEAR = 0.2
 
 @dataclass(frozen=True, kw_only=True)
 class PinnIdSolver(IdentificationSettings):
-    """The network of `pinn-std` at finite strain, whose contact, walls and law are found from the markers.
+    """The network of `pinn-local` at finite strain, whose contact, walls and law are found from the markers.
 
-    The search has the windows of `pinn-local`, which are quicker: one law is fitted on a coarse level, from
-    there all laws on a fine one; the network's error on each counts as the markers'. The equilibrium of the
-    most probable law is then solved for with the windows of `pinn-std`, and the unknowns are improved to
-    first order; the change is part of the deviations. Refits to other observations of the same markers are
-    of first order.
+    One law is fitted on a coarse level, from there all laws on a fine one; the network's error on each counts
+    as the markers'. The equilibrium of the most probable law is then solved for by a final network, which is
+    finer still, and the unknowns are improved to first order; the change is part of the deviations. Refits to
+    other observations of the same markers are of first order.
 
     Attributes:
         coarse: Spacing of the windows on the coarse level over that of `pinn-local`.
@@ -109,7 +108,7 @@ class PinnIdSolver(IdentificationSettings):
             if kept and _near(observations, kept[0][0]):
                 started = time.perf_counter()
                 _, identifier, found = kept[0]
-                given = _with_error(observations, FINEST_ERROR)
+                given = _with_error(observations, FINAL_ERROR)
                 again = identifier.updated(found, given, self.measured_reaction)
                 own = replace(problem, observations=observations)
                 return self._solution(own, again, started, 0.0)
@@ -144,16 +143,16 @@ class PinnIdSolver(IdentificationSettings):
             lambda share, text: progress(0.4 + 0.4 * share, text),
         )
         progress(0.8, f"{found.best.law}: finer")
-        given = _with_error(observations, FINEST_ERROR)
+        given = _with_error(observations, FINAL_ERROR)
         best, *others = found.fits
         found = replace(found, fits=[self._refined(fine, best, given), *others])
         return self._solution(problem, found, started, coarse_seconds), fine, found
 
     def _refined(self, identifier: Identifier, fit: Fit, observations: Observations) -> Fit:
-        """A fit by the network of `pinn-std`; the same, marked as inexact, if that finds no equilibrium."""
+        """A fit by the final network; the same, marked as inexact, if that finds no equilibrium."""
         unknowns = fit.model.unknowns
-        network = PinnStdSolver(seed=self.seed)
-        body = NetworkBody.of(network, unknowns.problem, unknowns.motion, FINEST)
+        network = replace(self._network, cell=SOLVED)
+        body = NetworkBody.of(network, unknowns.problem, unknowns.motion)
         model = ResponseModel(body, unknowns)
         refined = identifier.refined(fit, model, _projected(fit, model), observations)
         return fit._replace(exact=False) if refined is None else refined
@@ -174,7 +173,7 @@ class PinnIdSolver(IdentificationSettings):
     @property
     def _network(self) -> PinnLocalSolver:
         """Fewer quadrature points and windows at corners than `pinn-local` has: four times as fast."""
-        return PinnLocalSolver(cell=0.6, corner_spacing=0.02, seed=self.seed)
+        return PinnLocalSolver(cell=SEARCHED, corner_spacing=0.02, seed=self.seed)
 
     def _identifier(
         self, problem: Problem, scale: float, laws: Sequence[LawName] | None = None
