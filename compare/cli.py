@@ -1,38 +1,20 @@
-"""The command line: `compare`, the main job, and `pinnray` with every command."""
+"""The command line: `compare`, the main job, and `pinnray` with every command.
+
+The commands, which take most of a second to import, are imported when Ctrl-C no longer gives a traceback.
+"""
 
 import sys
 
-from cyclopts import App
-
-from compare.commands.calibrate import calibrate
-from compare.commands.compare import compare
-from compare.commands.crossval import crossval
-from compare.commands.design import design
-from compare.commands.gridsearch import gridsearch
-from compare.commands.launch import EXIT_CODES, launched
-from compare.commands.mesh import mesh
-from compare.commands.pick import pick
-from compare.commands.rig import rig
-from compare.commands.solve import solve
-from compare.commands.solvers import solvers
-from compare.commands.track import track
-from compare.runtime.provenance import program_version
-
-pinnray = App(
-    name="pinnray",
-    version=program_version,
-    help="Can a physics-informed neural network stand in for finite elements on a real Fin Ray finger?",
-    help_epilogue=EXIT_CODES,
-    result_action="return_value",
-    suppress_keyboard_interrupt=False,
-)
-for command in (compare, design, mesh, solve, gridsearch, crossval, solvers, calibrate, pick, rig, track):
-    pinnray.command(command, help_epilogue=EXIT_CODES, version=program_version)
+from compare.runtime.interruption import ending_at_once, interruptible
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Entry of `pinnray`."""
-    return launched(lambda: pinnray(arguments, exit_on_error=False, print_error=False))
+    with ending_at_once():
+        from compare.commands.app import pinnray
+        from compare.commands.launch import launched
+    with interruptible():
+        return launched(lambda: pinnray(arguments, exit_on_error=False, print_error=False))
 
 
 def compare_main(arguments: list[str] | None = None) -> int:

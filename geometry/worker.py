@@ -12,9 +12,11 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
+from queue import SimpleQueue
 from typing import IO, Any
 
 from geometry.errors import UserError
@@ -153,11 +155,13 @@ def _finger(definition: Mapping[str, Any]) -> Finger:
     return Design(**definition)
 
 
-def main() -> int:
-    """Read tasks, run them, and answer, until there are no more."""
-    for line in sys.stdin:
-        task = json.loads(line)
-        if hasattr(signal, "alarm"):  # ends this process if the parent was killed and Gmsh hangs
+def main() -> None:
+    """Read tasks, run them, and answer, until the parent ends, however it does."""
+    tasks: SimpleQueue[dict[str, Any]] = SimpleQueue()
+    threading.Thread(target=_listen, args=(tasks,), daemon=True).start()
+    while True:
+        task = tasks.get()
+        if hasattr(signal, "alarm"):  # ends this process if the parent was killed and a library hangs
             signal.alarm(int(task["timeout_s"]) + EXTRA_SECONDS)
         try:
             perform(task)
@@ -167,8 +171,18 @@ def main() -> int:
         if hasattr(signal, "alarm"):
             signal.alarm(0)
         print(json.dumps({"error": error}), flush=True)
-    return 0
+
+
+def _listen(tasks: SimpleQueue[dict[str, Any]]) -> None:
+    """Pass the tasks on; when the parent has ended, end this process and remove its unfinished file."""
+    task: dict[str, Any] = {}
+    for line in sys.stdin:
+        task = json.loads(line)
+        tasks.put(task)
+    if "output" in task:
+        Path(task["output"]).unlink(missing_ok=True)
+    os._exit(0)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -176,7 +176,7 @@ def command_lines() -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize(("page", "line"), command_lines())
 def test_command_lines_parse(page, line):
-    from compare.cli import pinnray
+    from compare.commands.app import pinnray
 
     tokens = shlex.split(line, comments=True)
     tokens = tokens[1:] if tokens[0] == "pinnray" else tokens
@@ -402,7 +402,7 @@ def test_the_guide_has_every_exit_code():
 
 
 def test_the_guide_has_every_command():
-    from compare.cli import pinnray
+    from compare.commands.app import pinnray
 
     commands = {name for name in pinnray if not name.startswith("-")}
     said = {name.split()[-1] if "SOLVER" not in name else "solve" for name in names(table(GUIDE, "command"))}

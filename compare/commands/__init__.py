@@ -1,1 +1,1 @@
-"""The commands, one a module: a function that has the command's name. `compare.cli` lists them."""
+"""The commands, one a module: a function that has the command's name. `compare.commands.app` lists them."""

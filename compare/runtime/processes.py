@@ -4,7 +4,6 @@ Not `pebble.ProcessPool`: when the program is killed its workers go on until the
 interrupted they are killed before they can save their state, and they cannot report progress.
 """
 
-import os
 import signal
 from collections.abc import Callable, Generator, Mapping
 from contextlib import ExitStack, closing
@@ -14,6 +13,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Generic, TypeVar
 
+from compare.runtime.interruption import leave_signals_alone
 from compare.runtime.stages import Stages
 from solvers.solver import Progress
 
@@ -128,10 +128,10 @@ def in_stages(
 
 
 def _child(work: Callable[[Input, Progress], Output], task: Input, connection: Connection) -> None:
-    """Run a task and send its answer; Ctrl-C on a terminal reaches this process through its parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # PETSc would end the process, with a page of text, when nobody listens.
-    os.environ["PETSC_OPTIONS"] = f"{os.environ.get('PETSC_OPTIONS', '')} -no_signal_handler"
+    """Run a task and send its answer; signals of the terminal reach this process through its parent."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    leave_signals_alone()  # PETSc would end the process when nobody listens
 
     def report(fraction: float, text: str) -> None:
         try:

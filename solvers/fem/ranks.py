@@ -71,9 +71,8 @@ def lead(command: Callable[[], Any], guarded: Callable[[Callable[[], Any]], int]
         del os.environ[name]
     leads = pool.comm.rank == 0
     # After Ctrl-C the launcher sends SIGTERM to all: rank 0 ends as if it were interrupted itself.
-    if leads:
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-    else:
+    signal.signal(signal.SIGTERM, signal.default_int_handler if leads else signal.SIG_DFL)
+    if not leads:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     token = _pool.set(pool)
     try:

@@ -1,0 +1,28 @@
+"""The application of the command line with every command."""
+
+from cyclopts import App
+
+from compare.commands.calibrate import calibrate
+from compare.commands.compare import compare
+from compare.commands.crossval import crossval
+from compare.commands.design import design
+from compare.commands.gridsearch import gridsearch
+from compare.commands.launch import EXIT_CODES
+from compare.commands.mesh import mesh
+from compare.commands.pick import pick
+from compare.commands.rig import rig
+from compare.commands.solve import solve
+from compare.commands.solvers import solvers
+from compare.commands.track import track
+from compare.runtime.provenance import program_version
+
+pinnray = App(
+    name="pinnray",
+    version=program_version,
+    help="Can a physics-informed neural network stand in for finite elements on a real Fin Ray finger?",
+    help_epilogue=EXIT_CODES,
+    result_action="return_value",
+    suppress_keyboard_interrupt=False,
+)
+for command in (compare, design, mesh, solve, gridsearch, crossval, solvers, calibrate, pick, rig, track):
+    pinnray.command(command, help_epilogue=EXIT_CODES, version=program_version)
