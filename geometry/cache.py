@@ -4,12 +4,13 @@ import importlib.metadata
 import os
 import warnings
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
-from geometry.atomic import atomic_path, write_bytes
+from geometry.atomic import write_bytes
 from geometry.content_hash import content_hash, file_digest
 from geometry.drawing.description import Description
 from geometry.drawing.drawn_finger import DrawnFinger
@@ -138,6 +139,25 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "pinn-ray"
 
 
+@contextmanager
+def kept_if_possible(folder: Path, what: str) -> Iterator[None]:
+    """Warn if the block cannot write to the cache, because the result itself is there.
+
+    Args:
+        folder: The cache.
+        what: What has to be done again next time, for the warning.
+    """
+    try:
+        yield
+    except OSError as error:
+        warnings.warn(
+            f"cannot write to the cache folder {folder} ({error.strerror}), so that {what} is repeated next "
+            "time; set PINNRAY_CACHE to a folder that can be written",
+            RuntimeWarning,
+            stacklevel=4,
+        )
+
+
 def cache_key(digest: str, task: dict[str, object]) -> str:
     """SHA-256 over a finger's or file's digest, task, package versions and this package's own sources."""
     sources = sorted(Path(__file__).parent.rglob("*.py"))
@@ -171,16 +191,14 @@ def _cached(
                 RuntimeWarning,
                 stacklevel=3,
             )
+    made = run_task({**task, "output": entry.name}, timeout_s)
     try:
-        with atomic_path(entry) as partial:
-            partial.touch()
-            run_task({**task, "output": str(partial.absolute())}, timeout_s)
-            return load(partial)
-    except OSError as error:
-        raise UserError(
-            f"cannot write to the cache folder {folder} ({error.strerror}); "
-            "set PINNRAY_CACHE to a folder that can be written"
-        ) from None
+        result, content = load(made), made.read_bytes()
+    finally:
+        made.unlink(missing_ok=True)
+    with kept_if_possible(folder, str(task["what"])):
+        write_bytes(entry, content)
+    return result
 
 
 def _unpack(path: Path) -> dict[str, bytes]:

@@ -6,6 +6,7 @@ The only module that imports CadQuery; import it where it is used.
 import tempfile
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
+from errno import EIO
 from pathlib import Path
 
 import cadquery as cq
@@ -115,13 +116,31 @@ WRITERS: Mapping[str, Callable[[Finger, Path], list[Path]]] = {
 }
 """The writer of each format, into a folder."""
 
+ENDS = {".step": b"END-ISO-10303-21;", ".dxf": b"EOF", ".svg": b"</svg>"}
+"""Last characters of the files."""
+
+STL_HEAD, STL_TRIANGLE = 84, 50
+"""Bytes of a binary STL file before its triangles, whose number comes last, and of each triangle."""
+
 
 def write_archive(finger: Finger, formats: Sequence[str], path: Path) -> None:
     """Write the files of some formats into one ZIP archive."""
     with tempfile.TemporaryDirectory() as folder, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name in formats:
             for file in WRITERS[name](finger, Path(folder)):
+                _check_end(file)
                 archive.write(file, file.name)
+
+
+def _check_end(path: Path) -> None:
+    """Raise an `OSError` if a file has no end: OpenCASCADE does not say that a disk is full."""
+    content = path.read_bytes()
+    if path.suffix == ".stl":
+        whole = len(content) == STL_HEAD + STL_TRIANGLE * int.from_bytes(content[80:84], "little")
+    else:
+        whole = content.rstrip().endswith(ENDS[path.suffix])
+    if not whole:
+        raise OSError(EIO, "a part was not written; is the disk full?", str(path))
 
 
 def _wires(finger: Finger) -> tuple[cq.Wire, list[cq.Wire]]:

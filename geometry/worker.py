@@ -8,6 +8,7 @@ import atexit
 import json
 import os
 import selectors
+import shutil
 import signal
 import subprocess
 import sys
@@ -28,39 +29,49 @@ FOREIGN_PREFIXES = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "I_MPI_", "MPI_", "HYDRA_
 EXTRA_SECONDS = 5
 
 
-def run_task(task: Mapping[str, Any], timeout_s: float) -> None:
+def run_task(task: Mapping[str, Any], timeout_s: float) -> Path:
     """Run a task in this process's worker and wait for it.
 
     Args:
         task: Argument of `perform`, with `what` as its description in messages.
         timeout_s: Time limit, s.
 
+    Returns:
+        The file with the result, in a temporary folder of the worker; remove it when it is read.
+
     Raises:
         UserError: One line, if the task fails or takes too long.
     """
     worker = _worker(os.getpid())
+    output = worker.folder / str(task["output"])
     try:
-        error = worker.answer({**task, "timeout_s": timeout_s}, timeout_s)
+        error = worker.answer({**task, "output": str(output), "timeout_s": timeout_s}, timeout_s)
     except BaseException:  # a time-out, a crash, or Ctrl-C: leave no process behind
         worker.stop()
         _worker.cache_clear()
         raise
     if error:
         raise UserError(error)
+    return output
 
 
 class Worker:
-    """A child process that runs tasks one after another."""
+    """A child process that runs tasks one after another.
+
+    Attributes:
+        folder: Folder of its results and temporary files, which ends with it.
+    """
 
     def __init__(self) -> None:
+        self.folder = Path(tempfile.mkdtemp(prefix="pinnray-"))
         self._errors: IO[str] = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")  # noqa: SIM115
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "geometry.worker"],
+            [sys.executable, "-m", "geometry.worker", str(self.folder)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
             text=True,
-            env=child_environment(os.environ),
+            env=child_environment(os.environ) | {"TMPDIR": str(self.folder)},
         )
 
     def answer(self, task: Mapping[str, Any], timeout_s: float) -> str:
@@ -92,6 +103,7 @@ class Worker:
         self._process.kill()
         self._process.communicate()
         self._errors.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
 
     def _ended(self, task: Mapping[str, Any]) -> UserError:
         code = self._process.wait()
@@ -120,8 +132,9 @@ def perform(task: Mapping[str, Any]) -> None:
     """Run a task in this process.
 
     Args:
-        task: `kind` and `output` as a path; for a "mesh" also `finger` as its definition and `settings` as a
-            dictionary, for "cad" `finger` and `formats`, for a "drawing" its `file` and `description`.
+        task: `kind` and `output` as the path of the result; for a "mesh" also `finger` as its definition and
+            `settings` as a dictionary, for "cad" `finger` and `formats`, for a "drawing" its `file` and
+            `description`.
     """
     output = Path(task["output"])
     if task["kind"] == "drawing":
@@ -168,19 +181,19 @@ def main() -> None:
             error = ""
         except UserError as refusal:
             error = str(refusal)
+        except OSError as fault:
+            place = fault.filename or sys.argv[1]
+            error = f"{task['what']} failed: {place}: {fault.strerror or fault}"
         if hasattr(signal, "alarm"):
             signal.alarm(0)
         print(json.dumps({"error": error}), flush=True)
 
 
 def _listen(tasks: SimpleQueue[dict[str, Any]]) -> None:
-    """Pass the tasks on; when the parent has ended, end this process and remove its unfinished file."""
-    task: dict[str, Any] = {}
+    """Pass the tasks on; when the parent has ended, end this process and remove its folder."""
     for line in sys.stdin:
-        task = json.loads(line)
-        tasks.put(task)
-    if "output" in task:
-        Path(task["output"]).unlink(missing_ok=True)
+        tasks.put(json.loads(line))
+    shutil.rmtree(sys.argv[1], ignore_errors=True)
     os._exit(0)
 
 

@@ -1,12 +1,15 @@
 """Runs a command, in one process or on the ranks of `mpirun`, and turns errors into exit codes."""
 
+import logging
 import os
 import sys
 import warnings
 from collections.abc import Callable
+from errno import EDQUOT, ENOSPC
 from io import TextIOWrapper
 from pathlib import Path
-from tempfile import TemporaryFile
+from shutil import disk_usage
+from tempfile import TemporaryFile, gettempdir
 from typing import Any
 
 import pydantic
@@ -23,6 +26,9 @@ EXIT_CODES = (
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
 """Variables in which Open MPI and the relatives of MPICH give the number of ranks."""
 
+MIN_SPACE = 2**20
+"""Bytes left on a disk below which it counts as full."""
+
 
 def launched(command: Callable[[], Any]) -> int:
     """Run a command and return its exit code; of several ranks one runs it, the others serve its solves."""
@@ -35,6 +41,7 @@ def launched(command: Callable[[], Any]) -> int:
 def guarded(command: Callable[[], Any]) -> int:
     """Run a command and return its exit code; faults of the program itself pass, with their traceback."""
     with warnings.catch_warnings():
+        logging.captureWarnings(True)  # FFCx does when it is imported, which would undo the next line
         warnings.showwarning = lambda message, *_, **__: say(f"warning: {message}")
         try:
             return int(command() or 0)
@@ -48,11 +55,26 @@ def guarded(command: Callable[[], Any]) -> int:
         except (UserError, CycloptsError) as error:
             say(f"error: {error}")
         except OSError as error:
-            say(f"error: {error.filename or 'input or output'}: {error.strerror or error}")
+            say(f"error: {error.filename or _written_to(error)}: {error.strerror or error}")
         except KeyboardInterrupt as interrupt:
             say(f"interrupted; {interrupt}" if interrupt.args else "interrupted")
             return INTERRUPTED
     return BAD_INPUT
+
+
+def _written_to(error: OSError) -> str:
+    """The folders that may have caused an error without a file name: those on a full disk."""
+    if error.errno not in (ENOSPC, EDQUOT):
+        return "input or output"
+    libraries = os.environ.get("XDG_CACHE_HOME") or "~/.cache"  # DOLFINx compiles there
+    folders = dict.fromkeys([Path.cwd(), Path(libraries).expanduser(), Path(gettempdir())])
+    return " or ".join(str(folder) for folder in folders if _space(folder) < MIN_SPACE) or "a disk"
+
+
+def _space(folder: Path) -> int:
+    """Bytes left on the disk where a folder is, or would be made."""
+    there = next(place for place in (folder, *folder.parents) if place.exists())
+    return disk_usage(there).free
 
 
 def _write_any_letter() -> None:

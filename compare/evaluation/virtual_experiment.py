@@ -14,7 +14,7 @@ import numpy as np
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.truths import SLIDING, Truth, check_walls
 from compare.runtime.provenance import package_versions, sources_digest
-from geometry.cache import cache_folder, finger_mesh
+from geometry.cache import cache_folder, finger_mesh, kept_if_possible
 from geometry.content_hash import content_hash
 from geometry.errors import UserError
 from geometry.mesh.settings import MeshSettings
@@ -88,7 +88,8 @@ def _truth(problem: Problem, progress: Progress, truth: Truth) -> Evaluation:
     except UserError as error:
         raise UserError(f"{error}; or give --measurements FILE.csv") from None
     evaluation = Evaluation.of(solution, problem.mesh)
-    evaluation.save(entry, key)
+    with kept_if_possible(entry.parent, "the virtual experiment"):
+        evaluation.save(entry, key)
     return evaluation
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from geometry.arrays import FloatArray
+from geometry.atomic import write_bytes
 from geometry.mesh.settings import MeshSettings
 from geometry.section.section import Section
 from geometry.section.thickness import wall_thickness
@@ -72,10 +73,8 @@ def set_sizes(
     """
     sizes, origin, spacing = field
     path = folder / "sizes.bin"
-    with path.open("wb") as file:
-        np.array([*origin, 0.0, spacing, spacing, 1.0]).tofile(file)
-        np.array([*sizes.shape, 1], dtype=np.int32).tofile(file)
-        np.ascontiguousarray(sizes, dtype=np.float64).tofile(file)
+    grid = np.array([*origin, 0.0, spacing, spacing, 1.0]), np.array([*sizes.shape, 1], dtype=np.int32)
+    write_bytes(path, b"".join(array.tobytes() for array in (*grid, sizes)))
     model = gmsh.model.mesh.field
     fields = [model.add("Structured")]
     model.setString(fields[0], "FileName", str(path))

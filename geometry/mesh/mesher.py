@@ -66,6 +66,8 @@ def _triangulation(finger: Finger, settings: MeshSettings, elements: float) -> T
             curves = add_section((outline_with_contact(finger), *section.cavities), finger.markers)
             set_sizes(field, grown, settings, Path(folder))
             return triangulate(curves)
+        except OSError:
+            raise
         except Exception as error:
             # Gmsh raises bare Exception with its last message.
             raise UserError(

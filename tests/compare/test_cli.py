@@ -20,7 +20,8 @@ from compare.cli import compare_main, main
 from compare.commands.options import FingerOptions, PhysicsOptions, SolverOptions
 from compare.commands.preset_jobs import JOBS, JobDefaults, job_defaults
 from compare.runtime.exits import BAD_INPUT, INTERRUPTED, NOT_CONVERGED
-from geometry.cache import finger_mesh
+from geometry.cache import cad_files, finger_mesh
+from geometry.finger.design import Design
 from geometry.finger.presets import preset_names
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.fem import adaptive_refinement as adapt
@@ -451,13 +452,20 @@ def test_a_training_that_is_too_short_does_not_converge(folder, capsys, without_
     assert capsys.readouterr().err.startswith("error: pinn-std did not converge: ")
 
 
-def test_a_full_disk_is_one_line(folder, capsys, monkeypatch, without_pictures):
+def test_a_full_disk_is_one_line_with_its_folders(folder, capsys, monkeypatch, without_pictures):
+    """Compilers and other libraries do not say where."""
+
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
+    cache = folder / "absent" / "cache"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
     monkeypatch.setattr("compare.pipeline.write_report", full)
+    monkeypatch.setattr(
+        "compare.commands.launch._space", lambda path: 10**3 if path.is_relative_to(cache) else 10**9
+    )
     assert main([*SMALL, "--measurements", "good.csv", "--quiet"]) == BAD_INPUT
-    assert capsys.readouterr().err == "error: input or output: No space left on device\n"
+    assert capsys.readouterr().err.splitlines()[-1] == f"error: {cache}: No space left on device"
 
 
 def test_a_missing_library_is_one_line(folder, capsys, monkeypatch):
@@ -513,6 +521,11 @@ def test_one_solver_that_follows_the_load_has_its_forces_beside_the_fields(folde
     assert rows[-1]["travel_mm"] == "2.0"
 
 
+@pytest.fixture
+def cad_in_cache(tmp_path_factory) -> None:
+    cad_files(Design(), tmp_path_factory.mktemp("cad"))
+
+
 @pytest.mark.parametrize(
     ("command", "said"),
     [
@@ -522,7 +535,7 @@ def test_one_solver_that_follows_the_load_has_its_forces_beside_the_fields(folde
     ],
 )
 def test_a_full_disk_is_told_in_one_line_and_leaves_no_part_of_a_file(
-    command, said, folder, coarse_mesh, full_disk, capsys
+    command, said, folder, coarse_mesh, cad_in_cache, full_disk, capsys
 ):
     assert main([*command, "--mesh-size", "1.0"]) == BAD_INPUT
     errors = [line for line in capsys.readouterr().err.splitlines() if not line.startswith(("mesh:", "fem:"))]

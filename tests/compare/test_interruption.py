@@ -43,19 +43,23 @@ sys.exit(main([]))
 """
 
 
-def started(code: str, *words: str, ignoring: Callable[[], object] | None = None) -> subprocess.Popen[str]:
+def started(
+    code: str, *words: str, ignoring: Callable[[], object] | None = None, **variables: str
+) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, "-c", code, *words],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env=child_environment(os.environ),
+        env=child_environment(os.environ) | variables,
         preexec_fn=ignoring,
     )
 
 
-def children(parent: int) -> list[int]:
-    return [int(word) for word in Path(f"/proc/{parent}/task/{parent}/children").read_text().split()]
+def workers(parent: int) -> list[int]:
+    """The children that run the worker; libraries start others while they are imported."""
+    found = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
+    return [int(word) for word in found if "geometry.worker" in Path(f"/proc/{word}/cmdline").read_text()]
 
 
 def runs(process: int) -> bool:
@@ -74,13 +78,13 @@ def until(condition: Callable[[], object]) -> None:
 
 @pytest.fixture
 def meshing(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], int, Path]]:
-    """A command whose worker is meshing, its worker's number, and its cache."""
-    cache = tmp_path / "cache"
-    command = started(WHILE_MESHING, str(cache))
-    until(lambda: list(cache.glob(".*.partial.npz")) and children(command.pid))
-    (worker,) = children(command.pid)
+    """A command whose worker is meshing, its worker's number, and the folder for temporary files."""
+    command = started(WHILE_MESHING, str(tmp_path / "cache"), TMPDIR=str(tmp_path))
+    until(lambda: workers(command.pid))
+    (worker,) = workers(command.pid)
     time.sleep(2)  # the worker has read its task and calls Gmsh
-    yield command, worker, cache
+    assert list(tmp_path.iterdir()) != []
+    yield command, worker, tmp_path
     for number in filter(runs, (command.pid, worker)):
         os.kill(number, signal.SIGKILL)
 
@@ -104,15 +108,15 @@ def test_a_signal_that_the_shell_has_ignored_stays_ignored(number):
 @pytest.mark.slow
 @pytest.mark.parametrize("number", ENDING, ids=lambda number: number.name)
 def test_a_signal_ends_the_worker_too(meshing, number):
-    command, worker, cache = meshing
+    command, worker, folder = meshing
     command.send_signal(number)
     assert command.communicate(timeout=60)[1] == "interrupted\n"
-    assert (command.returncode, runs(worker), list(cache.iterdir())) == (INTERRUPTED, False, [])
+    assert (command.returncode, runs(worker), list(folder.iterdir())) == (INTERRUPTED, False, [])
 
 
 @pytest.mark.slow
 def test_the_worker_of_a_killed_program_ends_and_leaves_no_file(meshing):
-    command, worker, cache = meshing
+    command, worker, folder = meshing
     command.kill()
     until(lambda: not runs(worker))
-    assert (runs(worker), list(cache.iterdir())) == (False, [])
+    assert (runs(worker), list(folder.iterdir())) == (False, [])

@@ -45,6 +45,13 @@ def problem(mesh: TriangleMesh) -> Problem:
     return Problem(mesh, load=Load(displacement=(0.0, -0.5)))
 
 
+def test_a_cache_that_cannot_be_written_is_a_warning(problem, cache):
+    cache.touch()  # a file, not a folder
+    with pytest.warns(RuntimeWarning, match=r"cache \(File exists\), so that the virtual experiment is rep"):
+        observations, _ = virtual_experiment(problem, 0.8)
+    assert observations.visible.all()
+
+
 def test_a_sliding_patch_presses_on_a_neo_hookean_finger(problem, solutions):
     virtual_experiment(problem, 0.8)
     (solution,) = solutions

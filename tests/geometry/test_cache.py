@@ -11,7 +11,7 @@ import pytest
 from geometry import Design, MeshSettings, UserError, cad_files, finger_mesh
 from geometry.cache import cache_folder, cache_key, drawn_finger
 from geometry.drawing.description import Description
-from geometry.worker import child_environment, run_task
+from geometry.worker import Worker, child_environment, run_task
 
 COARSE = MeshSettings(size=1.5, coarsening=2)
 
@@ -61,7 +61,8 @@ def test_damaged_entry_is_rebuilt_with_a_warning(folder: Path, damage, monkeypat
 
     def run(task, timeout_s):  # type: ignore[no-untyped-def]
         rebuilt.append(task["kind"])
-        Path(task["output"]).write_bytes(good)
+        (made := folder / "made").write_bytes(good)
+        return made
 
     monkeypatch.setattr("geometry.cache.run_task", run)
     entry.write_bytes(damage(good))
@@ -90,8 +91,8 @@ def test_time_limit_ends_the_worker_with_advice(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_refusal_in_the_worker_comes_back_as_its_own_line(tmp_path: Path) -> None:
-    task = {"kind": "mesh", "what": "meshing", "settings": {}, "output": str(tmp_path / "m.npz")}
+def test_refusal_in_the_worker_comes_back_as_its_own_line() -> None:
+    task = {"kind": "mesh", "what": "meshing", "settings": {}, "output": "m.npz"}
     with pytest.raises(UserError, match="ribs") as refused:
         run_task({**task, "finger": {"rib_count": 50}}, 60)
     assert "\n" not in str(refused.value)
@@ -111,18 +112,43 @@ def test_the_worker_stays_and_follows_a_change_of_folder(
     assert finger_mesh(drawn, settings=COARSE, cache_dir=Path("cache")).areas.sum() == pytest.approx(600)
 
 
-def test_crash_in_the_worker_gives_one_line(tmp_path: Path) -> None:
+def test_crash_in_the_worker_gives_one_line() -> None:
     task = {"kind": "mesh", "what": "meshing", "settings": {}, "finger": None}  # a fault of our own
     with pytest.raises(UserError, match=r"meshing failed \(exit code 1\)") as refused:
-        run_task({**task, "output": str(tmp_path / "m.npz")}, 60)
+        run_task({**task, "output": "m.npz"}, 60)
     assert "\n" not in str(refused.value)
 
 
-def test_folder_that_cannot_be_written_gives_one_line(tmp_path: Path) -> None:
+def test_a_cache_that_cannot_be_written_is_a_warning_and_the_mesh_is_there(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("")
-    with pytest.raises(UserError, match="PINNRAY_CACHE"):
-        finger_mesh(Design(), settings=COARSE, cache_dir=blocked / "cache")
+    with pytest.warns(RuntimeWarning, match=r"file/cache \(Not a directory\), .* set PINNRAY_CACHE"):
+        mesh = finger_mesh(Design(), settings=COARSE, cache_dir=blocked / "cache")
+    assert len(mesh.markers) == 9
+
+
+@pytest.mark.parametrize(
+    ("task", "end"),
+    [
+        ({"kind": "mesh", "settings": COARSE.model_dump()}, ": File too large"),
+        # OpenCASCADE writes a part and says nothing
+        (
+            {"kind": "cad", "formats": ["step"]},
+            "/finger.step: a part was not written; is the disk full?",
+        ),
+    ],
+    ids=["mesh", "cad"],
+)
+def test_a_full_disk_in_the_worker_names_the_place(
+    full_disk: None, task: dict[str, object], end: str
+) -> None:
+    worker = Worker()  # a new one, which inherits the full disk
+    more = {"what": "this", "finger": {}, "output": str(worker.folder / "made"), "timeout_s": 60}
+    said = worker.answer({**task, **more}, timeout_s=60)
+    worker.stop()
+    assert said.startswith(f"this failed: {worker.folder}")
+    assert said.endswith(end)
+    assert not worker.folder.exists()
 
 
 @pytest.mark.parametrize(
