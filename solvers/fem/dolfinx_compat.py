@@ -166,7 +166,9 @@ class DistributedSpace(Generic[SpaceT]):
         """A linear form on every shape function, shape (N, d)."""
         vector = dolfinx.fem.petsc.assemble_vector(form)
         vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        return self.gather(vector)
+        nodal = self.gather(vector)
+        vector.destroy()  # petsc4py would keep it for ever
+        return nodal
 
     def assemble_scalar(self, form: Any) -> float:
         """An integral over the whole body."""

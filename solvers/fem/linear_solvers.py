@@ -104,7 +104,7 @@ class Factorisation(StiffnessSolver):
             return np.array([self.solve(each) for each in nodal]).reshape(nodal.shape)
         right = PETSc.Mat().createDense((nodal[0].size, len(nodal)), comm=self._space.comm)
         right.setUp()
-        held, _ = self._matrix.createVecs()
+        held = self._matrix.createVecRight()
         columns = right.getDenseArray()
         for column, each in zip(columns.T, nodal, strict=True):
             self._space.distribute(np.where(self._clamped, 0.0, each), held)

@@ -57,7 +57,7 @@ class ConstrainedNewton:
         self._state = equilibrium.rest
         self._size = 0.0
         self._torn = False
-        self._part, _ = equilibrium.matrix.createVecs()
+        self._part = equilibrium.matrix.createVecRight()
         comm = equilibrium.distributed.comm
         self._last = comm.size - 1
         own = self._part.getLocalSize()

@@ -1,0 +1,57 @@
+"""Objects of PETSc: petsc4py keeps what is not destroyed for ever, so that every solve would take memory."""
+
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+
+from geometry.worker import child_environment
+
+PROGRAM = """
+import sys
+import numpy as np
+from geometry import Design, MeshSettings, Observations, finger_mesh
+from solvers.problem import Load, Material, Problem
+from solvers.registry import make_solver
+
+name, law, kind = sys.argv[1:]
+mesh = finger_mesh(Design(), settings=MeshSettings(size=1.5))
+markers = mesh.markers
+deviations, seen = np.full_like(markers, 0.01), np.ones(len(markers), bool)
+observations = Observations(markers, -0.01 * markers, deviations, seen, "test", True, 0.8)
+load = Load(kind=kind, displacement=(0.0, -1.0), radius=5.0 if kind == "cylinder" else None)
+given = observations if "asm" in name else None
+make_solver(name).solve(Problem(mesh, Material(law=law), load, given, Design()), lambda *_: None)
+"""
+
+CASES = [
+    ("fem", "linear", "mean"),  # with its error estimate
+    ("fem-nonlinear", "neo-hookean", "mean"),
+    ("fem-nonlinear", "neo-hookean", "cylinder"),
+    ("fem-asm", "linear", "mean"),
+    ("fem-asm", "neo-hookean", "mean"),
+    ("fem-3d", "linear", "mean"),
+]
+
+
+@pytest.mark.parametrize(("name", "law", "kind"), CASES)
+def test_every_object_of_petsc_is_destroyed(name, law, kind):
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, name, law, kind],
+        env=child_environment(os.environ) | {"PETSC_OPTIONS": "-log_view"},
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    table = done.stdout.partition("Object Type")[2].partition("===")[0]
+    counts = {
+        kind.strip(): (int(a), int(b)) for kind, a, b in re.findall(r"^ *(.+?) +(\d+) +(\d+)$", table, re.M)
+    }
+    assert counts["Vector"][0] > 0
+    assert {
+        kind: made - gone for kind, (made, gone) in counts.items() if made != gone and kind != "Viewer"
+    } == {}
