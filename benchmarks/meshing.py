@@ -17,9 +17,9 @@ from rich.table import Table
 
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design
-from geometry.mesh.element_size import set_sizes, size_field
+from geometry.mesh.element_size import TRIES, set_sizes, size_field
 from geometry.mesh.gmsh_model import session
-from geometry.mesh.mesher import TRIES, build_mesh
+from geometry.mesh.mesher import build_mesh
 from geometry.mesh.settings import MeshSettings
 
 SIZES = (0.25, 1.0)

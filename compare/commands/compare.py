@@ -67,6 +67,7 @@ def compare(
         quiet: Show no progress and no table.
         json_: Print metrics.json and nothing else.
     """
+    from compare.commands.cost import EXPERIMENT
     from compare.commands.preset_jobs import job_defaults
     from compare.evaluation.shared_mesh import tolerance_reached
     from compare.pipeline import Job, run
@@ -77,6 +78,7 @@ def compare(
     material, load = physics.read(options.preset)
     made = options.read(job_defaults(options.preset).solvers if solvers is None else solvers)
     physics.check_law(made)
+    finger.check_cost(design, mesh, [solver.name for solver in made] + [EXPERIMENT] * (measurements is None))
     job = Job(
         design=design,
         solvers=made,

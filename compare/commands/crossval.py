@@ -56,6 +56,7 @@ def crossval(
         processes: Solvers run at a time; default: one per core.
         out: Output folder; default out/crossval-DESIGN.
     """
+    from compare.commands.cost import EXPERIMENT
     from compare.crossval.cross_validation import cross_validate
     from compare.crossval.folds import LOAD
     from compare.crossval.study import ELEMENT_SIZE, Study
@@ -83,7 +84,9 @@ def crossval(
         out=out or Path("out") / f"crossval-{design.name}",
         processes=read_processes(processes),
     )
-    physics.check_law([variant.make(0) for variant in study.variants])
+    made = [variant.make(0) for variant in study.variants]
+    physics.check_law(made)
+    finger.check_cost(design, mesh, [EXPERIMENT, *(solver.name for solver in made)])
     if study.measurements and LOAD in study.schemes:
         say(f"warning: {LOAD} needs a truth at other loads, and is left out with --measurements")
     try:

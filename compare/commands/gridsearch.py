@@ -52,6 +52,7 @@ def gridsearch(
     from compare.runtime.stages import Stages
 
     design, mesh = finger.read(options.preset)
+    finger.check_cost(design, mesh, ["fem"])
     material, load = physics.read(options.preset)
     job = GridSearch(
         design=design,

@@ -31,6 +31,7 @@ def mesh(
     material, load = physics.read()
     if out.is_file():
         raise UserError(f"--out {out}: this is a file; name a folder")
+    finger.check_cost(chosen, settings)
     with Stages() as stages:
         triangles, adaptation = shared_mesh(
             chosen, settings, stages, tolerance=adapt, material=material, load=load

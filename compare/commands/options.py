@@ -58,6 +58,7 @@ class FingerOptions:
         set: Change a parameter, such as rib_count=6 or N=6, or a line on the drawing, such as depth=12; may
             be repeated.
         mesh_size: Element size in walls and ribs, mm, default 0.25; up to 4 times larger in the tip.
+        yes: Go on although the mesh is so fine that a run takes more than five minutes or much memory.
     """
 
     design: str = "default"
@@ -67,6 +68,7 @@ class FingerOptions:
     markers: str | None = None
     set: Repeated = ()
     mesh_size: float | None = None
+    yes: Flag = False
 
     def read(self, preset: str | None = None) -> tuple[Finger, MeshSettings]:
         """The finger and the mesh settings; a preset of the solvers may have its own mesh settings."""
@@ -78,6 +80,13 @@ class FingerOptions:
         except UserError as error:
             raise UserError(f"--mesh-{error}") from None
         return (self._designed() if self.section is None else self._drawn(self.section)), mesh
+
+    def check_cost(self, finger: Finger, mesh: MeshSettings, parts: Sequence[str] = ()) -> None:
+        """Raise a `UserError` with the price of a fine mesh, unless --yes is given; see `check_mesh_cost`."""
+        if not self.yes:
+            from compare.commands.cost import check_mesh_cost
+
+            check_mesh_cost(finger, mesh, parts)
 
     def _designed(self) -> Design:
         for option in ("clamp", "contact", "markers"):

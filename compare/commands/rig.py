@@ -42,6 +42,7 @@ def rig(
         out: Output folder.
     """
     from compare.camera.filmed_force import LONGEST_STEP, filmed_course, true_forces
+    from compare.commands.cost import EXPERIMENT
     from compare.evaluation.shared_mesh import shared_mesh
     from compare.evaluation.virtual_experiment import experiment_source, simulate
     from compare.runtime.output_folder import check_output, replaced_folder, write_run
@@ -68,6 +69,7 @@ def rig(
     if len(solvers) > 1:
         raise UserError("the rig films one finger; name one --solver")
     filmed = solvers[0] if solvers else None
+    finger.check_cost(design, mesh_settings, [filmed.name if filmed else EXPERIMENT])
     with Stages() as stages:
         mesh, _ = shared_mesh(design, mesh_settings, stages)
         if filmed is None:

@@ -55,6 +55,7 @@ def solve(
         raise UserError(f"name one solver, not {solver!r}; `compare` takes several")
     physics.check_law(chosen_solvers)
     (made,) = chosen_solvers
+    finger.check_cost(chosen, settings, [made.name])
     given = None
     if file := existing_table(measurements):
         given = read_measurements(file, marker_radius=chosen.marker_radius)

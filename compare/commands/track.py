@@ -57,6 +57,8 @@ def track(
     if finger.mesh_size is None:
         settings = MESH
     film, material = options.film(source), force.read()
+    if material:
+        finger.check_cost(design, settings, ["fem-id"])
     check_output(out)
     console = Console(stderr=True)
     forces, pace = [], None

@@ -10,7 +10,7 @@ from geometry.errors import UserError
 from geometry.finger.contact import CONTACT, outline_with_contact
 from geometry.finger.finger import Finger
 from geometry.mesh.boundary import boundary_edges, elements_through_thickness
-from geometry.mesh.element_size import set_sizes, size_field
+from geometry.mesh.element_size import TRIES, contact_points, set_sizes, size_field
 from geometry.mesh.gmsh_model import Triangulation, add_section, session, triangulate
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
@@ -18,9 +18,6 @@ from geometry.section.section import Section
 
 MIN_ELEMENTS = 3
 """Least number of elements through the thickness of every wall and rib."""
-
-TRIES = (3.6, 4.8, 6.4)
-"""Thickness over element size: the first that gives `MIN_ELEMENTS` is taken."""
 
 TOLERANCE = 1e-7
 """Maximum distance of a node from a position that it has, mm."""
@@ -56,7 +53,7 @@ def build_mesh(finger: Finger, settings: MeshSettings) -> TriangleMesh:
 
 
 def _triangulation(finger: Finger, settings: MeshSettings, elements: float) -> Triangulation:
-    section, contact = finger.section, _contact_points(finger)
+    section, contact = finger.section, contact_points(finger)
     grown = [(contact, min(settings.contact_size, settings.size))] if settings.contact_size else []
     if settings.corner_size is not None:
         grown.append((_corners(section), min(settings.corner_size, settings.size)))
@@ -73,12 +70,6 @@ def _triangulation(finger: Finger, settings: MeshSettings, elements: float) -> T
             raise UserError(
                 f"Gmsh could not mesh design {finger.name!r}: {error}; try another mesh size"
             ) from error
-
-
-def _contact_points(finger: Finger) -> FloatArray:
-    """Ends and middle of the contact, shape (3, 2), mm."""
-    low, high = finger.contact_ends
-    return np.array([finger.section.front_point(x) for x in (low, finger.contact_abscissa, high)])
 
 
 def _corners(section: Section) -> FloatArray:
