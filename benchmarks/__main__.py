@@ -23,6 +23,7 @@ BENCHMARKS = {
     "stress": "tracker_stress",
     "live": "live_tracking",
     "localisation": "localisation",
+    "dots": "printed_dots",
     "validation": "validation.document",
     "readings": "readings",
     "plane_strain": "plane_strain",

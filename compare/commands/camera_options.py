@@ -11,12 +11,15 @@ from pydantic import ValidationError
 from compare.camera.film import Film
 from compare.commands.options import Flag, Repeated, existing
 from geometry.errors import UserError
+from geometry.finger.finger import Finger
+from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.problem import Material
 from vision.tracking.workspace import Workspace
 
 if TYPE_CHECKING:  # OpenCV comes with them, and `--help` has to be quick
     from vision.calibration.camera import Camera, Pose
     from vision.calibration.chessboard import Board
+    from vision.rig.bench import Bench
 
 CAMERA = Group("Camera", sort_key=4)
 FORCE = Group("Force", sort_key=5)
@@ -139,10 +142,12 @@ class CameraOptions:
 @Parameter(name="*", group=SCENE)
 @dataclass(frozen=True, kw_only=True)
 class SceneOptions:
-    """Paint and occlusion of the markers.
+    """Paint, print and occlusion of the markers.
 
     Attributes:
         paint: Colour of the markers.
+        irregular: Deviation of the markers' outlines from circles, rms over the radius, up to 0.1.
+        mottle: Share of the markers' area that light specks cover, up to 0.5.
         marker_plane: Height of the markers above the fiducials, mm.
         cover: Cover a share of a marker's diameter with a cable, such as 5=0.4; may be repeated.
         cover_paint: Colour of the cables.
@@ -150,10 +155,25 @@ class SceneOptions:
     """
 
     paint: Literal["dark", "red", "green", "blue"] = "dark"
+    irregular: float = 0.0
+    mottle: float = 0.0
     marker_plane: float = 0.0
     cover: Repeated = ()
     cover_paint: Literal["dark", "light"] = "dark"
     cover_during: Literal["all", "rest", "moving", "held"] = "all"
+
+    def bench(self, mesh: TriangleMesh, finger: Finger, workspace: Workspace) -> "Bench":
+        """The finger on the bench, with markers as they are printed.
+
+        Raises:
+            UserError: If a share is out of its range.
+        """
+        from vision.rig.bench import Bench
+
+        for name, value, most in (("irregular", self.irregular, 0.1), ("mottle", self.mottle, 0.5)):
+            if not 0 <= value <= most:
+                raise UserError(f"--{name} {value:g}: give a share from 0 to {most:g}")
+        return Bench(mesh, finger, workspace, self.paint, self.irregular, self.mottle)
 
     def covered(self) -> dict[int, float]:
         """The shares of --cover by the numbers of the markers."""

@@ -51,7 +51,6 @@ def rig(
     from compare.runtime.tables import write_csv
     from solvers.problem import Problem
     from solvers.solver import solved, with_law
-    from vision.rig.bench import Bench
     from vision.rig.boards import board_poses, board_scene
     from vision.rig.occluders import cables
     from vision.rig.recording import Recording
@@ -86,7 +85,7 @@ def rig(
             source = f"displacements of {filmed.name}, rendered by the virtual rig; no camera was involved"
         displacement = solution.displacement(mesh.at_nodes())
         course = filmed_course(solution)
-        bench = Bench(mesh, design, workspace, scene.paint)
+        bench = scene.bench(mesh, design, workspace)
         recording = Recording(
             bench=bench,
             displacement=displacement,

@@ -2,7 +2,8 @@
 
     I(p) = (1 + g·(p - p₀)) (L - A Φ((R(φ) - √(ρ² + s²)) / s) + Σ B Φ((n·(p - p₀) - h) / s))
 
-Here ρ and φ are the distance and the direction of the pixel p from the centre; R(φ) is an ellipse; Φ is the
+Here ρ and φ are the distance and the direction of the pixel p from the centre; R(φ) is an ellipse, which
+waves cos kφ and sin kφ, relative to its radius, may turn into an irregular outline; Φ is the
 normal distribution, s the width of the edge, L the level around the disc, L - A the level within and g the
 gradient of the light about the fixed point p₀. The square root is the mean distance to the centre of a point
 that is blurred by s: it accounts for the curvature of the edge, which shrinks a blurred disc by s²/2R. The
@@ -16,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
+from geometry.arrays import FloatArray
+
 Array = NDArray[np.float32]
 
 X, Y, RADIUS, STRETCH, SLANT, BLUR, LIGHT, CONTRAST, SHADE_X, SHADE_Y = range(10)
@@ -23,21 +26,32 @@ X, Y, RADIUS, STRETCH, SLANT, BLUR, LIGHT, CONTRAST, SHADE_X, SHADE_Y = range(10
 sin 2φ)^-½ has semi-axes R e^(±ε), where sinh 2ε is the length of (a, b)."""
 COUNT = 10
 """Parameters of a disc."""
+LOBES = range(3, 10)
+"""Waves of an irregular outline; those with one and two lobes are the place and the ellipse."""
+OUTLINE = 2 * len(LOBES) + 1
+"""Parameters of a printed dot: heights of cosine and sine of every wave over the radius, and the halo of a
+sharpened edge, over the contrast."""
+HALO = COUNT + OUTLINE - 1
+"""Column of the halo: Φ(z) becomes Φ(z) + κ (Φ(z) - Φ(z / `WIDER`)), as by an unsharp mask."""
+WIDER = 1.6
+"""Width of the halo over that of the edge; 1.5 for an edge of 0.85 pixels and a mask of 1 pixel."""
 EDGE = 3
 """Parameters of a straight edge: angle of its normal, offset of the edge along that from p₀, and how much
 lighter it is beyond."""
 EDGES = 2
 """Straight edges of every disc; those that are absent have zero contrast."""
+DIRECTIONS = np.arange(128) * 2 * np.pi / 128
+"""Directions in which an outline is evaluated, rad."""
 WIDTH = COUNT + EDGES * EDGE
-"""All parameters."""
+"""All parameters of a fit that is reported."""
 
 
 def disc_image(parameters: Array, x: Array, y: Array) -> tuple[Array, Array]:
     """Grey levels and their derivatives.
 
     Args:
-        parameters: Those of the disc, the centre relative to p₀, then those of its straight edges; shape
-            (n, m) with m = 10 + 3 for each straight edge.
+        parameters: Those of the disc, the centre relative to p₀, those of an irregular outline or none, then
+            those of its straight edges; shape (n, m) with m = 10 (+ 15) + 3 for each straight edge.
         x: Pixels relative to p₀, to the right, shape (p,).
         y: Likewise, down.
 
@@ -50,27 +64,51 @@ def disc_image(parameters: Array, x: Array, y: Array) -> tuple[Array, Array]:
     square = dx * dx + dy * dy + np.float32(1e-6)
     twice_cosine, twice_sine = (dx * dx - dy * dy) / square, 2 * dx * dy / square
     length = np.sqrt(1 + a * a + b * b)
-    shape = 1 / np.sqrt(length - a * twice_cosine - b * twice_sine)
+    ellipse = 1 / np.sqrt(length - a * twice_cosine - b * twice_sine)
+    waves, first_edge = irregular_columns(parameters.shape[1])
+    cosines, sines = _multiples(dx, dy, square) if len(waves) else (np.empty(0), np.empty(0))
+    heights = columns[waves]
+    wave = np.float32(1)
+    slope = np.float32(0)
+    for lobe, even, odd, cosine, sine in zip(
+        LOBES, heights[::2], heights[1::2], cosines, sines, strict=False
+    ):
+        wave = wave + even * cosine + odd * sine
+        slope = slope + lobe * (odd * cosine - even * sine)
+    shape = ellipse * wave
     distance = np.sqrt(square + s * s)
-    z = (radius * shape - distance) / s
+    steep = np.sqrt(1 + (slope / wave) ** 2)  # the blur along ρ, where the outline is not across it
+    z = (radius * shape - distance) / (s * steep)
     covered, density = _blurred_step(z)
+    if len(waves):
+        halo, wide, wide_density = columns[HALO], *_blurred_step(z / np.float32(WIDER))
+        wide = covered - wide
+        covered = covered + halo * wide
+        density = (1 + halo) * density - halo / np.float32(WIDER) * wide_density
     shade = 1 + gx * x + gy * y
     reflectance = light - contrast * covered
 
     derivatives = np.empty((len(z), len(columns), z.shape[1]), dtype=np.float32)
-    by_edge = density * shade * (-contrast / s)
-    by_shape = radius * shape**3 / 2 * by_edge
+    by_edge = density * shade * (-contrast / (s * steep))
+    by_shape = radius * ellipse**2 * shape / 2 * by_edge
     turning = 2 * (a * twice_sine - b * twice_cosine) / square * by_shape  # of R(φ) by φ, over ρ²
+    turning = turning - radius * ellipse * slope / square * by_edge
     radial = by_edge / distance
     derivatives[:, X] = radial * dx - turning * dy
     derivatives[:, Y] = radial * dy + turning * dx
     derivatives[:, RADIUS] = shape * by_edge
     derivatives[:, STRETCH] = (twice_cosine - a / length) * by_shape
     derivatives[:, SLANT] = (twice_sine - b / length) * by_shape
-    derivatives[:, BLUR] = -(s / distance + z) * by_edge
+    derivatives[:, BLUR] = -(s / distance + z * steep) * by_edge
     derivatives[:, LIGHT] = shade
     derivatives[:, CONTRAST] = -shade * covered
-    for first in range(COUNT, len(columns), EDGE):
+    by_wave = radius * ellipse * by_edge if len(waves) else by_edge
+    for number, (cosine, sine) in enumerate(zip(cosines, sines, strict=True)):
+        derivatives[:, COUNT + 2 * number] = by_wave * cosine
+        derivatives[:, COUNT + 2 * number + 1] = by_wave * sine
+    if len(waves):
+        derivatives[:, HALO] = -shade * contrast * wide
+    for first in range(first_edge, len(columns), EDGE):
         angle, offset, lighter = columns[first : first + EDGE]
         cosine, sine = np.cos(angle), np.sin(angle)
         z = (cosine * x + sine * y - offset) / s
@@ -84,6 +122,59 @@ def disc_image(parameters: Array, x: Array, y: Array) -> tuple[Array, Array]:
     derivatives[:, SHADE_X] = reflectance * x
     derivatives[:, SHADE_Y] = reflectance * y
     return shade * reflectance, derivatives
+
+
+def irregular_columns(width: int) -> tuple[range, int]:
+    """Columns of an irregular outline among those of `width` parameters, and the first of straight edges."""
+    end = COUNT + OUTLINE if width >= COUNT + OUTLINE else COUNT
+    return range(COUNT, end), end
+
+
+def outline(parameters: FloatArray) -> FloatArray:
+    """Irregular outlines over their ellipses, 1 on the average, at `DIRECTIONS`, shape (n, 128)."""
+    turns = np.outer(LOBES, DIRECTIONS)
+    even, odd = _heights(parameters)
+    return np.asarray(1 + even @ np.cos(turns) + odd @ np.sin(turns))
+
+
+def _heights(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Heights of the cosines and sines of an irregular outline, each of shape (n, lobes)."""
+    return parameters[:, COUNT:HALO:2], parameters[:, COUNT + 1 : HALO : 2]
+
+
+def outline_centroid(parameters: FloatArray) -> FloatArray:
+    """Centroid of the darkness of irregular discs relative to their centres, shape (n, 2), pixels.
+
+    Blur keeps the centroid of the darkness, though not the outline. With t² = ρ² + s² and an edge of the
+    width w along ρ, which is above s where the outline is not across ρ, the darkness Φ((R - t) / w) has the
+    area R²/2 + (w² - s²)/2 and the moment R³/3 + R (w² - s²/2) per angle, but for terms of order s⁴/R.
+
+    Args:
+        parameters: As for `disc_image`, with an irregular outline, shape (n, m).
+    """
+    radius, a, b, blur = parameters[:, [RADIUS, STRETCH, SLANT, BLUR]].T[:, :, None]
+    even, odd = _heights(parameters)
+    turns, twice = np.outer(LOBES, DIRECTIONS), 2 * DIRECTIONS
+    wave = outline(parameters)
+    slope = (odd * LOBES) @ np.cos(turns) - (even * LOBES) @ np.sin(turns)
+    reach = radius * wave / np.sqrt(np.sqrt(1 + a**2 + b**2) - a * np.cos(twice) - b * np.sin(twice))
+    steep = (1 + (slope / wave) ** 2) * (1 - (WIDER**2 - 1) * parameters[:, [HALO]])  # by a halo's variance
+    moments = reach**3 / 3 + reach * blur**2 * (steep - 0.5)
+    areas = reach**2 / 2 + blur**2 * (steep - 1) / 2
+    arms = np.column_stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
+    return np.asarray(moments @ arms / areas.sum(axis=1, keepdims=True))
+
+
+def _multiples(dx: Array, dy: Array, square: Array) -> tuple[list[Array], list[Array]]:
+    """Cosines and sines of the multiples of a direction by the lobes, each of shape (n, p)."""
+    step = (dx + 1j * dy) / np.sqrt(square)
+    power = step ** (LOBES[0] - 1)
+    cosines, sines = [], []
+    for _ in LOBES:
+        power = power * step
+        cosines.append(power.real)
+        sines.append(power.imag)
+    return cosines, sines
 
 
 def _blurred_step(z: Array) -> tuple[Array, Array]:

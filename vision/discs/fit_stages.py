@@ -1,50 +1,32 @@
-"""Fit of discs of about one size: Hough votes, straight edges beside the discs, least squares."""
+"""Fit of discs of about one size: Hough votes, straight edges beside the discs, least squares, outlines."""
 
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
-from vision.discs.disc_image_model import (
-    BLUR,
-    CONTRAST,
-    COUNT,
-    EDGES,
-    LIGHT,
-    RADIUS,
-    SHADE_X,
-    SHADE_Y,
-    SLANT,
-    STRETCH,
-    Array,
-    X,
-    Y,
-)
+from vision.discs.disc_image_model import BLUR, CONTRAST, COUNT, LIGHT, RADIUS, Array, X, Y
+from vision.discs.fit_priors import prior_and_limits
 from vision.discs.hough import HoughVotes, sector, vote_for_centres
-from vision.discs.least_squares import DiscFit, DiscPrior, coherent_pixels, fit_disc_model, noise_correlation
+from vision.discs.irregular_outlines import better_outlines
+from vision.discs.least_squares import NEAR, DiscFit, coherent_pixels, correlated_variance, fit_disc_model
 from vision.discs.pixel_windows import PixelWindows, median_where
 from vision.discs.straight_edges import with_edges
 from vision.frames.frame import GreyImage
 
 MARGIN = 6
 """Pixels used on either side of the edge."""
-DEVIATIONS = {STRETCH: 0.05, SLANT: 0.05, BLUR: 5.0, SHADE_X: 0.05, SHADE_Y: 0.05}
-"""Prior standard deviations, about zero but for the blur. They matter where little of the edge is seen."""
 TYPICAL_BLUR = 1.0
 """Initial width of the edge, pixels."""
 LEAST_REACH = 4.0
 """Search distance around a guess, pixels; or a radius, if that is more."""
-STEPS = {X: 1.0, Y: 1.0, STRETCH: 0.3, SLANT: 0.3, BLUR: 0.7, SHADE_X: 0.02, SHADE_Y: 0.02}
-"""Longest steps of an iteration."""
-EDGE_DEVIATIONS, EDGE_STEPS, MISSING = (0.5, 1.5, 100.0), (0.3, 1.0, 1e3), 1e-3
-"""The same for straight edges: rad, pixels, grey levels; and the deviation of all of an absent edge."""
 REFINEMENTS = 3
 """Largest number of times that the pixels to use are chosen anew."""
-NEAR = 2.0
-"""Pixels from the edge within which the noise matters most."""
 LOOSE, STRICT = 0.25, 0.45
 """Votes that a trusted sector of the edge must have, over those of the better sectors: in the first fit, and
 in the second fit of discs whose first fit disagrees with the image."""
 CHANGED = 0.03
-"""Share of disagreeing pixels near the edge from which on a disc is fitted again."""
+"""Share of disagreeing pixels near the edge from which on a disc is fitted again, ..."""
+WRONG = 2.0
+"""... or variance of the noise that counts for the centre, over that of the fit."""
 
 
 def fit_discs_of_one_size(
@@ -65,18 +47,31 @@ def fit_discs_of_one_size(
     trusted = _trusted(window, votes, LOOSE)
     first, residuals = _first_fit(window, votes, trusted, tolerance)
     chosen = coherent_pixels(window, first, residuals)
-    near = np.abs(_distance_outside(window, first.parameters)) < NEAR
-    (again,) = np.nonzero(((chosen != trusted) & near).sum(axis=1) > CHANGED * near.sum(axis=1))
-    inflation = noise_correlation(window, first, residuals, chosen & trusted, near)
+    outside = window.outside(first.parameters)
+    near = np.abs(outside) < NEAR
+    changed = ((chosen != trusted) & near).sum(axis=1) > CHANGED * near.sum(axis=1)
+    chosen &= trusted
+    variance = correlated_variance(window, first, residuals, chosen, outside)
+    (again,) = np.nonzero(changed | (variance > WRONG) | ~first.settled)
     if len(again):
-        window, votes = window.at(again), votes.at(again)
-        second = _first_fit(window, votes, _trusted(window, votes, STRICT), tolerance)
-        either = _refined(window, first.at(again), residuals[again], votes.radii, tolerance)
-        other = _refined(window, *second, votes.radii, tolerance)
+        some, votes = window.at(again), votes.at(again)
+        second = _first_fit(some, votes, _trusted(some, votes, STRICT), tolerance)
+        either = _refined(some, first.at(again), residuals[again], votes.radii, tolerance)
+        other = _refined(some, *second, votes.radii, tolerance)
         first.put(again, either)
         (better,) = np.nonzero(_deviation(other) < _deviation(either))
         first.put(again[better], other.at(better))
-    first.covariances *= inflation
+        irregular, outlines, left = better_outlines(first.at(again), some, votes.radii, tolerance)
+        again = again[irregular]
+        if len(again):
+            first.put(again, outlines)
+            residuals[again], chosen[again] = left, window.within[again]
+            variance = correlated_variance(window, first, residuals, chosen, outside)
+    # The median over the discs leaves out the errors of the model that only some ellipses have.
+    usual = float(np.nanmedian(variance)) if np.isfinite(variance).any() else 1.0
+    inflation = np.full(len(variance), usual)
+    inflation[again] = np.fmax(variance[again], usual)
+    first.covariances *= inflation[:, None, None]
     return first
 
 
@@ -103,11 +98,11 @@ def _first_fit(
     start[:, [X, Y]] = votes.centres - window.origins
     start[:, RADIUS] = votes.radii
     start[:, BLUR] = TYPICAL_BLUR
-    outside = _distance_outside(window, start)
+    outside = window.outside(start)
     start[:, LIGHT] = median_where(window.values, trusted & (outside > 1) & (outside < 3))
     start[:, CONTRAST] = start[:, LIGHT] - median_where(window.values, trusted & (outside < -1))
     start, present = with_edges(window, start, trusted)
-    return fit_disc_model(window, start, *_prior_and_limits(start, present, votes.radii, tolerance), trusted)
+    return fit_disc_model(window, start, *prior_and_limits(start, present, votes.radii, tolerance), trusted)
 
 
 def _refined(
@@ -115,33 +110,10 @@ def _refined(
 ) -> DiscFit:
     """Fit again to the pixels that agree with the model, after a new search for straight edges."""
     chosen = coherent_pixels(window, fit, residuals)
-    ground = chosen | window.within & (_distance_outside(window, fit.parameters) > 0)
+    ground = chosen | window.within & (window.outside(fit.parameters) > 0)
     start, present = with_edges(window, fit.parameters[:, :COUNT], ground)
-    prior, limits = _prior_and_limits(start, present, radii, tolerance)
+    prior, limits = prior_and_limits(start, present, radii, tolerance)
     for _ in range(REFINEMENTS):
         fit, residuals = fit_disc_model(window, start, prior, limits, chosen)
         start, chosen = fit.parameters, coherent_pixels(window, fit, residuals)
     return fit
-
-
-def _distance_outside(window: PixelWindows, parameters: FloatArray) -> FloatArray:
-    """Distance of the pixels from the circles, positive outside, shape (n, p)."""
-    x, y, radius = parameters[:, [X, Y, RADIUS]].T[:, :, None]
-    return np.asarray(np.hypot(window.x - x, window.y - y) - radius, dtype=np.float64)
-
-
-def _prior_and_limits(
-    start: FloatArray, present: BoolArray, radii: FloatArray, tolerance: float
-) -> tuple[DiscPrior, FloatArray]:
-    """Prior of the parameters, and their longest steps; absent edges keep zero contrast."""
-    mean, deviations, limits = start.copy(), np.full(start.shape, 1e3), np.full(start.shape, 1e3)
-    mean[:, [STRETCH, SLANT, SHADE_X, SHADE_Y]] = 0
-    mean[:, RADIUS] = radii
-    deviations[:, list(DEVIATIONS)] = list(DEVIATIONS.values())
-    deviations[:, RADIUS] = np.minimum(tolerance * radii, 1e3)
-    edges = np.where(present[:, :, None], EDGE_DEVIATIONS, MISSING)
-    deviations[:, COUNT:] = edges.reshape(len(start), -1)
-    limits[:, list(STEPS)] = list(STEPS.values())
-    limits[:, RADIUS] = np.maximum(0.5, 0.2 * radii)
-    limits[:, COUNT:] = EDGE_STEPS * EDGES
-    return DiscPrior(mean, deviations**-2.0), limits

@@ -33,6 +33,8 @@ DARKEST, LIGHTEST, DOUBT = 5, 250, 10
 """Grey levels beyond which pixels may be clipped, and by how much noise can hide it."""
 NEIGHBOURS = 3
 """Side of the squares whose means show correlated noise, pixels."""
+NEAR, PROFILE = 2.0, 0.5
+"""Pixels from the edge within which the noise matters most, and width of the classes of that distance."""
 SHARPEST = 0.3
 """Width of an edge without any blur, pixels: that of the pixels themselves."""
 FAINT = 1e-5
@@ -84,7 +86,13 @@ class DiscFit:
 
 
 def fit_disc_model(
-    window: PixelWindows, start: FloatArray, prior: DiscPrior, limits: FloatArray, chosen: BoolArray
+    window: PixelWindows,
+    start: FloatArray,
+    prior: DiscPrior,
+    limits: FloatArray,
+    chosen: BoolArray,
+    *,
+    lenient: bool = False,
 ) -> tuple[DiscFit, Array]:
     """Fit each disc until its centre moves by less than `TOLERANCE`.
 
@@ -94,6 +102,7 @@ def fit_disc_model(
         prior: Of the parameters.
         limits: Longest step of every parameter, shape (n, m).
         chosen: Pixels that may be used, shape (n, p).
+        lenient: Whether the noise may be as large as the residuals suggest to the end.
 
     Returns:
         The fit and the residuals of the pixels, shape (n, p).
@@ -111,7 +120,7 @@ def fit_disc_model(
         free = ~clipped  # a clipped pixel has no residual
         residuals = (values - levels) * free
         most = np.maximum(2 * window.noise[active], MODEL_ERROR * np.abs(now[:, CONTRAST]))
-        if number < LENIENT:
+        if lenient or number < LENIENT:
             most = most + 1e3
         noise = np.minimum(SCALE * median_where(np.abs(residuals), allowed & free), most)
         noise = np.maximum(noise, QUANTISATION**0.5)
@@ -156,26 +165,46 @@ def coherent_pixels(window: PixelWindows, fitted: DiscFit, residuals: Array) -> 
     return np.asarray(window.within & ~near)
 
 
-def noise_correlation(
-    window: PixelWindows, fitted: DiscFit, residuals: Array, chosen: BoolArray, near: BoolArray
-) -> float:
-    """Variance of means over neighbours times their number, over the variance of the noise; at least 1.
+def misfit(window: PixelWindows, parameters: FloatArray, variance: FloatArray) -> FloatArray:
+    """Half the sum of the squared residuals over the variance of the noise, each at most `NONE`², shape (n,).
 
-    It is 1 for noise that differs from pixel to pixel. Cameras and codecs that smooth, or quantise in blocks,
-    leave correlated noise, and more of it near edges. The median over the discs leaves out the errors of the
-    model, which only some of them have.
+    Source: P. H. S. Torr, A. Zisserman, "MLESAC", Computer Vision and Image Understanding 78, 2000.
+    """
+    levels, _ = disc_image(parameters.astype(np.float32), window.x, window.y)
+    squares = (window.values - np.clip(levels, 0, 255)) ** 2 / np.maximum(variance, QUANTISATION)[:, None]
+    return np.asarray((np.minimum(squares, NONE**2) * window.within).sum(axis=1) / 2, dtype=np.float64)
+
+
+def correlated_variance(
+    window: PixelWindows, fitted: DiscFit, residuals: Array, chosen: BoolArray, outside: FloatArray
+) -> FloatArray:
+    """Variance of the noise near the edge that counts for the centres, over that of the fit, shape (n,).
+
+    It is the variance of means over neighbours times their number, which is that of single pixels if the
+    noise differs from pixel to pixel. Cameras and codecs that smooth, or quantise in blocks, leave correlated
+    noise, and more of it near edges. The means of the residuals at every distance from the edge are left out:
+    those of an edge that is sharpened, or has another profile, do not move a centre. Not a number where too
+    few pixels count.
 
     Args:
         window: The pixels.
         fitted: The fit to them.
         residuals: Of the pixels, shape (n, p).
         chosen: Pixels that belong to the model, shape (n, p).
-        near: Pixels near the edge, shape (n, p).
+        outside: Distance of the pixels from the edge, shape (n, p), pixels.
     """
+    chosen = chosen & (residuals != 0)  # clipped pixels
     inner = window.smoothed(chosen.astype(np.float32), NEIGHBOURS) > 1 - 1e-3
-    inner &= near
-    noise = fitted.variance[:, None] ** 0.5
-    means = window.smoothed(residuals / noise.astype(np.float32), NEIGHBOURS)
+    inner &= np.abs(outside) < NEAR
+    scaled = residuals / (fitted.variance[:, None] ** 0.5).astype(np.float32)
+    scaled = np.clip(scaled, -NONE, NONE)
+    bins, ends = np.floor(outside / PROFILE), int(NEAR / PROFILE)
+    for number in range(-ends - 2, ends + 2):
+        here = (bins == number) & chosen
+        mean = (scaled * here).sum(axis=1, keepdims=True) / np.maximum(here.sum(axis=1, keepdims=True), 1)
+        scaled = scaled - mean * here
+    means = window.smoothed(scaled, NEIGHBOURS)
     count = inner.sum(axis=1)
-    squares = NEIGHBOURS**2 * ((means * inner) ** 2).sum(axis=1)[count > 0] / count[count > 0]
-    return max(1.0, float(np.median(squares))) if squares.size else 1.0
+    squares, single = (((part * inner) ** 2).sum(axis=1) for part in (means, scaled))
+    known = np.maximum(NEIGHBOURS**2 * squares, single) / np.maximum(count - 2 * ends, 1)
+    return np.where(count > 2 * ends, known, np.nan)

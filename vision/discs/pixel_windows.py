@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
-from vision.discs.disc_image_model import Array
+from vision.discs.disc_image_model import RADIUS, Array, X, Y
 from vision.frames.frame import GreyImage
 
 QUANTISATION = 1 / 12
@@ -66,6 +66,11 @@ class PixelWindows:
         """The pixels of some discs."""
         by_disc = ("origins", "values", "within", "noise")
         return replace(self, **{name: getattr(self, name)[places] for name in by_disc})
+
+    def outside(self, parameters: FloatArray) -> FloatArray:
+        """Distance of the pixels from the circles of discs, positive outside, shape (n, p)."""
+        x, y, radius = parameters[:, [X, Y, RADIUS]].T[:, :, None]
+        return np.asarray(np.hypot(self.x - x, self.y - y) - radius, dtype=np.float64)
 
     def smoothed(self, values: Array, size: int) -> Array:
         """Means over `size`² pixels, with zero outside the ring, shape (n, p)."""

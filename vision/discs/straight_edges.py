@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from geometry.arrays import BoolArray, FloatArray
-from vision.discs.disc_image_model import BLUR, COUNT, EDGE, EDGES, RADIUS, Array, disc_image
+from vision.discs.disc_image_model import BLUR, EDGE, EDGES, RADIUS, Array, disc_image
 from vision.discs.pixel_windows import QUANTISATION, PixelWindows
 
 ANGLES, OFFSETS = 24, np.arange(0.75, 4.0, 0.5)
@@ -27,11 +27,11 @@ def with_edges(
 
     Args:
         window: The pixels around the discs.
-        parameters: Of the discs alone, near the solution, shape (n, 10).
+        parameters: Of the discs alone, near the solution, shape (n, m).
         trusted: Pixels that may be used, shape (n, p).
 
     Returns:
-        Parameters with two edges, shape (n, 16), and a mask of the edges that were found, shape (n, 2).
+        Parameters with two edges, shape (n, m + 6), and a mask of the edges that were found, shape (n, 2).
     """
     angles, gaps = (a.ravel() for a in np.meshgrid(np.arange(ANGLES) * 2 * np.pi / ANGLES, OFFSETS))
     offsets = gaps + np.median(parameters[:, RADIUS])
@@ -42,7 +42,9 @@ def with_edges(
     levels, known = disc_image(parameters.astype(np.float32), x, y)
     known *= used[:, None]
     residuals = (window.values[:, some] - np.clip(levels, 0, 255)) * used
-    inverse = np.linalg.inv(known @ known.transpose(0, 2, 1) + 1e-3 * np.eye(COUNT)).astype(np.float32)
+    inverse = np.linalg.inv(known @ known.transpose(0, 2, 1) + 1e-3 * np.eye(parameters.shape[1])).astype(
+        np.float32
+    )
 
     def orthogonal(values: Array) -> Array:
         """Part of values at the pixels that is orthogonal to the disc's derivatives, shape (n, p)."""

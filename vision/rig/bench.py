@@ -12,7 +12,7 @@ from geometry.finger.finger import Finger
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.triangle_mesh import TriangleMesh
-from vision.rig.shapes import Paint, Scene, Shape, circle, closed, rectangle
+from vision.rig.shapes import CORNERS, Paint, Scene, Shape, blot, circle, closed, rectangle
 from vision.tracking.workspace import Workspace
 
 PAINTS: dict[str, Paint] = {
@@ -32,6 +32,10 @@ CLAMP_SIZE = (7.0, 3.0)
 """Extent of the clamp behind the base, and beyond its ends, mm."""
 BLADE = ((0.0, 0.0), (0.033, 0.1), (0.033, 0.67))
 """Corners of the right half of the indenter, from the end of the contact, over the finger's height."""
+SPECK, SPECK_CORNERS = 0.1, 16
+"""Radius of a speck of mottle over that of its marker, and corners of the polygon that stands for it."""
+FADED = 0.5
+"""Colour of a speck, from the marker's to the finger's."""
 OVERLAP = 0.3
 """Overlap of the indenter with the finger, which hides it, so that no gap is visible, mm."""
 
@@ -45,12 +49,16 @@ class Bench:
         finger: The finger.
         workspace: Around it.
         paint: Of the markers, one of `PAINTS`.
+        irregular: Root mean square deviation of the markers' outlines from circles, over their radius.
+        mottle: Share of the markers' area that light specks cover.
     """
 
     mesh: TriangleMesh
     finger: Finger
     workspace: Workspace
     paint: str = "dark"
+    irregular: float = 0.0
+    mottle: float = 0.0
 
     def markers(self, displacement: FloatArray) -> FloatArray:
         """Centres of the markers, shape (m, 3), mm, for nodal displacements, shape (n, 2), mm."""
@@ -59,11 +67,17 @@ class Bench:
 
     def discs(self, displacement: FloatArray) -> list[Shape]:
         """The markers, deformed with the finger, for nodal displacements, shape (n, 2), mm."""
-        where = self._marker_borders
-        corners = _checked(displacement, self.mesh)[self.mesh.triangles[where.cells]]
-        moved = where.points + np.einsum("nc,ncx->nx", where.barycentric, corners)
-        borders = np.split(moved, len(self.mesh.marker_nodes))
+        borders = np.split(self._moved(self._marker_borders, displacement), len(self.mesh.marker_nodes))
         return [Shape(closed(border), PAINTS[self.paint], self.workspace.marker_plane) for border in borders]
+
+    def specks(self, displacement: FloatArray) -> list[Shape]:
+        """Light specks in the markers, deformed with the finger; none without mottle."""
+        if self._speck_borders is None:
+            return []
+        dark, light = np.array(PAINTS[self.paint]), np.array(FINGER)
+        blue, green, red = ((1 - FADED) * dark + FADED * light).tolist()
+        borders = self._moved(self._speck_borders, displacement).reshape(-1, SPECK_CORNERS, 2)
+        return [Shape(closed(border), (blue, green, red), self.workspace.marker_plane) for border in borders]
 
     def scene(self, displacement: FloatArray, occluders: Sequence[Shape] = ()) -> Scene:
         """The scene for nodal displacements, shape (n, 2), mm, with occluders in front."""
@@ -78,6 +92,7 @@ class Bench:
                 Shape(self._indenter(moved), INDENTER, plane),
                 Shape(moved[self._border], FINGER, plane),
                 *self.discs(displacement),
+                *self.specks(displacement),
                 *occluders,
             ],
         )
@@ -114,7 +129,32 @@ class Bench:
     @cached_property
     def _marker_borders(self) -> LocatedPoints:
         radius = self.finger.marker_radius
-        return self.mesh.locate(np.concatenate([circle(centre, radius) for centre in self.mesh.markers]))
+        borders = [
+            blot(centre, radius, self.irregular, np.random.default_rng(number))
+            for number, centre in enumerate(self.mesh.markers)
+        ]
+        return self.mesh.locate(np.concatenate(borders))
+
+    @cached_property
+    def _speck_borders(self) -> LocatedPoints | None:
+        """Borders of the specks, `SPECK_CORNERS` for each; none if there is no mottle."""
+        count = round(self.mottle / SPECK**2)
+        if not count:
+            return None
+        radius = self.finger.marker_radius
+        speck = SPECK * radius * circle((0.0, 0.0), 1.0)[:: CORNERS // SPECK_CORNERS]
+        places = []
+        for number, centre in enumerate(self.mesh.markers):
+            rng = np.random.default_rng((number, count))
+            away = (1 - 2 * SPECK) * radius * np.sqrt(rng.uniform(size=count))
+            angle = rng.uniform(0, 2 * np.pi, count)
+            places.append(centre + away[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+        return self.mesh.locate((np.concatenate(places)[:, None] + speck).reshape(-1, 2))
+
+    def _moved(self, where: LocatedPoints, displacement: FloatArray) -> FloatArray:
+        """Points of the body after nodal displacements, shape (n, 2), mm."""
+        corners = _checked(displacement, self.mesh)[self.mesh.triangles[where.cells]]
+        return np.asarray(where.points + np.einsum("nc,ncx->nx", where.barycentric, corners))
 
 
 def _frame(edges: FloatArray) -> FloatArray:

@@ -5,6 +5,7 @@ release 4.0, section 2), here normally distributed, as it is above some ten elec
 same variance everywhere. Units: pixels, grey levels of 0 to 255.
 """
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
@@ -14,6 +15,9 @@ from vision.frames.frame import Image
 
 LUMA = (0.114, 0.587, 0.299)
 """Weights of blue, green and red (ITU-R BT.601)."""
+
+GLARE = 0.04
+"""Standard deviation of a lamp's reflection, over the width of the image."""
 
 Light = NDArray[np.float32]
 """Light on the pixels, as shares of white, shape (height, width, 3)."""
@@ -36,17 +40,33 @@ class Exposure(CheckedModel):
     gradient_direction: float = bounded(
         30.0, -360, 360, "deg", "", "Direction in which the light grows, from right to down"
     )
+    glare: float = bounded(
+        0.0, 0, 1000, "grey levels", "", "Reflection of a lamp right of the middle, in its brightest pixel"
+    )
+    sharpen: float = bounded(
+        0.0, 0, 10, "", "", "Unsharp mask: growth of differences from a blur of 1 px, relative"
+    )
     monochrome: bool = Field(default=False, description="A camera without colours")
 
     def develop(self, light: Light, rng: np.random.Generator) -> Image:
         """The image from light on the pixels, shape (height, width, 3), or (height, width) if monochrome."""
         grey = self.white * self._lamp(light.shape[1::-1])[:, :, None] * light
+        if self.glare:
+            grey += self.glare * self._reflection(light.shape[1::-1])[:, :, None]
         if self.monochrome:
             grey = grey @ np.array(LUMA, dtype=np.float32)
         if self.noise or self.full_well:
             variance = self.noise**2 + (grey * (255 / self.full_well) if self.full_well else 0.0)
             grey += np.sqrt(variance, dtype=np.float32) * rng.standard_normal(grey.shape, dtype=np.float32)
+        if self.sharpen:
+            grey += self.sharpen * (grey - cv2.GaussianBlur(grey, (0, 0), 1.0))
         return np.asarray(np.clip(np.rint(grey), 0, 255), dtype=np.uint8)
+
+    def _reflection(self, size: tuple[int, ...]) -> Light:
+        """A lamp's reflection, 1 in its brightest pixel, shape (height, width)."""
+        width, height = size
+        x, y = (np.arange(width) - 0.6 * width) / GLARE, (np.arange(height) - 0.5 * height) / GLARE
+        return np.asarray(np.exp(-(x**2 + y[:, None] ** 2) / (2 * width**2)), np.float32)
 
     def _lamp(self, size: tuple[int, ...]) -> Light:
         """Illumination relative to that in the middle of the image, shape (height, width)."""

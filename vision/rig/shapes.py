@@ -14,6 +14,9 @@ CORNERS = 512
 CHORD = 1e-3
 """Largest distance of an edge's image, a polyline, from the curve that the lens makes of it, pixels."""
 
+LOBES = range(3, 10)
+"""Waves of an irregular outline around the circle; all have the same expected height."""
+
 Paint = tuple[float, float, float]
 """Reflectance in blue, green and red."""
 
@@ -58,6 +61,30 @@ def circle(centre: ArrayLike, radius: float) -> FloatArray:
     angle = 2 * np.pi * np.arange(CORNERS) / CORNERS
     reach = radius * np.sqrt(angle[1] / np.sin(angle[1]))
     return np.asarray(centre + reach * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+
+
+def blot(centre: ArrayLike, radius: float, irregular: float, rng: np.random.Generator) -> FloatArray:
+    """Corners of a disc with an irregular outline, shape (n, 2), mm, with the disc's centroid and area.
+
+    Args:
+        centre: Centroid, mm.
+        radius: Of the disc with the same area, mm.
+        irregular: Root mean square deviation of the outline from a circle, relative to the radius.
+        rng: Draws the outline.
+    """
+    if not irregular:
+        return circle(centre, radius)
+    angle = 2 * np.pi * np.arange(CORNERS) / CORNERS
+    waves = sum(
+        height * np.cos(lobe * angle + turn)
+        for lobe, height, turn in zip(
+            LOBES, rng.standard_normal(len(LOBES)), rng.uniform(0, 2 * np.pi, len(LOBES)), strict=True
+        )
+    )
+    reach = 1 + irregular * waves / np.sqrt(np.mean(waves**2))
+    corners = reach[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    edges = closed(corners)
+    return np.asarray(centre + radius * np.sqrt(np.pi / area(edges)) * (corners - centroid(edges)))
 
 
 def area(edges: FloatArray) -> float:

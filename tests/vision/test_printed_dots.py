@@ -1,0 +1,128 @@
+"""Printed dots are found, as accurately as their noise allows, though no ellipse fits them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.cache import finger_mesh
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from tests.vision import films
+from tests.vision.printed_dots import INK, PAPER, PrintedDots, darkness_centroids
+from vision.discs.disc_fit import FittedDiscs, fit_discs
+from vision.discs.disc_image_model import BLUR, CONTRAST, COUNT, HALO, LIGHT, OUTLINE, RADIUS, disc_image
+from vision.rig.bench import Bench
+from vision.rig.exposure import Exposure
+from vision.rig.shapes import area, blot, centroid, closed
+from vision.tracking.scene import FilmedScene
+from vision.tracking.tracker import track
+
+COUNTED = 48
+
+
+def exposure(**changes: float) -> Exposure:
+    return Exposure(**{"noise": 1.0, "gradient": 0.0, "monochrome": True, **changes})
+
+
+def measured(dots: PrintedDots) -> tuple[FittedDiscs, np.ndarray, np.ndarray]:
+    """Fitted dots from guesses half a pixel off, their errors, and those of plain centroids."""
+    picture = dots.picture()
+    rng = np.random.default_rng(1)
+    guesses = dots.centres + rng.normal(0, 0.4, dots.centres.shape)
+    radii = dots.radius * rng.uniform(0.9, 1.1, dots.count)
+    discs = fit_discs(picture, np.column_stack([guesses, radii]))
+    return discs, discs.centres - dots.centres, darkness_centroids(picture, dots) - dots.centres
+
+
+def rms(errors: np.ndarray) -> float:
+    """Root mean square distance."""
+    return float(np.sqrt((errors**2).sum(axis=1).mean()))
+
+
+@pytest.mark.parametrize("irregular", [0.03, 0.05, 0.08])
+@pytest.mark.parametrize("radius", [4.0, 7.3, 12.0])
+def test_irregular_dots_are_as_accurate_as_round_ones(radius, irregular):
+    discs, errors, _ = measured(PrintedDots(radius, irregular, count=COUNTED, seed=3))
+    assert discs.found.sum() >= COUNTED - 1  # one of 48 may be so uneven that it could be hidden in part
+    wrong = errors[discs.found]
+    blur = np.hypot(0.8, 12**-0.5)
+    bound = 2 / (235 * (PAPER - INK)) * np.sqrt(blur / (radius * np.sqrt(np.pi)))  # of a round one
+    assert rms(wrong) < 1.7 * bound  # 1.1 on the average; 8 % at 4 pixels: 1.5
+    deviations = np.sqrt(np.diagonal(discs.covariances[discs.found], axis1=1, axis2=2))
+    assert (np.abs(wrong) < 1.96 * deviations).mean() > 0.88  # 0.95 less four deviations of 96 coordinates
+
+
+@pytest.mark.parametrize("radius", [7.3, 12.0])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"mottle": 0.1},
+        {"mottle": 0.1, "irregular": 0.03},
+        {"exposure": exposure(sharpen=1.5)},
+        {"exposure": exposure(sharpen=1.5), "irregular": 0.03},
+        {"exposure": exposure(blur=2.0), "irregular": 0.03},  # out of focus
+        {"exposure": exposure(glare=60.0), "irregular": 0.03},
+        {"exposure": exposure(noise=6.0), "irregular": 0.05},
+    ],
+)
+def test_no_plain_centroid_is_more_accurate(radius, changes):
+    discs, errors, plain = measured(PrintedDots(radius, count=COUNTED, seed=3, **changes))
+    assert discs.found.sum() >= COUNTED - 2
+    assert rms(errors[discs.found]) < 1.2 * rms(plain)
+
+
+def test_a_square_is_no_printed_dot():
+    grey = np.full((60, 60), 180, dtype=np.uint8)
+    grey[20:40, 20:40] = 60
+    assert not fit_discs(grey, [(29.5, 29.5, 11.3)]).found.any()
+
+
+def test_derivatives_of_an_irregular_disc_are_differences():
+    rng = np.random.default_rng(0)
+    start = np.zeros((1, COUNT + OUTLINE))
+    start[:, [RADIUS, BLUR, LIGHT, CONTRAST, HALO]] = 8.0, 1.0, 180.0, 120.0, 0.4
+    start[:, COUNT:HALO] = 0.002 * rng.standard_normal(HALO - COUNT)
+    line = np.arange(-12, 13, dtype=np.float32)
+    x, y = (part.ravel() for part in np.meshgrid(line, line))
+    away = np.hypot(x, y) > 3  # the waves have no direction in the middle
+    _, derivatives = disc_image(start.astype(np.float32), x, y)
+    for column in (0, 1, RADIUS, COUNT, COUNT + 5, HALO - 1, HALO):
+        step = 1e-2 if column in (0, 1, RADIUS) else 1e-3
+        ends = []
+        for sign in (1, -1):
+            moved = start.copy()
+            moved[0, column] += sign * step
+            ends.append(disc_image(moved.astype(np.float32), x, y)[0][0])
+        slope = (ends[0] - ends[1]) / (2 * step)
+        scale = np.abs(slope[away]).max()
+        # Without the change of the edge's slope, of second order in the heights of the waves.
+        assert np.abs(derivatives[0, column] - slope)[away].max() < 0.06 * scale
+
+
+def test_the_outline_of_a_blot_has_the_discs_area_and_centroid():
+    edges = closed(blot((3.0, -2.0), 0.8, 0.05, np.random.default_rng(4)))
+    assert area(edges) == pytest.approx(np.pi * 0.8**2, rel=1e-9)
+    # The rescaled area's centroid, to the waves' second order: it is moved by the centroid before.
+    np.testing.assert_allclose(centroid(edges), (3.0, -2.0), atol=1e-9)
+    reach = np.linalg.norm(edges[:, 0] - (3.0, -2.0), axis=1) / 0.8
+    assert reach.std() == pytest.approx(0.05, rel=0.02)
+
+
+def test_specks_cover_the_share_that_the_bench_is_told(coarse_mesh):
+    bench = Bench(coarse_mesh, Design(), films.WORKSPACE, mottle=0.1)
+    rest = np.zeros_like(coarse_mesh.points)
+    shares = [area(speck.edges) / area(bench.discs(rest)[0].edges) for speck in bench.specks(rest)]
+    assert sum(shares) / len(coarse_mesh.markers) == pytest.approx(0.1, rel=0.05)
+    assert not replace(bench, mottle=0.0).specks(rest)
+
+
+def test_a_film_of_printed_dots_is_tracked_to_thousandths_of_a_millimetre():
+    recording = films.recording()
+    mesh = finger_mesh(films.DESIGN, settings=MeshSettings(size=1.0))
+    bench = Bench(mesh, films.DESIGN, films.WORKSPACE, irregular=0.05)
+    pictures, truths = zip(*replace(recording, bench=bench).frames(), strict=True)
+    scene = FilmedScene(films.DESIGN, films.WORKSPACE, films.CAMERA)
+    tracking = track(films.frames_of(pictures), scene)
+    before, after = tracking.rest_positions
+    assert np.abs(after - before - (truths[-1].discs - truths[0].discs)).max() < 0.003  # 0.02 pixels

@@ -1,0 +1,169 @@
+"""Fits of printed dots, whose outlines are not quite elliptical.
+
+Printing leaves an outline that deviates by some hundredths of the radius, and specks. The outline is fitted
+as an ellipse with waves, and the centre is the centroid of its area, which a deformation of the finger
+carries along. A partly hidden disc deviates as well: an outline must be that of a whole dot, and explain the
+pixels better than an ellipse that leaves out what disagrees.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from geometry.arrays import BoolArray, FloatArray, IntArray
+from vision.discs.disc_image_model import (
+    BLUR,
+    CONTRAST,
+    COUNT,
+    EDGE,
+    EDGES,
+    HALO,
+    LOBES,
+    OUTLINE,
+    RADIUS,
+    SLANT,
+    STRETCH,
+    Array,
+    X,
+    Y,
+    disc_image,
+    outline,
+    outline_centroid,
+)
+from vision.discs.fit_priors import MISSING, prior_and_limits
+from vision.discs.hough import SECTORS, sector
+from vision.discs.least_squares import NEAR, DiscFit, coherent_pixels, fit_disc_model, misfit
+from vision.discs.pixel_windows import PixelWindows
+from vision.discs.straight_edges import with_edges
+
+PENALTY = 40.0
+"""Gain in logarithmic likelihood from which on an irregular outline is preferred to an ellipse: half of the
+logarithm of some hundred pixels for each of its parameters (G. Schwarz, "Estimating the dimension of a
+model", Annals of Statistics 6, 1978)."""
+REFINEMENTS = 3
+"""Number of times that the pixels to use are chosen."""
+UNEVEN, EXCURSION = 0.12, 0.3
+"""Largest deviation of a printed dot's outline, root mean square and anywhere, over the radius."""
+ROUGH = 0.06
+"""Largest residual of a printed dot, root mean square over the contrast, without the noise."""
+LEAST_SEEN = 0.7
+"""Share of an irregular outline that must support its fit."""
+OTHER_SIZE = 5.0
+"""Deviation of a known radius, in standard deviations, from which on a disc counts as partly hidden."""
+FOREIGN, FEWEST = 0.3, 4
+"""Residual over the contrast from which on a pixel may belong to an occluder, and the fewest such pixels."""
+AGREED = 0.9
+"""Share of the pixels of a sector of the edge that agree with the model where nothing hides it."""
+
+
+def better_outlines(
+    ellipses: DiscFit, window: PixelWindows, radii: FloatArray, tolerance: float
+) -> tuple[IntArray, DiscFit, Array]:
+    """Fits of irregular outlines that explain the pixels better than ellipses do.
+
+    Returns:
+        The numbers of these discs, shape (k,), their fits, whose centres are the centroids of the outlines,
+        and the residuals of their pixels, shape (k, p).
+    """
+    outlines, residuals = _outlined(window, ellipses, radii, tolerance)
+    noise = np.maximum(np.minimum(ellipses.variance, outlines.variance), window.noise**2)
+    gain = misfit(window, ellipses.parameters, noise) - misfit(window, outlines.parameters, noise)
+    seen = ~_hidden_in_one_place(window, ellipses)
+    good = _whole(window, outlines, radii, tolerance) & (gain > PENALTY) & seen
+    doubtful = ~(ellipses.settled & (ellipses.seen > LEAST_SEEN)) & ~good & seen
+    (tried,) = np.nonzero(doubtful)
+    if len(tried):
+        lenient, left = _outlined(window.at(tried), ellipses.at(tried), radii[tried], tolerance, lenient=True)
+        outlines.put(tried, lenient)
+        residuals[tried] = left
+        good[tried] = _whole(window.at(tried), lenient, radii[tried], tolerance)
+    (better,) = np.nonzero(good)
+    outlines, residuals = outlines.at(better), residuals[better]
+    parameters = outlines.parameters.copy()
+    parameters[:, [X, Y]] += outline_centroid(parameters)
+    columns = [*range(COUNT), *range(COUNT + OUTLINE, parameters.shape[1])]
+    return better, replace(outlines, parameters=parameters[:, columns]), residuals
+
+
+def _whole(window: PixelWindows, outlines: DiscFit, radii: FloatArray, tolerance: float) -> BoolArray:
+    """Whether outlines may be those of printed dots that nothing hides, shape (n,)."""
+    parameters = outlines.parameters
+    radius, contrast = parameters[:, RADIUS], np.abs(parameters[:, CONTRAST])
+    waves = outline(parameters)
+    uneven = (waves.std(axis=1) < UNEVEN) & (np.abs(waves - 1).max(axis=1) < EXCURSION)
+    size = np.abs(radius / radii - 1) < OTHER_SIZE * tolerance
+    rough = np.sqrt(np.maximum(outlines.variance - window.noise**2, 0))
+    edges = parameters[:, COUNT + OUTLINE :].reshape(-1, EDGES, EDGE)
+    angle, offset = edges[:, :, 0], edges[:, :, 1]
+    gap = offset - np.cos(angle) * parameters[:, [X]] - np.sin(angle) * parameters[:, [Y]] - radius[:, None]
+    crossed = (gap < -UNEVEN * radius[:, None]) & (np.abs(edges[:, :, 2]) > ROUGH * contrast[:, None])
+    likely = uneven & size & (rough < ROUGH * contrast) & ~crossed.any(axis=1)
+    return np.asarray(outlines.settled & (outlines.seen > LEAST_SEEN) & likely)
+
+
+def _hidden_in_one_place(window: PixelWindows, ellipses: DiscFit) -> BoolArray:
+    """Whether ellipses disagree with the image in one arc, at most half of the edge, and nowhere else."""
+    levels, _ = disc_image(ellipses.parameters.astype(np.float32), window.x, window.y)
+    residuals = window.values - np.clip(levels, 0, 255)
+    agree = coherent_pixels(window, ellipses, residuals)
+    near = (np.abs(window.outside(ellipses.parameters)) < NEAR) & window.within
+    x, y = ellipses.parameters[:, [X, Y]].T[:, :, None]
+    sectors = sector(window.x - x, window.y - y)
+    good = np.stack(
+        [
+            (agree & (here := near & (sectors == number))).sum(axis=1) >= 0.9 * here.sum(axis=1)
+            for number in range(SECTORS)
+        ],
+        axis=1,
+    )
+    changes = (good != np.roll(good, 1, axis=1)).sum(axis=1)
+    foreign = near & (np.abs(residuals) > FOREIGN * np.abs(ellipses.parameters[:, [CONTRAST]]))
+    hidden = (changes == 2) & (good.sum(axis=1) >= SECTORS / 2) & (foreign.sum(axis=1) >= FEWEST)
+    return np.asarray(hidden)
+
+
+def _outlined(
+    window: PixelWindows, ellipses: DiscFit, radii: FloatArray, tolerance: float, *, lenient: bool = False
+) -> tuple[DiscFit, Array]:
+    """Fit discs with irregular outlines, from the moments of what circles leave of the darkness.
+
+    A lenient fit takes the residuals for noise, however large they are, so that it leaves out few pixels.
+    """
+    start = ellipses.parameters[:, :COUNT].copy()
+    start[:, [STRETCH, SLANT]] = 0
+    start[:, RADIUS] = radii
+    start = np.concatenate([start, np.zeros((len(start), OUTLINE))], axis=1)
+    for _ in range(2):
+        start = _by_moments(window, start)
+    start, present = with_edges(window, start, window.within)
+    prior, limits = prior_and_limits(start, present, radii, tolerance)
+    plain = prior._replace(precision=prior.precision.copy())
+    plain.precision[:, HALO] = MISSING**-2.0  # a halo is sought after the outline
+    chosen = window.within
+    for number in range(1 if lenient else REFINEMENTS):
+        fit, residuals = fit_disc_model(
+            window, start, prior if number else plain, limits, chosen, lenient=lenient
+        )
+        start, chosen = fit.parameters, coherent_pixels(window, fit, residuals)
+    return fit, residuals
+
+
+def _by_moments(window: PixelWindows, start: FloatArray) -> FloatArray:
+    """Improve discs by the moments of the residuals near their edges, which are shares of darkness astray."""
+    levels, _ = disc_image(start.astype(np.float32), window.x, window.y)
+    x, y, radius = start[:, [X, Y, RADIUS]].T
+    near = np.abs(window.outside(start)) < EXCURSION * radius[:, None] + 2 * start[:, [BLUR]]
+    contrast = np.copysign(np.maximum(np.abs(start[:, CONTRAST]), 1.0), start[:, CONTRAST])
+    astray = np.clip((levels - window.values) / contrast[:, None], -1, 1) * (near & window.within)
+    angle = np.arctan2(window.y - y[:, None], window.x - x[:, None])
+    even, odd = (
+        np.stack([(astray * wave(lobe * angle)).sum(axis=1) for lobe in range(LOBES.stop)], axis=1)
+        for wave in (np.cos, np.sin)
+    )
+    moved = start.copy()
+    moved[:, X] += even[:, 1] / (np.pi * radius)
+    moved[:, Y] += odd[:, 1] / (np.pi * radius)
+    moved[:, RADIUS] += even[:, 0] / (2 * np.pi * radius)
+    moved[:, COUNT:HALO:2] += even[:, LOBES] / (np.pi * radius[:, None] ** 2)
+    moved[:, COUNT + 1 : HALO : 2] += odd[:, LOBES] / (np.pi * radius[:, None] ** 2)
+    return moved
