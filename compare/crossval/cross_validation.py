@@ -171,10 +171,12 @@ def _results(
 
     cases = list(dict.fromkeys(case for case, _ in tasks))
     named = {", ".join(filter(None, [label, case.said_among(cases)])): (case, label) for case, label in tasks}
+    order = {label: -place for place, (_, label) in enumerate(tasks)}
     answers = dict(
         in_stages(
             run_folds,
-            {name: tasks[key] for name, key in named.items()},
+            # Slow solvers are usually named last: started first, they leave no processor idle at the end.
+            {name: tasks[named[name]] for name in sorted(named, key=lambda name: order[named[name][1]])},
             processes=study.processes,
             stages=stages,
             kind="solvers",

@@ -10,6 +10,7 @@ over the drawn body, with the motion W of `WallMotion`; u = 0 holds at the base.
 from typing import Protocol
 
 from geometry.arrays import FloatArray
+from geometry.mesh.point_location import LocatedPoints
 from solvers.elasticity import Lame
 from solvers.solution import DisplacementField
 
@@ -70,4 +71,8 @@ class Body(Protocol):
 
     def field(self, state: FloatArray) -> DisplacementField:
         """The displacement as a function of the drawn position."""
+        ...
+
+    def gradients(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
+        """Displacement gradients (s, n, 2, 2) of states (s, *shape) at points of the drawn body."""
         ...

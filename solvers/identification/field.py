@@ -8,6 +8,7 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.wall_motion import WallMotion
+from solvers.identification.body import Body
 from solvers.identification.clamp import RigidMotion
 from solvers.identification.response import Response, ResponseModel
 from solvers.problem import Problem
@@ -28,14 +29,21 @@ class Snapshot:
         walls: The motions by the walls' thickness.
         changes: Of the walls' thickness, shape (k,), mm.
         clamp: Motion of the clamp.
-        drawn: The displacement without that, as a function of the drawn position.
+        body: The discretised finger.
+        state: Its displacement without the clamp's.
     """
 
     problem: Problem
     walls: WallMotion
     changes: FloatArray
     clamp: RigidMotion
-    drawn: DisplacementField
+    body: Body
+    state: FloatArray
+
+    @property
+    def drawn(self) -> DisplacementField:
+        """The displacement without the clamp's, as a function of the drawn position."""
+        return self.body.field(self.state)
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement of the material drawn at points, shape (n, 2), mm."""
@@ -51,13 +59,30 @@ class Snapshot:
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Gradient of the displacement by the place before the load, shape (n, 2, 2)."""
-        walls = np.einsum("k,ktij->tij", self.changes, self.walls.gradients())[location.cells]
-        gradient = self.drawn.gradient(location) @ np.linalg.inv(np.eye(2) + walls)
-        return np.asarray(self.clamp.rotation @ (np.eye(2) + gradient) - np.eye(2))
+        return self._gradient(self.drawn.gradient(location), location)
 
     def von_mises(self, location: LocatedPoints) -> FloatArray:
         """Von Mises stress, shape (n,), MPa."""
-        return State.from_gradient(self.gradient(location), self.problem).von_mises
+        (found,) = von_mises_stresses([self], location)
+        return found
+
+    def _gradient(self, drawn: FloatArray, location: LocatedPoints) -> FloatArray:
+        """`gradient` from that by the drawn position without the clamp, both of shape (n, 2, 2)."""
+        walls = np.einsum("k,ktij->tij", self.changes, self.walls.gradients())[location.cells]
+        gradient = drawn @ np.linalg.inv(np.eye(2) + walls)
+        return np.asarray(self.clamp.rotation @ (np.eye(2) + gradient) - np.eye(2))
+
+
+def von_mises_stresses(snapshots: Sequence[Snapshot], location: LocatedPoints) -> list[FloatArray]:
+    """Von Mises stress of snapshots of one body, each of shape (n,), MPa.
+
+    The functions of the body at the points, most of the work for a network, are evaluated once for all.
+    """
+    drawn = snapshots[0].body.gradients(np.array([each.state for each in snapshots]), location)
+    return [
+        State.from_gradient(each._gradient(gradient, location), each.problem).von_mises
+        for each, gradient in zip(snapshots, drawn, strict=True)
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,19 +132,21 @@ class IdentifiedField:
 
     def standard_deviation(self, location: LocatedPoints) -> FloatArray:
         """Standard deviation of `displacement_in_space`, shape (n, 2), mm."""
-        return self._deviation(lambda snapshot: snapshot.displacement_in_space(location))
+        return self._deviation(lambda them: [each.displacement_in_space(location) for each in them])
 
     def von_mises_deviation(self, location: LocatedPoints) -> FloatArray:
         """Standard deviation of the von Mises stress, shape (n,), MPa."""
-        return self._deviation(lambda snapshot: snapshot.von_mises(location))
+        return self._deviation(lambda them: von_mises_stresses(them, location))
 
-    def _deviation(self, quantity: Callable[[Snapshot], FloatArray]) -> FloatArray:
-        best = quantity(self.members[0].found)
-        variance = np.zeros_like(best)
+    def _deviation(self, quantities: Callable[[Sequence[Snapshot]], list[FloatArray]]) -> FloatArray:
+        """Of a quantity that is asked for snapshots of one body at a time."""
+        best: FloatArray | None = None
+        variance: FloatArray | float = 0.0
         for member in self.members:
-            own = quantity(member.found)
-            spread = sum(((quantity(step) - own) / STEP) ** 2 for step in member.steps)
+            own, *steps = quantities([member.found, *member.steps])
+            best = own if best is None else best
+            spread = sum(((step - own) / STEP) ** 2 for step in steps)
             if member.coarser is not None:
-                spread += (quantity(member.coarser) - own) ** 2
-            variance += member.probability * (spread + (own - best) ** 2)
+                spread += (quantities([member.coarser])[0] - own) ** 2
+            variance = variance + member.probability * (spread + (own - best) ** 2)
         return np.sqrt(variance)

@@ -181,7 +181,7 @@ class ResponseModel:
             if not np.isfinite(size) or size > max(2 * before, 1.0):
                 return None
             if size < tolerance:
-                return self._with_slopes(values, hypothesis, state + step, linearised, traction)
+                return self._with_slopes(values, hypothesis, (state + step, state), linearised, traction)
             before = size
         return None
 
@@ -189,11 +189,17 @@ class ResponseModel:
         self,
         values: FloatArray,
         hypothesis: Hypothesis,
-        state: FloatArray,
+        states: tuple[FloatArray, FloatArray],
         linearised: Linearised,
         traction: FloatArray,
     ) -> Response:
+        """The response at the first of two states or, where that turns a point inside out, at the second."""
         unknowns, names = self.unknowns, self.unknowns.names
+        state, before = states
+        of_walls, of_moduli = self.body.force_slopes(state, hypothesis.lame, hypothesis.changes)
+        if not (np.isfinite(of_walls).all() and np.isfinite(of_moduli).all()):
+            state = before
+            of_walls, of_moduli = self.body.force_slopes(state, hypothesis.lame, hypothesis.changes)
         force_slopes = unknowns.force_slopes()
         right = np.tensordot(force_slopes, traction[0], axes=1)
         right += np.tensordot(unknowns.couple_slopes(values), traction[1], axes=1)
@@ -201,7 +207,6 @@ class ResponseModel:
             if name in names:
                 right[names.index(name)] += np.tensordot(hypothesis.force, moved, axes=1)
                 right[names.index(name)] += np.tensordot(hypothesis.couple, turned, axes=1)
-        of_walls, of_moduli = self.body.force_slopes(state, hypothesis.lame, hypothesis.changes)
         for name, slope in zip(unknowns.motion.names, of_walls, strict=True):
             if name in names:
                 right[names.index(name)] -= slope

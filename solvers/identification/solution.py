@@ -91,7 +91,8 @@ def _snapshot(fit: Fit, problem: Problem, error: FloatArray | float = 0.0) -> Sn
         walls=unknowns.motion,
         changes=there.hypothesis.changes,
         clamp=there.motion,
-        drawn=model.body.field(there.state),
+        body=model.body,
+        state=there.state,
     )
 
 

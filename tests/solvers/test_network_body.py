@@ -176,3 +176,19 @@ def test_a_state_is_carried_to_a_finer_network(mesh, motion, state):
     expected = coarse.field(state).displacement(there)
     error = np.linalg.norm(fine.field(found).displacement(there) - expected)
     assert error < 0.02 * np.linalg.norm(expected)
+
+
+def test_gradients_of_several_states_are_those_of_their_fields(body, mesh, state):
+    """As the body gives them together, to rounding."""
+    location = mesh.locate(mesh.markers)
+    states = np.array([state, -0.5 * state])
+    for one, found in zip(states, body.gradients(states, location), strict=True):
+        np.testing.assert_allclose(found, body.field(one).gradient(location), atol=1e-12)
+
+
+def test_what_is_no_number_is_not_solved_by_zero(body, mesh, state, motion):
+    """With the factors of another tangent at hand, by conjugate gradients."""
+    linearised = body.linearised(state, LAME, np.zeros(len(motion.names)))
+    right = np.stack([pressed(body, mesh), np.full(body.shape, np.nan)])
+    linearised.solve(right[:1])
+    assert np.isnan(linearised.solve(right)).any()

@@ -114,6 +114,13 @@ class FemBody:
         """The finite-element field."""
         return LagrangeField(self.space, state)
 
+    def gradients(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
+        """Displacement gradients (s, n, 2, 2) of states (s, N, 2) at points of the drawn body."""
+        columns = np.concatenate(list(states), axis=1)
+        by_axis = [each @ columns for each in self.space.shape_gradients(location)]
+        found: FloatArray = np.stack(by_axis, axis=-1).reshape(len(location.points), len(states), 2, 2)
+        return found.swapaxes(0, 1)
+
     def _admissible(self, state: FloatArray, changes: FloatArray) -> bool:
         """Whether neither the walls' motion nor the deformation turns a quadrature point inside out."""
         walls = np.einsum("k,kqij->qij", changes, self._wall_gradients)

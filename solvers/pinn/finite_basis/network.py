@@ -118,6 +118,22 @@ class FiniteBasis:
             found.index_add_(1, near, torch.einsum("knx,xnwu->kwu", of_patch, along))
         return np.asarray(found)
 
+    def evaluated(
+        self, points: FloatArray, quantity: Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
+    ) -> FloatArray:
+        """A quantity at points (n, 2), mm, computed for a few points and the windows near them at a time.
+
+        Args:
+            points: Shape (n, 2), mm.
+            quantity: Its values, shape (m, ...), at some of the points, (m, 2), from the windows `near` (w,).
+        """
+        patches = self.patches(points)
+        parts = imap_in_threads(lambda patch: quantity(*patch[1:]).numpy(), patches)
+        found: FloatArray = np.concatenate(list(parts))
+        result: FloatArray = np.empty_like(found)
+        result[np.concatenate([patch for patch, *_ in patches])] = found
+        return result
+
     def _unwindowed(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
         """One and the neurons without window and constraint, (n, m + 1, w)."""
         function = points.new_ones(len(points), self.per_window, len(near))
@@ -143,11 +159,11 @@ class FiniteBasisField:
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""
-        return self._evaluate(location.points, self.displacement_of_patch)
+        return self.basis.evaluated(location.points, self.displacement_of_patch)
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
-        return self._evaluate(location.points, self.gradient_of_patch)
+        return self.basis.evaluated(location.points, self.gradient_of_patch)
 
     def displacement_of_patch(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
         """Displacement at a few points (n, 2), mm, that only the windows `near` (w,) reach: (n, 2), mm."""
@@ -164,13 +180,3 @@ class FiniteBasisField:
     def gradient_of_patch(self, points: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
         """Its gradient at a few points (n, 2), mm, that only the windows `near` (w,) reach: (n, 2, 2)."""
         return torch.einsum("xnwu,wiu->nix", self.basis.gradients(points, near), self.output[near])
-
-    def _evaluate(
-        self, points: FloatArray, field: Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
-    ) -> FloatArray:
-        patches = self.basis.patches(points)
-        parts = imap_in_threads(lambda patch: field(*patch[1:]).numpy(), patches)
-        found: FloatArray = np.concatenate(list(parts))
-        result: FloatArray = np.empty_like(found)
-        result[np.concatenate([patch for patch, *_ in patches])] = found
-        return result

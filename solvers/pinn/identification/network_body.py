@@ -16,6 +16,7 @@ import numpy as np
 import torch
 
 from geometry.arrays import FloatArray
+from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.wall_motion import WallMotion
 from solvers.elasticity import Lame, deformation_jacobian
 from solvers.pinn.finite_basis.constrained_network import REGULARISATION
@@ -181,6 +182,16 @@ class NetworkBody:
         """The displacement as a function of the drawn position."""
         return FiniteBasisField(self._energy.basis, torch.from_numpy(state))
 
+    def gradients(self, states: FloatArray, location: LocatedPoints) -> FloatArray:
+        """Displacement gradients (s, n, 2, 2) of states (s, *shape) at points of the drawn body."""
+        outputs = torch.from_numpy(states)
+        return self._energy.basis.evaluated(
+            location.points,
+            lambda points, near: torch.einsum(
+                "xnwu,swiu->nsix", self._energy.basis.gradients(points, near), outputs[:, near]
+            ),
+        ).swapaxes(0, 1)
+
     def projected(
         self, other: "NetworkBody", state: FloatArray, lame: Lame, changes: FloatArray
     ) -> FloatArray:
@@ -250,7 +261,7 @@ class NetworkBody:
         direction = steepest = _solved(factors, residual)
         work = first = _dot(residual, steepest)
         for iteration in range(1, MOST_ITERATIONS + 1):
-            if not (work.abs() > TOLERANCE**2 * first.abs()).any():
+            if (work.abs() <= TOLERANCE**2 * first.abs()).all():
                 return found
             product = self._product(factors, tangent, direction)
             stiffness = _dot(direction, product)
