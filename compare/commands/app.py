@@ -6,10 +6,12 @@ from compare.commands.calibrate import calibrate
 from compare.commands.compare import compare
 from compare.commands.crossval import crossval
 from compare.commands.design import design
+from compare.commands.fiducials import fiducials
 from compare.commands.gridsearch import gridsearch
 from compare.commands.launch import EXIT_CODES
 from compare.commands.mesh import mesh
 from compare.commands.pick import pick
+from compare.commands.quiet import quietable
 from compare.commands.rig import rig
 from compare.commands.solve import solve
 from compare.commands.solvers import solvers
@@ -24,5 +26,10 @@ pinnray = App(
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
-for command in (compare, design, mesh, solve, gridsearch, crossval, solvers, calibrate, pick, rig, track):
-    pinnray.command(command, help_epilogue=EXIT_CODES, version=program_version)
+COMMANDS = (
+    *(compare, design, mesh, solve, gridsearch, crossval, solvers),
+    *(fiducials, calibrate, pick, rig, track),
+)
+for command in COMMANDS:
+    pinnray.command(quietable(command), help_epilogue=EXIT_CODES, version=program_version)
+pinnray.register_install_completion_command(help="Install the completion of commands and options in a shell.")

@@ -53,8 +53,10 @@ class FingerOptions:
             the same name beside it may say where it is clamped, touched and marked.
         clamp: Clamped part of the drawing's outline, such as "[[0, 0], [0, -30]]" or a label of the file;
             default: the file's own, else proposed.
-        contact: Point of the outline where the indenter touches, such as "[35, 0]", or a label.
-        markers: Centres of the markers, such as "[[10, -1], [20, -1]]", their number, or a label.
+        contact: Point of the outline where the indenter touches, such as "[35, 0]", or a label; default as
+            for --clamp.
+        markers: Centres of the markers, such as "[[10, -1], [20, -1]]", their number, or a label; default as
+            for --clamp.
         set: Change a parameter, such as rib_count=6 or N=6, or a line on the drawing, such as depth=12; may
             be repeated.
         mesh_size: Element size in walls and ribs, mm, default 0.25; up to 4 times larger in the tip.
@@ -205,7 +207,7 @@ class SolverOptions:
             exactly. paper: the paper's training, 60,000 epochs, many hours on a CPU; also takes the paper's
             uniform mesh of 91,006 nodes and --load point, unless --mesh-size or --load is given.
         solver_set: Change a setting of a solver, such as pinn-std.neurons=7; may be repeated.
-        device: cpu or cuda, for the solvers that can use either.
+        device: cpu (default) or cuda, for the solvers that can use either.
         seed: Seed of the random numbers.
     """
 

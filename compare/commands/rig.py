@@ -23,7 +23,7 @@ def rig(
     motion: Annotated[Motion, Parameter(name="*", group=MOTION)] = Motion(),
     scene: SceneOptions = SceneOptions(),
     boards: BoardOptions = BoardOptions(),
-    codec: Annotated[str, Parameter(group=OUTPUT)] = "ffv1",
+    codec: Annotated[str, Parameter(group=OUTPUT, show_default=True)] = "ffv1",
     out: OutputPath = Path("out/rig"),
 ) -> int:
     """Render a film of a pressed finger, and write the true marker positions beside it.

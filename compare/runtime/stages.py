@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from datetime import UTC, datetime
 from types import TracebackType
 from typing import Any, Self
@@ -22,6 +23,18 @@ from compare.runtime.provenance import machine
 from solvers.solver import Progress as Report
 from solvers.solver import UnsupportedProblemError
 
+_silenced: ContextVar[bool] = ContextVar("silenced", default=False)
+
+
+@contextmanager
+def silenced() -> Iterator[None]:
+    """Let `Stages` that are made in the block show nothing."""
+    token = _silenced.set(True)
+    try:
+        yield
+    finally:
+        _silenced.reset(token)
+
 
 class Stages:
     """Shows a line with progress and time left for every stage.
@@ -34,7 +47,7 @@ class Stages:
     """
 
     def __init__(self, console: Console | None = None, *, quiet: bool = False) -> None:
-        console = console or Console(stderr=True)
+        console, quiet = console or Console(stderr=True), quiet or _silenced.get()
         self.started = datetime.now(UTC)
         self.seconds: dict[str, float] = {}
         self._console = console

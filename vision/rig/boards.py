@@ -38,6 +38,23 @@ def board_scene(board: Board) -> Scene:
     return Scene(WALL, [Shape(rectangle(low, high), PAPER), ink])
 
 
+def board_svg(board: Board) -> str:
+    """SVG of a board in true scale, with its white rim; one user unit is 1 mm, y down as in a photograph."""
+    low, high = -(1 + MARGIN) * board.square, (np.array([board.columns, board.rows]) + MARGIN) * board.square
+    width, height = high - low
+    ink = board_scene(board).shapes[-1].edges.reshape(-1, 4, 2, 2)[:, :, 0]
+    path = " ".join(f"M {' L '.join(f'{x:.6g},{y:.6g}' for x, y in corners)} Z" for corners in ink.tolist())
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+<svg xmlns="http://www.w3.org/2000/svg" width="{width:.6g}mm" height="{height:.6g}mm"
+     viewBox="{low:.6g} {low:.6g} {width:.6g} {height:.6g}">
+  <title>board of {board}, squares of {board.square:g} mm</title>
+  <path id="ink" fill="black" d="{path}"/>
+  <text x="{low + width / 2:.6g}" y="{high[1] - 0.2 * board.square:.6g}" font-size="{0.15 * board.square:.6g}"
+        text-anchor="middle" fill="#606060">print at 100 %: a square is {board.square:g} mm</text>
+</svg>
+"""
+
+
 def board_poses(board: Board, camera: Camera, count: int, *, seed: int = 0) -> list[Pose]:
     """Random poses that show the whole board, tilted in all directions; together they cover the image.
 
