@@ -72,6 +72,17 @@ def test_no_plain_centroid_is_more_accurate(radius, changes):
     assert rms(errors[discs.found]) < 1.2 * rms(plain)
 
 
+@pytest.mark.parametrize("irregular", [0.0, 0.03])
+@pytest.mark.parametrize("radius", [3.0, 4.0])
+def test_small_dots_in_sharpened_pictures_are_found(radius, irregular):
+    """The halo drew the fit of an ellipse away, to contrasts of the other sign."""
+    discs, errors, plain = measured(
+        PrintedDots(radius, irregular, count=COUNTED, exposure=exposure(sharpen=1.5), seed=5)
+    )
+    assert discs.found.all()
+    assert rms(errors) < rms(plain)
+
+
 def test_a_square_is_no_printed_dot():
     grey = np.full((60, 60), 180, dtype=np.uint8)
     grey[20:40, 20:40] = 60

@@ -56,12 +56,15 @@ def fit_discs_of_one_size(
     if len(again):
         some, votes = window.at(again), votes.at(again)
         second = _first_fit(some, votes, _trusted(some, votes, STRICT), tolerance)
-        either = _refined(some, first.at(again), residuals[again], votes.radii, tolerance)
+        initial = first.at(again)
+        either = _refined(some, initial, residuals[again], votes.radii, tolerance)
         other = _refined(some, *second, votes.radii, tolerance)
         first.put(again, either)
         (better,) = np.nonzero(_deviation(other) < _deviation(either))
         first.put(again[better], other.at(better))
-        irregular, outlines, left = better_outlines(first.at(again), some, votes.radii, tolerance)
+        irregular, outlines, left = better_outlines(
+            first.at(again), initial.parameters, some, votes.radii, tolerance
+        )
         again = again[irregular]
         if len(again):
             first.put(again, outlines)

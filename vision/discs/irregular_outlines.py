@@ -50,6 +50,10 @@ LEAST_SEEN = 0.7
 """Share of an irregular outline that must support its fit."""
 OTHER_SIZE = 5.0
 """Deviation of a known radius, in standard deviations, from which on a disc counts as partly hidden."""
+OTHER_CONTRAST = 0.5
+"""Relative change of a contrast between two fits from which on they are of different shapes."""
+STRONGEST = 512.0
+"""Contrast that no picture shows, grey levels: twice the range, for light that is clipped."""
 FOREIGN, FEWEST = 0.3, 4
 """Residual over the contrast from which on a pixel may belong to an occluder, and the fewest such pixels."""
 AGREED = 0.9
@@ -57,23 +61,32 @@ AGREED = 0.9
 
 
 def better_outlines(
-    ellipses: DiscFit, window: PixelWindows, radii: FloatArray, tolerance: float
+    ellipses: DiscFit, start: FloatArray, window: PixelWindows, radii: FloatArray, tolerance: float
 ) -> tuple[IntArray, DiscFit, Array]:
     """Fits of irregular outlines that explain the pixels better than ellipses do.
+
+    Args:
+        ellipses: Fits of ellipses, which leave out what disagrees.
+        start: Parameters of fits that leave out less, shape (n, m).
+        window: The pixels around the discs.
+        radii: Known or guessed, shape (n,), pixels.
+        tolerance: Relative standard deviation of the radii; infinite if they are guessed.
 
     Returns:
         The numbers of these discs, shape (k,), their fits, whose centres are the centroids of the outlines,
         and the residuals of their pixels, shape (k, p).
     """
-    outlines, residuals = _outlined(window, ellipses, radii, tolerance)
+    outlines, residuals = _outlined(window, start, radii, tolerance)
     noise = np.maximum(np.minimum(ellipses.variance, outlines.variance), window.noise**2)
     gain = misfit(window, ellipses.parameters, noise) - misfit(window, outlines.parameters, noise)
-    seen = ~_hidden_in_one_place(window, ellipses)
+    change = np.abs(ellipses.parameters[:, CONTRAST] - start[:, CONTRAST])
+    likely = change < OTHER_CONTRAST * np.abs(start[:, CONTRAST])
+    seen = ~(_hidden_in_one_place(window, ellipses) & ellipses.settled & likely)
     good = _whole(window, outlines, radii, tolerance) & (gain > PENALTY) & seen
     doubtful = ~(ellipses.settled & (ellipses.seen > LEAST_SEEN)) & ~good & seen
     (tried,) = np.nonzero(doubtful)
     if len(tried):
-        lenient, left = _outlined(window.at(tried), ellipses.at(tried), radii[tried], tolerance, lenient=True)
+        lenient, left = _outlined(window.at(tried), start[tried], radii[tried], tolerance, lenient=True)
         outlines.put(tried, lenient)
         residuals[tried] = left
         good[tried] = _whole(window.at(tried), lenient, radii[tried], tolerance)
@@ -97,7 +110,7 @@ def _whole(window: PixelWindows, outlines: DiscFit, radii: FloatArray, tolerance
     angle, offset = edges[:, :, 0], edges[:, :, 1]
     gap = offset - np.cos(angle) * parameters[:, [X]] - np.sin(angle) * parameters[:, [Y]] - radius[:, None]
     crossed = (gap < -UNEVEN * radius[:, None]) & (np.abs(edges[:, :, 2]) > ROUGH * contrast[:, None])
-    likely = uneven & size & (rough < ROUGH * contrast) & ~crossed.any(axis=1)
+    likely = uneven & size & (rough < ROUGH * contrast) & (contrast < STRONGEST) & ~crossed.any(axis=1)
     return np.asarray(outlines.settled & (outlines.seen > LEAST_SEEN) & likely)
 
 
@@ -123,13 +136,13 @@ def _hidden_in_one_place(window: PixelWindows, ellipses: DiscFit) -> BoolArray:
 
 
 def _outlined(
-    window: PixelWindows, ellipses: DiscFit, radii: FloatArray, tolerance: float, *, lenient: bool = False
+    window: PixelWindows, start: FloatArray, radii: FloatArray, tolerance: float, *, lenient: bool = False
 ) -> tuple[DiscFit, Array]:
     """Fit discs with irregular outlines, from the moments of what circles leave of the darkness.
 
     A lenient fit takes the residuals for noise, however large they are, so that it leaves out few pixels.
     """
-    start = ellipses.parameters[:, :COUNT].copy()
+    start = start[:, :COUNT].copy()
     start[:, [STRETCH, SLANT]] = 0
     start[:, RADIUS] = radii
     start = np.concatenate([start, np.zeros((len(start), OUTLINE))], axis=1)
