@@ -1,5 +1,6 @@
 """The main job: mesh, measure, solve, evaluate; then draw and write."""
 
+from collections import deque
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -48,6 +49,7 @@ from solvers.solver import (
     solved,
     with_law,
 )
+from vision.frames.frame import Frame
 from vision.measurements import read_measurements, write_measurements
 
 TRACK = "track"
@@ -105,16 +107,26 @@ def run(job: Job, stages: Stages) -> Comparison:
         tracked: Sequence[str] = ()
         measurements = job.measurements
         if isinstance(measurements, Film):
-            from compare.camera.track_film import track_figures, track_film  # needs OpenCV
+            # They need OpenCV.
+            from compare.camera.predicted_frame import predicted_frame
+            from compare.camera.track_film import track_figures, track_film
 
+            last: deque[Frame] = deque(maxlen=1)
             with stages.stage("track") as progress:
                 (folder / TRACK).mkdir()
                 tracking, measurements = track_film(
-                    measurements, job.design, folder / TRACK, progress, video=False
+                    measurements,
+                    job.design,
+                    folder / TRACK,
+                    progress,
+                    video=False,
+                    watch=lambda frame, _: last.append(frame),
                 )
             photographs, tracked = track_figures(folder / TRACK, tracking), tracking.warnings
         comparison = compute(replace(job, measurements=measurements), stages, folder)
         comparison = replace(comparison, warnings=[*tracked, *comparison.warnings])
+        if photographs:
+            photographs.append(predicted_frame(folder / TRACK, comparison, tracking, last[0].image))
         write(folder, job, comparison, stages, photographs=photographs)
     return comparison
 

@@ -187,7 +187,9 @@ def test_compare_goes_from_pixels_to_the_table(film, tmp_path, capsys):
     report = (out / "report.html").read_text(encoding="utf-8")
     assert "The finger pressed, as the virtual camera saw it" in report
     assert "Measured by" not in report
-    assert {path.name for path in (out / "track").iterdir()} >= {"initial.png", "final.png"}
+    assert "Predicted finger in the film" in report
+    pictures = {"initial.png", "final.png", "predicted.png"}
+    assert {path.name for path in (out / "track").iterdir()} >= pictures
     run = json.loads((out / "run.json").read_text(encoding="utf-8"))
     assert len(run["film"]["video_sha256"]) == 64
     assert "track/final.png" in run["files_sha256"]

@@ -93,6 +93,7 @@ def track(
         final=final,
         method=scene.method,
         simulated=frames.simulated or scene.workspace.simulated,
+        final_plane=motion.planes[1] if motion and motion.planes else None,
     )
     if motion is None:
         return _oriented_by_motion(scene, tracking)

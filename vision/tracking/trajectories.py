@@ -29,6 +29,7 @@ class Tracking:
         method: How the markers were detected.
         warnings: For the user, one line each.
         simulated: True if the film or its workspace is of the virtual rig.
+        final_plane: The plane at the end, if the camera has moved; None if it is `plane`.
     """
 
     design: Finger
@@ -43,6 +44,7 @@ class Tracking:
     method: DetectionMethod
     warnings: tuple[str, ...] = ()
     simulated: bool = False
+    final_plane: MarkerPlane | None = None
 
     @property
     def visible(self) -> BoolArray:
