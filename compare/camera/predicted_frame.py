@@ -13,6 +13,7 @@ from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import marker_errors
 from compare.figures import Picture
+from compare.figures.gallery import each_of
 from compare.figures.style import axes_at, heading, legend_below_heading
 from geometry.arrays import FloatArray
 from geometry.figure import INK, MEASURED, WIDTH, Figure, figure
@@ -46,6 +47,11 @@ def predicted_frame(folder: Path, comparison: Comparison, tracking: Tracking, im
         f"The {camera} last frame, and in it (yellow) the outline that each solver predicts, mapped through "
         "the plane that the film gave: the paper’s Fig. 5. Circles: the markers as they were tracked. "
         "Crosses: the solver’s.",
+        each_of(
+            "Mean of |Δu| + |Δv| at the markers, mm",
+            comparison.evaluations,
+            lambda each: marker_errors(each, comparison.observations).mae_sum,
+        ),
     )
 
 

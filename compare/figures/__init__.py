@@ -19,11 +19,13 @@ class Picture:
         path: The PNG file.
         title: Its subject, in a few words.
         caption: What a reader must know to read it, in sentences.
+        alt: What it shows, in numbers, for those who cannot see it.
     """
 
     path: Path
     title: str
     caption: str
+    alt: str
 
 
 def draw_all(
@@ -42,6 +44,6 @@ def draw_all(
         progress(number / len(DRAWINGS), what)
         if (drawing := draw(comparison)) is not None:
             path = drawing.figure.save(folder / f"{name}.png")
-            pictures.append(Picture(path, drawing.title, drawing.caption))
+            pictures.append(Picture(path, drawing.title, drawing.caption, drawing.alt))
     progress(1.0, "pictures drawn")
     return pictures

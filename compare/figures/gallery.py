@@ -1,12 +1,15 @@
 """The pictures of a comparison by name, in the order of the report, with their captions."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import NamedTuple
 
+import numpy as np
+
 from compare.evaluation.comparison import Comparison
-from compare.evaluation.evaluation import IN_SAMPLE
+from compare.evaluation.evaluation import IN_SAMPLE, Evaluation
 from compare.evaluation.force_displacement import force_curves
+from compare.evaluation.metrics import held_out_errors
 from compare.figures.colours import PERCENT
 from compare.figures.design_drawing import draw_design
 from compare.figures.energy_chart import draw_energy
@@ -27,11 +30,13 @@ class Drawing(NamedTuple):
         figure: The picture.
         title: Its subject, in a few words.
         caption: What a reader must know to read it, in sentences.
+        alt: What it shows, in numbers, for those who cannot see it.
     """
 
     figure: Figure
     title: str
     caption: str
+    alt: str
 
 
 def overlay(comparison: Comparison) -> Drawing:
@@ -44,6 +49,11 @@ def overlay(comparison: Comparison) -> Drawing:
         f"The deformed body of each solver, coloured by displacement magnitude on one scale; the "
         f"displacement is not exaggerated. Circles: {observations.label} marker positions. Crosses: "
         f"the solver’s. Grey: the undeformed body.{cylinder} {_given(comparison)}{_simulated(comparison)}",
+        each_of(
+            "Largest displacement, mm",
+            comparison.evaluations,
+            lambda each: float(np.hypot(*each.node_displacement.T).max()),
+        ),
     )
 
 
@@ -64,6 +74,11 @@ def marker_errors(comparison: Comparison) -> Drawing:
         f"are numbered as in the drawing of the design. Full bars: at a marker that the solver was "
         f"not given, predicted from all others if it was given those. Hollow bars: training errors."
         f"{unseen} {_given(comparison)}{_simulated(comparison)}",
+        each_of(
+            "Mean of |Δu| + |Δv| at markers that were not given, mm",
+            comparison.evaluations,
+            lambda each: getattr(held_out_errors(each, observations), "mae_sum", float("nan")),
+        ),
     )
 
 
@@ -90,6 +105,11 @@ def field(comparison: Comparison, quantity: Quantity) -> Drawing:
         f"mean. One scale for all: {PERCENT:g} % of the area of {reference} lie "
         f"within it, the peaks at the corners take the end colours. At a sharp corner the field has no "
         f"bound: the largest mean of a triangle, printed beside, grows with refinement.{beside}{mixed}",
+        each_of(
+            f"Mean size over the body, {quantity.unit}",
+            comparison.shown_fields,
+            lambda each: float(np.average(np.abs(quantity.values(each)), weights=each.weights)),
+        ),
     )
 
 
@@ -105,6 +125,11 @@ def force_displacement(comparison: Comparison) -> Drawing | None:
         f"{depth:g} mm (right). A point is an equilibrium that a solver found as the load "
         f"grew; a linear solver’s line (dashed) is straight by its law. Solvers that were given the "
         f"markers are left out: the markers pull too.",
+        each_of(
+            f"Force at the end of the travel, N per mm, after {curves[0].travel[-1]:g} mm",
+            [curve.evaluation for curve in curves],
+            lambda each: float(np.linalg.norm(each.reaction)),
+        ),
     )
 
 
@@ -120,6 +145,11 @@ def excess(comparison: Comparison) -> Drawing | None:
         f"over each triangle, on one logarithmic scale of {DECADES} powers of ten. {PERCENT:g} % of the "
         f"area of every solver lie below its end. A solver without a certificate, or without any excess, "
         f"is left out.",
+        each_of(
+            "Energy above the least, %",
+            [each for each in comparison.evaluations if each.certificate and each.certificate.has_excess],
+            lambda each: 100 * (each.certificate.rel_excess if each.certificate else 0.0),
+        ),
     )
 
 
@@ -134,6 +164,7 @@ def energy(comparison: Comparison) -> Drawing | None:
         f"from that of {comparison.reference.label} (dashed line). A solver that solves directly "
         f"keeps no record. One that was given the markers pays energy for them: assimilation never "
         f"lowers the least energy. Over factors of the markers’ weight: the energy that they add.",
+        each_of("Energy at the end, N mm per mm", comparison.evaluations, lambda each: each.energy),
     )
 
 
@@ -149,6 +180,11 @@ def losses(comparison: Comparison) -> Drawing | None:
         f"cannot lower it at convergence. A network with the lower L_PDE at some epoch has come farther "
         f"in its training or misses its conditions by more, which L_BC tells; it is no more accurate for "
         f"it. A curve that still falls is a training that has not ended. {_given(comparison)}",
+        each_of(
+            "Last L_PDE",
+            [each for each in comparison.evaluations if "PDE" in each.history],
+            lambda each: float(each.history["PDE"][-1]),
+        ),
     )
 
 
@@ -161,6 +197,7 @@ def design(comparison: Comparison) -> Drawing:
         "Design",
         f"The finger “{finger.name}”, to scale, with its dimensions{symbols}, the clamped base (hatched), "
         f"the contact (orange) and the numbered markers.",
+        "; ".join(f"{name} {value}" for name, symbol, value in finger.facts() if symbol or not symbols),
     )
 
 
@@ -173,6 +210,7 @@ def mesh(comparison: Comparison) -> Drawing:
         f"The mesh that every solver shares: {numbers['size']}, edges from {numbers['edges']}. Quality is "
         f"twice the ratio of the inscribed to the circumscribed radius (1 for an equilateral triangle): "
         f"{numbers['quality']}. Orange: the contact. Dots: the markers.",
+        f"{numbers['size']}, edges from {numbers['edges']}",
     )
 
 
@@ -202,6 +240,11 @@ def draw(comparison: Comparison, name: str) -> Drawing:
     if (drawing := make(comparison)) is None:
         raise UserError(f"{name}: no solver of this comparison has data for the {what}")
     return drawing
+
+
+def each_of(quantity: str, evaluations: Iterable[Evaluation], value: Callable[[Evaluation], float]) -> str:
+    """A quantity of every evaluation in words."""
+    return f"{quantity}: {', '.join(f'{each.label} {value(each):.3g}' for each in evaluations)}."
 
 
 def _given(comparison: Comparison) -> str:

@@ -1,5 +1,6 @@
 """Pictures as a whole: their files, their colours, and type that neither overlaps nor leaves the page."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from io import BytesIO
@@ -58,6 +59,15 @@ def drawings(comparison: Comparison) -> dict[str, Drawing]:
 @pytest.fixture(scope="module")
 def pages(drawings: dict[str, Drawing]) -> dict[str, Page]:
     return {name: page_of(drawing.figure) for name, drawing in drawings.items()}
+
+
+def test_every_picture_is_told_in_numbers_to_those_who_cannot_see_it(drawings, comparison) -> None:
+    for name, drawing in drawings.items():
+        assert re.search(r"\d", drawing.alt), name
+        if name in ("overlay", "marker_errors", "energy", *FIELDS):
+            assert all(f"{each.label} " in drawing.alt for each in comparison.evaluations), name
+    largest = np.hypot(*comparison.evaluations[0].node_displacement.T).max()
+    assert drawings["overlay"].alt.startswith(f"Largest displacement, mm: fem {largest:.3g}, ")
 
 
 FIELDS = tuple(quantity.name for quantity in QUANTITIES)

@@ -61,7 +61,11 @@ def content(fem: Evaluation, pinn: Evaluation, compared: Callable[..., Compariso
 @pytest.fixture
 def pictures(tmp_path: Path) -> list[Picture]:
     Image.new("RGB", (4, 3), "red").save(tmp_path / "overlay.png")
-    return [Picture(tmp_path / "overlay.png", "Deformed finger", "Two fingers.")]
+    return [
+        Picture(
+            tmp_path / "overlay.png", "Deformed finger", "Two fingers.", "Largest displacement, mm: fem 9."
+        )
+    ]
 
 
 def render(
@@ -125,7 +129,7 @@ def test_a_network_is_called_what_it_is(content: Comparison, preset: str, words:
 def test_every_picture_has_its_caption(content: Comparison, pictures: list[Picture]) -> None:
     page = Page(render(content, pictures))
     assert "Figure 1. Deformed finger. Two fingers." in page.text
-    assert page.values("alt") == ["Deformed finger"]
+    assert page.values("alt") == ["Deformed finger. Largest displacement, mm: fem 9."]
 
 
 def test_simulated_displacements_are_warned_of(content: Comparison) -> None:
@@ -156,7 +160,7 @@ def test_errors_on_assimilated_markers_are_training_errors(content: Comparison, 
     page = Page(render(replace(content, evaluations=[fem, replace(pinn, in_sample=given)])))
     assert ("in-sample" in page.values("id")) is given
     numbers, none = [r" \d\.\d{3}" * 4, " –" * 4]
-    assert re.search(f"pinn-std{numbers}{none}" if given else f"pinn-std{none}{numbers}", page.text)
+    assert re.search(f"pinn-std{none}{numbers}" if given else f"pinn-std{numbers}{none}", page.text)
     told = replace(pinn, in_sample=given, left_out=pinn.marker_displacement if given else None)
     page = Page(render(replace(content, evaluations=[fem, told])))
     assert bool(re.search(f"pinn-std{numbers}{numbers}", page.text)) is given
@@ -165,7 +169,7 @@ def test_errors_on_assimilated_markers_are_training_errors(content: Comparison, 
 
 def test_the_papers_own_numbers_are_said_to_be_of_another_experiment(content: Comparison) -> None:
     text = Page(render(content)).text
-    assert "paper: PINN-Ray std – – – – 1.37 0.48 – 1.452" in text
+    assert "paper: PINN-Ray std 1.37 0.48 – 1.452 – – – –" in text
     assert "of its own experiment" in text
 
 
@@ -293,3 +297,32 @@ def test_small_words() -> None:
 )
 def test_numbers_have_three_digits(value: float, expected: str) -> None:
     assert number(value, 3) == expected
+
+
+def test_every_heading_says_what_it_heads(content) -> None:
+    html = render(content)
+    heads = re.findall(r"<thead>.*?</thead>", html, flags=re.DOTALL)
+    cells = [cell for head in heads for cell in re.findall(r"<th\b[^>]*>", head)]
+    assert len(cells) > 20
+    assert [cell for cell in cells if 'scope="col' not in cell] == []
+
+
+def test_held_out_errors_come_first_as_a_phone_shows_no_more(content) -> None:
+    html = render(content)
+    table = html[html.index('<table id="table-one">') :]
+    table = table[: table.index("</table>")]
+    assert table.index("at markers that it was not given") < table.index("at markers that it was given")
+    body = table[table.index("<tbody>") :]
+    cells = re.findall(r"<td>(.*?)</td>", body[: body.index("</tr>")])
+    assert "–" not in cells[:4]
+    assert cells[4:] == 4 * ["–"]  # fem is given no markers
+
+
+def test_a_reader_who_wants_it_dark_has_it_dark_but_not_on_paper(content) -> None:
+    html = render(content)
+    style = html[html.index("<style>") : html.index("</style>")]
+    assert "@media screen and (prefers-color-scheme: dark)" in style
+    named = set(re.findall(r"var\((--[a-z-]+)\)", style))
+    light, dark = (set(re.findall(r"(--[a-z-]+):", part)) for part in re.findall(r":root \{(.*?)\}", style))
+    assert named == light == dark
+    assert re.findall(r"(?<!-)color: #", style) == []  # every colour of type can change
