@@ -1,7 +1,7 @@
 """Tracks a film and writes the displacements, the trajectories and pictures to check them by eye."""
 
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +17,11 @@ from compare.figures import Picture
 from compare.runtime.tables import Cell, terminal_table, write_csv
 from geometry.arrays import FloatArray
 from geometry.atomic import write_json
+from geometry.errors import UserError
 from geometry.finger.finger import Finger
 from geometry.observations import Observations
 from solvers.solver import Progress
-from vision.frames.frame import RIG_MARK, Frame, Image
+from vision.frames.frame import RIG_MARK, Frame, Frames, Image
 from vision.frames.pictures import write_picture
 from vision.frames.sources import open_frames
 from vision.frames.video import video_writer
@@ -38,6 +39,7 @@ def track_film(
     report: Progress,
     *,
     video: bool = True,
+    record: Path | None = None,
     watch: Callable[[Frame, FrameDetections], None] | None = None,
 ) -> tuple[Tracking, Observations]:
     """Track a film and write `observations.csv`, `tracks.csv`, `track.json` and pictures into a folder.
@@ -48,6 +50,8 @@ def track_film(
         folder: An existing folder.
         report: Called with the fraction done and a short text.
         video: Whether to write the annotated video too.
+        record: Video of all frames that were seen, also of a film that is refused in the end; for a camera or
+            a pipe, which show them once.
         watch: Called with every frame and its detections.
 
     Raises:
@@ -56,6 +60,8 @@ def track_film(
     scene = film.scene(design)
     kept: dict[str, tuple[Image, FrameDetections]] = {}
     with open_frames(film.source) as frames, ExitStack() as stack:
+        if record is not None:
+            stack.enter_context(recorded(frames, record))
         write = None
         if video:
             write = stack.enter_context(
@@ -91,6 +97,35 @@ def track_film(
     write_csv(folder / "tracks.csv", track_rows(tracking))
     write_json(folder / "track.json", track_summary(tracking, observations) | film.provenance())
     return tracking, observations
+
+
+@contextmanager
+def recorded(frames: Frames, path: Path) -> Iterator[None]:
+    """Write the frames that are iterated in the block into a video, also if the block raises a `UserError`.
+
+    Raises:
+        UserError: If the frames are those of a file, which exists, or the video cannot be written.
+    """
+    if frames.count is not None:
+        raise UserError(f"{frames.name} is a file; --record keeps the frames of a camera or a pipe")
+    refusal: UserError | None = None
+    with video_writer(path, frames.size, frames.rate, comment=RIG_MARK if frames.simulated else "") as write:
+        seen = 0
+
+        def keep(image: Image) -> None:
+            nonlocal seen
+            write(image)
+            seen += 1
+
+        frames.keep(keep)
+        try:
+            yield
+        except UserError as error:
+            if not seen:
+                raise
+            refusal = error
+    if refusal is not None:
+        raise refusal
 
 
 def _sentence(film: Film, tracking: Tracking) -> str:

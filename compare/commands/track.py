@@ -20,6 +20,7 @@ def track(
     force: ForceOptions = ForceOptions(),
     *,
     live: Flag = False,
+    record: Path | None = None,
     without_video: OutputFlag = False,
     out: OutputPath = Path("out/track"),
 ) -> int:
@@ -36,6 +37,7 @@ def track(
     Args:
         source: Video, folder or glob of pictures, number of a camera, or - for a pipe.
         live: Show the displacements of every frame as it comes.
+        record: Keep the frames of a camera or a pipe as a video: .mkv (lossless), .avi or .mp4.
         without_video: Write no annotated video.
         out: Output folder.
     """
@@ -73,7 +75,7 @@ def track(
             watch = displacement_line(line, following) if line else None
             report = stack.enter_context(stages.stage("track"))
             tracking, observations = track_film(
-                film, design, folder, report, video=not without_video, watch=watch
+                film, design, folder, report, video=not without_video, record=record, watch=watch
             )
             if following is not None:
                 forces, pace = following.finish(), following.live_rate

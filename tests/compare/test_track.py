@@ -68,6 +68,25 @@ def test_the_same_frames_come_through_a_pipe(film, tracked, tmp_path, monkeypatc
     np.testing.assert_allclose(found, before, rtol=0, atol=0.001)  # live looks at fewer fiducials
 
 
+def test_a_pipe_is_recorded_even_if_its_film_is_refused(film, tmp_path, monkeypatch, capsys):
+    with open_frames(film / "video.mkv") as frames:
+        rest = [frame.image for frame in frames][:3]
+    (tmp_path / "pictures").write_bytes(b"".join(cv2.imencode(".png", image)[1].tobytes() for image in rest))
+    options = ["--camera", str(film / "camera.json"), "--record", str(tmp_path / "run.mkv")]
+    with (tmp_path / "pictures").open() as pipe:
+        monkeypatch.setattr("sys.stdin", pipe)
+        assert main(["track", "-", *options, "--out", str(tmp_path / "out")]) == BAD_INPUT
+    assert "the film must end while it is pressed" in capsys.readouterr().err
+    with open_frames(tmp_path / "run.mkv") as kept:
+        np.testing.assert_array_equal([frame.image for frame in kept], rest)
+
+
+def test_a_file_is_not_recorded_again(film, tmp_path, capsys):
+    assert main(["track", str(film / "video.mkv"), "--record", str(tmp_path / "run.mkv")]) == BAD_INPUT
+    assert "--record keeps the frames of a camera or a pipe" in capsys.readouterr().err
+    assert not (tmp_path / "run.mkv").exists()
+
+
 def test_the_table_shows_deviations_below_a_micrometre(film, tmp_path, capsys):
     """They are 0.0002 to 0.0005 mm in this film."""
     options = ["--camera", str(film / "camera.json"), "--without-video"]

@@ -52,11 +52,11 @@ def images(*, design: Design = DESIGN, hidden: int | None = None, tilt: float = 
     return tuple(image for image, _ in recording(design=design, hidden=hidden, tilt=tilt).frames())
 
 
-def frames_of(pictures: Sequence[Image]) -> Frames:
-    """Images as a film."""
+def frames_of(pictures: Sequence[Image], *, live: bool = False) -> Frames:
+    """Images as a film, or as those of a camera."""
 
     def shots() -> Iterator[CapturedImage]:
         for number, picture in enumerate(pictures):
             yield CapturedImage(np.ascontiguousarray(picture), number / 30, f"picture {number}")
 
-    return Frames("the film", shots(), rate=30.0, count=len(pictures))
+    return Frames("the film", shots(), rate=30.0, count=None if live else len(pictures))

@@ -48,6 +48,23 @@ def test_a_tilted_camera_measures_a_jump_of_10_mm_to_hundredths_of_a_millimetre(
     assert (tracking.rest.initial, tracking.rest.final) == (range(3), range(3, 6))
 
 
+@pytest.mark.parametrize(
+    ("rest", "held"),
+    [
+        (3, 3),  # no fifth frame among those held
+        (7, 8),  # one of eight, fewer than a fifth
+        (6, 4),  # none again; the one before belongs to the rest at the start
+    ],
+)
+def test_a_live_film_is_tracked_wherever_it_is_cut(tracking, rest, held):
+    pictures = images()
+    film = [*(pictures[number % 3] for number in range(rest)), *(pictures[3 + n % 3] for n in range(held))]
+    live = track(frames_of(film, live=True), FilmedScene(DESIGN, WORKSPACE, CAMERA))
+    # Fewer of the same pictures show the fiducials: their noise is 0.01 pixels, a thousandth of a millimetre.
+    found, whole = (each.observations("rig").displacements for each in (live, tracking))
+    np.testing.assert_allclose(found, whole, rtol=0, atol=0.002)
+
+
 def test_the_standard_deviations_are_of_the_size_of_the_errors(tracking):
     observations = tracking.observations("rig")
     errors = (observations.displacements - TRUE) / observations.standard_deviations

@@ -37,7 +37,8 @@ def annotated(
     for trajectory in trajectories:
         known = trajectory[np.isfinite(trajectory).all(axis=1)]
         cv2.polylines(canvas, [_fixed(known)], False, TRAJECTORY, width, cv2.LINE_AA, SHIFT)
-    for discs, colour in ((detections.fiducials, FIXED), (detections.markers, SEEN)):
+    fiducials = [] if detections.fiducials is None else [(detections.fiducials, FIXED)]
+    for discs, colour in (*fiducials, (detections.markers, SEEN)):
         for centre, radius in zip(discs.centres, discs.radii, strict=True):
             if np.isfinite(radius):
                 whole = round(float(radius) * 2**SHIFT)

@@ -35,14 +35,15 @@ class FrameDetections(NamedTuple):
 
     Attributes:
         markers: Every marker, shape (m, ...); nan where it was not detected.
-        fiducials: Every fiducial of the workspace, shape (f, ...); nan where it was not detected.
+        fiducials: Every fiducial of the workspace, shape (f, ...); nan where it was not detected. None in a
+            frame in which they were not searched for.
         places: Positions of the markers, predicted ones if not detected, shape (m, 2), mm, by the plane of
             the first frame.
         guesses: The same in the image, pixels.
     """
 
     markers: DiscDetections
-    fiducials: DiscDetections
+    fiducials: DiscDetections | None
     places: FloatArray
     guesses: FloatArray
 
@@ -158,13 +159,13 @@ class FrameTracker:
         places = self._places
         return FrameDetections(markers, self._detected_fiducials(image), places, self.plane.pixels(places))
 
-    def _detected_fiducials(self, image: Image) -> DiscDetections:
-        """The fiducials, shape (f, ...), nan where one was not detected or not searched for."""
+    def _detected_fiducials(self, image: Image) -> DiscDetections | None:
+        """The fiducials, shape (f, ...), nan where one was not detected; None if it is not their turn."""
         self._number += 1
+        if (self._number - 1) % self._period:
+            return None
         old, known = self._fiducials, np.isfinite(self._fiducials.radii)
         discs = np.full(len(known), -1)
-        if (self._number - 1) % self._period:
-            return old.numbered(discs)
         old = old.where(known)
         found = detect_discs_near(image, DARK, old.centres, old.radii, self._scene.method)
         if len(found.radii):

@@ -1,6 +1,6 @@
 """Track the markers through a film: from frames to displacements."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from vision.frames.frame import Frame, Frames
 from vision.tracking.camera_motion import CameraMotion, find_camera_motion
 from vision.tracking.frame_means import mean_detections
 from vision.tracking.frame_tracker import FrameDetections, FrameTracker
-from vision.tracking.rest_detection import find_rest_intervals
+from vision.tracking.rest_detection import RestIntervals, find_rest_intervals
 from vision.tracking.scene import FilmedScene
 from vision.tracking.trajectories import Tracking
 
@@ -71,8 +71,8 @@ def track(
     still = [[detections[number] for number in end] for end in rest]
     initial, final = (mean_detections([frame.markers for frame in end], scene.method) for end in still)
     before, after, always = (
-        mean_detections([frame.fiducials for frame in end], scene.method)
-        for end in (*still, still[0] + still[1])
+        mean_detections(fiducials, scene.method)
+        for fiducials in _fiducials_at_rest([frame.fiducials for frame in detections], rest)
     )
     motion = None
     if np.isfinite(always.radii).any():
@@ -104,6 +104,24 @@ def track(
             "film of a real finger give the rig's fiducials.json"
         )
     return replace(tracking, warnings=tuple(warnings))
+
+
+def _fiducials_at_rest(
+    fiducials: Sequence[DiscDetections | None], rest: RestIntervals
+) -> tuple[list[DiscDetections], list[DiscDetections], list[DiscDetections]]:
+    """Fiducials of the frames at rest in which they were searched for: at the start, at the end, and both.
+
+    If there is no such frame at an end of a live film, the nearest one counts: fiducials do not move with the
+    finger. They are always searched for in the first frame.
+    """
+    searched = [number for number, discs in enumerate(fiducials) if discs is not None]
+
+    def of(end: range, nearest: int) -> list[DiscDetections]:
+        numbers = [number for number in searched if number in end] or [nearest]
+        return [discs for number in numbers if (discs := fiducials[number]) is not None]
+
+    before, after = of(rest.initial, searched[0]), of(rest.final, searched[-1])
+    return before, after, before + after
 
 
 def _oriented_by_motion(scene: FilmedScene, tracking: Tracking) -> Tracking:
