@@ -17,7 +17,7 @@ from compare.evaluation.plausibility import check_positions, displacement_remark
 from compare.evaluation.shared_mesh import shared_mesh, write_rounds
 from compare.evaluation.truths import SLIDING, TRUTHS, check_truths, check_walls
 from compare.evaluation.virtual_experiment import virtual_experiment
-from compare.figures import Picture, draw_all
+from compare.figures import FORMATS, Picture, draw_all
 from compare.report.html_report import write_report
 from compare.report.metrics_json import metrics
 from compare.report.tables import write_markers, write_summary, write_table_one
@@ -73,6 +73,7 @@ class Job:
         reference: Name of the solver that the others are compared with; `fem`, else the first, if None.
         out: Output folder.
         resume: Whether to take over solutions that an earlier run of the same job finished.
+        picture_formats: Formats of the pictures besides PNG, of `FORMATS`.
     """
 
     design: Finger
@@ -87,6 +88,7 @@ class Job:
     reference: str | None = None
     out: Path = Path("out/default")
     resume: bool = False
+    picture_formats: Sequence[str] = ()
 
     @property
     def names(self) -> list[str]:
@@ -141,6 +143,8 @@ def checked(job: Job) -> Job:
         check_adaptable(job.adapt, job.load)
     if job.reference is not None and job.reference not in job.names:
         raise UserError(f"the reference {job.reference!r} is not among the solvers {', '.join(job.names)}")
+    if unknown := [kind for kind in job.picture_formats if kind not in FORMATS]:
+        raise UserError(f"there are no pictures as {unknown[0]}; besides PNG there are {', '.join(FORMATS)}")
     check_truths([job.truth], job.design)
     check_walls(TRUTHS[job.truth])
     supported_solvers(job.solvers, job.spare, job.material, job.load)
@@ -231,7 +235,7 @@ def write(
         write_rounds(folder / "adapt.csv", comparison.adaptation)
     write_measurements(folder / "observations.csv", comparison.observations)
     with stages.stage("pictures") as progress:
-        pictures = draw_all(folder / "figures", comparison, progress)
+        pictures = draw_all(folder / "figures", comparison, progress, job.picture_formats)
     with stages.stage("report"):
         for evaluation in comparison.shown_fields:
             write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", comparison.mesh, evaluation)

@@ -53,7 +53,17 @@ _RC: "dict[RcKeyType, Any]" = {
     "figure.titlesize": 10,
     "mathtext.fontset": "dejavusans",
     "savefig.dpi": "figure",
+    "pdf.fonttype": 42,  # letters as letters, as journals ask for
+    "svg.hashsalt": "pinnray",  # the same file every time
 }
+
+
+OPTIONS: dict[str, dict[str, Any]] = {
+    ".png": {"pil_kwargs": {"compress_level": 3}},  # quick
+    ".pdf": {"metadata": {"CreationDate": None}},  # equal figures are equal files
+    ".svg": {"metadata": {"Date": None}},
+}
+"""Options of a format, by its suffix."""
 
 
 class Figure(MplFigure):
@@ -73,10 +83,9 @@ class Figure(MplFigure):
 
     def save(self, path: Path) -> Path:
         """Write the figure atomically, in the format of the path's suffix, and return the path."""
-        quick = {"compress_level": 3} if path.suffix == ".png" else None
         buffer = BytesIO()
         with mpl.rc_context(_RC):
-            self.savefig(buffer, format=path.suffix.removeprefix("."), pil_kwargs=quick)
+            self.savefig(buffer, format=path.suffix.removeprefix("."), **OPTIONS.get(path.suffix, {}))
         write_bytes(path, buffer.getvalue())
         return path
 

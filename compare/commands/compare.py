@@ -17,6 +17,7 @@ from compare.commands.options import (
     OutputFlag,
     PhysicsOptions,
     SolverOptions,
+    comma_list,
     existing,
 )
 from compare.evaluation.truths import SLIDING
@@ -37,6 +38,7 @@ def compare(
     film: FilmOptions = FilmOptions(),
     reference: str | None = None,
     out: OptionalOutputPath = None,
+    pictures: Annotated[str, Parameter(group=OUTPUT)] = "",
     resume: OutputFlag = False,
     quiet: OutputFlag = False,
     json_: Annotated[bool, Parameter(name="--json", group=OUTPUT)] = False,
@@ -63,6 +65,7 @@ def compare(
             oblique, friction, 3d or sticking; see the guide.
         reference: Solver that the others are compared with; default fem, else the first.
         out: Output folder; default out/DESIGN.
+        pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
         resume: Reuse solutions that an earlier run finished.
         quiet: Show no progress and no table.
         json_: Print metrics.json and nothing else.
@@ -92,6 +95,7 @@ def compare(
         reference=reference,
         out=out or Path("out") / design.name,
         resume=resume,
+        picture_formats=comma_list(pictures),
     )
     try:
         with Stages(Console(stderr=True), quiet=quiet or json_) as stages:

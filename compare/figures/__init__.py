@@ -4,11 +4,14 @@ Imports `compare.evaluation`. Matplotlib and PyVista are imported when the first
 run without pictures starts fast.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 
 from compare.evaluation.comparison import Comparison
+
+FORMATS = ("svg", "pdf")
+"""Formats of pictures for print."""
 
 
 @dataclass(frozen=True)
@@ -32,10 +35,15 @@ def draw_all(
     folder: Path,
     comparison: Comparison,
     progress: Callable[[float, str], None] = lambda done, what: None,
+    formats: Collection[str] = (),
 ) -> list[Picture]:
     """Write every picture of a comparison as PNG, in the order of a report.
 
-    `progress` is called before every picture with the share done, from 0 to 1, and what comes next.
+    Args:
+        folder: Where to write.
+        comparison: The comparison.
+        progress: Called before every picture with the share done, from 0 to 1, and what comes next.
+        formats: Others in which they are written too, of `FORMATS`.
     """
     from compare.figures.gallery import DRAWINGS
 
@@ -44,6 +52,8 @@ def draw_all(
         progress(number / len(DRAWINGS), what)
         if (drawing := draw(comparison)) is not None:
             path = drawing.figure.save(folder / f"{name}.png")
+            for kind in formats:
+                drawing.figure.save(folder / f"{name}.{kind}")
             pictures.append(Picture(path, drawing.title, drawing.caption, drawing.alt))
     progress(1.0, "pictures drawn")
     return pictures

@@ -14,7 +14,7 @@ from PIL import Image
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.convergence import with_certificates
 from compare.evaluation.evaluation import Evaluation
-from compare.figures import draw_all
+from compare.figures import FORMATS, draw_all
 from compare.figures.fields import QUANTITIES, draw_field
 from compare.figures.gallery import DRAWINGS, Drawing, draw
 from compare.figures.overlay import overlay_extent
@@ -59,6 +59,21 @@ def drawings(comparison: Comparison) -> dict[str, Drawing]:
 @pytest.fixture(scope="module")
 def pages(drawings: dict[str, Drawing]) -> dict[str, Page]:
     return {name: page_of(drawing.figure) for name, drawing in drawings.items()}
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_every_picture_is_written_for_print_too(comparison, drawings, tmp_path, kind, monkeypatch) -> None:
+    """In letters, not in pixels; and the same file every time."""
+    chosen = {"marker_errors": DRAWINGS["marker_errors"], "mesh": DRAWINGS["mesh"]}
+    monkeypatch.setattr("compare.figures.gallery.DRAWINGS", chosen)
+    first, second = (
+        [path.read_bytes() for path in sorted(folder.glob(f"*.{kind}"))]
+        for folder in (tmp_path / "first", tmp_path / "second")
+        if draw_all(folder, comparison, formats=[kind])
+    )
+    assert len(first) == 2
+    assert first == second
+    assert all((b"/FontFile2" if kind == "pdf" else b"<path") in content for content in first)
 
 
 def test_every_picture_is_told_in_numbers_to_those_who_cannot_see_it(drawings, comparison) -> None:
