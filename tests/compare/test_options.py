@@ -22,6 +22,7 @@ NOTHING = {
         "--radii",
         "--preset",
         "--full-well",
+        "--record",
     ),
 }
 """Options without which nothing is done."""
