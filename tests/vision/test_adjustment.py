@@ -77,6 +77,29 @@ def test_the_covariance_covers_the_errors_of_200_fits():
     np.testing.assert_allclose(np.mean(np.array(scores) < 1, axis=0), 0.683, rtol=0, atol=0.11)
 
 
+def scores(*, bend: float, fits: int = 20, count: int = 15) -> np.ndarray:
+    """Errors of the intrinsics over their standard deviations, root mean square, of boards bent by mm."""
+    rotations, translations = zip(*poses(count), strict=True)
+    board = Poses(Rotation.from_rotvec(rotations), np.array(translations))
+    view, points = np.repeat(np.arange(count), 54), np.tile(BOARD.corners, (count, 1))
+    x, y, _ = (BOARD.corners - BOARD.corners.mean(axis=0)).T / 80
+    rng, found = np.random.default_rng(1), []
+    for _ in range(fits):
+        curved = points.copy()
+        bowl, saddle = bend * rng.standard_normal((2, count, 1))
+        curved[:, 2] = (bowl * (x**2 + y**2) + saddle * x * y).ravel()
+        pixels = CAMERA.project(board.to_camera(curved, view)) + rng.normal(0, 0.1, (len(view), 2))
+        camera = adjust(CAMERA, board, CornerObservations(points, pixels, view), free=FREE).camera
+        found.append((camera.intrinsics - CAMERA.intrinsics)[:8] / camera.standard_deviations[:8])
+    return np.sqrt(np.mean(np.square(found), axis=0))
+
+
+def test_errors_that_the_corners_of_a_photograph_share_are_in_the_standard_deviations():
+    """Without the jackknife the scores of bent boards are 4 to 6."""
+    assert scores(bend=1.0).max() < 1.6  # 20 fits tell a deviation within a sixth
+    assert scores(bend=0.0).min() > 0.6  # the larger of two deviations is a little too large
+
+
 def test_a_known_camera_leaves_only_the_poses():
     found = adjust(CAMERA, placed(), SOME, free=np.zeros(9, dtype=bool))
     assert found.camera.intrinsics.tolist() == CAMERA.intrinsics.tolist()

@@ -88,7 +88,7 @@ def _adjusted(camera: Camera, observations: CornerObservations, lens: LensChoice
         adjusted = adjust(camera, initial_poses(camera, observations), observations, free=free)
     except (UserError, np.linalg.LinAlgError):
         raise UserError(UNDETERMINED) from None
-    deviation = np.array(adjusted.camera.standard_deviations)[:2] / adjusted.camera.intrinsics[:2]
+    deviation = adjusted.independent[:2] / adjusted.camera.intrinsics[:2]
     error = max(rms([adjusted.residuals]), 1e-9)
     if not (deviation * max(1, CORNER_ERROR / error) < LARGEST_DEVIATION).all():
         raise UserError(UNDETERMINED)
