@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
 
 WIDTH = 5.5
-"""Width of every figure, inches: type stays readable when a journal prints it in one column of 88 mm."""
+"""Width of every figure, inches. In a journal's column of 3.4 inches type of 8.5 points has 5.3."""
 
 DPI = 300
 NOTEBOOK_DPI = 150

@@ -5,7 +5,6 @@ release 4.0, section 2), here normally distributed, as it is above some ten elec
 same variance everywhere. Units: pixels, grey levels of 0 to 255.
 """
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
@@ -59,6 +58,8 @@ class Exposure(CheckedModel):
             variance = self.noise**2 + (grey * (255 / self.full_well) if self.full_well else 0.0)
             grey += np.sqrt(variance, dtype=np.float32) * rng.standard_normal(grey.shape, dtype=np.float32)
         if self.sharpen:
+            import cv2  # the options of the rig are exposures, and `--help` has to be quick
+
             grey += self.sharpen * (grey - cv2.GaussianBlur(grey, (0, 0), 1.0))
         return np.asarray(np.clip(np.rint(grey), 0, 255), dtype=np.uint8)
 
