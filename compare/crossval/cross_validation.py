@@ -84,7 +84,7 @@ def cross_validate(study: Study, stages: Stages | None = None) -> CrossvalResult
             for variant in study.variants
         }
         results, failed = _results(study, tasks, stages)
-        sweeps = _sweeps(tasks, results, stages) if files else {}
+        sweeps = _sweeps(tasks, results, study.processes, stages) if files else {}
         found = CrossvalResult(
             study,
             {
@@ -200,12 +200,20 @@ def _results(
 def _sweeps(
     tasks: Mapping[tuple[Case, str], SolverTask],
     results: Mapping[Case, Mapping[str, SeedResults]],
+    processes: int,
     stages: Stages,
 ) -> dict[Case, dict[str, list[float]]]:
     """The sweep of `sweep_weights` for each truth and layout, if its solver is there."""
     cases = {f"{case.truth}, {case.layout}": case for case, each in results.items() if SWEPT in each}
     swept = {name: tasks[case, SWEPT] for name, case in cases.items()}
     answers = dict(
-        in_stages(sweep_weights, swept, processes=1, stages=stages, kind="curves", note=lambda *_: "weighed")
+        in_stages(
+            sweep_weights,
+            swept,
+            processes=processes,
+            stages=stages,
+            kind="curves",
+            note=lambda *_: "weighed",
+        )
     )
     return {cases[name]: each for name, each in answers.items() if not isinstance(each, ProcessFailed)}

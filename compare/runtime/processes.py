@@ -4,9 +4,10 @@ Not `pebble.ProcessPool`: when the program is killed its workers go on until the
 interrupted they are killed before they can save their state, and they cannot report progress.
 """
 
+import os
 import signal
-from collections.abc import Callable, Generator, Mapping
-from contextlib import ExitStack, closing
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
@@ -14,8 +15,12 @@ from multiprocessing.context import SpawnProcess
 from typing import Generic, TypeVar
 
 from compare.runtime.interruption import leave_signals_alone
+from compare.runtime.provenance import cores
 from compare.runtime.stages import Stages
 from solvers.solver import Progress
+
+THREADS = "OMP_NUM_THREADS"
+"""Variable that torch and OpenBLAS read when they are loaded."""
 
 Input = TypeVar("Input")
 Output = TypeVar("Output")
@@ -53,6 +58,9 @@ def in_processes(
 ) -> Generator[tuple[str, Output | ProcessFailed], None, None]:
     """Run tasks in fresh processes and yield their answers as they come.
 
+    Every process has its share of the cores as threads, unless `OMP_NUM_THREADS` is set: threads that wait
+    for one another on cores of others take more than they give.
+
     When the iterator is closed or interrupted, or this process is killed, the next progress report of every
     running process raises KeyboardInterrupt there, so that it can save its state.
 
@@ -71,7 +79,8 @@ def in_processes(
                 name = next(iter(waiting))
                 ours, theirs = context.Pipe(duplex=False)
                 process = context.Process(target=_child, args=(work, waiting.pop(name), theirs), name=name)
-                process.start()
+                with _threads(max(1, cores() // min(processes, len(tasks)))):
+                    process.start()
                 theirs.close()
                 running[ours] = name, process
             ready = wait(list(running))
@@ -125,6 +134,19 @@ def in_stages(
             report(name, 1.0, note(name, answer))
             lines[name][0].close()
             overall(done / len(tasks), f"{done} of {len(tasks)} {kind}")
+
+
+@contextmanager
+def _threads(count: int) -> Iterator[None]:
+    """Processes that start meanwhile have a number of threads, unless the user has chosen one."""
+    if THREADS in os.environ:
+        yield
+        return
+    os.environ[THREADS] = str(count)
+    try:
+        yield
+    finally:
+        del os.environ[THREADS]
 
 
 def _child(work: Callable[[Input, Progress], Output], task: Input, connection: Connection) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from compare.runtime.processes import ProcessFailed, in_processes
+from compare.runtime.provenance import cores
 from solvers.solver import Progress
 
 ROOT = Path(__file__).parent.parent.parent
@@ -27,6 +28,10 @@ def ended(number: int, progress: Progress) -> float:
     if number == 1:
         os.kill(os.getpid(), signal.SIGKILL)
     return 1 / (number - 2)
+
+
+def threads(_: int, progress: Progress) -> str:
+    return os.environ["OMP_NUM_THREADS"]
 
 
 def endless(folder: Path, progress: Progress) -> None:
@@ -113,3 +118,16 @@ def test_processes_end_with_the_program_that_started_them(tmp_path):
     program.communicate()
     until((tmp_path / child).exists)
     assert (tmp_path / child).read_text() == "saved"
+
+
+@pytest.mark.parametrize(("chosen", "expected"), [(None, "1"), ("3", "3")], ids=["share", "chosen"])
+def test_processes_share_the_cores(monkeypatch, chosen, expected):
+    """As many processes as cores have one thread each, and this process keeps its own."""
+    if chosen is None:
+        monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    else:
+        monkeypatch.setenv("OMP_NUM_THREADS", chosen)
+    tasks = {str(number): number for number in range(cores())}
+    answers = dict(in_processes(threads, tasks, processes=cores(), report=silent))
+    assert set(answers.values()) == {expected}
+    assert os.environ.get("OMP_NUM_THREADS") == chosen
