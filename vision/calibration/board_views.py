@@ -4,7 +4,7 @@ A view is the corners in one photograph, in the order of the board, shape (n, 2)
 """
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import cv2
 import numpy as np
@@ -16,6 +16,8 @@ from vision.calibration.chessboard import Board
 from vision.frames.frame import GreyImage
 
 FEWEST_VIEWS = 4
+MAX_NAMED = 5
+"""Photographs of other sizes that a message names."""
 MAX_SUGGESTIONS = 8
 """Photographs without the expected board that are searched for another one."""
 
@@ -34,16 +36,12 @@ def find_views(
     views: dict[str, FloatArray] = {}
     boardless: list[str] = []
     others = Counter[str]()
-    first, size = "", (0, 0)
+    sizes: dict[tuple[int, int], list[str]] = {}
     for name, image in images:
         width, height = image.shape[::-1]
-        if not first:
-            first, size = name, (width, height)
-        if (width, height) != size:
-            raise UserError(
-                f"{first} has {size[0]}x{size[1]} pixels and {name} {width}x{height}; "
-                "photographs for one calibration must have one size"
-            )
+        sizes.setdefault((width, height), []).append(name)
+        if len(sizes) > 1:
+            continue  # the rest only tells which size is the usual one
         corners = board.find(image)
         if corners is not None:
             views[name] = corners
@@ -52,13 +50,28 @@ def find_views(
         undecided = len(views) < FEWEST_VIEWS and len(boardless) <= MAX_SUGGESTIONS
         if undecided and (other := board.suggest(image)):
             others[other] += 1
+    if len(sizes) > 1:
+        raise UserError(_other_sizes(sizes))
     other, votes = others.most_common(1)[0] if others else ("", 0)
     if len(views) < FEWEST_VIEWS and votes > max(1, len(views)):
         raise UserError(
             f"{len(views)} of {len(views) + len(boardless)} photographs show the board of {board}; "
             f"{votes} seem to show {other}"
         )
-    return views, size, tuple(boardless)
+    return views, next(iter(sizes), (0, 0)), tuple(boardless)
+
+
+def _other_sizes(sizes: Mapping[tuple[int, int], Sequence[str]]) -> str:
+    """One line on photographs of other sizes than most have."""
+    usual = max(sizes, key=lambda size: len(sizes[size]))
+    others = [(name, size) for size, names in sizes.items() if size != usual for name in names]
+    named = ", ".join(f"{name} {width}x{height}" for name, (width, height) in others[:MAX_NAMED])
+    rest = f" and {len(others) - MAX_NAMED} more" if len(others) > MAX_NAMED else ""
+    without = " ".join(f"--without {name}" for name, _ in others[:MAX_NAMED])
+    return (
+        f"photographs for one calibration must have one size: {len(sizes[usual])} have "
+        f"{usual[0]}x{usual[1]} pixels, {named}{rest}; leave those out by {without}"
+    )
 
 
 def corner_observations(views: Sequence[FloatArray] | FloatArray, board: Board) -> CornerObservations:
