@@ -95,6 +95,7 @@ class Case:
     hide: Hide = nothing
     codec: str = ""
     paint: str = "dark"
+    printed: Mapping[str, float] = field(default_factory=dict)
     picked: bool = False
     layout: Literal["front", "joints"] = "front"
     fiducials: bool = True
@@ -120,6 +121,15 @@ CASES: dict[tuple[str, str], Case] = {
     ("markers", "red, called dark"): Case(paint="red"),
     **{("markers", f"{paint}, picked"): Case(paint=paint, picked=True) for paint in ("red", "blue")},
     ("markers", "at the joints"): Case(layout="joints"),
+    **{
+        ("print, irregular", f"{share:.0%}"): Case(printed={"irregular": share})
+        for share in (0.03, 0.05, 0.08)
+    },
+    ("print", "specks on 10 %, irregular 5 %"): Case(printed={"irregular": 0.05, "mottle": 0.1}),
+    ("print", "irregular 5 %, sharpened by 1.5"): Case(
+        printed={"irregular": 0.05}, exposure={"sharpen": 1.5}
+    ),
+    ("print", "irregular 5 %, glare of 60"): Case(printed={"irregular": 0.05}, exposure={"glare": 60}),
     ("camera", "monochrome"): Case(exposure={"monochrome": True}),
     ("camera", "upside down"): Case(turn=180),
     ("no fiducials", ""): Case(hide=fiducials(*range(7)), fiducials=False, tilt=0),
@@ -182,7 +192,7 @@ def filmed(case: Case, finger: Finger, number: int) -> Recording:
     camera = default_camera(*case.size)
     direction = 60.0 + 137.5 * number
     recording = Recording(
-        bench=Bench(finger.mesh, finger.design, workspace, case.paint),
+        bench=Bench(finger.mesh, finger.design, workspace, case.paint, **case.printed),
         displacement=finger.displacement,
         camera=camera,
         pose=viewing_pose(camera, workspace, tilt=case.tilt, direction=direction, turn=case.turn + number),
