@@ -54,6 +54,16 @@ class ConstrainedElimination:
         """C K⁻¹ Cᵀ + S, shape (k, k)."""
         return self.flexibility + self.compliance * np.eye(len(self.rows))
 
+    def unstable(self, negative: int) -> int:
+        """Number of directions that keep the constraints and in which the energy falls.
+
+        The inertia of the whole system is that of K and that of its Schur complement together (Haynsworth).
+
+        Args:
+            negative: Number of negative eigenvalues of K.
+        """
+        return negative - int(np.count_nonzero(np.linalg.eigvalsh(self.schur_complement) < 0))
+
     def values(self, x: FloatArray) -> FloatArray:
         """C x, shape (k,)."""
         return _flat(self.rows) @ x.ravel()

@@ -53,6 +53,15 @@ class Status:
     message: str
 
 
+def unstable_phrase(directions: int) -> str:
+    """A clause on an equilibrium in which the energy falls in some directions."""
+    where = "one direction" if directions == 1 else f"{directions} directions"
+    return (
+        f"this equilibrium is NOT STABLE: the energy falls in {where}, so that a real finger buckles away "
+        "from it; take smaller load steps, a smaller stroke or thicker ribs"
+    )
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class ErrorEstimate:
     """A solver's estimate of the error of its solution.

@@ -34,6 +34,13 @@ def beam(length: float = 60.0, height: float = 4.0) -> tuple[Section, float]:
     return Section(Loop.polygon(corners, ["", "", "front", "base"])), length - 3.0
 
 
+def column(height: float = 40.0, width: float = 2.0) -> tuple[Section, float]:
+    """A column clamped at its foot, whose head is the front."""
+    half = width / 2
+    corners = np.array([[half, -height], [half, 0.0], [-half, 0.0], [-half, -height]])
+    return Section(Loop(corners, np.zeros(4), ("", "front", "", "base"))), 0.0
+
+
 def tilted_wedge(tilt: float = 10.0) -> tuple[Section, float]:
     """A wedge with two cavities whose base leans by so many degrees."""
     low = np.array([30 * tan(radians(tilt)), -30.0])

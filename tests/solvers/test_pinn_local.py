@@ -228,7 +228,7 @@ def test_block_matrix_is_solved_as_the_dense_matrix():
     rows, columns = np.triu_indices(4)
     blocks = dense.reshape(4, 3, 4, 3).transpose(0, 2, 1, 3)[rows, columns]
     right = rng.normal(size=(2, 12))
-    found = BlockMatrix(4, rows, columns, blocks).solve(right, 0.0)
+    found = BlockMatrix(4, rows, columns, blocks).factorised(0.0).solve(right)
     np.testing.assert_allclose(found, np.linalg.solve(dense, right.T).T, rtol=1e-9)
 
 
@@ -236,14 +236,14 @@ def test_factors_are_freed():
     """Those of one solve take 18 MB."""
     blocks = np.eye(1500)[None] + 1e-4
     matrix, one = BlockMatrix(1, np.zeros(1, dtype=int), np.zeros(1, dtype=int), blocks), np.ones((1, 1500))
-    matrix.solve(one, 0.0)
+    matrix.factorised(0.0).solve(one)
 
     def resident() -> int:
         return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
 
     before = resident()
     for _ in range(10):
-        matrix.solve(one, 0.0)
+        matrix.factorised(0.0).solve(one)
     assert resident() - before < 50e6
 
 
@@ -253,7 +253,7 @@ def test_a_window_without_quadrature_points_does_no_harm(coarse_mesh):
     corner = coarse_mesh.points[:1] + 0.05
     energy = NetworkEnergy.of(basis, Material(), corner, np.ones(1))
     hessian = energy.derivatives(torch.ones(basis.windows.count, 2, basis.per_window).double())[1]
-    found = hessian.solve(np.ones((1, 2 * basis.windows.count * basis.per_window)), 1e-12)
+    found = hessian.factorised(1e-12).solve(np.ones((1, 2 * basis.windows.count * basis.per_window)))
     assert hessian.size == basis.windows.count > len(energy.patches[0].near)
     assert np.isfinite(found).all()
 

@@ -6,6 +6,7 @@ potential Π of the elastic energy and, for a cylinder, of contact, equilibrium 
     dΠ/dc - f_k b_k = 0        b_k . c + s_k f_k = d_k
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +23,7 @@ from solvers.fem.linear_solvers import TOLERANCE, Factorisation, Multigrid
 from solvers.lagrange import NodalSpace
 from solvers.problem import Problem
 from solvers.solid_elasticity import solid_energy_density, solid_jacobian
+from solvers.stability import Step
 
 QUADRATURE_DEGREE = 4
 """Exact for the quadratic part of the law on quadratic elements."""
@@ -29,6 +31,10 @@ NEWTON_TOLERANCE = 1e-4
 """Residual of the iterations for one step of Newton's method, whose next step takes the rest."""
 PROBE = 1e-4
 """Fraction of the load in the finite difference of the internal forces at rest."""
+
+
+INVERSE_ITERATIONS = 3
+"""Enough to leave soft directions of an unstable equilibrium, not only the softest."""
 
 
 class FiniteStrainEquilibrium:
@@ -64,6 +70,7 @@ class FiniteStrainEquilibrium:
         self.prescribed = dirichlet_displacement(problem, space)
         self.constraints = constraints or DisplacementConstraints.of(problem, space)
         self.contact = CylinderContact.of(problem, space) if problem.load.kind == "cylinder" else None
+        self._young = problem.material.young
         material, gradient = problem.material, ufl.grad(self.distributed.function)
         solid = self.distributed.dimension == 3
         constants = self.distributed.moduli(material.solid_lame if solid else material.lame)
@@ -107,8 +114,8 @@ class FiniteStrainEquilibrium:
             balance[self.contact.nodes, :2] += self.contact.gradient(state)
         return np.where(self.clamped, 0.0, balance), float(np.abs(internal).max())
 
-    def factorise(self, state: LoadState) -> None:
-        """Factorise the tangent at a state."""
+    def factorise(self, state: LoadState, shift: float = 0.0) -> None:
+        """Factorise the tangent at a state, with a shift of its diagonal, N/mm per mm."""
         self.distributed.set_function(state.nodal)
         self.distributed.assemble_matrix(self._tangent, self._conditions, into=self.matrix)
         if self.contact is not None:
@@ -117,6 +124,8 @@ class FiniteStrainEquilibrium:
             blocks = np.pad(inner, ((0, 0), *2 * ((0, self.distributed.dimension - 2),)))
             blocks *= free[:, :, None] & free[:, None, :]
             self.distributed.add_blocks(self.matrix, self.contact.nodes, blocks)
+        if shift:
+            self.matrix.shift(shift)
         self.factors.update(state.nodal)
         self.elimination = self._elimination()
 
@@ -128,6 +137,48 @@ class FiniteStrainEquilibrium:
     def response(self, force: FloatArray) -> FloatArray:
         """Displacements, mm, under nodal forces, N/mm, by the factorised tangent: both (N, d)."""
         return self.elimination.solution(self.factors.solve(force))[0]
+
+    @property
+    def unstable(self) -> int | None:
+        """Number of directions in which the energy falls at the state factorised last; None if iterated."""
+        if not isinstance(self.factors, Factorisation):
+            return None
+        return self.elimination.unstable(self.factors.negative)
+
+    def softest(self) -> FloatArray:
+        """The direction of least stiffness at the state factorised last, largest component one, (N, d).
+
+        By inverse iteration; it keeps the constraints.
+        """
+        direction = np.random.default_rng(0).standard_normal(self.clamped.shape)
+        for _ in range(INVERSE_ITERATIONS):
+            direction = self.response(np.where(self.clamped, 0.0, direction))
+            direction /= np.abs(direction).max()
+        return direction
+
+    def step_at(self, about: LoadState) -> Callable[[FloatArray, float], Step | None]:
+        """Newton's step at displacements, the load that of a state, and a shift over Young's modulus."""
+
+        def step(nodal: FloatArray, shift: float) -> Step | None:
+            self.factorise(replace(about, nodal=nodal), shift * self._young)
+            force = np.where(self.clamped, 0.0, -self.internal_force(nodal))
+            gaps = about.fraction * self.constraints.targets - self.constraints.values(nodal)
+            change, _ = self.elimination.solution(self.factors.solve(force), gaps)
+            return Step(change, self.unstable or 0)
+
+        return step
+
+    def energy_with_springs(self, about: LoadState) -> Callable[[FloatArray], float]:
+        """Energy per depth, with that of springs, under the load of a state; infinite if inadmissible."""
+        soft = self.constraints.slacks > 0
+
+        def energy(nodal: FloatArray) -> float:
+            if not self.admissible(nodal):
+                return np.inf
+            gaps = about.fraction * self.constraints.targets - self.constraints.values(nodal)
+            return self.energy(nodal) + 0.5 * float((gaps[soft] ** 2 / self.constraints.slacks[soft]).sum())
+
+        return energy
 
     def admissible(self, nodal: FloatArray) -> bool:
         """Whether the deformation turns no quadrature point inside out."""

@@ -16,6 +16,7 @@ from solvers.fem.finite_strain.newton import ConstrainedNewton
 from solvers.lagrange import NodalSpace
 from solvers.problem import Problem
 from solvers.solver import Progress
+from solvers.stability import aside, descended
 
 QUICK = 5
 """Newton iterations of a step after which the next one may be twice as long."""
@@ -45,6 +46,7 @@ class LoadPath:
         points: The equilibria, from rest.
         halved: Number of failed steps.
         iterations: Newton iterations of all steps.
+        left: Number of unstable equilibria that were left for a stable one.
         reason: Why the last failed step failed, for Newton's method in PETSc's word.
     """
 
@@ -75,7 +77,7 @@ class LoadPath:
         contact = self.equilibrium.contact
         self._max_step = max_step if contact is None else min(max_step, contact.longest_step)
         self.points = [self.equilibrium.rest]
-        self.halved = self.iterations = 0
+        self.halved = self.iterations = self.left = 0
         self.reason = ""
 
     def close(self) -> None:
@@ -96,6 +98,7 @@ class LoadPath:
                 if step < self._min_step:
                     return
                 continue
+            point = self._stable(point)
             self.points.append(point)
             progress(fraction, f"{fraction:.0%} of the load, {self.iterations - before} Newton iterations")
             step = min(self._max_step, step * (2 if hardest <= QUICK else 1))
@@ -109,6 +112,26 @@ class LoadPath:
         newton.close()
         self.equilibrium.constraints = constraints
         return state
+
+    def _stable(self, point: LoadState) -> LoadState:
+        """An equilibrium or, if it is unstable, a stable one beside it: of those to either side, the lower.
+
+        Stability is that of the tangent factorised last, at Newton's last guess. A cylinder's contact, whose
+        multipliers would have to settle again, is left where it is.
+        """
+        equilibrium = self.equilibrium
+        if not equilibrium.unstable or equilibrium.contact is not None:
+            return point
+        energy, found = equilibrium.energy_with_springs(point), []
+        for start in aside(point.nodal, equilibrium.softest(), energy):
+            lower = descended(start, energy, equilibrium.step_at(point))
+            state = None if lower is None else self._settled(self._newton, replace(point, nodal=lower))
+            if state is not None and not equilibrium.unstable:
+                found.append(state)
+        if not found:
+            return point
+        self.left += 1
+        return min(found, key=lambda state: energy(state.nodal))
 
     def _settled(self, newton: ConstrainedNewton, guess: LoadState) -> LoadState | None:
         result = newton.solve(guess)

@@ -16,7 +16,7 @@ from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
-from solvers.solution import ErrorEstimate, Solution, Status
+from solvers.solution import ErrorEstimate, Solution, Status, unstable_phrase
 from solvers.solver import Progress, check_problem, silent
 
 
@@ -87,6 +87,8 @@ class FemNonlinearSolver:
         last = points[-1]
         regions = [path.region(point) for point in points]
         abscissa = path.force_abscissa(last)
+        path.equilibrium.factorise(last)
+        unstable = path.equilibrium.unstable or 0
         solved = time.perf_counter()
         error = _error(path, problem, space)
         path.close()
@@ -100,7 +102,7 @@ class FemNonlinearSolver:
             field=LagrangeField(space, last.nodal),
             energy=energies[-1],
             reaction=reactions[-1],
-            status=_status(path, regions, "; ".join(filter(None, remarks))),
+            status=_status(path, regions, unstable, "; ".join(filter(None, remarks))),
             stats={
                 "seconds": solved - started,
                 "estimate_seconds": time.perf_counter() - solved,
@@ -108,6 +110,8 @@ class FemNonlinearSolver:
                 "load_steps": len(points) - 1,
                 "halved_steps": path.halved,
                 "newton_iterations": path.iterations,
+                "unstable_directions": unstable,
+                "left_unstable": path.left,
                 "degree": self.degree,
                 **({} if abscissa is None else {"force_abscissa_mm": abscissa}),
                 **(regions[-1].stats() if regions[-1] else {}),
@@ -126,16 +130,18 @@ class FemNonlinearSolver:
 
 
 def _error(path: LoadPath, problem: Problem, space: LagrangeSpace) -> ErrorEstimate | None:
-    """The discretisation error at the full load; None where it was not reached, has no limit or no force."""
+    """The discretisation error at the full load; None where it was not reached, has no limit or no force.
+
+    The tangent there must be factorised.
+    """
     last = path.points[-1]
     untouched = path.equilibrium.contact is not None and not last.contact.any()
     if last.fraction < 1 or problem.load.kind == "point" or untouched:
         return None
-    path.equilibrium.factorise(last)
     return ErrorEstimator(problem, space).estimate(last.nodal, path.equilibrium.response)
 
 
-def _status(path: LoadPath, regions: Sequence[ContactRegion | None], remarks: str) -> Status:
+def _status(path: LoadPath, regions: Sequence[ContactRegion | None], unstable: int, remarks: str) -> Status:
     """Success at the full load with remarks, or advice."""
     contact = path.equilibrium.contact
     fraction = path.points[-1].fraction
@@ -147,6 +153,13 @@ def _status(path: LoadPath, regions: Sequence[ContactRegion | None], remarks: st
             f"take a finer mesh, {wider} or a smaller stroke",
         )
     taken = f"all of the load applied in {len(path.points) - 1} steps, {path.iterations} Newton iterations"
+    if unstable:
+        return Status(False, f"{taken}, but {unstable_phrase(unstable)}")
+    if path.left:
+        taken += (
+            f"; {path.left} unstable equilibria were left for a stable one beside them, of lower energy: "
+            "the finger buckles, and there may be other branches"
+        )
     if any(region and region.at_end for region in regions):
         return Status(
             False,

@@ -20,6 +20,10 @@ REGULARISATION = 1e-12
 """Added to the unit diagonal of the scaled system, against nearly dependent basis functions."""
 
 
+INVERSE_ITERATIONS = 3
+"""Enough to leave soft directions of an unstable equilibrium, not only the softest."""
+
+
 class NewtonIterate(NamedTuple):
     """Result of a Newton step.
 
@@ -29,6 +33,7 @@ class NewtonIterate(NamedTuple):
         change: Twice the energy of the step over the work of the load: small where Newton has converged.
         markers: The forces at the markers for all factors of their weights; None at finite strain.
         factor: The factor taken.
+        unstable: Number of directions in which the energy falls at the output layer before the step.
     """
 
     output: torch.Tensor
@@ -36,6 +41,7 @@ class NewtonIterate(NamedTuple):
     change: float
     markers: MarkerForces | None = None
     factor: float = 1.0
+    unstable: int = 0
 
 
 class LinearResponse(NamedTuple):
@@ -45,11 +51,13 @@ class LinearResponse(NamedTuple):
         residual: First derivative of the energy there, shape (U,), N/mm.
         free: Newton's step without springs, shape (U,), mm.
         unit: Steps by unit forces of the springs, shape (n, U), mm per N/mm.
+        negative: Number of negative eigenvalues of the second derivative.
     """
 
     residual: FloatArray
     free: FloatArray
     unit: FloatArray
+    negative: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,43 +144,67 @@ class ConstrainedNetwork:
         """The displacement field of an output layer."""
         return FiniteBasisField(self.energy.basis, output)
 
-    def step(self, output: torch.Tensor, fraction: float = 1.0) -> NewtonIterate | None:
+    def step(
+        self, output: torch.Tensor, fraction: float = 1.0, shift: float = REGULARISATION
+    ) -> NewtonIterate | None:
         """One Newton step to equilibrium under a fraction of the load; for a linear law it is the solution.
 
         With K the second derivative of the energy and r its first, y = K^-1 (-r) and x_k = K^-1 b_k for the
         functionals b_k; the step is y + f_k x_k with the forces f by which every spring with compliance s_k
         is short of its target by s_k f_k.
 
+        Args:
+            output: Where the network is linearised.
+            fraction: Of the load.
+            shift: Added to the unit diagonal of the scaled K.
+
         Returns:
             None if a point of the quadrature is inside out.
         """
-        response = self.linear_response(output)
+        response = self.linear_response(output, shift)
         return None if response is None else self.constrained_step(output, response, fraction)
 
-    def linear_response(self, output: torch.Tensor) -> LinearResponse | None:
+    def linear_response(self, output: torch.Tensor, shift: float = REGULARISATION) -> LinearResponse | None:
         """One factorisation, and one solve for every spring; None as in `step`."""
         gradient, hessian = self.energy.derivatives(output)
         if not torch.isfinite(gradient).all():
             return None
         residual = gradient.numpy().ravel()
-        free, *unit = hessian.solve(
-            np.concatenate([-residual[None], self.functionals]),
-            REGULARISATION,
-            definite=self.energy.material.law == "linear",
-        )
-        return LinearResponse(residual, free, np.array(unit))
+        factors = hessian.factorised(shift, definite=self.energy.material.law == "linear")
+        try:
+            free, *unit = factors.solve(np.concatenate([-residual[None], self.functionals]))
+            return LinearResponse(residual, free, np.array(unit), factors.negative)
+        finally:
+            factors.close()
+
+    def softest(self, output: torch.Tensor) -> FloatArray:
+        """A soft direction at an output layer, of its shape, by inverse iteration under the constraints."""
+        _, hessian = self.energy.derivatives(output)
+        factors = hessian.factorised(REGULARISATION, definite=False)
+        try:
+            springs = ConstrainedElimination(
+                self.functionals, factors.solve(self.functionals), self.compliance
+            )
+            found = np.random.default_rng(0).standard_normal(self.functionals.shape[1])
+            for _ in range(INVERSE_ITERATIONS):
+                found, _ = springs.solution(factors.solve(found[None])[0])
+                found /= np.abs(found).max()
+        finally:
+            factors.close()
+        return found.reshape(output.shape)
 
     def constrained_step(
         self, output: torch.Tensor, response: LinearResponse, fraction: float = 1.0
     ) -> NewtonIterate:
         """The Newton step by the springs' forces that close their gaps."""
-        residual, free, unit = response
+        residual, free, unit, negative = response
         springs = ConstrainedElimination(self.functionals, unit, self.compliance)
         values = fraction * self.targets - springs.values(output.numpy())
         markers = self._marker_forces(springs, values - springs.values(free))
         factor = self.weighting.factor(markers) if self.weighting and markers else 1.0
         scaled = np.append(self.compliance[: self.load_count], self.compliance[self.load_count :] / factor)
-        change, forces = replace(springs, compliance=scaled).solution(free, values)
+        springs = replace(springs, compliance=scaled)
+        change, forces = springs.solution(free, values)
         decrement = (forces @ self.functionals - residual) @ change
         return NewtonIterate(
             output + torch.from_numpy(change).view_as(output),
@@ -180,7 +212,15 @@ class ConstrainedNetwork:
             float(abs(decrement / (fraction * self.targets @ forces))),
             markers,
             factor,
+            springs.unstable(negative),
         )
+
+    def energy_with_springs(self, output: torch.Tensor, fraction: float = 1.0) -> float:
+        """Energy per depth with that of the springs that are not rigid, under a fraction of the load."""
+        soft = self.compliance > 0
+        flat = self.functionals.reshape(len(self.functionals), -1)
+        gaps = fraction * self.targets - flat @ output.numpy().ravel()
+        return self.energy.total(output) + 0.5 * float((gaps[soft] ** 2 / self.compliance[soft]).sum())
 
     def with_misfit(self, misfit: Misfit, rows: IntArray) -> "ConstrainedNetwork":
         """The network with some of its springs, all of the load's among them, and another misfit's values."""

@@ -5,8 +5,10 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
+from geometry.arrays import FloatArray
+from solvers.pinn.finite_basis.constrained_network import REGULARISATION, ConstrainedNetwork, NewtonIterate
 from solvers.solver import Progress
+from solvers.stability import Step, aside, descended
 
 FIRST_STEP, MAX_STEP, MIN_STEP = 0.1, 0.25, 1e-3
 """Fractions of the load in one step."""
@@ -38,7 +40,10 @@ class LoadStep(NamedTuple):
 def find_equilibrium(
     network: ConstrainedNetwork, guess: torch.Tensor, fraction: float
 ) -> tuple[NewtonIterate | None, int]:
-    """Equilibrium under a fraction of the load, None if the iteration fails, and the iterations taken."""
+    """Equilibrium under a fraction of the load, None if the iteration fails, and the iterations taken.
+
+    An unstable one is left for a stable one beside it; where none is found, it is the result.
+    """
     before = np.inf
     for iteration in range(1, MAX_ITERATIONS + 1):
         state = network.step(guess, fraction)
@@ -46,9 +51,31 @@ def find_equilibrium(
             return None, iteration
         slow = SLOW * before < state.change < SETTLED
         if state.change < TOLERANCE or slow:
-            return state, iteration
+            return (_stable(network, state, fraction) if state.unstable else state), iteration
         guess, before = state.output, state.change
     return None, MAX_ITERATIONS
+
+
+def _stable(network: ConstrainedNetwork, state: NewtonIterate, fraction: float) -> NewtonIterate:
+    """A stable equilibrium beside an unstable one, of two to either side the lower; itself if none is found.
+
+    The step aside is the response to random forces of a tangent that is nearly singular in soft directions.
+    """
+
+    def step(output: FloatArray, shift: float) -> Step | None:
+        taken = network.step(torch.from_numpy(output), fraction, max(shift, REGULARISATION))
+        return None if taken is None else Step(taken.output.numpy() - output, taken.unstable)
+
+    def energy(output: FloatArray) -> float:
+        return network.energy_with_springs(torch.from_numpy(output), fraction)
+
+    found = []
+    for start in aside(state.output.numpy(), network.softest(state.output), energy):
+        lower = descended(start, energy, step)
+        settled = None if lower is None else network.step(torch.from_numpy(lower), fraction)
+        if settled is not None and not settled.unstable:
+            found.append(settled)
+    return min(found, key=lambda each: energy(each.output.numpy()), default=state)
 
 
 def follow_load(network: ConstrainedNetwork, progress: Progress) -> LoadStep:

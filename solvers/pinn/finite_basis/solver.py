@@ -26,7 +26,7 @@ from solvers.pinn.finite_basis.point_spacing import (
 )
 from solvers.pinn.threading import pool
 from solvers.problem import Problem
-from solvers.solution import Solution, Status
+from solvers.solution import Solution, Status, unstable_phrase
 from solvers.solver import Progress, check_problem, silent
 
 Train = Callable[[float, FiniteBasisField | None, Progress], tuple[ConstrainedNetwork, LoadStep]]
@@ -154,7 +154,7 @@ class FiniteBasisSolver(ABC):
             field=field,
             energy=energy,
             reaction=reaction,
-            status=self._status(reached.fraction, finer, change, error, fit),
+            status=self._status(reached, finer, change, error, fit),
             stats={
                 "seconds": time.perf_counter() - started,
                 "unknowns": field.output.numel(),
@@ -162,6 +162,7 @@ class FiniteBasisSolver(ABC):
                 "windows": field.basis.windows.count,
                 "quadrature_points": network.energy.points,
                 "newton_iterations": reached.iterations,
+                "unstable_directions": state.unstable,
                 **network.marker_stats(state),
                 "seed": self.seed,
                 "device": "cpu",
@@ -203,18 +204,20 @@ class FiniteBasisSolver(ABC):
         return ConstrainedNetwork.of(basis, problem, *quadrature, self.weighting)
 
     def _status(
-        self, fraction: float, finer: float, change: float, error: float, fit: MarkerFit | None
+        self, reached: LoadStep, finer: float, change: float, error: float, fit: MarkerFit | None
     ) -> Status:
-        if fraction < 1:
+        if reached.fraction < 1:
             return Status(
                 False,
-                f"stopped at {fraction:.1%} of the load: Newton's method fails beyond; "
+                f"stopped at {reached.fraction:.1%} of the load: Newton's method fails beyond; "
                 "take a smaller spacing, the load patch or a smaller stroke",
             )
         message = (
             f"{finer:.2g} times finer windows changed the displacement by {change:.2%}, "
             f"so that its error is about {error:.2%} or less (criterion {self.tolerance:.2%})"
         )
+        if unstable := reached.state.unstable:
+            return Status(False, f"{message}; but {unstable_phrase(unstable)}")
         converged = error <= self.tolerance
         advice = "" if converged else "; take a smaller spacing"
         return Status(converged, message + advice + (f"; {fit.phrase}" if fit else ""))

@@ -10,6 +10,8 @@ from petsc4py import PETSc
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
 
+NEGATIVE_PIVOTS = 12
+"""Number of MUMPS' output that counts them."""
 SPARE_WORKSPACE = 14, 200
 """MUMPS' option for the workspace beyond its estimate, %: indefinite tangents delay many pivots."""
 
@@ -33,14 +35,6 @@ class BlockMatrix:
     def diagonal(self) -> FloatArray:
         """The diagonal, shape (n, b)."""
         return np.diagonal(self.blocks[self.rows == self.columns], axis1=1, axis2=2)
-
-    def solve(self, right: FloatArray, regularisation: float, *, definite: bool = True) -> FloatArray:
-        """Solve for several right-hand sides (r, n b) with one factorisation; see `factorised`."""
-        factors = self.factorised(regularisation, definite=definite)
-        try:
-            return factors.solve(right)
-        finally:
-            factors.close()
 
     def factorised(self, regularisation: float, *, definite: bool = True) -> "Factors":
         """The factors of the matrix with its diagonal scaled to one, for any number of solves.
@@ -114,6 +108,11 @@ class Factors:
         finally:
             given.destroy()
             found.destroy()
+
+    @property
+    def negative(self) -> int:
+        """Number of negative eigenvalues: that of negative pivots, by Sylvester's law of inertia."""
+        return int(self.preconditioner.getFactorMatrix().getMumpsInfog(NEGATIVE_PIVOTS))
 
     def close(self) -> None:
         """Free the factors."""
