@@ -29,9 +29,16 @@ def frozen_array(
 
     Raises:
         ShapeError: If the shape differs.
-        UserError: If an entry is not finite.
+        UserError: If an entry is no number of that type, masked or not finite.
     """
-    array = np.array(values, dtype=dtype)
+    if isinstance(values, np.ma.MaskedArray) and np.any(values.mask):
+        raise UserError(f"{name} holds masked values; leave those points out")
+    if np.iscomplexobj(values):
+        raise UserError(f"{name} holds complex numbers")
+    try:
+        array = np.array(values, dtype=dtype)
+    except (TypeError, ValueError):
+        raise UserError(f"{name} holds something that is no number, or rows of different lengths") from None
     wanted = tuple("n" if length is None else length for length in shape)
     if array.ndim != len(shape) or any(
         length is not None and length != actual for length, actual in zip(shape, array.shape, strict=True)

@@ -8,6 +8,9 @@ import numpy as np
 from geometry.arrays import BoolArray, FloatArray, frozen_array
 from geometry.errors import ShapeError, UserError
 
+LEAST_DEVIATION, LARGEST_DEVIATION = 1e-12, 1e6
+"""Smallest (far below rounding) and largest standard deviation of a marker that was measured, mm."""
+
 
 @dataclass(frozen=True, eq=False)
 class Observations:
@@ -24,7 +27,8 @@ class Observations:
 
     Raises:
         ShapeError: If the arrays do not fit together.
-        UserError: If a standard deviation or the radius is negative or no marker is visible.
+        UserError: If a standard deviation is negative or of an impossible size, the radius is negative, or
+            no marker is visible.
     """
 
     points: FloatArray
@@ -47,8 +51,16 @@ class Observations:
             object.__setattr__(self, name, frozen)
         if not self.visible.any():
             raise UserError("none of the markers is visible; at least one is needed")
-        if (self.standard_deviations < 0).any():
+        deviations = self.standard_deviations
+        if (deviations < 0).any():
             raise UserError("standard deviations must be zero or more (mm)")
+        if not (
+            (deviations == 0) | (deviations >= LEAST_DEVIATION) & (deviations <= LARGEST_DEVIATION)
+        ).all():
+            raise UserError(
+                f"standard deviations must be 0 or from {LEAST_DEVIATION:g} to {LARGEST_DEVIATION:g} mm; set "
+                "visible to 0 at a marker that was not measured"
+            )
         if not 0 <= self.marker_radius < inf:
             raise UserError(f"the marker radius must be zero or more, got {self.marker_radius} (mm)")
         if count == 0:

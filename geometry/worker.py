@@ -169,7 +169,13 @@ def _finger(definition: Mapping[str, Any]) -> Finger:
 
 
 def main() -> None:
-    """Read tasks, run them, and answer, until the parent ends, however it does."""
+    """Read tasks, run them, and answer, until the parent ends, however it does.
+
+    Libraries print to the standard output too, such as OpenCASCADE about a STEP file that was cut off: that
+    goes to the standard error, so that the answers are alone.
+    """
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     tasks: SimpleQueue[dict[str, Any]] = SimpleQueue()
     threading.Thread(target=_listen, args=(tasks,), daemon=True).start()
     while True:
@@ -186,7 +192,7 @@ def main() -> None:
             error = f"{task['what']} failed: {place}: {fault.strerror or fault}"
         if hasattr(signal, "alarm"):
             signal.alarm(0)
-        print(json.dumps({"error": error}), flush=True)
+        print(json.dumps({"error": error}), file=answers, flush=True)
 
 
 def _listen(tasks: SimpleQueue[dict[str, Any]]) -> None:

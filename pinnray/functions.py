@@ -11,6 +11,7 @@ from geometry.cache import drawn_finger, finger_mesh
 from geometry.drawing.description import Description, description_beside, load_description
 from geometry.drawing.drawn_finger import DrawnFinger
 from geometry.errors import UserError
+from geometry.finger.design import Design
 from geometry.finger.finger import Finger
 from geometry.finger.presets import load_design
 from geometry.mesh.settings import MeshSettings
@@ -267,11 +268,17 @@ def crossval(
 
 def _design(design: str | Path | Finger) -> Finger:
     if not isinstance(design, str | Path):
+        if not isinstance(design, Design | DrawnFinger):
+            raise UserError(f"{design!r} is no design; give a finger, the name of a preset or a file")
         return design
     return load_drawing(design) if Path(design).suffix.lower() in DRAWINGS else load_design(design)
 
 
 def _solver(given: str | Solver) -> Solver:
+    if isinstance(given, type) or not isinstance(given, str | Solver):
+        raise UserError(
+            f"{given!r} is no solver; give one that is made, such as pr.solver('fem'), or its name"
+        )
     return solver(given) if isinstance(given, str) else given
 
 
@@ -285,7 +292,12 @@ def _observations(given: "str | Path | Observations | pd.DataFrame", design: Fin
         if Path(given).suffix.lower() != ".csv":
             return track(given, design)
         return read_measurements(Path(given), marker_radius=design.marker_radius)
-    frame = given.assign(visible=given["visible"].astype(int)) if "visible" in given else given
+    if not hasattr(given, "to_csv"):
+        raise UserError(
+            f"measurements that are a {type(given).__name__}; give a data frame, Observations, or a file"
+        )
+    flags = "visible" in given and given["visible"].dtype == bool
+    frame = given.assign(visible=given["visible"].astype(int)) if flags else given
     with TemporaryDirectory() as folder:
         path = Path(folder) / "measurements.csv"
         frame.to_csv(path, index=False)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
@@ -16,6 +16,9 @@ from geometry.mesh.quadrature import segment_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.elasticity import Lame, LawName, lame_constants
+
+SOFTEST, STIFFEST = 1e-6, 1e7
+"""Young's moduli of solids, MPa: a thousandth of the softest gels' to eight times diamond's."""
 
 
 class Material(BaseModel):
@@ -30,12 +33,21 @@ class Material(BaseModel):
         law: "linear" (Hooke), or one of finite strain: "neo-hookean", "st-venant-kirchhoff" or "gent".
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     young: float = Field(default=11.4, gt=0, description="Young's modulus, MPa")
     poisson: float = Field(default=0.45, gt=-1, lt=0.5, description="Poisson's ratio")
     plane: Literal["strain", "stress"] = "strain"
     law: LawName = "linear"
+
+    @field_validator("young")
+    @classmethod
+    def _of_a_solid(cls, young: float) -> float:
+        if not SOFTEST <= young <= STIFFEST:
+            raise ValueError(
+                f"no solid has this Young's modulus; give {SOFTEST:g} to {STIFFEST:g} MPa (1 MPa = 10^6 Pa)"
+            )
+        return young
 
     @model_validator(mode="after")
     def _supported(self) -> Self:
@@ -69,7 +81,7 @@ class Load(BaseModel):
         radius: Radius of the cylinder, mm; None for the other kinds.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     kind: Literal["mean", "point", "patch", "cylinder"] = "mean"
     displacement: tuple[float | None, float | None] = (0.0, -10.0)
@@ -116,8 +128,8 @@ class Problem:
             thickness of a wall; None if only the mesh is known.
 
     Raises:
-        UserError: If part of the mesh is not connected to the base, so that it could move freely, or if the
-            contact is not on the front face.
+        UserError: If part of the mesh is not connected to the base, so that it could move freely, if the
+            contact is not on the front face, or if the load moves it farther than the finger is large.
     """
 
     mesh: TriangleMesh
@@ -137,6 +149,15 @@ class Problem:
             raise UserError(
                 f"part of the mesh is not connected to the base: {int(free.sum())} nodes, "
                 f"one of them at ({x:.6g}, {y:.6g}) mm"
+            )
+        travel, size = (
+            float(np.linalg.norm(self.load.values)),
+            float(np.linalg.norm(np.ptp(self.mesh.points, axis=0))),
+        )
+        if travel > size:
+            raise UserError(
+                f"the load moves the contact by {travel:g} mm, farther than the finger is large "
+                f"({size:.3g} mm); give mm"
             )
         left, right = contact_ends(self)
         front = self.mesh.points[self.mesh.boundary("front").ravel(), 0]

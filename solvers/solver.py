@@ -1,9 +1,9 @@
 """The interface of a solver: settings live in the solver, the problem is the argument."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -100,14 +100,29 @@ def solved(solver: Solver, problem: Problem, progress: Progress = silent) -> Sol
     Raises:
         UserError: If it is no `Solution`, or an array in it has another shape or is not finite.
     """
-    solution = solver.solve(problem, progress)
+    try:
+        solution = solver.solve(problem, progress)
+    except SystemExit as ended:
+        raise UserError(f"solver {solver.name} ended the program (exit code {ended.code!r})") from ended
     for value, kind in ((solution, Solution), (getattr(solution, "status", None), Status)):
         if not isinstance(value, kind):
             said = f"{_named(value)} as its {kind.__name__}"
             raise UserError(f"solver {solver.name} returned {said}; see docs/own-solver.md")
     if fault := _fault(solution, problem):
         raise UserError(f"solver {solver.name} returned a {fault}; see docs/own-solver.md")
-    return solution
+    # A solver that passes on another one's solution would be a second row of that name.
+    return solution if solution.solver == solver.name else replace(solution, solver=solver.name)
+
+
+def _other_kind(values: Any, *, of_field: bool) -> str | None:
+    """The kind of values that are no array of real numbers; None if they are one."""
+    if (of_field and not isinstance(values, np.ndarray)) or isinstance(values, np.ma.MaskedArray):
+        return _named(values)
+    try:
+        kind = np.asarray(values).dtype
+    except (TypeError, ValueError, RuntimeError):
+        return _named(values)
+    return None if kind.kind in "fiu" else f"of type {kind}"
 
 
 def _named(value: object) -> str:
@@ -116,6 +131,13 @@ def _named(value: object) -> str:
 
 def _fault(solution: Solution, problem: Problem) -> str | None:
     """A number or array of a solution that cannot be, with the reason; None if there is none."""
+    if solution.problem.mesh.digest != problem.mesh.digest:
+        return "Solution on another mesh; it must be of the problem that it was given"
+    if not isinstance(solution.stats, Mapping):
+        return f"stats that are {_named(solution.stats)}, not a dictionary"
+    lengths = {name: len(column) for name, column in solution.history.items()}
+    if len(set(lengths.values())) > 1:
+        return f"history whose columns differ in length: {lengths}"
     mesh, markers = problem.mesh, len(problem.observations.points) if problem.observations else 0
     nodes, middles = mesh.at_nodes(), mesh.at_centroids()
     checks: list[tuple[str, ArrayLike | None, tuple[int, ...]]] = [
@@ -126,16 +148,15 @@ def _fault(solution: Solution, problem: Problem) -> str | None:
     ]
     if solution.left_out is not None:
         checks.append(("left_out", solution.left_out, (markers, 2)))
-    for name, given, shape in checks:
-        try:
-            values = np.asarray(given, dtype=np.float64)
-        except (TypeError, ValueError):
-            return f"{name} that is {_named(given)}, not numbers"
+    for what, given, shape in checks:
+        if given is not None and (kind := _other_kind(given, of_field=what in ("displacement", "gradient"))):
+            return f"{what} that is {kind}, not floats"
+        values = np.asarray(given, dtype=np.float64)
         if values.shape != shape or given is None:
             found = "that is None" if given is None else f"of shape {values.shape}"
-            return f"{name} {found}; it must have the shape {shape}"
-        if name in ("energy", "displacement", "gradient") and not np.isfinite(values).all():
-            return f"{name} that is not finite everywhere"
+            return f"{what} {found}; it must have the shape {shape}"
+        if what in ("energy", "displacement", "gradient") and not np.isfinite(values).all():
+            return f"{what} that is not finite everywhere"
     return None
 
 

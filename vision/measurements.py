@@ -3,6 +3,7 @@
 import csv
 import re
 from collections.abc import Mapping
+from math import hypot
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,10 @@ POSITION = ("x_mm", "y_mm")
 DISPLACEMENT = ("u_mm", "v_mm")
 REQUIRED = (*POSITION, *DISPLACEMENT)
 OPTIONAL = {"std_u_mm": 0.0, "std_v_mm": 0.0, "visible": 1.0}
+SMALLEST_DISTANCE = 1e-3
+"""Distance below which two markers are the same one, mm: less than a camera tells apart."""
+LARGEST = 1e6
+"""Size of a coordinate or displacement that cannot be of a finger, mm."""
 SIMULATED_MARK = "# simulated"
 SOURCE_MARK = "# source: "
 
@@ -75,7 +80,10 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
                 "separate them with commas, and write decimals with a point"
             )
         marker = _marker(dict(zip(header, cells, strict=True)), f"{path}, line {number}")
-        if any(other["x_mm"] == marker["x_mm"] and other["y_mm"] == marker["y_mm"] for other in markers):
+        if any(
+            hypot(other["x_mm"] - marker["x_mm"], other["y_mm"] - marker["y_mm"]) < SMALLEST_DISTANCE
+            for other in markers
+        ):
             place = f"({marker['x_mm']:g}, {marker['y_mm']:g}) mm"
             raise UserError(f"{path}, line {number}: there is already a marker at {place}; keep one")
         markers.append(marker)
@@ -130,9 +138,11 @@ def _marker(cells: Mapping[str, str], where: str) -> dict[str, float]:
 def _number(cells: Mapping[str, str], name: str, where: str) -> float:
     text = cells.get(name, str(OPTIONAL.get(name, "")))
     try:
-        value = float(text)
+        value = float(text if "_" not in text else "nan")  # Python reads 2_0 as 20
     except ValueError:
         value = float("nan")
     if not np.isfinite(value):
         raise UserError(f"{where}: {name} is {text!r}, which is not a number")
+    if abs(value) > LARGEST:
+        raise UserError(f"{where}: {name} is {text}, beyond {LARGEST:g} mm; give mm")
     return value

@@ -3,9 +3,12 @@
 from pathlib import Path
 
 from compare.commands.options import FingerOptions, OutputPath, comma_list
+from geometry.errors import UserError
 
 STEP = "finger"
 """Name of the STEP file, beside which its clamp and contact lie."""
+CAD_FILES = ("finger.step", "finger-body.stl", "finger-markers.stl", "section.dxf", "section.svg")
+PICTURE = "design.png"
 
 
 def design(
@@ -30,12 +33,20 @@ def design(
     from geometry.finger.design import Design
 
     chosen, _ = finger.read()
-    paths = cad_files(chosen, out, formats=comma_list(formats))
     stem = Path(chosen.file).stem if isinstance(chosen, DrawnFinger) else STEP
     lines = out / f"{stem}.toml"
+    written = [
+        lines,
+        out / PICTURE,
+        *(out / name for name in CAD_FILES if name.endswith(tuple(comma_list(formats)))),
+    ]
+    for given in finger.files():
+        if any(path.exists() and path.samefile(given) for path in written):
+            raise UserError(f"--out {out}: this would overwrite {given}, which is read; name another folder")
+    paths = cad_files(chosen, out, formats=comma_list(formats))
     write_text(lines, description_lines(chosen))
     drawn = draw_design(chosen) if isinstance(chosen, Design) else chosen.plot()
-    picture = drawn.save(out / "design.png")
+    picture = drawn.save(out / PICTURE)
     for path in [*paths, lines, picture]:
         print(path)
     return 0

@@ -33,11 +33,11 @@ def fiducials(
     from geometry.atomic import write_json, write_text
     from vision.calibration.charuco import parse_board
     from vision.rig.boards import board_svg
-    from vision.tracking.workspace import default_workspace, workspace_svg
+    from vision.tracking.workspace import Workspace, default_workspace, workspace_svg
 
     design, _ = finger.read()
     sheet = board_svg(parse_board(board, square, marker=marker, dictionary=dictionary))
-    workspace = default_workspace(design).model_copy(update={"marker_plane": marker_plane})
+    workspace = Workspace(**{**default_workspace(design).model_dump(), "marker_plane": marker_plane})
     write_text(out / "fiducials.svg", workspace_svg(workspace, design))
     write_json(out / "fiducials.json", workspace.model_dump(mode="json"))
     write_text(out / "board.svg", sheet)

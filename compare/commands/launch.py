@@ -6,8 +6,10 @@ import sys
 import warnings
 from collections.abc import Callable
 from errno import EDQUOT, ENOSPC
+from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
+from resource import RLIM_INFINITY, RLIMIT_NOFILE, getrlimit, setrlimit
 from shutil import disk_usage
 from tempfile import TemporaryFile, gettempdir
 from typing import Any
@@ -26,6 +28,9 @@ EXIT_CODES = (
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
 """Variables in which Open MPI and the relatives of MPICH give the number of ranks."""
 
+MIN_FILES = 128
+"""Open files that a run needs: a comparison has opened up to 40 at once, MPI's included."""
+
 MIN_SPACE = 2**20
 """Bytes left on a disk below which it counts as full."""
 
@@ -34,6 +39,7 @@ def launched(command: Callable[[], Any]) -> int:
     """Run a command and return its exit code; of several ranks one runs it, the others serve its solves."""
     _write_any_letter()
     _give_libraries_a_cache()
+    command = partial(_with_enough_files, command)
     alone = all(os.environ.get(name, "1") == "1" for name in SIZES)
     return guarded(command if alone else lambda: _on_ranks(command))
 
@@ -78,7 +84,16 @@ def _space(folder: Path) -> int:
 
 
 def _write_any_letter() -> None:
-    """Let letters that the terminal lacks come out as question marks, not as an error after the work."""
+    """Let letters that the terminal lacks come out as question marks, not as an error after the work.
+
+    A stream that the caller has closed gives nothing, takes everything and shows nothing.
+    """
+    if sys.stdin is None:
+        sys.stdin = open(os.devnull, encoding="utf-8")  # noqa: SIM115
+    if sys.stdout is None:
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")
@@ -96,6 +111,16 @@ def _give_libraries_a_cache() -> None:
     except OSError:
         os.environ["XDG_CACHE_HOME"] = cache
         os.environ.setdefault("MPLCONFIGDIR", str(Path(cache) / "matplotlib"))
+
+
+def _with_enough_files(command: Callable[[], Any]) -> Any:
+    """Run a command, with the limit of open files raised as far as needed: MPI aborts without a reason."""
+    own, most = getrlimit(RLIMIT_NOFILE)
+    if most != RLIM_INFINITY and most < MIN_FILES:
+        raise UserError(f"the limit of open files is {most}; allow {MIN_FILES} (ulimit -n {MIN_FILES})")
+    if own != RLIM_INFINITY and own < MIN_FILES:
+        setrlimit(RLIMIT_NOFILE, (MIN_FILES, most))
+    return command()
 
 
 def _on_ranks(command: Callable[[], Any]) -> int:

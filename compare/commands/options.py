@@ -83,6 +83,11 @@ class FingerOptions:
             raise UserError(f"--mesh-{error}") from None
         return (self._designed() if self.section is None else self._drawn(self.section)), mesh
 
+    def files(self) -> list[Path]:
+        """The files that describe the finger."""
+        given = [Path(self.design), self.section, self.section and description_beside(self.section)]
+        return [path for path in given if path is not None and path.is_file()]
+
     def check_cost(self, finger: Finger, mesh: MeshSettings, parts: Sequence[str] = ()) -> None:
         """Raise a `UserError` with the price of a fine mesh, unless --yes is given; see `check_mesh_cost`."""
         if not self.yes:
@@ -108,6 +113,9 @@ class FingerOptions:
             for option in ("clamp", "contact", "markers")
             if (text := getattr(self, option)) is not None
         ]
+        keys = [line.partition("=")[0].strip() for line in (*lines, *self.set)]
+        if twice := [key for key in keys if keys.count(key) > 1]:
+            raise UserError(f"{twice[0]} is set twice; give it once")
         for setting in self.set:
             key, _, value = setting.partition("=")
             lines.append(f"{key.strip()} = {toml_value(value.strip())}" if value else setting)
@@ -188,7 +196,7 @@ class PhysicsOptions:
             said = first["msg"].removeprefix("Value error, ")
             if not first["loc"]:  # a rule between options
                 raise UserError(said) from None
-            raise UserError(f"--{first['loc'][0]} {first['input']}: {said.lower()}") from None
+            raise UserError(f"--{first['loc'][0]} {first['input']}: {said[0].lower()}{said[1:]}") from None
 
     def check_law(self, solvers: Sequence[Solver]) -> None:
         """Raise a `UserError` if none of the solvers has the law."""

@@ -50,6 +50,8 @@ def solve(
     material, load = physics.read(options.preset)
     if out.suffix != ".vtu":
         raise UserError(f"--out {out}: the fields are a VTU file; give a name that ends in .vtu")
+    if out.is_dir():
+        raise UserError(f"--out {out}: this is a folder; name a file that ends in .vtu")
     chosen_solvers = options.read(solver)
     if len(chosen_solvers) != 1:
         raise UserError(f"name one solver, not {solver!r}; `compare` takes several")

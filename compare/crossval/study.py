@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,8 @@ from solvers.problem import Load, Material
 from solvers.registry import make_solver
 from solvers.solver import Solver, check_load, with_law
 
+LARGEST_NOISE = 100.0
+"""Largest standard deviation of a marker's displacement, mm: more than a finger moves."""
 ELEMENT_SIZE = 0.5
 """Usual element size, mm.
 
@@ -182,8 +183,11 @@ class Study:
             raise UserError(f"--schemes: name at least one of {', '.join(known)}, none twice")
         if self.seeds < 1:
             raise UserError(f"--seeds {self.seeds}: give a whole number from 1")
-        if not 0 <= self.noise < inf:
-            raise UserError(f"--noise {self.noise:g}: give a standard deviation of zero or more, mm")
+        if not 0 <= self.noise <= LARGEST_NOISE:
+            raise UserError(
+                f"--noise {self.noise:g}: give a standard deviation of zero or more, "
+                f"at most {LARGEST_NOISE:g} mm"
+            )
         for variant in self.variants:
             solver = variant.make(0)
             check_load(solver, self.load)

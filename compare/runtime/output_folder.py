@@ -27,6 +27,10 @@ TRAINING = "training"
 
 def check_output(out: Path) -> None:
     """Raise a `UserError` if the folder must not be replaced."""
+    try:
+        out.resolve(strict=out.is_symlink())
+    except (OSError, RuntimeError):  # Python 3.11 raises the latter for a loop of links
+        raise UserError(f"{out} is a link that leads nowhere; name a folder with --out") from None
     if out.exists() and not out.is_dir():
         raise UserError(f"{out} is a file; name a folder with --out")
     if Path.cwd().is_relative_to(out.resolve()):

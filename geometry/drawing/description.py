@@ -1,6 +1,7 @@
 """Clamp, contact and markers of a drawn finger: a small TOML file beside the drawing, or lines of one."""
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Any, Literal
 
@@ -102,6 +103,7 @@ def _is_point(value: Any) -> bool:
         isinstance(value, list | tuple)
         and len(value) == 2
         and all(isinstance(number, int | float) and not isinstance(number, bool) for number in value)
+        and all(isfinite(number) for number in value)
     )
 
 

@@ -107,7 +107,7 @@ class FactorisedProblem:
         residual = elasticity.internal_force(nodal)
         solved = time.perf_counter()
         error = None
-        if self._solver.estimate and load.kind != "point":
+        if self._solver.estimate and load.kind != "point" and load.values.any():
             error = self._estimator.estimate(nodal, self._equilibrium.response)
         space = elasticity.distributed.space
         sentence = [

@@ -34,6 +34,11 @@ ROOT = Path(__file__).parent.parent.parent
 HEADER = "x_mm,y_mm,u_mm,v_mm"
 SMALL = ["compare", "--solvers", "fem", "--mesh-size", "1.0"]
 
+BEAM = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="60mm" height="10mm" viewBox="0 0 60 10">'
+    '<path d="M 0 0 H 60 V 10 H 0 Z"/></svg>'
+)
+
 INPUTS: dict[str, str | bytes] = {
     "broken.toml": "height = = 90",
     "other.toml": "hight = 90",
@@ -48,6 +53,13 @@ INPUTS: dict[str, str | bytes] = {
     "binary.csv": bytes(range(256)),
     "good.csv": f"{HEADER}\n20,-1,0,-5\n",
     "file": "",
+    "far.csv": f"{HEADER}\n20,-1,1e308,0\n",
+    "underscore.csv": f"{HEADER}\n2_0,-1,0,0\n",
+    "close.csv": f"{HEADER}\n20,-1,0,-5\n20.000000001,-1,0,5\n",
+    "unsure.csv": f"{HEADER},std_u_mm\n20,-1,0,-5,1e-300\n",
+    "beam.svg": BEAM,
+    "finger.toml": "height = 95",
+    "folder.vtu/kept": "",
     "foreign/thesis.txt": "three years of work",
 }
 
@@ -104,10 +116,16 @@ BAD = [
     # material and load
     ("compare --young -1", "--young -1.0: input should be greater than 0"),
     ("compare --young inf", "--young inf"),
+    ("compare --young 1e-300", "--young 1e-300: no solid has this Young's modulus"),
+    ("compare --young 11400000", r"--young 11400000.0: no solid .* MPa \(1 MPa = 10\^6 Pa\)"),  # in pascals
     ("compare --poisson 0.5", "--poisson 0.5: input should be less than 0.5"),  # incompressible
     ("compare --stroke 0", "--stroke 0: the indenter presses"),
     ("compare --stroke -10", "--stroke -10: the indenter presses"),  # not the displacement v
     ("compare --stroke nan", "--stroke nan"),
+    (
+        "solve fem --mesh-size 1 --stroke 10000 --quiet",  # in micrometres
+        "moves the contact by 10000 mm, farther than the finger is large",
+    ),
     ("compare --direction 90", "--direction 90: give an angle between -90 and 90 degrees"),
     ("compare --direction 5 --slide", "--slide leaves the travel along the finger free"),
     ("compare --load pull", 'Choose from: "mean", "point", "patch"'),
@@ -166,6 +184,10 @@ BAD = [
     ("compare --measurements column.csv", "column.csv has no column v_mm"),
     ("compare --measurements text.csv", "text.csv, line 2: u_mm is 'left', which is not a number"),
     ("compare --measurements nan.csv", "nan.csv, line 2: u_mm is 'nan', which is not a number"),
+    ("compare --measurements far.csv", "far.csv, line 2: u_mm is 1e308, beyond 1e[+]06 mm"),
+    ("compare --measurements underscore.csv", "line 2: x_mm is '2_0', which is not a number"),  # 20 in Python
+    ("compare --measurements close.csv", "close.csv, line 3: there is already a marker at"),
+    ("compare --measurements unsure.csv", "unsure.csv: standard deviations must be 0 or from 1e-12 to 1e"),
     ("compare --measurements flag.csv", "flag.csv, line 2: visible is '2'"),
     ("compare --measurements unseen.csv", "unseen.csv: none of the markers is visible"),
     ("compare --measurements header.csv", "header.csv has a header but no marker"),
@@ -189,6 +211,14 @@ BAD = [
     ("solve fem-asm --measurements film.mkv", "takes a CSV file of displacements, and no film"),
     ("compare --solvers pinn-std --device cuda", "can choose a device; with --preset paper one can"),
     ("compare --solvers fem --device cuda", "none of the solvers fem can choose a device"),
+    ("solve fem --out folder.vtu", "--out folder.vtu: this is a folder; name a file that ends in .vtu"),
+    ("design --design finger.toml --formats svg --out .", "this would overwrite finger.toml, which is read"),
+    ("design --section beam.svg --set depth=5 --set depth=6", "depth is set twice"),
+    ("design --section beam.svg --clamp '[[nan, 0], [0, -10]]'", r"clamp = \[\[nan, .* is no pair of points"),
+    ("fiducials --marker-plane nan", "workspace: marker_plane: Input should be a finite number"),
+    ("fiducials --marker-plane 1e9", "workspace: marker_plane: Input should be less than or equal to 1000"),
+    ("fiducials --square 1e9", "a square of 1e[+]09 mm; its side must be above zero, at most 1000 mm"),
+    ("crossval --solvers fem --noise 1e6", "--noise 1e[+]06: .* zero or more, at most 100 mm"),  # a kilometre
     ("solve fem --out fields.csv", "give a name that ends in .vtu"),
     ("gridsearch --learning-rates 1e-3;1e-2", "--learning-rates 1e-3;1e-2: give numbers with commas"),
     ("gridsearch --bc-weights 1,1.0", "--bc-weights 1,1.0: give different numbers above 0"),
@@ -225,6 +255,42 @@ def test_a_read_only_folder_is_one_line(folder, capsys):
     (folder / "foreign").chmod(0o555)
     assert main([*SMALL, "--out", "foreign/run"]) == BAD_INPUT
     assert capsys.readouterr().err.endswith("run.partial: Permission denied\n")
+
+
+def test_a_link_to_itself_is_no_output_folder(folder, capsys):
+    Path("loop").symlink_to("loop")
+    assert main([*SMALL, "--out", "loop"]) == BAD_INPUT
+    assert capsys.readouterr().err == "error: loop is a link that leads nowhere; name a folder with --out\n"
+
+
+def test_a_drawing_is_not_replaced_by_what_is_drawn_from_it(folder, capsys):
+    Path("section.svg").write_text(BEAM)
+    assert main(["design", "--section", "section.svg", "--formats", "svg", "--out", "."]) == BAD_INPUT
+    assert "this would overwrite section.svg, which is read" in capsys.readouterr().err
+    assert Path("section.svg").read_text() == BEAM
+
+
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-"])
+def test_a_closed_stream_is_no_fault(closed):
+    command = f'"{sys.executable}" -m compare.cli solvers {closed}'
+    done = subprocess.run(
+        ["bash", "-c", command], env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+def test_too_few_open_files_are_one_line(folder):
+    """MPI aborts with forty lines of which none names the limit."""
+    command = f'ulimit -n 16; "{sys.executable}" -m compare.cli compare --solvers fem'
+    done = subprocess.run(
+        ["bash", "-c", command],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    said = "error: the limit of open files is 16; allow 128 (ulimit -n 128)\n"
+    assert (done.returncode, done.stderr) == (BAD_INPUT, said)
 
 
 def test_bad_input_of_a_process_has_no_traceback(folder):

@@ -26,6 +26,11 @@ def observations(**changes: object) -> Observations:
         ({"displacements": np.zeros((3, 3))}, ShapeError, "displacements"),  # three components
         ({"standard_deviations": np.zeros(3)}, ShapeError, "standard_deviations"),
         ({"standard_deviations": np.full((3, 2), -1.0)}, UserError, "zero or more"),
+        ({"standard_deviations": np.full((3, 2), 1e300)}, UserError, "must be 0 or from 1e-12 to 1e"),
+        ({"standard_deviations": np.full((3, 2), 1e-300)}, UserError, "must be 0 or from 1e-12 to 1e"),
+        ({"displacements": np.ma.masked_less(np.full((3, 2), -1.0), 0)}, UserError, "holds masked values"),
+        ({"displacements": np.full((3, 2), 1j)}, UserError, "displacements holds complex numbers"),
+        ({"points": [["a", "b"]] * 3}, UserError, "points holds something that is no number"),
         ({"displacements": np.full((3, 2), np.nan)}, UserError, "not finite"),
         ({"visible": [False] * 3}, UserError, "none of the markers is visible"),
         ({"marker_radius": -0.1}, UserError, "marker radius must be zero or more, got -0.1"),

@@ -125,3 +125,34 @@ def test_a_design_and_a_mesh_show_themselves():
     mesh = pr.mesh("default", **MeshSettings(**COARSE).model_dump())
     assert f'<td style="text-align:left">{len(mesh.points)}</td>' in mesh._repr_html_()
     assert pr.Design().plot()._repr_png_().startswith(b"\x89PNG")
+
+
+FRAME = pd.DataFrame({"x_mm": [20.0, 50.0], "y_mm": -1.0, "u_mm": [-1.0, -1.5], "v_mm": [-3.0, -8.5]})
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: pr.mesh(None), "None is no design; give a finger, the name of a preset or a file"),
+        (lambda: pr.solve("default", FemSolver, **COARSE), "FemSolver'> is no solver; give one that is made"),
+        (lambda: pr.compare("default", [1], **COARSE), "1 is no solver; give one that is made"),
+        (lambda: pr.compare("default", "fem", measurements={"x_mm": [1]}, **COARSE), "that are a dict; give"),
+        (lambda: pr.compare("default", "fem", measurements=np.zeros((3, 4)), **COARSE), "that are a ndarray"),
+        (
+            lambda: pr.compare("default", "fem", measurements=FRAME.assign(visible=[0.9, 1.0]), **COARSE),
+            "the data frame, line 2: visible is '0.9'; it must be 1",
+        ),
+        (
+            lambda: pr.compare("default", "fem", measurements=FRAME.assign(visible=["yes", "no"]), **COARSE),
+            "the data frame, line 2: visible is 'yes', which is not a number",
+        ),
+    ],
+)
+def test_what_is_of_another_type_is_named(call: Callable[[], object], said: str):
+    with pytest.raises(pr.UserError, match=said):
+        call()
+
+
+def test_a_load_that_does_not_move_has_no_displacement():
+    solution = pr.solve("default", "fem", load=pr.Load(displacement=(0.0, 0.0)), **COARSE)
+    assert not solution.reaction.any()

@@ -76,6 +76,8 @@ def test_a_contact_beyond_the_finger_is_refused(coarse_mesh):
     ("make", "message"),
     [
         (lambda: Material(young=-1.0), "greater than 0"),
+        (lambda: Material(young=1e300), "no solid has this Young's modulus"),
+        (lambda: Load(displacement=(0.0, float("nan"))), "finite number"),
         (lambda: Material(poisson=0.5), "less than 0.5"),  # incompressible: no displacement formulation
         (lambda: Load(displacement=(None, None)), "leaves both components free"),
         (lambda: Load(kind="magnet"), "'mean', 'point', 'patch' or 'cylinder'"),

@@ -1,5 +1,6 @@
 """The border between the program and a solver of another package."""
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -14,6 +15,7 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, silent, solved
+from tests.meshes import permuted
 
 
 class Bending:
@@ -81,6 +83,33 @@ def spoilt(array: Any) -> Any:
         ),
         (lambda solution: replace(solution, field=Field(gradient=lambda a: a[:, 0])), "gradient of shape"),
         (lambda solution: replace(solution, field=Field(gradient=spoilt)), "gradient that is not finite"),
+        (
+            lambda solution: replace(solution, field=Field(displacement=lambda a: a + 1j)),
+            "displacement that is of type complex128",
+        ),
+        (
+            lambda solution: replace(solution, field=Field(displacement=lambda a: a.astype(object))),
+            "displacement that is of type object",
+        ),
+        (
+            lambda solution: replace(solution, field=Field(displacement=lambda a: np.ma.masked_less(a, -1))),
+            "displacement that is a MaskedArray",
+        ),
+        (
+            lambda solution: replace(solution, field=Field(gradient=np.ndarray.tolist)),
+            "gradient that is a li",
+        ),
+        (lambda solution: replace(solution, reaction=["0", "1"]), "reaction that is of type <U1"),
+        (lambda solution: replace(solution, stats=None), "stats that are None, not a dictionary"),
+        (
+            lambda solution: replace(solution, history={"energy": [1, 2], "epoch": [1]}),
+            "history whose columns differ in length",
+        ),
+        (
+            lambda solution: replace(solution, problem=Problem(permuted(solution.problem.mesh, 0))),
+            "Solution on another mesh",
+        ),
+        (lambda solution: sys.exit(0), r"beam ended the program \(exit code 0\)"),
         (lambda solution: replace(solution, left_out=np.zeros((9, 2))), r"left_out of shape \(9, 2\)"),
     ],
 )
@@ -93,6 +122,11 @@ def test_what_is_no_solution_is_refused_with_the_solvers_name(
 
 def test_a_sound_solution_passes(coarse_mesh: TriangleMesh) -> None:
     assert solved(Beam(), Problem(coarse_mesh)).energy == 1.0
+
+
+def test_a_solution_bears_the_name_of_its_solver(coarse_mesh: TriangleMesh) -> None:
+    passed_on = Beam(lambda solution: replace(solution, solver="fem"))
+    assert solved(passed_on, Problem(coarse_mesh)).solver == "beam"
 
 
 def test_a_beam_model_sees_the_thickness_of_a_wall(coarse_mesh: TriangleMesh) -> None:

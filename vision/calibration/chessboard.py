@@ -12,6 +12,8 @@ from vision.frames.frame import GreyImage
 
 EDGE = 0.45
 """Radius around a corner in which only its own two edges lie, over a square's side."""
+LARGEST_SQUARE = 1000.0
+"""Largest side of a square, mm."""
 RADII = (2.5, 12.0)
 """Smallest and largest radius of the pixels that a corner is fitted to."""
 LARGE = 1600
@@ -41,8 +43,10 @@ class Board:
             raise UserError(
                 f"a board of {self.columns}x{self.rows} inner corners; either side must have 3 to 100"
             )
-        if not 0 < self.square < np.inf:
-            raise UserError(f"a square of {self.square:g} mm; its side must be above zero")
+        if not 0 < self.square <= LARGEST_SQUARE:
+            raise UserError(
+                f"a square of {self.square:g} mm; its side must be above zero, at most {LARGEST_SQUARE:g} mm"
+            )
 
     def __str__(self) -> str:
         return f"{self.columns}x{self.rows} inner corners"

@@ -26,6 +26,10 @@ SHEET_MARGIN, RULER = 10.0, 50.0
 Point = tuple[float, float]
 
 
+LARGEST = 1000.0
+"""Largest diameter and distance of a workspace on a table, mm."""
+
+
 class Workspace(BaseModel):
     """Fiducials around the finger, in the finger's frame: x to the tip, y out of the front.
 
@@ -42,8 +46,8 @@ class Workspace(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     fiducials: tuple[Point, ...]
-    fiducial_diameter: float = Field(default=4.0, gt=0)
-    marker_plane: float = 0.0
+    fiducial_diameter: float = Field(default=4.0, gt=0, le=LARGEST)
+    marker_plane: float = Field(default=0.0, ge=-LARGEST, le=LARGEST)
     simulated: bool = False
 
     def __init__(self, **values: object) -> None:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterable, Iterator
+from math import inf
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import ParseError
@@ -40,16 +41,40 @@ def read_svg(path: Path, units: str | None = None) -> Drawing:
         parsed = svgelements.SVG.parse(str(path), reify=False)
     except (OSError, ParseError, ValueError, UnicodeDecodeError) as error:
         raise UserError(f"cannot read {path.name} as SVG: {error}") from None
+    _check_view_box(parsed, path.name)
     back = ~svgelements.Matrix(parsed.viewbox_transform or "")
     unit = UNITS[units] if units else _unit(parsed, path.name)
     marks = Marks(path.name)
     pieces: list[Piece] = []
     for element, label in _shapes(parsed, ""):
         place = _Transformation(element.transform * back, unit)
-        if not marks.took(*_mark(element, place), label):
-            pieces += _pieces(element.segments(transformed=False), label, place)
+        try:
+            if not marks.took(*_mark(element, place), label):
+                pieces += _pieces(element.segments(transformed=False), label, place)
+        except TypeError:  # svgelements reads a coordinate that is no number as None
+            raise UserError(f"{path.name}: a coordinate of {_described(element)} is no number") from None
     return marks.drawing(
         pieces, digest, note=f"SVG, {unit:.6g} mm in a user unit{' (given)' if units else ''}"
+    )
+
+
+def _check_view_box(parsed: Any, file: str) -> None:
+    """Raise a `UserError` for a viewBox that is not four numbers, which the parser would pass over."""
+    if (given := parsed.values.get("viewBox")) is None:
+        return
+    try:
+        *_, width, height = numbers = [float(text) for text in re.split(r"[\s,]+", str(given).strip())]
+    except ValueError:
+        numbers, width, height = [], 0.0, 0.0
+    if len(numbers) != 4 or not (0 < width < inf and 0 < height < inf):
+        raise UserError(
+            f"{file}: viewBox = {str(given)!r} is not four numbers with width and height, such as 0 0 60 10"
+        )
+
+
+def _described(element: Any) -> str:
+    return (
+        f"the element {element.id!r}" if element.id else f"a {type(element).__name__.lower()} without an id"
     )
 
 

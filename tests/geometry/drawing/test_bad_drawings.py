@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from geometry import UserError
+from geometry.cache import drawn_finger
 from geometry.drawing.description import Description, load_description
 from geometry.drawing.load import load_drawing
 from tests.geometry.drawing.files import BEAM, FINRAY, rectangle, write_dxf, write_svg
@@ -63,6 +64,9 @@ def test_message(tmp_path, curves, description, message):
     ("lines", "message"),
     [
         (["contact = 35"], "contact = 35 is no point"),
+        (["contact = [nan, 0]"], "is no point"),
+        (["clamp = [[0, 0], [inf, 0]]"], "is no pair of points"),
+        (["markers = [[1, nan]]"], "are no points"),
         (["clamp = [1, 2]"], "is no pair of points; write clamp"),
         (["clamp = [[[0, 0], [1, 0], [2, 0]]]"], "is no pair of points"),
         (["markers = 0"], "outside its range, 1 to 200"),
@@ -90,6 +94,33 @@ def test_description_file(tmp_path):
         load_description(path)
     with pytest.raises(UserError, match="cannot read the description"):
         load_description(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize("box", ["0 0 0 0", "nan nan nan nan", "0 0 60", "all"])
+def test_a_view_box_must_be_four_numbers(box, tmp_path):
+    path = tmp_path / "a.svg"
+    path.write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="60mm" height="10mm" viewBox="{box}">'
+        '<path d="M 0 0 H 60 V 10 H 0 Z"/></svg>'
+    )
+    with pytest.raises(
+        UserError, match=rf"a\.svg: viewBox = '{box}' is not four numbers with width and height"
+    ):
+        load_drawing(path)
+
+
+def test_a_coordinate_must_be_a_number(tmp_path):
+    path = write_svg(tmp_path / "a.svg", '<path d="M 0 0 H nan V 10 H 0 Z"/>')
+    with pytest.raises(UserError, match=r"a\.svg: a coordinate of a path without an id is no number"):
+        load_drawing(path)
+
+
+def test_a_step_file_that_was_cut_off_is_one_line(tmp_path):
+    """OpenCASCADE prints about it to the standard output, on which the child process answers."""
+    path = tmp_path / "cut.stp"
+    path.write_bytes((FINRAY / "Finray_8.stp").read_bytes()[:3000])
+    with pytest.raises(UserError, match=r"cannot read cut\.stp as STEP: STEP File could not be loaded"):
+        drawn_finger(path, Description(), cache_dir=tmp_path / "cache")
 
 
 def test_a_marker_must_be_round(tmp_path):
