@@ -44,15 +44,22 @@ sys.exit(main([]))
 
 
 def started(
-    code: str, *words: str, ignoring: Callable[[], object] | None = None, **variables: str
+    code: str, *words: str, ignored: signal.Signals | None = None, **variables: str
 ) -> subprocess.Popen[str]:
+    """A program that ignores one signal at most, even if these tests run under nohup."""
+
+    def set_signals() -> None:
+        for each in ENDING:
+            usual = signal.default_int_handler if each == signal.SIGINT else signal.SIG_DFL
+            signal.signal(each, signal.SIG_IGN if each == ignored else usual)
+
     return subprocess.Popen(
         [sys.executable, "-c", code, *words],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         env=child_environment(os.environ) | variables,
-        preexec_fn=ignoring,
+        preexec_fn=set_signals,
     )
 
 
@@ -98,9 +105,7 @@ def test_a_signal_while_the_program_is_imported_is_one_line(number):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP], ids=["in the background", "nohup"])
 def test_a_signal_that_the_shell_has_ignored_stays_ignored(number):
-    command = started(
-        WHILE_IMPORTING, str(int(number)), ignoring=lambda: signal.signal(number, signal.SIG_IGN)
-    )
+    command = started(WHILE_IMPORTING, str(int(number)), ignored=number)
     _, errors = command.communicate(timeout=60)
     assert (command.returncode, errors) == (0, "")
 
