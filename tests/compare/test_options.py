@@ -1,4 +1,4 @@
-"""What every command has: --quiet, defaults in its help, completion in a shell."""
+"""Options of every command: --quiet, defaults in its help, completion in a shell."""
 
 import re
 
