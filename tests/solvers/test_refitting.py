@@ -75,6 +75,8 @@ def test_other_markers_are_solved_afresh(coarse_mesh, observed, name, change):
 
 def test_another_solver_is_just_asked_again(coarse_mesh, observed):
     class Plain:
+        name = "plain"
+
         def solve(self, problem, progress):
             return FemSolver(degree=1, estimate=False).solve(problem, progress)
 
