@@ -16,7 +16,11 @@ from compare.evaluation.metrics import evaluated, pick_reference
 from compare.evaluation.plausibility import check_positions, displacement_remarks
 from compare.evaluation.shared_mesh import shared_mesh, write_rounds
 from compare.evaluation.truths import SLIDING, TRUTHS, check_truths, check_walls
-from compare.evaluation.virtual_experiment import virtual_experiment
+from compare.evaluation.virtual_experiment import (
+    UnfinishedExperimentError,
+    no_displacements,
+    virtual_experiment,
+)
 from compare.figures import FORMATS, Picture, draw_all
 from compare.report.html_report import write_report
 from compare.report.metrics_json import metrics
@@ -179,12 +183,15 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
     )
     problem = Problem(mesh, job.material, job.load, finger=job.design)
     with stages.stage("measurements") as progress:
-        observations, truth = (
-            (given, None)
-            if given
-            else virtual_experiment(problem, job.design.marker_radius, progress, TRUTHS[job.truth])
-        )
-        remarks = displacement_remarks(given, problem) if given else []
+        observations, truth, remarks = given, None, displacement_remarks(given, problem) if given else []
+        if observations is None:
+            radius = job.design.marker_radius
+            try:
+                observations, truth = virtual_experiment(problem, radius, progress, TRUTHS[job.truth])
+            except UnfinishedExperimentError as error:
+                solvers, without = _without_markers(solvers, job.spare, error)
+                left_out |= without
+                observations, remarks = no_displacements(problem, radius, str(error)), [f"no truth: {error}"]
     evaluations: list[Evaluation] = []
     settings: dict[str, dict[str, object]] = {}
     for solver in solvers:
@@ -212,6 +219,21 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
         left_out=left_out,
         warnings=remarks,
     )
+
+
+def _without_markers(
+    solvers: Sequence[Solver], spare: Collection[str], error: UserError
+) -> tuple[list[Solver], dict[str, str]]:
+    """The solvers that need no markers, and by name why others are left out.
+
+    Raises:
+        UserError: The given one, if a solver that needs markers is not spare, or all need them.
+    """
+    chosen = [solver for solver in solvers if not assimilates(solver)]
+    needing = [solver.name for solver in solvers if assimilates(solver)]
+    if not chosen or not set(needing) <= set(spare):
+        raise error
+    return chosen, dict.fromkeys(needing, "no markers to assimilate")
 
 
 def write(

@@ -20,15 +20,14 @@ class Observations:
         points: Initial positions, shape (m, 2), mm.
         displacements: Shape (m, 2), mm; meaningless at markers that are not visible.
         standard_deviations: Standard deviations of the displacements, shape (m, 2), mm.
-        visible: Which markers were seen, shape (m,).
-        source: One sentence on the origin of the numbers, shown with them.
+        visible: Which markers were seen, shape (m,); none where no displacement is known.
+        source: One sentence on the origin of the numbers, or on why there are none, shown with them.
         simulated: True if no camera was involved.
         marker_radius: Radius of the markers' discs, over which their displacements are means, mm.
 
     Raises:
         ShapeError: If the arrays do not fit together.
-        UserError: If a standard deviation is negative or of an impossible size, the radius is negative, or
-            no marker is visible.
+        UserError: If a standard deviation is negative or of an impossible size, or the radius is negative.
     """
 
     points: FloatArray
@@ -49,8 +48,6 @@ class Observations:
         ):
             frozen = frozen_array(getattr(self, name), dtype=dtype, shape=shape, name=name)
             object.__setattr__(self, name, frozen)
-        if not self.visible.any():
-            raise UserError("none of the markers is visible; at least one is needed")
         deviations = self.standard_deviations
         if (deviations < 0).any():
             raise UserError("standard deviations must be zero or more (mm)")
@@ -67,6 +64,11 @@ class Observations:
             raise ShapeError("observations need at least one marker")
 
     @property
+    def known(self) -> bool:
+        """True if the displacement of a marker is known."""
+        return bool(self.visible.any())
+
+    @property
     def label(self) -> str:
-        """`simulated` or `measured`, for captions."""
-        return "simulated" if self.simulated else "measured"
+        """`simulated`, `measured` or `unknown`, for captions."""
+        return ("simulated" if self.simulated else "measured") if self.known else "unknown"

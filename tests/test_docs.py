@@ -357,10 +357,15 @@ def test_the_guide_has_every_setting_of_the_other_presets_as_it_is():
 
 
 def test_the_guide_has_the_limits_of_the_certificate():
-    from compare.evaluation.certificate import CONDITION_LIMIT, ENERGY_LIMIT, INTERPOLANT_LIMIT
+    from compare.evaluation.certificate import (
+        CONDITION_LIMIT,
+        ENERGY_LIMIT,
+        INTERPOLANT_LIMIT,
+        WORK_LIMIT,
+    )
 
     said = [float(row[1].split(" %")[0]) / 100 for row in table(GUIDE, "fault")]
-    assert said == [ENERGY_LIMIT, CONDITION_LIMIT, INTERPOLANT_LIMIT]
+    assert said == [ENERGY_LIMIT, CONDITION_LIMIT, INTERPOLANT_LIMIT, WORK_LIMIT]
 
 
 def test_the_guide_has_every_solver_with_its_loads():

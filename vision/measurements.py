@@ -88,6 +88,8 @@ def read_measurements(path: Path, *, marker_radius: float) -> Observations:
             raise UserError(f"{path}, line {number}: there is already a marker at {place}; keep one")
         markers.append(marker)
     columns = {name: np.array([marker[name] for marker in markers]) for name in (*REQUIRED, *OPTIONAL)}
+    if not columns["visible"].any():
+        raise UserError(f"{path}: none of the markers is visible; at least one is needed")
     sources = [found[1] for comment in comments if (found := re.match(r"#\s*source:\s*(.*)", comment, re.I))]
     try:
         return Observations(

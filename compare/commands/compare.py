@@ -110,8 +110,9 @@ def compare(
         print((job.out / "metrics.json").read_text(encoding="utf-8"), end="")
     elif not quiet:
         console = Console()
-        console.print(marker_table(comparison))
-        console.print()
+        if comparison.observations.known:
+            console.print(marker_table(comparison))
+            console.print()
         console.print(body_table(comparison))
         console.print(f"report: {job.out / 'report.html'}", soft_wrap=True, highlight=False)
     for evaluation in comparison.unconverged:

@@ -26,6 +26,13 @@ has 1 % too much on the default mesh and 3 % with three elements across every wa
 between the points where its stress was looked at has far more.
 """
 
+WORK_LIMIT = 0.05
+"""Largest reported energy above that of `fem`, and deviation of the work of the reported force, relative.
+
+Both are integrals, so that networks and coarse elements that pass the other limits have them to 1 %; a wrong
+sign, unit or factor has far more.
+"""
+
 CONDITION_LIMIT = 0.02
 """Largest deviation from the conditions of a converged solution, relative to the prescribed displacement."""
 
@@ -69,6 +76,7 @@ class Certificate:
         imbalance: Largest force on a node that is not in balance, over the reaction of `fem`.
         base: Largest displacement on the base, mm.
         load: Largest deviation from the prescribed value of u and v, shape (2,), mm; NaN where free.
+        work: Of the solver's own reaction on the prescribed displacement; twice the energy in equilibrium.
         stroke: Largest prescribed displacement, mm.
         regions: The error by region, see `compare.evaluation.regions`.
         density: Energy density of the rest, its mean over each triangle, shape (t,), MPa.
@@ -83,6 +91,7 @@ class Certificate:
     imbalance: float
     base: float
     load: FloatArray
+    work: float
     stroke: float
     regions: Mapping[str, Region]
     density: FloatArray
@@ -135,13 +144,25 @@ class Certificate:
                 f"its energy is {percent(self.rel_excess, 2)} above that of fem "
                 f"(limit {percent(INTERPOLANT_LIMIT, 1)})"
             )
+        reported = -self.missed / self.fem_energy
+        work = self.work / (2 * self.fem_energy) - 1
+        if not reported <= WORK_LIMIT:
+            found.append(
+                f"it reports an energy {percent(reported, 2)} above that of fem "
+                f"(limit {percent(WORK_LIMIT, 1)})"
+            )
+        if not abs(work) <= WORK_LIMIT:
+            found.append(
+                f"it reports a force whose work is {percent(work, 2)} off twice the energy of fem "
+                f"(limit {percent(WORK_LIMIT, 1)})"
+            )
         return [fault.replace("\N{NO-BREAK SPACE}", " ") for fault in found]  # for files and terminals
 
     def numbers(self) -> dict[str, Any]:
         """The numbers for `metrics.json`."""
         plain = (
             *("energy", "fem_energy", "excess", "rel_excess", "violation", "rel_violation"),
-            *("energy_norm_error", "weak_residual", "imbalance", "missed", "misses_energy", "base"),
+            *("energy_norm_error", "weak_residual", "imbalance", "missed", "misses_energy", "work", "base"),
         )
         return {name: getattr(self, name) for name in plain} | {
             "load": self.load.tolist(),

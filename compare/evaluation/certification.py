@@ -63,6 +63,7 @@ class Certifier:
             imbalance=float(np.linalg.norm(balance, axis=1).max() / np.linalg.norm(reaction)),
             base=float(np.linalg.norm(nodal[self._space.boundary_nodes("base")], axis=1).max()),
             load=self._load_missed(nodal, values),
+            work=float(evaluation.reaction[self._problem.load.prescribed] @ self._problem.load.values),
             stroke=float(np.abs(self._problem.load.values).max()),
             regions=self._by_region(evaluation, density),
             density=evaluation.per_triangle(density),

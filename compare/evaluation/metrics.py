@@ -49,8 +49,11 @@ def marker_errors(evaluation: Evaluation, observations: Observations) -> MarkerE
 def held_out_errors(evaluation: Evaluation, observations: Observations) -> MarkerErrors | None:
     """The same at markers that the solver was not given: all, or each left out in its turn.
 
-    None for a solver that was given the markers and does not tell what it would say without.
+    None where no displacement is known, and for a solver that was given the markers and does not tell what
+    it would say without.
     """
+    if not observations.known:
+        return None
     if not evaluation.in_sample:
         return marker_errors(evaluation, observations)
     return None if evaluation.left_out is None else _errors(evaluation.left_out, observations)
@@ -59,7 +62,7 @@ def held_out_errors(evaluation: Evaluation, observations: Observations) -> Marke
 def _errors(displacement: FloatArray, observations: Observations) -> MarkerErrors:
     error = np.abs(displacement - observations.displacements)
     error[~observations.visible] = np.nan
-    mae_u, mae_v = (float(value) for value in np.nanmean(error, axis=0))
+    mae_u, mae_v = error[observations.visible].mean(axis=0).tolist() if observations.known else 2 * [np.nan]
     return MarkerErrors(
         ae_u=error[:, 0],
         ae_v=error[:, 1],

@@ -43,6 +43,10 @@ SOURCES = (
 """Modules whose change makes a new simulation."""
 
 
+class UnfinishedExperimentError(UserError):
+    """The virtual experiment did not reach its full load."""
+
+
 def virtual_experiment(
     problem: Problem, marker_radius: float, progress: Progress = silent, truth: Truth = SLIDING
 ) -> tuple[Observations, Evaluation]:
@@ -59,7 +63,8 @@ def virtual_experiment(
         The observations, and the true fields on the problem's mesh.
 
     Raises:
-        UserError: If the simulation cannot be run or does not reach the full load.
+        UserError: If the simulation cannot be run.
+        UnfinishedExperimentError: If it does not reach the full load.
     """
     found = _truth(problem, progress, truth)
     markers = problem.mesh.markers
@@ -86,11 +91,18 @@ def _truth(problem: Problem, progress: Progress, truth: Truth) -> Evaluation:
             return kept
         solution = _solved(solver, richer, progress)
     except UserError as error:
-        raise UserError(f"{error}; or give --measurements FILE.csv") from None
+        raise type(error)(f"{error}; or give --measurements FILE.csv") from None
     evaluation = Evaluation.of(solution, problem.mesh)
     with kept_if_possible(entry.parent, "the virtual experiment"):
         evaluation.save(entry, key)
     return evaluation
+
+
+def no_displacements(problem: Problem, marker_radius: float, reason: str) -> Observations:
+    """The mesh's markers, none of whose displacements is known, for one reason."""
+    markers = problem.mesh.markers
+    zeros, hidden = np.zeros_like(markers), np.zeros(len(markers), dtype=bool)
+    return Observations(markers, zeros, zeros, hidden, reason, simulated=False, marker_radius=marker_radius)
 
 
 def simulate(
@@ -105,7 +117,8 @@ def simulate(
         settings: Of the solver that simulates it.
 
     Raises:
-        UserError: If it cannot be run or does not reach the full load.
+        UserError: If it cannot be run.
+        UnfinishedExperimentError: If it does not reach the full load.
     """
     return _solved(*_richer(problem, truth, settings), progress)
 
@@ -118,7 +131,7 @@ def experiment_source(problem: Problem, truth: Truth = SLIDING) -> str:
 def _solved(solver: Solver, richer: Problem, progress: Progress) -> Solution:
     solution = solver.solve(richer, progress)
     if not solution.status.converged:
-        raise UserError(f"the virtual experiment {solution.status.message}")
+        raise UnfinishedExperimentError(f"the virtual experiment {solution.status.message}")
     return solution
 
 

@@ -43,12 +43,13 @@ def overlay(comparison: Comparison) -> Drawing:
     """The deformed finger of every solver."""
     observations = comparison.observations
     cylinder = "" if comparison.load.radius is None else " Grey circle: the cylinder where it ends."
+    circles = f"Circles: {observations.label} marker positions. " if observations.known else ""
     return Drawing(
         draw_overlay(comparison),
         "Deformed finger",
         f"The deformed body of each solver, coloured by displacement magnitude on one scale; the "
-        f"displacement is not exaggerated. Circles: {observations.label} marker positions. Crosses: "
-        f"the solver’s. Grey: the undeformed body.{cylinder} {_given(comparison)}{_simulated(comparison)}",
+        f"displacement is not exaggerated. {circles}Crosses: the solver’s markers. "
+        f"Grey: the undeformed body.{cylinder} {_given(comparison)}{_simulated(comparison)}",
         each_of(
             "Largest displacement, mm",
             comparison.evaluations,
@@ -57,9 +58,11 @@ def overlay(comparison: Comparison) -> Drawing:
     )
 
 
-def marker_errors(comparison: Comparison) -> Drawing:
-    """Bars of the errors at the markers."""
+def marker_errors(comparison: Comparison) -> Drawing | None:
+    """Bars of the errors at the markers; none where no displacement is known."""
     observations = comparison.observations
+    if not observations.known:
+        return None
     hidden = int((~observations.visible).sum())
     unseen = (
         f" {hidden} of {len(observations.visible)} markers (×) were not seen and count nowhere."
@@ -254,6 +257,6 @@ def _given(comparison: Comparison) -> str:
 
 def _simulated(comparison: Comparison) -> str:
     observations = comparison.observations
-    if not observations.simulated:
+    if observations.label != "simulated":
         return ""
     return f"The marker positions are simulated, not measured: {observations.source.rstrip('.')}."

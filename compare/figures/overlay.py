@@ -54,8 +54,9 @@ def draw_overlay(comparison: Comparison) -> Figure:
         body.colour_bar(bar, scale, "displacement magnitude, mm")
         moved = "contact" if comparison.load.radius is None else "cylinder"
         label = f"markers, {comparison.observations.label}"
+        seen = [Line2D([], [], ls="", marker="o", ms=5, mfc="none", mec=MEASURED, mew=1.1, label=label)]
         handles = [
-            Line2D([], [], ls="", marker="o", ms=5, mfc="none", mec=MEASURED, mew=1.1, label=label),
+            *(seen if comparison.observations.known else []),
             Line2D([], [], ls="", marker="x", ms=4, color=INK, mew=0.9, label="solver’s markers"),
             Line2D([], [], color="#9a9a9a", lw=0.9, label="undeformed"),
             Line2D([], [], color=INK, lw=1, marker=">", ms=3.5, markevery=[1], label=f"{moved}’s motion"),
@@ -102,10 +103,11 @@ def _panel(axes: Axes, canvas: Canvas, scale: Scale, comparison: Comparison, eva
     axes.plot(*observed.T, "o", ms=5, mfc="none", mec=MEASURED, mew=1.1, zorder=5)
     axes.plot(*computed.T, "x", ms=4, color="white", mew=2.0, zorder=4)
     axes.plot(*computed.T, "x", ms=4, color=INK, mew=0.9, zorder=5)
-    errors = marker_errors(evaluation, observations)
     axes.set_title(evaluation.label_at_markers, size=9, pad=3, weight="bold")
-    note = f"MAE{', given' * evaluation.in_sample}  u {errors.mae_u:.3f} mm,  v {errors.mae_v:.3f} mm"
-    body.write_note(axes, canvas.extent, note)
+    if observations.known:
+        errors = marker_errors(evaluation, observations)
+        note = f"MAE{', given' * evaluation.in_sample}  u {errors.mae_u:.3f} mm,  v {errors.mae_v:.3f} mm"
+        body.write_note(axes, canvas.extent, note)
 
 
 def _motion(axes: Axes, comparison: Comparison, evaluation: Evaluation) -> None:

@@ -148,8 +148,7 @@ def _summary(evaluation: Evaluation, comparison: Comparison) -> dict[str, Cell]:
     row: dict[str, Cell] = {"solver": evaluation.solver, "converged": int(evaluation.converged)}
     row |= {"in_sample": int(evaluation.in_sample)}
     row |= {"observations": observations.label, "reference": reference.solver}
-    row |= {"mae_u_mm": errors.mae_u, "mae_v_mm": errors.mae_v}
-    row |= {"mae_sum_mm": errors.mae_sum, "mae_rss_mm": errors.mae_rss}
+    row |= {f"{name}_mm": getattr(errors, name) if observations.known else "" for name in MEANS}
     held_out = held_out_errors(evaluation, observations)
     for name in MEANS:
         row[f"held_out_{name}_mm"] = getattr(held_out, name) if held_out else ""

@@ -1,5 +1,6 @@
 """The certificate against identities of linear algebra that hold for any displacement, and its verdict."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,13 @@ import skfem
 from scipy.sparse import csr_matrix
 from skfem.models.elasticity import linear_elasticity
 
-from compare.evaluation.certificate import CONDITION_LIMIT, ENERGY_LIMIT, INTERPOLANT_LIMIT, Certificate
+from compare.evaluation.certificate import (
+    CONDITION_LIMIT,
+    ENERGY_LIMIT,
+    INTERPOLANT_LIMIT,
+    WORK_LIMIT,
+    Certificate,
+)
 from compare.evaluation.certification import Certifier
 from compare.evaluation.convergence import with_certificate, with_certificates
 from compare.evaluation.evaluation import Evaluation
@@ -43,14 +50,16 @@ def finger() -> TriangleMesh:
     return finger_mesh(Design(), settings=MeshSettings(size=1.0))
 
 
-def sampled(problem: Problem, nodal: FloatArray, energy: float = 1.0) -> Evaluation:
-    """The evaluation of a quadratic finite-element displacement, which reports the energy given, N mm/mm."""
+def sampled(
+    problem: Problem, nodal: FloatArray, energy: float = 1.0, reaction: Sequence[float] = (0.0, 0.0)
+) -> Evaluation:
+    """The evaluation of a quadratic finite-element displacement, which reports the energy and force given."""
     solution = Solution(
         solver="given",
         problem=problem,
         field=LagrangeField(LagrangeSpace(problem.mesh, 2), nodal),
         energy=energy,
-        reaction=np.zeros(2),
+        reaction=np.array(reaction),
         status=Status(True, "a given displacement"),
         stats={},
     )
@@ -129,8 +138,10 @@ def stiffness_of_scikit_fem(problem: Problem, *, centroids_only: bool = False) -
 def test_missed_conditions_are_told_in_mm(finger: TriangleMesh, load: Load) -> None:
     """Everything moved by (0.02, -0.03) mm, base and contact included, which takes no energy."""
     problem = Problem(finger, load=load)
-    moved = FemSolver().solve(problem).field.values + np.array([0.02, -0.03])
-    certificate = Certifier(problem).certificate(sampled(problem, moved))
+    solution = FemSolver().solve(problem)
+    moved = solution.field.values + np.array([0.02, -0.03])
+    reported = sampled(problem, moved, solution.energy, solution.reaction)
+    certificate = Certifier(problem).certificate(reported)
     assert certificate.base == pytest.approx(np.hypot(0.02, 0.03))
     free = [value is None for value in load.displacement]
     np.testing.assert_allclose(certificate.load, np.where(free, np.nan, [0.02, 0.03]), rtol=1e-8)
@@ -172,6 +183,29 @@ def test_a_solver_that_reports_too_little_energy_is_found_out(finger: TriangleMe
     assert short.missed == pytest.approx(0.05 * solution.energy)
 
 
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({"energy": 1000.0}, "it reports an energy"),
+        ({"reaction": -1.0}, "it reports a force"),
+        ({"reaction": 1000.0}, "it reports a force"),
+    ],
+)
+@pytest.mark.parametrize("load", LOADS.values(), ids=LOADS)
+def test_a_wrong_energy_or_force_is_found_out(
+    finger: TriangleMesh, load: Load, changes: dict[str, float], fault: str
+) -> None:
+    """A factor of a thousand is that of a wrong unit."""
+    problem = Problem(finger, load=load)
+    solution = FemSolver().solve(problem)
+    wrong = replace(solution, **{name: factor * getattr(solution, name) for name, factor in changes.items()})
+    [right], [found] = (
+        with_certificates([Evaluation.of(each, finger)], problem) for each in (solution, wrong)
+    )
+    assert (right.converged, found.converged) == (True, False)
+    assert fault in found.message
+
+
 def test_a_minimiser_whose_quadrature_is_too_coarse_is_found_out(finger: TriangleMesh) -> None:
     """Quadratic elements whose energy is seen at one point a triangle: blind to some of their modes."""
     problem = Problem(finger)
@@ -190,7 +224,7 @@ def test_a_minimiser_whose_quadrature_is_too_coarse_is_found_out(finger: Triangl
     certificate = Certifier(problem).certificate(sampled(problem, nodal, 0.5 * float(dofs @ (seen @ dofs))))
     assert certificate.misses_energy
     assert certificate.energy > 2 * certificate.fem_energy
-    assert len(certificate.faults) == 2
+    assert len(certificate.faults) == 3  # the third: it reports no force
 
 
 def test_least_energy_does_not_judge_a_solver_that_was_given_the_markers(
@@ -219,6 +253,10 @@ def test_a_verdict_can_only_take_convergence_away(fem: Evaluation, failed: Evalu
         {"load": np.array([np.nan, 1.01 * CONDITION_LIMIT])},
         {"excess": 1.01 * INTERPOLANT_LIMIT},
         {"excess": np.nan},
+        {"missed": -1.01 * WORK_LIMIT},
+        {"missed": np.nan},
+        {"work": 2 * (1 + 1.01 * WORK_LIMIT)},
+        {"work": -2.0},
     ):
         bad = with_certificate(fem, replace(good, **fault))
         assert not bad.converged
@@ -236,6 +274,7 @@ def perfect() -> Certificate:
         imbalance=0.0,
         base=0.0,
         load=np.zeros(2),
+        work=2.0,
         stroke=1.0,
         regions={},
         density=np.zeros(1),

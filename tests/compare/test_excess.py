@@ -28,6 +28,7 @@ def certificate(mesh: TriangleMesh) -> Certificate:
         imbalance=0.3,
         base=0.0,
         load=np.array([np.nan, 2e-6]),
+        work=4.0,
         stroke=10.0,
         regions={"corners": Region(0.1, 0.9, 0.001, 0.02), "walls": Region(0.9, 0.1, 0.002, 0.01)},
         density=np.linspace(0.0, 1.0, len(mesh.triangles)),

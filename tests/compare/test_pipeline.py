@@ -438,22 +438,19 @@ def test_numbers_of_numpy_are_no_obstacle(job):
     def with_numpy(solution: Solution) -> Solution:
         status = Status(np.bool_(True), "solved")
         stats = {"seconds": np.float32(0.5), "unknowns": np.int64(7)}
-        return replace(solution, status=status, stats=stats, energy=np.float32(1.5))
+        return replace(solution, status=status, stats=stats, energy=np.float32(solution.energy))
 
     asked = job(Scripted("first", with_numpy))
     compare(asked)
     told = strictly(asked.out / "metrics.json")["solvers"]["first"]
-    assert (told["status"], told["energy"], told["stats"]) == (
-        "converged",
-        1.5,
-        {"seconds": 0.5, "unknowns": 7},
-    )
+    assert (told["status"], told["stats"]) == ("converged", {"seconds": 0.5, "unknowns": 7})
+    assert told["energy"] == pytest.approx(told["certificate"]["fem_energy"], rel=1e-6)  # single precision
 
 
 def test_what_is_not_a_number_is_null(job):
-    asked = job(Scripted("first", lambda solution: replace(solution, reaction=np.array([np.nan, np.inf]))))
+    asked = job(Scripted("first", lambda solution: replace(solution, stats={"seconds": np.nan})))
     compare(asked)
-    assert strictly(asked.out / "metrics.json")["solvers"]["first"]["reaction"] == [None, None]
+    assert strictly(asked.out / "metrics.json")["solvers"]["first"]["seconds"] is None
 
 
 def test_a_solver_that_did_not_converge_is_marked(job):

@@ -20,7 +20,7 @@ COMPONENTS = {"xx": DIFFERENCE, "yy": DIFFERENCE, "xy": DIFFERENCE}
 REGION = {"area": Real, "excess": Real, "rel_l2_displacement": Real, "rel_l2_von_mises": Real}
 CERTIFICATE = {
     **dict.fromkeys(("energy", "fem_energy", "excess", "rel_excess", "violation", "rel_violation"), Real),
-    **dict.fromkeys(("energy_norm_error", "weak_residual", "imbalance", "missed", "base"), Real),
+    **dict.fromkeys(("energy_norm_error", "weak_residual", "imbalance", "missed", "work", "base"), Real),
     "misses_energy": bool,
     "load": list,
     "regions": {"corners": REGION, "contact": REGION, "rest": REGION},

@@ -1,13 +1,20 @@
 """The simulated measurements: what is solved, when, and what is said of it; on the small rectangle."""
 
+import csv
+import json
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
+from compare.evaluation.comparison import Comparison
 from compare.evaluation.truths import TRUTHS
-from compare.evaluation.virtual_experiment import virtual_experiment
+from compare.evaluation.virtual_experiment import UnfinishedExperimentError, virtual_experiment
+from compare.pipeline import Job, run
+from compare.runtime.stages import Stages
 from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.finger.design import Design
@@ -15,6 +22,7 @@ from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.problem import Load, Material, Problem
+from solvers.registry import make_solver
 from solvers.solution import Solution, Status
 from tests.meshes import permuted
 
@@ -219,3 +227,49 @@ def test_without_the_finite_element_library_measurements_are_asked_for(problem, 
     monkeypatch.setattr("compare.evaluation.virtual_experiment.make_solver", missing)
     with pytest.raises(UserError, match=r"No module named 'dolfinx'; or give --measurements"):
         virtual_experiment(problem, 0.8)
+
+
+@pytest.fixture
+def unfinished(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A virtual experiment that stops before its full load."""
+
+    def stops(*_: object) -> None:
+        raise UnfinishedExperimentError("the virtual experiment stopped at 67.5% of the load")
+
+    monkeypatch.setattr("compare.pipeline.virtual_experiment", stops)
+
+
+def _compared(out: Path, *names: str, spare: tuple[str, ...] = ()) -> Comparison:
+    job = Job(Design(), [make_solver(name) for name in names], spare, MeshSettings(size=1.0), out=out)
+    with Stages(Console(file=StringIO()), quiet=True) as stages:
+        return run(job, stages)
+
+
+def test_a_comparison_goes_on_without_a_truth(tmp_path: Path, unfinished: None) -> None:
+    comparison = _compared(tmp_path / "run", "fem", "fem-asm", spare=("fem-asm",))
+    assert [each.solver for each in comparison.evaluations] == ["fem"]
+    assert comparison.truth is None
+    assert not comparison.observations.known
+    assert comparison.remarks == [
+        "left out: fem-asm (no markers to assimilate)",
+        "no truth: the virtual experiment stopped at 67.5% of the load",
+    ]
+    page = (tmp_path / "run" / "report.html").read_text()
+    assert "No marker displacement is known" in page
+    assert "Errors at the markers" not in page
+    assert not (tmp_path / "run" / "figures" / "markers.png").exists()
+    assert (tmp_path / "run" / "figures" / "overlay.png").exists()
+    solver = json.loads((tmp_path / "run" / "metrics.json").read_text())["solvers"]["fem"]
+    assert solver["held_out"] is None
+    assert solver["markers"]["mae_sum"] is None
+    [row] = csv.DictReader((tmp_path / "run" / "summary.csv").open())
+    assert row["mae_sum_mm"] == row["held_out_mae_sum_mm"] == ""
+    assert float(row["energy_N_mm_per_mm"]) > 0
+
+
+def test_without_a_truth_a_chosen_solver_that_needs_markers_is_refused(
+    tmp_path: Path, unfinished: None
+) -> None:
+    with pytest.raises(UserError, match=r"stopped at 67\.5% of the load"):
+        _compared(tmp_path / "run", "fem", "fem-asm")
+    assert not (tmp_path / "run").exists()

@@ -32,7 +32,6 @@ def observations(**changes: object) -> Observations:
         ({"displacements": np.full((3, 2), 1j)}, UserError, "displacements holds complex numbers"),
         ({"points": [["a", "b"]] * 3}, UserError, "points holds something that is no number"),
         ({"displacements": np.full((3, 2), np.nan)}, UserError, "not finite"),
-        ({"visible": [False] * 3}, UserError, "none of the markers is visible"),
         ({"marker_radius": -0.1}, UserError, "marker radius must be zero or more, got -0.1"),
         ({"marker_radius": np.nan}, UserError, "marker radius must be zero or more"),
     ],
@@ -50,4 +49,12 @@ def test_no_marker_at_all_is_refused() -> None:
 
 @pytest.mark.parametrize(("simulated", "label"), [(True, "simulated"), (False, "measured")])
 def test_label_says_where_the_numbers_come_from(simulated: bool, label: str) -> None:
-    assert observations(simulated=simulated).label == label
+    found = observations(simulated=simulated)
+    assert found.known
+    assert found.label == label
+
+
+def test_markers_that_nobody_saw_are_unknown() -> None:
+    hidden = observations(visible=[False] * 3)
+    assert not hidden.known
+    assert hidden.label == "unknown"
