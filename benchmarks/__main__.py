@@ -27,13 +27,14 @@ BENCHMARKS = {
     "validation": "validation.document",
     "readings": "readings",
     "plane_strain": "plane_strain",
+    "paper": "paper_run",
 }
 """Names and modules; the modules' docstrings have descriptions and times."""
 
 WIDEST = 400
 """Columns of the widest table."""
 SHORT = ("fem", "pinn")
-TIMED = ("deepxde", "recipes")
+TIMED = ("deepxde", "recipes", "paper")
 
 
 def show(table: RenderableType, console: Console | None = None) -> None:
