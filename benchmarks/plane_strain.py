@@ -20,7 +20,7 @@ from compare.figures.style import axes_at, heading
 from geometry.atomic import write_text
 from geometry.cache import finger_mesh
 from geometry.errors import UserError
-from geometry.figure import INK, MUTED, Figure, figure
+from geometry.figure import INK, MUTED, SMALL, Figure, figure
 from geometry.finger.design import Design
 from geometry.finger.presets import load_design
 from geometry.mesh.quadrature import body_quadrature
@@ -335,5 +335,5 @@ def _label(axes: Axes, text: str, place: tuple[float, float], colour: str, *, ab
         ha="center",
         va="bottom" if above else "top",
         color=colour,
-        size=7.5,
+        size=SMALL,
     )

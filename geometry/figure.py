@@ -20,7 +20,10 @@ if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
 
 WIDTH = 5.5
-"""Width of every figure, inches. In a journal's column of 3.4 inches type of 8.5 points has 5.3."""
+"""Width of every figure, inches."""
+
+SMALL = 8.1
+"""Smallest type, points: 5 points in a journal's column of 3.4 inches, the least that journals print."""
 
 DPI = 300
 NOTEBOOK_DPI = 150
@@ -44,11 +47,11 @@ _RC: "dict[RcKeyType, Any]" = {
     "axes.titlelocation": "left",
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
+    "xtick.labelsize": SMALL,
+    "ytick.labelsize": SMALL,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
-    "legend.fontsize": 8,
+    "legend.fontsize": SMALL,
     "legend.frameon": False,
     "figure.titlesize": 10,
     "mathtext.fontset": "dejavusans",

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from compare.figures.style import axes_at, heading
 from geometry.arrays import FloatArray
-from geometry.figure import INK, MEASURED, MUTED, WIDTH, Figure, figure
+from geometry.figure import INK, MEASURED, MUTED, SMALL, WIDTH, Figure, figure
 from vision.calibration.camera import Camera
 from vision.calibration.camera_calibration import Calibration
 
@@ -81,7 +81,7 @@ def draw_calibration(calibration: Calibration, name: str, photograph: NDArray[np
             axes = axes_at(drawn, (MARGIN + number * (half + GAP), below, half, half * shape))
             _image(axes, camera).imshow(image, cmap="gray", vmin=0, vmax=255, interpolation="antialiased")
             axes.plot(*corners.T, ".", ms=1.5, color=MEASURED)
-            axes.set_title(f"{Path(name).name} {title}", size=7.5, color=MUTED, pad=3)
+            axes.set_title(f"{Path(name).name} {title}", size=SMALL, color=MUTED, pad=3)
     return drawn
 
 

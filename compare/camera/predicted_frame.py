@@ -16,7 +16,7 @@ from compare.figures import Picture
 from compare.figures.gallery import each_of
 from compare.figures.style import axes_at, heading, legend_below_heading
 from geometry.arrays import FloatArray
-from geometry.figure import INK, MEASURED, WIDTH, Figure, figure
+from geometry.figure import INK, MEASURED, SMALL, WIDTH, Figure, figure
 from geometry.mesh.boundary import boundary_edges
 from vision.frames.frame import Image
 from vision.tracking.trajectories import Tracking
@@ -115,4 +115,4 @@ def _name(axes: Axes, comparison: Comparison, evaluation: Evaluation) -> None:
     errors = marker_errors(evaluation, comparison.observations)
     given = ", given" * evaluation.in_sample
     note = f"MAE{given}  u {errors.mae_u:.2f} mm,  v {errors.mae_v:.2f} mm"
-    axes.set_title(f"{evaluation.label_at_markers}: {note}", size=7.5)
+    axes.set_title(f"{evaluation.label_at_markers}: {note}", size=SMALL)

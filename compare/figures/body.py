@@ -12,7 +12,7 @@ from matplotlib.collections import LineCollection
 from compare.figures.canvas import Canvas, Extent, Pixels
 from compare.figures.colours import Scale
 from geometry.arrays import FloatArray, IntArray
-from geometry.figure import INK, MUTED
+from geometry.figure import INK, MUTED, SMALL
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 
@@ -90,7 +90,7 @@ def panel(
 def write_note(axes: Axes, extent: Extent, note: str) -> None:
     """A note at the left of the strip below the body."""
     place = (extent.left + 0.01 * extent.width, extent.bottom)
-    axes.annotate(note, place, xytext=(0, 3), textcoords="offset points", size=7, color=MUTED)
+    axes.annotate(note, place, xytext=(0, 3), textcoords="offset points", size=SMALL, color=MUTED)
 
 
 def outline(
@@ -157,7 +157,7 @@ def scale_bar(axes: Axes, extent: Extent) -> None:
     right, y = extent.right - 0.01 * extent.width, extent.bottom + 0.005 * extent.width
     axes.plot([right - length, right], [y, y], color=INK, lw=1.6, solid_capstyle="butt", zorder=6)
     axes.annotate(
-        f"{length:g} mm", (right, y), xytext=(0, 2.5), textcoords="offset points", ha="right", size=7.5
+        f"{length:g} mm", (right, y), xytext=(0, 2.5), textcoords="offset points", ha="right", size=SMALL
     )
 
 
@@ -179,9 +179,9 @@ def colour_bar(axes: Axes, scale: Scale, title: str, *, extend: str = "neither")
     figure = axes.figure
     bar = figure.colorbar(scale.mappable, cax=axes, orientation="horizontal", extend=extend, extendfrac=0.03)
     bar.outline.set_linewidth(0.4)
-    bar.ax.tick_params(length=2, width=0.5, pad=1.5, labelsize=7.5, colors=INK)
+    bar.ax.tick_params(length=2, width=0.5, pad=1.5, labelsize=SMALL, colors=INK)
     if not scale.log:
         bar.ax.locator_params(nbins=5)
         bar.ax.ticklabel_format(scilimits=(-2, 3), useMathText=True)
-    bar.ax.xaxis.get_offset_text().set(size=7, color=MUTED)
-    bar.set_label(title, size=8, labelpad=2)
+    bar.ax.xaxis.get_offset_text().set(size=SMALL, color=MUTED)
+    bar.set_label(title, size=SMALL, labelpad=2)

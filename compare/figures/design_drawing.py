@@ -14,7 +14,7 @@ from compare.figures.canvas import Extent
 from compare.figures.dimensions import CENTRE_LINE, Draughtsman, upright
 from compare.figures.style import arrow, axes_at, heading
 from geometry.arrays import FloatArray
-from geometry.figure import CONTACT, MEASURED, WIDTH, Figure, figure
+from geometry.figure import CONTACT, MEASURED, SMALL, WIDTH, Figure, figure
 from geometry.finger.design import Design
 from geometry.finger.finger import Finger
 from geometry.finger.picture import draw_section
@@ -262,5 +262,5 @@ def _markers(pen: Draughtsman, finger: Finger) -> None:
         room = shapely.distance(shapely.points(places), taken)
         room = np.fmin(room, shapely.distance(shapely.points(places), shapely.union_all(numbers)) - half)
         found = places[int(np.minimum(room, ENOUGH * em).round(6).argmax())]
-        pen.text(found, text, size=6.5, va="center", color=MEASURED)
+        pen.text(found, text, size=SMALL, va="center", color=MEASURED)
         numbers.append(shapely.Point(found).buffer(half))

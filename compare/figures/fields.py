@@ -16,7 +16,7 @@ from compare.figures.canvas import Canvas
 from compare.figures.colours import PERCENT, Scale, diverging, sequential, symmetric
 from compare.figures.style import axes_at, heading
 from geometry.arrays import FloatArray
-from geometry.figure import MUTED, WIDTH, Figure, figure
+from geometry.figure import MUTED, SMALL, WIDTH, Figure, figure
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 MARGIN = 0.1
@@ -150,11 +150,11 @@ def _explain(drawn: Figure, box: tuple[float, float, float, float], reference: E
     axes.set_axis_off()
     text = (
         f"Reference: {reference.label}\n"
-        f"Scales end at the {PERCENT:g} % point of the area\n"
-        "(left: of the reference; right: of each\ndifference, as stated). Values beyond take the\n"
-        "end colours. Largest: of the means over a triangle."
+        f"Scales end at the {PERCENT:g} % point of the area:\n"
+        "left of the reference, right of each\ndifference. Values beyond have the\n"
+        "end colours. Largest: of triangles’ means."
     )
-    axes.text(0.02, 0.95, text, va="top", size=7, color=MUTED, linespacing=1.35, transform=axes.transAxes)
+    axes.text(0.02, 0.95, text, va="top", size=SMALL, color=MUTED, linespacing=1.35, transform=axes.transAxes)
 
 
 def excess_scale(mesh: TriangleMesh, densities: Sequence[FloatArray]) -> Scale:

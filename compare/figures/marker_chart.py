@@ -12,12 +12,12 @@ from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import MarkerErrors, held_out_errors, marker_errors
 from compare.figures.style import axes_at, heading, legend_below_heading, solver_colour
 from geometry.arrays import BoolArray
-from geometry.figure import MUTED, WIDTH, Figure, figure
+from geometry.figure import MUTED, SMALL, WIDTH, Figure, figure
 from geometry.observations import Observations
 
 HEAD, TITLE, HEIGHT, GAP, FOOT = 0.62, 0.19, 0.42, 0.09, 0.4
 """Heights in inches: heading and legend; a solver's name; its bars; the space below; the lowest axis."""
-LEFT, MEANS = 0.48, 0.72
+LEFT, MEANS = 0.56, 0.82
 """Widths in inches beside the bars: their scale; their means."""
 
 
@@ -45,7 +45,7 @@ def draw_marker_errors(comparison: Comparison) -> Figure:
                 axes = axes_at(drawn, box)
                 _bars(axes, symbol, held_out, given, solver_colour(row))
                 _scales(axes, observations.visible, ceiling)
-                axes.set_ylabel(rf"$|\Delta {symbol}|$, mm", size=7)
+                axes.set_ylabel(rf"$|\Delta {symbol}|$, mm", size=SMALL)
                 if column == 0:
                     axes.set_title(evaluation.label_at_markers, size=8.5, pad=2, weight="bold")
                 if row == len(evaluations) - 1:
@@ -81,18 +81,20 @@ def _bars(
         face = "white" if hollow else colour
         axes.bar(x[seen], values[seen], 0.9 * width, color=face, edgecolor=colour, linewidth=0.6)
         words.append(f"{'given' if hollow else 'mean'} {getattr(errors, f'mae_{symbol}'):.3f}")
-    axes.text(1.03, 0.5, "\n".join(words), size=7, va="center", color=MUTED, transform=axes.transAxes)
+    axes.text(1.03, 0.5, "\n".join(words), size=SMALL, va="center", color=MUTED, transform=axes.transAxes)
 
 
 def _scales(axes: Axes, visible: BoolArray, ceiling: float) -> None:
     count = len(visible)
     for marker in np.flatnonzero(~visible) + 1:
-        axes.text(marker, 0.04, "×", size=7, color=MUTED, ha="center", transform=axes.get_xaxis_transform())
+        axes.text(
+            marker, 0.04, "×", size=SMALL, color=MUTED, ha="center", transform=axes.get_xaxis_transform()
+        )
     axes.set_xticks(range(1, count + 1) if count <= 12 else range(1, count + 1, 5))
     axes.set_xlim(0.4, count + 0.6)
     axes.set_ylim(0, 1.04 * ceiling)
     axes.yaxis.set_major_locator(MaxNLocator(2))
     axes.yaxis.set_major_formatter("{x:g}")
-    axes.tick_params(labelsize=7)
+    axes.tick_params(labelsize=SMALL)
     axes.grid(axis="y", color="#dddddd", linewidth=0.5)
     axes.set_axisbelow(True)

@@ -9,7 +9,7 @@ from compare.figures import body
 from compare.figures.canvas import Extent
 from compare.figures.style import HALO, axes_at, heading
 from geometry.arrays import FloatArray
-from geometry.figure import CONTACT, INK, MEASURED, WIDTH, Figure, figure
+from geometry.figure import CONTACT, INK, MEASURED, SMALL, WIDTH, Figure, figure
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 
@@ -86,7 +86,7 @@ def draw_mesh(mesh: TriangleMesh) -> Figure:
             inset.tick_params(bottom=False, left=False, labelbottom=False, labelleft=False)
             for spine in inset.spines.values():
                 spine.set(visible=True, color=MEASURED, linewidth=0.9)
-            inset.set_title(f"{letter}: {title}, {window.width:.2g} mm across", size=8, pad=3)
+            inset.set_title(f"{letter}: {title}, {window.width:.2g} mm across", size=SMALL, pad=3)
     return drawn
 
 

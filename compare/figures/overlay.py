@@ -106,7 +106,7 @@ def _panel(axes: Axes, canvas: Canvas, scale: Scale, comparison: Comparison, eva
     axes.set_title(evaluation.label_at_markers, size=9, pad=3, weight="bold")
     if observations.known:
         errors = marker_errors(evaluation, observations)
-        note = f"MAE{', given' * evaluation.in_sample}  u {errors.mae_u:.3f} mm,  v {errors.mae_v:.3f} mm"
+        note = f"MAE{', given' * evaluation.in_sample}  u {errors.mae_u:.3f},  v {errors.mae_v:.3f} mm"
         body.write_note(axes, canvas.extent, note)
 
 

@@ -7,7 +7,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from geometry.arrays import FloatArray
-from geometry.figure import INK, MUTED, Figure
+from geometry.figure import INK, MUTED, SMALL, Figure
 
 HALO = [patheffects.withStroke(linewidth=2.5, foreground="white")]
 """Keeps type and lines legible on anything."""
@@ -21,7 +21,7 @@ def heading(drawn: Figure, text: str, note: str = "") -> None:
     height = drawn.get_figheight()
     drawn.text(0.012, 1 - 0.06 / height, text, va="top", weight="bold", size=9.5, color=INK)
     if note:
-        drawn.text(0.012, 1 - 0.25 / height, note, va="top", size=7.5, color=MUTED, linespacing=1.3)
+        drawn.text(0.012, 1 - 0.25 / height, note, va="top", size=SMALL, color=MUTED, linespacing=1.3)
 
 
 def axes_at(drawn: Figure, box: Sequence[float]) -> Axes:

@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 from compare.figures.style import HALO, axes_at, heading
 from compare.gridsearch.tables import best_of
 from compare.gridsearch.training_run import TrainingMetrics, TrainingRun
-from geometry.figure import INK, MUTED, WIDTH, Figure, figure
+from geometry.figure import INK, MUTED, SMALL, WIDTH, Figure, figure
 
 HEAD, CELL, FOOT, LEFT, GAP = 0.68, 0.34, 0.5, 0.85, 0.25
 """Heights, the left margin and the gap between the maps, inches."""
@@ -58,7 +58,7 @@ def _map(axes: Axes, runs: Sequence[TrainingRun], value: Callable[[TrainingMetri
         if run.measured:
             table[y, x] = max(100 * value(run.measured), SMALLEST)
             words, colour = f"{table[y, x]:.3g}", INK
-        axes.text(x, y, words, ha="center", va="center", size=7.5, color=colour, path_effects=HALO)
+        axes.text(x, y, words, ha="center", va="center", size=SMALL, color=colour, path_effects=HALO)
     if np.isfinite(table).any():
         norm = LogNorm(np.nanmin(table), np.nanmax(table))
         axes.imshow(table, norm=norm, cmap=colormaps["viridis_r"], aspect="auto")

@@ -6,7 +6,7 @@ from matplotlib.path import Path as Outline
 
 from geometry.arrays import FloatArray
 from geometry.drawing.drawn_finger import DrawnFinger
-from geometry.figure import BODY, CONTACT, INK, MEASURED, Figure, body_figure
+from geometry.figure import BODY, CONTACT, INK, MEASURED, SMALL, Figure, body_figure
 from geometry.section.loop import Loop
 from geometry.section.section import Section
 from geometry.section.thickness import inner_normals
@@ -46,7 +46,7 @@ def plot_drawing(finger: DrawnFinger) -> Figure:
                 centre,
                 xytext=(3, 3),
                 textcoords="offset points",
-                fontsize=6,
+                fontsize=SMALL,
                 color=MEASURED,
                 zorder=6,
             )

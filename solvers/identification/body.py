@@ -23,6 +23,11 @@ class Linearised(Protocol):
         """F there, of the shape of a state, N/mm."""
         ...
 
+    @property
+    def negative(self) -> int:
+        """Number of negative eigenvalues of the tangent K; valid as long as `solve` is."""
+        ...
+
     def solve(self, right: FloatArray) -> FloatArray:
         """K⁻¹ of generalised forces of shape (r, *shape); valid until the body is linearised again."""
         ...

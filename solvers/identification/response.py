@@ -16,6 +16,7 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from solvers.assimilation.misfit import Misfit
+from solvers.constrained_elimination import ConstrainedElimination
 from solvers.identification.body import Body, Linearised
 from solvers.identification.clamp import Clamp, RigidMotion
 from solvers.identification.hypothesis import Hypothesis, Unknowns
@@ -110,6 +111,16 @@ class ResponseModel:
         found = self._near(near.values, ROUGH, MOST_ITERATIONS)
         self._last = found or near
         return found
+
+    def unstable(self, response: Response) -> int:
+        """Number of directions in which the energy falls while the mean of the contact is held still."""
+        hypothesis = response.hypothesis
+        there = self.body.linearised(response.state, hypothesis.lame, hypothesis.changes)
+        if there is None:
+            raise UserError("the finger that was found is inside out")
+        rows = self._traction(hypothesis.position, hypothesis.width)[0]
+        held = ConstrainedElimination(rows, there.solve(rows))
+        return held.unstable(there.negative)
 
     def restart(self, response: Response | None) -> None:
         """Start the next response from this one; None: from rest."""

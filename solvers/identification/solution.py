@@ -12,7 +12,7 @@ from solvers.identification.fit import PROBABLE, Fit, Identified
 from solvers.identification.hypothesis import Unknowns
 from solvers.identification.summary import identified_sentence, identified_stats, standard_errors
 from solvers.problem import Problem
-from solvers.solution import Solution, Status
+from solvers.solution import Solution, Status, unstable_phrase
 
 
 def identified_solution(
@@ -29,9 +29,12 @@ def identified_solution(
         found: The fits.
         stats: Columns of the solution's `stats` beside those of the identification.
     """
-    best = found.best
+    best, (missed, left_out) = found.best, residuals_by_marker(found)
     hypothesis = best.response.hypothesis
-    missed, left_out = residuals_by_marker(found)
+    unstable = best.model.unstable(best.response)
+    sentence = identified_sentence(found, missed)
+    if unstable:
+        sentence = f"{unstable_phrase(unstable)}; {sentence}"
     return Solution(
         solver=name,
         problem=_with_values(best.markers.unknowns, best.response.values, problem),
@@ -44,8 +47,8 @@ def identified_solution(
         ),
         energy=best.model.body.energy(best.response.state, hypothesis.lame, hypothesis.changes),
         reaction=hypothesis.force,
-        status=Status(best.estimate.converged and best.exact, identified_sentence(found, missed)),
-        stats={**stats, **identified_stats(found)},
+        status=Status(best.estimate.converged and best.exact and not unstable, sentence),
+        stats={**stats, **identified_stats(found), "unstable_directions": unstable},
         left_out=leave_one_out_displacements(problem, left_out),
     )
 

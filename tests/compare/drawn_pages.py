@@ -12,10 +12,11 @@ from geometry.figure import Figure
 
 
 class Page(NamedTuple):
-    """A matplotlib figure and what it wrote where, in pixels, when it was drawn."""
+    """A matplotlib figure, what it wrote where when it was drawn, pixels, and its smallest type, points."""
 
     figure: Figure
     words: list[tuple[str, Bbox]]
+    smallest: float
 
     @property
     def text(self) -> str:
@@ -40,14 +41,16 @@ class Page(NamedTuple):
 def page_of(figure: Figure) -> Page:
     """The figure, drawn, with its words."""
     words: list[tuple[str, Bbox]] = []
+    sizes: list[float] = []
     draw = Text.draw
 
     def noted(text: Text, renderer: RendererBase) -> None:
         draw(text, renderer)
         if text.get_visible() and text.get_text().strip():
             words.append((text.get_text(), text.get_window_extent(renderer)))
+            sizes.append(float(text.get_fontsize()))
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Text, "draw", noted)
         figure.canvas.draw()
-    return Page(figure, words)
+    return Page(figure, words, min(sizes))

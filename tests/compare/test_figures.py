@@ -132,6 +132,12 @@ def test_no_text_leaves_the_page_or_runs_into_another(
     assert pages[name].overlaps() == []
 
 
+@pytest.mark.parametrize("name", ALL)
+def test_type_is_readable_in_a_column(name: str, pages: dict[str, Page]) -> None:
+    """In 3.4 inches no letter is below 5 points, the least that journals print."""
+    assert pages[name].smallest * 3.4 / WIDTH >= 5.0
+
+
 @pytest.mark.slow
 def test_eight_solvers_find_room_too(
     mesh: TriangleMesh,

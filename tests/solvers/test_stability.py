@@ -4,12 +4,19 @@ Source: S. P. Timoshenko, J. M. Gere, Theory of Elastic Stability, 2nd edition, 
 and 2.7.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from solvers.constrained_elimination import ConstrainedElimination
 from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
+from solvers.fem.identification.body import FemBody
+from solvers.fem.solid.solver import Fem3dSolver
+from solvers.identification.hypothesis import Unknowns
+from solvers.identification.response import ResponseModel
+from solvers.lagrange import LagrangeSpace
 from solvers.pinn.finite_basis import newton
 from solvers.pinn.finite_basis.local import PinnLocalSolver
 from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
@@ -57,6 +64,39 @@ def test_a_column_that_stays_straight_is_said_to_be_unstable(problem, monkeypatc
         assert "NOT STABLE: the energy falls in" in found.status.message
         assert found.stats["unstable_directions"] > 0
         assert -found.reaction[1] > 40 * bent_force(problem)
+
+
+def test_three_dimensions_tell_of_stability(monkeypatch):
+    """A column with held side faces, which is in plane strain; straight, and bent."""
+    section, middle = column(HEIGHT, WIDTH)
+    mesh = mesh_of(section, middle, 1.0, WIDTH)
+    problem = Problem(mesh, Material(law="neo-hookean"), Load(kind="mean", displacement=(None, -STROKE)))
+    solver = Fem3dSolver(layers=1, grading=1.0, sides="held", linear_solver="direct")
+    bent = solver.solve(problem)
+    assert bent.status.converged, bent.status.message
+    assert bent.stats["unstable_directions"] == 0
+    assert -bent.reaction[1] == pytest.approx(bent_force(problem), rel=0.05)  # coarse tetrahedra
+    monkeypatch.setattr(LoadPath, "_stable", lambda path, point: point)
+    straight = solver.solve(problem)
+    assert not straight.status.converged
+    assert "NOT STABLE" in straight.status.message
+
+    gently = replace(problem, load=Load(kind="mean", displacement=(None, -0.001)))
+    assert "stability not checked" in replace(solver, linear_solver="iterative").solve(gently).status.message
+
+
+def test_an_identified_finger_is_checked_with_its_contact_held(problem, monkeypatch):
+    """The column at rest is stable; straight under fifty times Euler's load it is not."""
+    unknowns = Unknowns.of(problem, ("normal_force",))
+    space = LagrangeSpace(problem.mesh, 2)
+    body = FemBody(unknowns.problem, space, unknowns.motion)
+    model = ResponseModel(body, unknowns)
+    rest = model.response(np.zeros(1))
+    assert model.unstable(rest) == 0
+    monkeypatch.setattr(LoadPath, "_stable", lambda path, point: point)
+    straight = FemNonlinearSolver().solve(problem).field.values
+    assert model.unstable(replace(rest, state=straight)) > 0
+    body.close()
 
 
 def test_a_finger_that_bends_leaves_nothing(coarse_mesh):

@@ -151,6 +151,11 @@ class _Linearised:
     force: FloatArray
     factors: Factorisation
 
+    @property
+    def negative(self) -> int:
+        """By the factors that the body holds."""
+        return self.factors.negative
+
     def solve(self, right: FloatArray) -> FloatArray:
         """By the factors that the body holds."""
         return self.factors.solve_all(right)

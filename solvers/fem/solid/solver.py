@@ -15,7 +15,7 @@ from solvers.fem.solid.extrusion import ExtrudedSpace
 from solvers.fem.solid.plane_guide import PlaneGuide
 from solvers.fem.solid.side_face import Face, FaceField
 from solvers.problem import Problem
-from solvers.solution import Solution, Status
+from solvers.solution import Solution, Status, unstable_phrase
 from solvers.solver import Progress, check_problem, silent
 
 PLANE_SHARE = 0.1
@@ -115,6 +115,7 @@ class Fem3dSolver:
         )
         path.follow(lambda done, text: progress(PLANE_SHARE + (1 - PLANE_SHARE) * done, text))
         points, last = path.points, path.points[-1]
+        unstable = 0 if linear else path.equilibrium.unstable
         energies = np.array([path.equilibrium.energy(point.nodal) for point in points])
         region = path.region(last)
         reactions = np.array([path.reaction(point) for point in points])
@@ -127,7 +128,7 @@ class Fem3dSolver:
             field=FaceField(space, last.nodal, self.face),
             energy=float(energies[-1]),
             reaction=reactions[-1],
-            status=self._status(path, cost, region),
+            status=self._status(path, cost, region, unstable),
             stats={
                 "seconds": time.perf_counter() - started,
                 "unknowns": last.nodal.size,
@@ -136,6 +137,8 @@ class Fem3dSolver:
                 "load_steps": len(points) - 1,
                 "halved_steps": path.halved,
                 "newton_iterations": path.iterations,
+                **({} if unstable is None else {"unstable_directions": unstable}),
+                "left_unstable": path.left,
                 **path.equilibrium.factors.stats,
                 **(region.stats() if region else {}),
                 "estimated_memory_GB": cost.memory_gb,
@@ -151,8 +154,10 @@ class Fem3dSolver:
             states=[FaceField(space, point.nodal, self.face) for point in points],
         )
 
-    def _status(self, path: LoadPath, cost: Cost, region: ContactRegion | None) -> Status:
-        """Success at the full load, or advice."""
+    def _status(
+        self, path: LoadPath, cost: Cost, region: ContactRegion | None, unstable: int | None
+    ) -> Status:
+        """Success at the full load, or advice; `unstable` is None where multigrid cannot tell."""
         fraction = path.points[-1].fraction
         if fraction < 1:
             return Status(
@@ -166,11 +171,15 @@ class Fem3dSolver:
                 "the contact reaches an end of the front face, beyond which none is looked for; "
                 "press nearer to its middle or take a smaller stroke or radius",
             )
+        if unstable:
+            return Status(False, f"all of the load applied, but {unstable_phrase(unstable)}")
         place = "side face" if self.face == "side" else "middle plane"
         how = (
             f"all of the load applied in {len(path.points) - 1} steps, {path.iterations} Newton iterations, "
             f"{'by multigrid' if cost.iterative else 'solved directly'}"
         )
+        checked = "" if unstable is not None else " and its stability not checked"
         return Status(
-            True, f"{how}; the field is that of the {place}; its discretisation error was not estimated"
+            True,
+            f"{how}; the field is that of the {place}; its discretisation error was not estimated{checked}",
         )

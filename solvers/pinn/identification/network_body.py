@@ -64,6 +64,11 @@ class NetworkLinearisation:
         self.force = force
         self._body, self._tangent = body, tangent
 
+    @property
+    def negative(self) -> int:
+        """Number of negative eigenvalues of the tangent, which is factorised for it."""
+        return self._body.negative(self._tangent)
+
     def solve(self, right: FloatArray) -> FloatArray:
         """K^-1 of generalised forces, shape (r, *shape)."""
         return self._body.solved(self._tangent, right)
@@ -125,6 +130,11 @@ class NetworkBody:
             stress, tangent = piola_stress_and_tangent(gradient, lame, self._law)
             force = self._forces(_pulled_back(stress, metric)[None])[0]
         return NetworkLinearisation(self, force.numpy(), _tangent_pulled_back(tangent, metric))
+
+    def negative(self, tangent: torch.Tensor) -> int:
+        """Number of negative eigenvalues of a tangent A at the quadrature points."""
+        with pool():
+            return self._factorised(tangent).negative
 
     def solved(self, tangent: torch.Tensor, right: FloatArray) -> FloatArray:
         """Solutions for generalised forces (r, *shape) with the tangent A at the quadrature points."""
