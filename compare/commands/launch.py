@@ -92,7 +92,7 @@ def _with_messages(command: Callable[[], Any]) -> int:
 
 
 def _flush(stream: TextIO) -> None:
-    """Write what a stream holds back; if it cannot, drop it, so that the program's end does not fail on it."""
+    """Write what a stream holds back; if it cannot, drop it: the program's end would fail on it."""
     try:
         stream.flush()
     except OSError:
