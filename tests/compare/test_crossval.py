@@ -620,6 +620,25 @@ def test_simulated_markers_of_a_file_are_called_simulated_everywhere(
     assert "measured" not in printed.out + printed.err
 
 
+@pytest.mark.filterwarnings("default:cannot write to the cache folder")
+def test_a_cache_that_cannot_be_written_is_a_warning_and_the_study_keeps_its_truths(
+    tmp_path, capsys, monkeypatch, in_line
+):
+    (tmp_path / "cache").touch()  # a file, not a folder
+    monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path / "cache"))
+    line = "--solvers gp --schemes one-out --seeds 1"
+    assert run(line, tmp_path / "out") == 0
+    assert re.search(
+        r"warning: cannot write to the cache folder .*cache \(File exists\), so that the virtual experiment",
+        capsys.readouterr().err,
+    )
+    (kept,) = (tmp_path / "out" / "truths").iterdir()
+    before = kept.stat().st_mtime_ns
+    assert run(line, tmp_path / "out") == 0
+    assert kept.stat().st_mtime_ns == before
+    assert "virtual experiment" not in capsys.readouterr().err
+
+
 def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, observations):
     study = Study(
         design=Design(),
