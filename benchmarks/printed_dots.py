@@ -42,6 +42,8 @@ CASES: dict[str, dict[str, Any]] = {
     "irregular 3 %, glare of 60": {"irregular": 0.03, **_through(glare=60.0)},
     "clipped white": _through(white=400.0),
     "irregular 3 %, clipped white": {"irregular": 0.03, **_through(white=400.0)},
+    "irregular 3 %, clipped white, uneven light": {"irregular": 0.03, **_through(white=400.0, gradient=0.3)},
+    "irregular 3 %, print layers of 10 %": {"irregular": 0.03, "layers": 0.1},
     "irregular 5 %, noise 6": {"irregular": 0.05, **_through(noise=6.0)},
 }
 HEADER = (

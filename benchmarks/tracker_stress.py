@@ -130,6 +130,11 @@ CASES: dict[tuple[str, str], Case] = {
         printed={"irregular": 0.05}, exposure={"sharpen": 1.5}
     ),
     ("print", "irregular 5 %, glare of 60"): Case(printed={"irregular": 0.05}, exposure={"glare": 60}),
+    ("print", "layers of 10 %, irregular 3 %"): Case(printed={"irregular": 0.03, "layers": 0.1}),
+    ("print", "irregular 5 %, white clipped"): Case(printed={"irregular": 0.05}, exposure={"white": 400}),
+    ("camera", "rolling shutter, half of a frame"): Case(
+        motion=Motion(rest=5, moving=6, held=5, rolling=0.5)
+    ),
     ("camera", "monochrome"): Case(exposure={"monochrome": True}),
     ("camera", "upside down"): Case(turn=180),
     ("no fiducials", ""): Case(hide=fiducials(*range(7)), fiducials=False, tilt=0),

@@ -3,9 +3,10 @@
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from cyclopts import Group, Parameter
+from pydantic import ValidationError
 
 from compare.camera.film import Film
 from compare.commands.options import Flag, Repeated, existing
@@ -86,12 +87,18 @@ class ForceOptions:
         Raises:
             UserError: If a constant is out of its range or given without --force.
         """
-        given: dict[str, Any] = {
+        given: dict[str, object] = {
             name: value for name in ("young", "poisson", "law") if (value := getattr(self, name)) is not None
         }
         if given and not self.force:
             raise UserError(f"--{next(iter(given))} is for --force")
-        return Material(**given) if self.force else None
+        if not self.force:
+            return None
+        try:
+            return Material.model_validate(given)
+        except ValidationError as error:
+            first = error.errors()[0]
+            raise UserError(f"--{first['loc'][0]} {first['input']}: {first['msg'].lower()}") from None
 
 
 @Parameter(name="*", group=CAMERA)
@@ -141,6 +148,7 @@ class SceneOptions:
         paint: Colour of the markers.
         irregular: Deviation of the markers' outlines from circles, rms over the radius, up to 0.1.
         mottle: Share of the markers' area that light specks cover, up to 0.5.
+        layers: Difference between the reflectances of every other layer of the print, relative, up to 0.5.
         marker_plane: Height of the markers above the fiducials, mm.
         cover: Cover a share of a marker's diameter with a cable, such as 5=0.4; may be repeated.
         cover_paint: Colour of the cables.
@@ -150,6 +158,7 @@ class SceneOptions:
     paint: Literal["dark", "red", "green", "blue"] = "dark"
     irregular: float = 0.0
     mottle: float = 0.0
+    layers: float = 0.0
     marker_plane: float = 0.0
     cover: Repeated = ()
     cover_paint: Literal["dark", "light"] = "dark"
@@ -163,10 +172,11 @@ class SceneOptions:
         """
         from vision.rig.bench import Bench
 
-        for name, value, most in (("irregular", self.irregular, 0.1), ("mottle", self.mottle, 0.5)):
+        for name, most in (("irregular", 0.1), ("mottle", 0.5), ("layers", 0.5)):
+            value = getattr(self, name)
             if not 0 <= value <= most:
                 raise UserError(f"--{name} {value:g}: give a share from 0 to {most:g}")
-        return Bench(mesh, finger, workspace, self.paint, self.irregular, self.mottle)
+        return Bench(mesh, finger, workspace, self.paint, self.irregular, self.mottle, self.layers)
 
     def covered(self) -> dict[int, float]:
         """The shares of --cover by the numbers of the markers."""

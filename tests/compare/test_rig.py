@@ -73,6 +73,7 @@ def test_the_run_says_what_it_depends_on_and_may_be_replaced(folder):
         ("--codec h264", "no codec 'h264'; there are ffv1, mjpg, mp4v, png"),
         ("--cover 5", "--cover 5: write marker=share"),
         ("--irregular 0.2", "--irregular 0.2: give a share from 0 to 0.1"),
+        ("--layers 0.6", "--layers 0.6: give a share from 0 to 0.5"),
         ("--cover 10=0.5", "there is no marker 10 to cover; there are 1 to 9"),
         ("--solver fem,pinn-std", "name one --solver"),
         ("--boards 3 --board 9", "cannot read the board '9'"),

@@ -4,14 +4,31 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import truncnorm
 
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from tests.vision import films
 from tests.vision.printed_dots import INK, PAPER, PrintedDots, darkness_centroids
+from vision.discs import least_squares
 from vision.discs.disc_fit import FittedDiscs, fit_discs
-from vision.discs.disc_image_model import BLUR, CONTRAST, COUNT, HALO, LIGHT, OUTLINE, RADIUS, disc_image
+from vision.discs.disc_image_model import (
+    BLUR,
+    CONTRAST,
+    COUNT,
+    HALO,
+    LIGHT,
+    OUTLINE,
+    RADIUS,
+    SHADE_X,
+    SHADE_Y,
+    WIDTH,
+    disc_image,
+)
+from vision.discs.fit_priors import CLIPPED_SHADE, Known
+from vision.discs.least_squares import DiscFit, behind_clipping
+from vision.discs.pixel_windows import DARKEST, LIGHTEST
 from vision.rig.bench import Bench
 from vision.rig.exposure import Exposure
 from vision.rig.shapes import area, blot, centroid, closed
@@ -70,6 +87,77 @@ def test_no_plain_centroid_is_more_accurate(radius, changes):
     discs, errors, plain = measured(PrintedDots(radius, count=COUNTED, seed=3, **changes))
     assert discs.found.sum() >= COUNTED - 2
     assert rms(errors[discs.found]) < 1.2 * rms(plain)
+
+
+@pytest.mark.parametrize("radius", [4.0, 12.0])
+@pytest.mark.parametrize("irregular", [0.0, 0.03])
+def test_no_plain_centroid_is_more_accurate_where_white_is_clipped(radius, irregular):
+    """Half of the light that is lost around a dot is known from the other dots: how it grows."""
+    discs, errors, plain = measured(
+        PrintedDots(radius, irregular, count=COUNTED, seed=3, exposure=exposure(white=400.0))
+    )
+    assert discs.found.all()
+    assert rms(errors) < 1.2 * rms(plain)  # 0.5 to 1.1 times; 1.4 to 4 times with each dot's own gradient
+    deviations = np.sqrt(np.diagonal(discs.covariances, axis1=1, axis2=2))
+    assert (np.abs(errors) < 1.96 * deviations).mean() > 0.88  # 0.95 less three deviations of 96 coordinates
+
+
+def test_uneven_light_around_dots_on_clipped_white_does_not_move_them():
+    discs, errors, plain = measured(
+        PrintedDots(7.3, 0.03, count=COUNTED, seed=3, exposure=exposure(white=400.0, gradient=0.3))
+    )
+    assert discs.found.sum() >= COUNTED - 1
+    assert rms(errors[discs.found]) < rms(plain) / 4  # a tenth
+
+
+@pytest.mark.parametrize("radius", [7.3, 12.0])
+def test_dots_on_the_layers_of_a_print_are_found_within_hundredths_of_a_pixel(radius):
+    discs, errors, plain = measured(PrintedDots(radius, 0.03, layers=0.1, count=COUNTED, seed=3))
+    assert discs.found.all()
+    assert rms(errors) < 1.5 * rms(plain)  # 1.0 and 1.3 times: outlines follow the layers beside them
+
+
+def test_the_light_at_a_disc_is_that_of_the_others():
+    """Gradients that agree within their deviations are pooled; the disc's own does not count twice."""
+    rng = np.random.default_rng(2)
+    count, deviation, mean = 40, 1e-3, np.array([8e-4, -5e-4])
+    fit = DiscFit.start(np.zeros((count, WIDTH)), np.zeros((count, 2), dtype=np.int64))
+    fit.parameters[:, [SHADE_X, SHADE_Y]] = mean + deviation * rng.standard_normal((count, 2))
+    fit.parameters[0, SHADE_X] = 0.02  # an outlier that is trusted by mistake
+    fit.shade_precision[:] = deviation**-2.0
+    known = Known.of(count, np.inf)
+    trusted = np.arange(count) > 0
+    lit = known.lit(fit, trusted)
+    assert np.abs(lit.shade - mean).max() < 4 * deviation / np.sqrt(count)
+    assert (lit.shade_deviation < deviation / 2).all()
+    alone = known.lit(fit, np.zeros(count, dtype=bool))
+    np.testing.assert_allclose(alone.shade, 0, atol=1e-4)
+    assert (alone.shade_deviation > 0.9 * CLIPPED_SHADE).all()
+
+
+@pytest.mark.parametrize(("value", "sign"), [(255, 1), (0, -1)])
+def test_clipped_pixels_are_expected_where_a_truncated_normal_distribution_is(value, sign):
+    limit, deviation = (LIGHTEST, 3.0) if sign > 0 else (DARKEST, 3.0)
+    levels = limit + deviation * np.linspace(-3, 3, 13)
+    expected, known = behind_clipping(
+        np.full((1, 13), value, np.float32), levels.astype(np.float32)[None], np.array([deviation**2])
+    )
+    low, high = (
+        ((limit - levels) / deviation, np.inf) if sign > 0 else (-np.inf, (limit - levels) / deviation)
+    )
+    clipped = truncnorm(low, high, loc=levels, scale=deviation)
+    np.testing.assert_allclose(expected[0], clipped.mean(), atol=0.01)
+    np.testing.assert_allclose(known[0], 1 - clipped.var() / deviation**2, atol=0.002)
+
+
+def test_settled_fits_are_not_repeated(monkeypatch):
+    """Sixteen irregular dots took 131 evaluations of the model, most of them for ellipses that stayed."""
+    dots = PrintedDots(7.3, 0.05, count=16, seed=5)
+    picture, calls = dots.picture(), []
+    monkeypatch.setattr(least_squares, "disc_image", lambda *given: calls.append(given) or disc_image(*given))
+    discs = fit_discs(picture, np.column_stack([dots.centres + 0.3, np.full(16, 7.3)]), radii=7.3)
+    assert discs.found.all()
+    assert len(calls) < 90
 
 
 @pytest.mark.parametrize("irregular", [0.0, 0.03])

@@ -13,8 +13,10 @@ from numpy.typing import ArrayLike
 from geometry.arrays import BoolArray, FloatArray, frozen_array
 from geometry.errors import UserError
 from vision.discs import disc_image_model as model
+from vision.discs.fit_priors import Known
 from vision.discs.fit_stages import fit_discs_of_one_size
 from vision.discs.least_squares import DiscFit
+from vision.discs.pixel_windows import LIGHTEST
 from vision.frames.frame import GreyImage
 
 KNOWN_RADIUS = 0.01
@@ -81,17 +83,28 @@ def fit_discs(grey: GreyImage, guesses: ArrayLike, *, radii: ArrayLike | None = 
         raise UserError(
             f"discs are fitted in grey images of eight bits; this one is {grey.dtype} {grey.shape}"
         )
-    known = np.broadcast_to(guesses[:, 2] if radii is None else radii, (len(guesses),))
-    known = frozen_array(known, dtype=np.float64, shape=(None,), name="radii")
-    if not (guesses[:, 2] > 0).all() or not (known > 0).all():
+    sizes = np.broadcast_to(guesses[:, 2] if radii is None else radii, (len(guesses),))
+    sizes = frozen_array(sizes, dtype=np.float64, shape=(None,), name="radii")
+    if not (guesses[:, 2] > 0).all() or not (sizes > 0).all():
         raise UserError("the radius of a disc must be above zero")
-    tolerance = np.inf if radii is None else KNOWN_RADIUS
     fit = DiscFit.start(np.zeros((len(guesses), model.WIDTH)), np.zeros((len(guesses), 2), dtype=np.int64))
-    sizes = np.rint(np.log(known) / np.log(1.4))
-    for size in np.unique(sizes):  # discs of one size share the shape of their windows
-        (alike,) = np.nonzero(sizes == size)
-        fit.put(alike, fit_discs_of_one_size(grey, guesses[alike, :2], known[alike], tolerance))
+    known = Known.of(len(guesses), np.inf if radii is None else KNOWN_RADIUS)
+    _fit(fit, grey, guesses, sizes, known, np.ones(len(guesses), dtype=bool))
+    if (clipped := fit.parameters[:, model.LIGHT] >= LIGHTEST).any():
+        _fit(
+            fit, grey, guesses, sizes, known.lit(fit, fit.settled & (fit.seen >= LEAST_SEEN_UNKNOWN)), clipped
+        )
     return _accepted(fit, guesses, LEAST_SEEN_UNKNOWN if radii is None else LEAST_SEEN)
+
+
+def _fit(
+    fit: DiscFit, grey: GreyImage, guesses: FloatArray, radii: FloatArray, known: Known, chosen: BoolArray
+) -> None:
+    """Fit the chosen discs; those of about one size at once, which share the shape of their windows."""
+    sizes = np.rint(np.log(radii) / np.log(1.4))
+    for size in np.unique(sizes[chosen]):
+        (alike,) = np.nonzero((sizes == size) & chosen)
+        fit.put(alike, fit_discs_of_one_size(grey, guesses[alike, :2], radii[alike], known.at(alike)))
 
 
 def _accepted(fit: DiscFit, guesses: FloatArray, least_seen: float) -> FittedDiscs:

@@ -1,8 +1,11 @@
 """Prior of the parameters of a disc's image, and the longest steps of its fit."""
 
-import numpy as np
+from typing import NamedTuple
 
-from geometry.arrays import BoolArray, FloatArray
+import numpy as np
+from scipy.special import softmax
+
+from geometry.arrays import BoolArray, FloatArray, IntArray
 from vision.discs.disc_image_model import (
     BLUR,
     EDGES,
@@ -17,7 +20,8 @@ from vision.discs.disc_image_model import (
     Y,
     irregular_columns,
 )
-from vision.discs.least_squares import LIGHTEST, DiscPrior
+from vision.discs.least_squares import DiscFit, DiscPrior
+from vision.discs.pixel_windows import LIGHTEST
 
 DEVIATIONS = {STRETCH: 0.05, SLANT: 0.05, BLUR: 5.0, SHADE_X: 0.05, SHADE_Y: 0.05}
 """Prior standard deviations, about zero but for the blur. They matter where little of the edge is seen."""
@@ -29,12 +33,61 @@ OUTLINE_DEVIATION, OUTLINE_STEP = 0.05, 0.05
 """The same for the waves of an irregular outline, over the radius."""
 HALO_DEVIATION, HALO_STEP = 1.0, 0.3
 """The same for the halo of a sharpened edge, over the contrast."""
-CLIPPED, CLIPPED_SHADE = 30.0, 0.005
-"""Prior standard deviation of a clipped level, grey levels, and of its relative gradient, 1/pixel."""
+CLIPPED = 100.0
+"""Prior standard deviation of a clipped level, grey levels."""
+CLIPPED_SHADE = 0.002
+"""Prior standard deviation of the mean relative gradient of the light, 1/pixel."""
+SCATTERS = np.geomspace(1e-4, 5e-3, 24)
+"""Standard deviations of the gradient at discs from its mean that are weighed, 1/pixel."""
+
+
+class Known(NamedTuple):
+    """Knowledge of discs before their fit.
+
+    Attributes:
+        tolerance: Relative standard deviation of the radii; infinite if they are guessed.
+        shade: Relative gradient of the light at discs on a clipped ground, shape (n, 2), 1/pixel.
+        shade_deviation: Its standard deviations, shape (n, 2).
+    """
+
+    tolerance: float
+    shade: FloatArray
+    shade_deviation: FloatArray
+
+    @classmethod
+    def of(cls, count: int, tolerance: float) -> "Known":
+        """Knowledge without any of the light."""
+        return cls(tolerance, np.zeros((count, 2)), np.full((count, 2), CLIPPED_SHADE))
+
+    def at(self, places: IntArray) -> "Known":
+        """The same of some discs."""
+        return self._replace(shade=self.shade[places], shade_deviation=self.shade_deviation[places])
+
+    def lit(self, fit: DiscFit, trusted: BoolArray) -> "Known":
+        """The same with the gradient of the light at a disc from the trusted others in the picture.
+
+        The gradients scatter normally about a mean; the variance of the scatter is its expectation over
+        `SCATTERS`, which are equally probable before.
+
+        Source: A. Gelman et al., Bayesian Data Analysis, third edition, 2013, section 5.4.
+        """
+        precision = np.where(trusted[:, None], fit.shade_precision, 0.0)
+        variances = 1 / np.maximum(precision, 1e-3)
+        fitted = fit.parameters[:, [SHADE_X, SHADE_Y]]
+        weights = 1 / (SCATTERS[:, None, None] ** 2 + variances)
+        total = weights.sum(axis=1) + CLIPPED_SHADE**-2.0
+        mean = (weights * fitted).sum(axis=1) / total
+        evidence = (np.log(weights).sum(axis=1) - (weights * (fitted - mean[:, None]) ** 2).sum(axis=1)) / 2
+        evidence -= (np.log(total) + (mean / CLIPPED_SHADE) ** 2) / 2
+        scatter = SCATTERS**2 @ softmax(evidence.sum(axis=1))
+        weights = 1 / (scatter + variances)
+        others = weights.sum(axis=0) - weights + CLIPPED_SHADE**-2.0
+        shade = ((weights * fitted).sum(axis=0) - weights * fitted) / others
+        return self._replace(shade=shade, shade_deviation=np.sqrt(scatter + 1 / others))
 
 
 def prior_and_limits(
-    start: FloatArray, present: BoolArray, radii: FloatArray, tolerance: float
+    start: FloatArray, present: BoolArray, radii: FloatArray, known: Known
 ) -> tuple[DiscPrior, FloatArray]:
     """Prior of the parameters, and their longest steps; absent edges keep zero contrast.
 
@@ -42,7 +95,7 @@ def prior_and_limits(
         start: Parameters at the start of the fit, shape (n, m).
         present: Straight edges that are there, shape (n, 2).
         radii: Known or guessed, shape (n,), pixels.
-        tolerance: Relative standard deviation of the radii; infinite if they are guessed.
+        known: Of the discs.
     """
     mean, deviations, limits = start.copy(), np.full(start.shape, 1e3), np.full(start.shape, 1e3)
     mean[:, [STRETCH, SLANT, SHADE_X, SHADE_Y]] = 0
@@ -54,9 +107,11 @@ def prior_and_limits(
         deviations[:, HALO], limits[:, HALO] = HALO_DEVIATION, HALO_STEP
     clipped = start[:, LIGHT] >= LIGHTEST
     deviations[clipped, LIGHT] = CLIPPED
-    for shade in (SHADE_X, SHADE_Y):
-        deviations[clipped, shade] = CLIPPED_SHADE
-    deviations[:, RADIUS] = np.minimum(tolerance * radii, 1e3)
+    for column, shade, deviation in zip(
+        (SHADE_X, SHADE_Y), known.shade.T, known.shade_deviation.T, strict=True
+    ):
+        mean[clipped, column], deviations[clipped, column] = shade[clipped], deviation[clipped]
+    deviations[:, RADIUS] = np.minimum(known.tolerance * radii, 1e3)
     edges = np.where(present[:, :, None], EDGE_DEVIATIONS, MISSING)
     deviations[:, first_edge:] = edges.reshape(len(start), -1)
     limits[:, list(STEPS)] = list(STEPS.values())

@@ -4,11 +4,18 @@ import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
 from vision.discs.disc_image_model import BLUR, CONTRAST, COUNT, LIGHT, RADIUS, Array, X, Y
-from vision.discs.fit_priors import prior_and_limits
+from vision.discs.fit_priors import Known, prior_and_limits
 from vision.discs.hough import HoughVotes, sector, vote_for_centres
 from vision.discs.irregular_outlines import better_outlines
-from vision.discs.least_squares import NEAR, DiscFit, coherent_pixels, correlated_variance, fit_disc_model
-from vision.discs.pixel_windows import PixelWindows, median_where
+from vision.discs.least_squares import (
+    NEAR,
+    DiscFit,
+    coherent_pixels,
+    correlated_variance,
+    fit_disc_model,
+    refined_fit,
+)
+from vision.discs.pixel_windows import QUANTISATION, PixelWindows, median_where
 from vision.discs.straight_edges import with_edges
 from vision.frames.frame import GreyImage
 
@@ -29,41 +36,44 @@ WRONG = 2.0
 """... or variance of the noise that counts for the centre, over that of the fit."""
 
 
-def fit_discs_of_one_size(
-    grey: GreyImage, guesses: FloatArray, radii: FloatArray, tolerance: float
-) -> DiscFit:
+def fit_discs_of_one_size(grey: GreyImage, guesses: FloatArray, radii: FloatArray, known: Known) -> DiscFit:
     """Fit discs of about one size.
 
     Args:
         grey: Shape (height, width).
         guesses: x and y, shape (n, 2), pixels.
         radii: Known or guessed, shape (n,), pixels.
-        tolerance: Relative standard deviation of the radii; infinite if they are guessed.
+        known: Of the discs.
     """
     reach = max(radii.max(), LEAST_REACH)
-    votes = vote_for_centres(grey, guesses, radii, reach, known=tolerance < np.inf)
+    votes = vote_for_centres(grey, guesses, radii, reach, known=known.tolerance < np.inf)
     inner, outer = votes.radii.min() - MARGIN, votes.radii.max() + MARGIN
     window = PixelWindows.of(grey, votes.centres, inner, outer)
     trusted = _trusted(window, votes, LOOSE)
-    first, residuals = _first_fit(window, votes, trusted, tolerance)
+    first, residuals = _first_fit(window, votes, trusted, known)
     chosen = coherent_pixels(window, first, residuals)
     outside = window.outside(first.parameters)
     near = np.abs(outside) < NEAR
     changed = ((chosen != trusted) & near).sum(axis=1) > CHANGED * near.sum(axis=1)
     chosen &= trusted
     variance = correlated_variance(window, first, residuals, chosen, outside)
-    (again,) = np.nonzero(changed | (variance > WRONG) | ~first.settled)
+    noisy = first.variance > WRONG * np.maximum(window.noise**2, QUANTISATION)
+    (again,) = np.nonzero(changed | (variance > WRONG) | noisy | ~first.settled)
     if len(again):
-        some, votes = window.at(again), votes.at(again)
-        second = _first_fit(some, votes, _trusted(some, votes, STRICT), tolerance)
+        some, votes, their = window.at(again), votes.at(again), known.at(again)
         initial = first.at(again)
-        either = _refined(some, initial, residuals[again], votes.radii, tolerance)
-        other = _refined(some, *second, votes.radii, tolerance)
+        either = _refined(some, initial, residuals[again], votes.radii, their)
         first.put(again, either)
-        (better,) = np.nonzero(_deviation(other) < _deviation(either))
-        first.put(again[better], other.at(better))
+        strict = _trusted(some, votes, STRICT)
+        (fewer,) = np.nonzero((strict != trusted[again]).any(axis=1))
+        if len(fewer):
+            few = some.at(fewer), votes.at(fewer), their.at(fewer)
+            second = _first_fit(*few[:2], strict[fewer], few[2])
+            other = _refined(few[0], *second, few[1].radii, few[2])
+            (better,) = np.nonzero(_deviation(other) < _deviation(either.at(fewer)))
+            first.put(again[fewer[better]], other.at(better))
         irregular, outlines, left = better_outlines(
-            first.at(again), initial.parameters, some, votes.radii, tolerance
+            first.at(again), initial.parameters, some, votes.radii, their
         )
         again = again[irregular]
         if len(again):
@@ -94,7 +104,7 @@ def _trusted(window: PixelWindows, votes: HoughVotes, least: float) -> BoolArray
 
 
 def _first_fit(
-    window: PixelWindows, votes: HoughVotes, trusted: BoolArray, tolerance: float
+    window: PixelWindows, votes: HoughVotes, trusted: BoolArray, known: Known
 ) -> tuple[DiscFit, Array]:
     """Fit the trusted pixels, from the voted centres and the levels on either side of the edge."""
     start = np.zeros((len(trusted), COUNT))
@@ -105,18 +115,16 @@ def _first_fit(
     start[:, LIGHT] = median_where(window.values, trusted & (outside > 1) & (outside < 3))
     start[:, CONTRAST] = start[:, LIGHT] - median_where(window.values, trusted & (outside < -1))
     start, present = with_edges(window, start, trusted)
-    return fit_disc_model(window, start, *prior_and_limits(start, present, votes.radii, tolerance), trusted)
+    return fit_disc_model(window, start, *prior_and_limits(start, present, votes.radii, known), trusted)
 
 
 def _refined(
-    window: PixelWindows, fit: DiscFit, residuals: Array, radii: FloatArray, tolerance: float
+    window: PixelWindows, fit: DiscFit, residuals: Array, radii: FloatArray, known: Known
 ) -> DiscFit:
     """Fit again to the pixels that agree with the model, after a new search for straight edges."""
     chosen = coherent_pixels(window, fit, residuals)
     ground = chosen | window.within & (window.outside(fit.parameters) > 0)
     start, present = with_edges(window, fit.parameters[:, :COUNT], ground)
-    prior, limits = prior_and_limits(start, present, radii, tolerance)
-    for _ in range(REFINEMENTS):
-        fit, residuals = fit_disc_model(window, start, prior, limits, chosen)
-        start, chosen = fit.parameters, coherent_pixels(window, fit, residuals)
+    prior, limits = prior_and_limits(start, present, radii, known)
+    fit, _ = refined_fit(window, [prior] * REFINEMENTS, start, limits, chosen)
     return fit

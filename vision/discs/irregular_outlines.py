@@ -30,9 +30,9 @@ from vision.discs.disc_image_model import (
     outline,
     outline_centroid,
 )
-from vision.discs.fit_priors import MISSING, prior_and_limits
+from vision.discs.fit_priors import MISSING, Known, prior_and_limits
 from vision.discs.hough import SECTORS, sector
-from vision.discs.least_squares import NEAR, DiscFit, coherent_pixels, fit_disc_model, misfit
+from vision.discs.least_squares import NEAR, DiscFit, coherent_pixels, fit_disc_model, misfit, refined_fit
 from vision.discs.pixel_windows import PixelWindows
 from vision.discs.straight_edges import with_edges
 
@@ -61,7 +61,7 @@ AGREED = 0.9
 
 
 def better_outlines(
-    ellipses: DiscFit, start: FloatArray, window: PixelWindows, radii: FloatArray, tolerance: float
+    ellipses: DiscFit, start: FloatArray, window: PixelWindows, radii: FloatArray, known: Known
 ) -> tuple[IntArray, DiscFit, Array]:
     """Fits of irregular outlines that explain the pixels better than ellipses do.
 
@@ -70,26 +70,26 @@ def better_outlines(
         start: Parameters of fits that leave out less, shape (n, m).
         window: The pixels around the discs.
         radii: Known or guessed, shape (n,), pixels.
-        tolerance: Relative standard deviation of the radii; infinite if they are guessed.
+        known: Of the discs.
 
     Returns:
         The numbers of these discs, shape (k,), their fits, whose centres are the centroids of the outlines,
         and the residuals of their pixels, shape (k, p).
     """
-    outlines, residuals = _outlined(window, start, radii, tolerance)
+    outlines, residuals = _outlined(window, start, radii, known)
     noise = np.maximum(np.minimum(ellipses.variance, outlines.variance), window.noise**2)
     gain = misfit(window, ellipses.parameters, noise) - misfit(window, outlines.parameters, noise)
     change = np.abs(ellipses.parameters[:, CONTRAST] - start[:, CONTRAST])
     likely = change < OTHER_CONTRAST * np.abs(start[:, CONTRAST])
     seen = ~(_hidden_in_one_place(window, ellipses) & ellipses.settled & likely)
-    good = _whole(window, outlines, radii, tolerance) & (gain > PENALTY) & seen
+    good = _whole(window, outlines, radii, known.tolerance) & (gain > PENALTY) & seen
     doubtful = ~(ellipses.settled & (ellipses.seen > LEAST_SEEN)) & ~good & seen
     (tried,) = np.nonzero(doubtful)
     if len(tried):
-        lenient, left = _outlined(window.at(tried), start[tried], radii[tried], tolerance, lenient=True)
+        lenient, left = _outlined(window.at(tried), start[tried], radii[tried], known.at(tried), lenient=True)
         outlines.put(tried, lenient)
         residuals[tried] = left
-        good[tried] = _whole(window.at(tried), lenient, radii[tried], tolerance)
+        good[tried] = _whole(window.at(tried), lenient, radii[tried], known.tolerance)
     (better,) = np.nonzero(good)
     outlines, residuals = outlines.at(better), residuals[better]
     parameters = outlines.parameters.copy()
@@ -136,7 +136,7 @@ def _hidden_in_one_place(window: PixelWindows, ellipses: DiscFit) -> BoolArray:
 
 
 def _outlined(
-    window: PixelWindows, start: FloatArray, radii: FloatArray, tolerance: float, *, lenient: bool = False
+    window: PixelWindows, start: FloatArray, radii: FloatArray, known: Known, *, lenient: bool = False
 ) -> tuple[DiscFit, Array]:
     """Fit discs with irregular outlines, from the moments of what circles leave of the darkness.
 
@@ -149,16 +149,12 @@ def _outlined(
     for _ in range(2):
         start = _by_moments(window, start)
     start, present = with_edges(window, start, window.within)
-    prior, limits = prior_and_limits(start, present, radii, tolerance)
+    prior, limits = prior_and_limits(start, present, radii, known)
     plain = prior._replace(precision=prior.precision.copy())
     plain.precision[:, HALO] = MISSING**-2.0  # a halo is sought after the outline
-    chosen = window.within
-    for number in range(1 if lenient else REFINEMENTS):
-        fit, residuals = fit_disc_model(
-            window, start, prior if number else plain, limits, chosen, lenient=lenient
-        )
-        start, chosen = fit.parameters, coherent_pixels(window, fit, residuals)
-    return fit, residuals
+    if lenient:
+        return fit_disc_model(window, start, plain, limits, window.within, lenient=True)
+    return refined_fit(window, [plain, *[prior] * (REFINEMENTS - 1)], start, limits, window.within)
 
 
 def _by_moments(window: PixelWindows, start: FloatArray) -> FloatArray:
@@ -168,11 +164,14 @@ def _by_moments(window: PixelWindows, start: FloatArray) -> FloatArray:
     near = np.abs(window.outside(start)) < EXCURSION * radius[:, None] + 2 * start[:, [BLUR]]
     contrast = np.copysign(np.maximum(np.abs(start[:, CONTRAST]), 1.0), start[:, CONTRAST])
     astray = np.clip((levels - window.values) / contrast[:, None], -1, 1) * (near & window.within)
-    angle = np.arctan2(window.y - y[:, None], window.x - x[:, None])
-    even, odd = (
-        np.stack([(astray * wave(lobe * angle)).sum(axis=1) for lobe in range(LOBES.stop)], axis=1)
-        for wave in (np.cos, np.sin)
-    )
+    arms = (window.x - x[:, None] + 1j * (window.y - y[:, None])).astype(np.complex64)
+    arms /= np.maximum(np.abs(arms), 1e-6)
+    turned, sums = astray.astype(np.complex64), []
+    for _ in range(LOBES.stop):
+        sums.append(turned.sum(axis=1))
+        turned *= arms
+    waves = np.stack(sums, axis=1)
+    even, odd = waves.real, waves.imag
     moved = start.copy()
     moved[:, X] += even[:, 1] / (np.pi * radius)
     moved[:, Y] += odd[:, 1] / (np.pi * radius)

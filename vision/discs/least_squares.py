@@ -8,14 +8,28 @@ Source: F. R. Hampel et al., Robust Statistics, Wiley 1986, section 2.6 (redesce
 Robust Statistics, Wiley 1981, chapter 7 (regression, scale by the median absolute residual).
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
-from vision.discs.disc_image_model import BLUR, CONTRAST, RADIUS, Array, X, Y, disc_image
-from vision.discs.pixel_windows import QUANTISATION, SCALE, PixelWindows, median_where
+from vision.discs.disc_image_model import (
+    BLUR,
+    CONTRAST,
+    EDGE,
+    RADIUS,
+    SHADE_X,
+    SHADE_Y,
+    Array,
+    X,
+    Y,
+    disc_image,
+    irregular_columns,
+)
+from vision.discs.pixel_windows import DARKEST, LIGHTEST, QUANTISATION, SCALE, PixelWindows, median_where
 
 FULL, NONE = 3.0, 6.0
 """Residuals over the noise up to which a pixel has full weight, and from which on it has none."""
@@ -27,10 +41,15 @@ LENIENT = 2
 """First iterations, in which the noise may be as large as the residuals suggest."""
 TOLERANCE = 0.01
 """Last step of a centre, pixels."""
+STEADY = 0.8
+"""Variance of the noise over that of the iteration before, from which on a fit of a clipped disc has settled:
+expected levels make for short steps."""
 MODEL_ERROR = 0.04
 """Residual over contrast that is attributed to the model, not to occlusion."""
-DARKEST, LIGHTEST, DOUBT = 5, 250, 10
-"""Grey levels beyond which pixels may be clipped, and by how much noise can hide it."""
+DOUBT = 10
+"""Grey levels from those that may be clipped to those that a codec may leave of clipped ones."""
+SURE = 8.0
+"""Distance from a limit, in standard deviations, from which on a clipped pixel tells all."""
 NEIGHBOURS = 3
 """Side of the squares whose means show correlated noise, pixels."""
 NEAR, PROFILE = 2.0, 0.5
@@ -57,6 +76,7 @@ class DiscFit:
         origins: Shape (n, 2), pixels.
         covariances: Of the centres, from the variance of the noise, shape (n, 2, 2), pixels².
         variance: Of the noise, shape (n,), grey levels².
+        shade_precision: Of the relative gradient of the light by the pixels alone, shape (n, 2), pixels².
         seen: Share of the information on the radius that kept its weight, shape (n,).
         settled: Whether the last step was small, shape (n,).
     """
@@ -65,6 +85,7 @@ class DiscFit:
     origins: IntArray
     covariances: FloatArray
     variance: FloatArray
+    shade_precision: FloatArray
     seen: FloatArray
     settled: BoolArray
 
@@ -73,7 +94,9 @@ class DiscFit:
         """A fit before its first iteration."""
         count = len(parameters)
         covariances = np.tile(np.eye(2), (count, 1, 1))
-        return cls(parameters, origins, covariances, np.ones(count), np.zeros(count), np.zeros(count, bool))
+        nothing = np.zeros(count)
+        unknown, unsettled = np.zeros((count, 2)), np.zeros(count, dtype=bool)
+        return cls(parameters, origins, covariances, np.ones(count), unknown, nothing, unsettled)
 
     def at(self, places: IntArray) -> "DiscFit":
         """The fit of some discs."""
@@ -107,6 +130,14 @@ def fit_disc_model(
     Returns:
         The fit and the residuals of the pixels, shape (n, p).
     """
+    if len(kept := _columns(start)) < start.shape[1]:
+        fewer = DiscPrior(prior.mean[:, kept], prior.precision[:, kept])
+        fit, residuals = fit_disc_model(
+            window, start[:, kept], fewer, limits[:, kept], chosen, lenient=lenient
+        )
+        parameters = np.zeros_like(start)
+        parameters[:, kept] = fit.parameters
+        return replace(fit, parameters=parameters), residuals
     count, width = start.shape
     result = DiscFit.start(start.copy(), window.origins)
     information = np.tile(np.eye(width), (count, 1, 1))
@@ -115,18 +146,16 @@ def fit_disc_model(
     for number in range(STEPS):
         now, allowed, values = result.parameters[active], chosen[active], window.values[active]
         levels, derivatives = disc_image(now.astype(np.float32), window.x, window.y)
-        clipped = np.minimum(levels, values + DOUBT) >= LIGHTEST
-        clipped |= np.maximum(levels, values - DOUBT) <= DARKEST
-        free = ~clipped  # a clipped pixel has no residual
-        residuals = (values - levels) * free
+        expected, known = behind_clipping(values, levels, result.variance[active])
+        residuals = expected - levels
         most = np.maximum(2 * window.noise[active], MODEL_ERROR * np.abs(now[:, CONTRAST]))
         if lenient or number < LENIENT:
             most = most + 1e3
-        noise = np.minimum(SCALE * median_where(np.abs(residuals), allowed & free), most)
+        noise = np.minimum(SCALE * median_where(np.abs(residuals), allowed & (known > 0.5)), most)
         noise = np.maximum(noise, QUANTISATION**0.5)
         ratio = np.abs(residuals) / noise[:, None].astype(np.float32)
         agreement = np.clip((NONE - ratio) / (NONE - FULL), 0, 1) * allowed
-        weights = agreement * free
+        weights = agreement * known
         weighted = derivatives * weights[:, None]
         squares = (weights * residuals**2).sum(axis=1)
         variance = np.maximum(squares / np.maximum(weights.sum(axis=1) - width, 1), QUANTISATION)
@@ -134,23 +163,98 @@ def fit_disc_model(
         normal = (weighted @ derivatives.transpose(0, 2, 1)) / variance[:, None, None]
         normal[:, diagonal, diagonal] *= 1 + FAINT
         normal[:, diagonal, diagonal] += precision + FAINT
-        gradient = (weighted @ residuals[:, :, None])[:, :, 0] / variance[:, None]
+        pulls = agreement * residuals
+        gradient = (derivatives @ pulls[:, :, None])[:, :, 0] / variance[:, None]
         gradient += precision * (prior.mean[active] - now)
         step = np.linalg.solve(normal, gradient[:, :, None])[:, :, 0]
         shortened = np.minimum(1, (limits[active] / np.maximum(np.abs(step), 1e-12)).min(axis=1))
         now = now + shortened[:, None] * step
         now[:, RADIUS] = np.maximum(now[:, RADIUS], 1.0)
         now[:, BLUR] = np.clip(now[:, BLUR], SHARPEST, now[:, RADIUS])
+        steady = (variance > STEADY * result.variance[active]) | (known.min(axis=1) == 1)
         result.parameters[active], information[active], result.variance[active] = now, normal, variance
         all_residuals[active] = residuals
         by_radius = derivatives[:, RADIUS] ** 2
         result.seen[active] = (by_radius * agreement).sum(axis=1) / np.maximum(by_radius.sum(axis=1), 1e-6)
-        result.settled[active] = (np.hypot(step[:, X], step[:, Y]) < TOLERANCE) & (number >= LENIENT)
+        result.settled[active] = (np.hypot(step[:, X], step[:, Y]) < TOLERANCE) & (number >= LENIENT) & steady
         active = active[~result.settled[active]]
         if not len(active):
             break
-    result.covariances[:] = np.linalg.inv(information)[:, :2, :2]
+    covariances, shades = np.linalg.inv(information), [SHADE_X, SHADE_Y]
+    result.covariances[:] = covariances[:, :2, :2]
+    variances = np.maximum(covariances[:, shades, shades], 1e-12)
+    result.shade_precision[:] = np.maximum(1 / variances - prior.precision[:, shades], 0)
     return result, all_residuals
+
+
+def behind_clipping(values: Array, levels: Array, variance: FloatArray) -> tuple[Array, Array]:
+    """Expected grey levels before clipping, and the share of the information that clipping left.
+
+    Of a clipped pixel it is known only that its level is beyond the limit: with the model's level m and
+    normal noise of variance v, the level is expected at m + √v λ(z) and has the information λ(z) (λ(z) + z),
+    where λ is the ratio of density and distribution at z, the model's excess over the limit by √v.
+
+    Args:
+        values: Grey levels in the image, shape (n, p).
+        levels: The same by the model, without clipping.
+        variance: Of the noise, shape (n,), grey levels².
+
+    Source: J. Tobin, "Estimation of relationships for limited dependent variables", Econometrica 26, 1958.
+    """
+    expected, known = values.copy(), np.ones_like(values)
+    deviation = np.sqrt(variance).astype(np.float32)[:, None]
+    for sign, limit in ((1, LIGHTEST), (-1, DARKEST)):
+        clipped = sign * values >= sign * limit
+        if not clipped.any():
+            continue
+        blurred = (sign * values >= sign * limit - DOUBT) & (sign * levels >= sign * limit + DOUBT)
+        excess = sign * (levels - limit) / deviation
+        bounded = np.maximum(excess, -SURE)
+        hazard = np.exp(-(bounded**2) / 2 - log_ndtr(bounded)) / np.float32(np.sqrt(2 * np.pi))
+        behind = np.where(blurred, 0, np.clip(hazard * (hazard + bounded), 0, 1))
+        pulled = levels + np.where(blurred, 0, sign * deviation * (hazard + bounded - excess))
+        expected = np.where(clipped | blurred, pulled, expected)
+        known = np.where(clipped | blurred, behind, known)
+    return expected, known
+
+
+def _columns(start: FloatArray) -> list[int]:
+    """Columns of the parameters without those of the straight edges that no disc has."""
+    first = irregular_columns(start.shape[1])[1]
+    edges = [range(edge, edge + EDGE) for edge in range(first, start.shape[1], EDGE)]
+    return [*range(first), *(column for edge in edges if start[:, edge].any() for column in edge)]
+
+
+def refined_fit(
+    window: PixelWindows,
+    priors: Sequence[DiscPrior],
+    start: FloatArray,
+    limits: FloatArray,
+    chosen: BoolArray,
+) -> tuple[DiscFit, Array]:
+    """Fit by one prior after the other, each time to the pixels that agree with the fit before.
+
+    A settled fit whose prior and pixels stay is not repeated. Arguments and result as of `fit_disc_model`.
+    """
+    result, residuals = fit_disc_model(window, start, priors[0], limits, chosen)
+    used, moving, before = chosen.copy(), np.arange(len(start)), priors[0]
+    for prior in priors[1:]:
+        chosen = coherent_pixels(window, result, residuals)
+        if prior is before:
+            moving = moving[(chosen != used)[moving].any(axis=1) | ~result.settled[moving]]
+        if not len(moving):
+            break
+        used, before = chosen, prior
+        part, left = fit_disc_model(
+            window.at(moving),
+            result.parameters[moving],
+            DiscPrior(prior.mean[moving], prior.precision[moving]),
+            limits[moving],
+            chosen[moving],
+        )
+        result.put(moving, part)
+        residuals[moving] = left
+    return result, residuals
 
 
 def coherent_pixels(window: PixelWindows, fitted: DiscFit, residuals: Array) -> BoolArray:

@@ -12,6 +12,10 @@ from vision.frames.frame import GreyImage
 
 QUANTISATION = 1 / 12
 """Variance of rounding to grey levels, the smallest possible variance of the noise."""
+DARKEST, LIGHTEST = 5, 250
+"""Grey levels beyond which pixels may be clipped."""
+INSIDE = 2.0
+"""Distance from the edge inside a disc from which on its pixels show the noise alone, pixels."""
 SCALE = 1.4826
 """Standard deviation over median absolute value, of normal noise."""
 
@@ -27,7 +31,7 @@ class PixelWindows:
         within: Whether the image has that pixel, shape (n, p).
         ring: Mask of these pixels in the squares around the discs, shape (s, s).
         noise: Standard deviation from the second differences along the rows, shape (n,), grey levels; edges
-            in the window make it larger.
+            in the window make it larger. On a clipped ground, of the discs' insides.
     """
 
     origins: IntArray
@@ -51,7 +55,10 @@ class PixelWindows:
         values = grey[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)].astype(np.float32)
         within = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
         second = np.abs(values[:, :, 2:] - 2 * values[:, :, 1:-1] + values[:, :, :-2])
-        noise = median_where(*(part.reshape(len(origins), -1) for part in (second, within[:, :, 1:-1])))
+        ground = (values >= LIGHTEST).mean(axis=(1, 2)) < 0.5  # a clipped one has no noise
+        inside = away < (inner + outer) / 2 - INSIDE
+        counted = within & (ground[:, None, None] | inside)
+        noise = median_where(*(part.reshape(len(origins), -1) for part in (second, counted[:, :, 1:-1])))
         return cls(
             origins=origins,
             x=x[ring].astype(np.float32),

@@ -11,13 +11,15 @@ import numpy as np
 from scipy.special import ndtr
 
 from geometry.arrays import BoolArray, FloatArray
-from vision.discs.disc_image_model import BLUR, EDGE, EDGES, RADIUS, Array, disc_image
-from vision.discs.pixel_windows import QUANTISATION, PixelWindows
+from vision.discs.disc_image_model import BLUR, EDGE, EDGES, LIGHT, RADIUS, Array, disc_image
+from vision.discs.pixel_windows import LIGHTEST, QUANTISATION, PixelWindows
 
 ANGLES, OFFSETS = 24, np.arange(0.75, 4.0, 0.5)
 """Half-planes that are tried: number of directions of the normal, and pixels between disc and edge."""
 GAIN = 30.0
 """Sum of squares that an edge must explain, over the variance of the noise."""
+CLIPPED = 0.5
+"""Share of unclipped pixels beyond an edge that a clipped ground needs to show it."""
 
 
 def with_edges(
@@ -52,12 +54,14 @@ def with_edges(
         return np.asarray(values - (share.transpose(0, 2, 1) @ known)[:, 0])
 
     shared = known @ tried.T
-    squares = used @ (tried * tried).T - (shared * (inverse @ shared)).sum(axis=1)
+    squares = used.astype(np.float32) @ (tried * tried).T - (shared * (inverse @ shared)).sum(axis=1)
     residuals = orthogonal(residuals)
+    unclipped = (used * ((window.values[:, some] < LIGHTEST) - CLIPPED)).astype(np.float32)
+    shown = (unclipped @ tried.T > 0) | (parameters[:, [LIGHT]] < LIGHTEST)
     each = np.arange(len(residuals))
     edges, present = np.zeros((len(residuals), EDGES, EDGE)), np.zeros((len(residuals), EDGES), dtype=bool)
     for number in range(EDGES):
-        overlap, length = residuals @ tried.T, np.maximum(squares, 1.0)
+        overlap, length = (residuals @ tried.T) * shown, np.maximum(squares, 1.0)
         best = (overlap**2 / length).argmax(axis=1)
         lighter = overlap[each, best] / length[each, best]
         gain = lighter * overlap[each, best]

@@ -12,6 +12,7 @@ from geometry.finger.finger import Finger
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.triangle_mesh import TriangleMesh
+from vision.rig.print_layers import PrintLayers
 from vision.rig.shapes import CORNERS, Paint, Scene, Shape, blot, circle, closed, rectangle
 from vision.tracking.workspace import Workspace
 
@@ -51,6 +52,7 @@ class Bench:
         paint: Of the markers, one of `PAINTS`.
         irregular: Root mean square deviation of the markers' outlines from circles, over their radius.
         mottle: Share of the markers' area that light specks cover.
+        layers: Difference between the reflectances of light and dark layers of the finger, relative.
     """
 
     mesh: TriangleMesh
@@ -59,6 +61,7 @@ class Bench:
     paint: str = "dark"
     irregular: float = 0.0
     mottle: float = 0.0
+    layers: float = 0.0
 
     def markers(self, displacement: FloatArray) -> FloatArray:
         """Centres of the markers, shape (m, 3), mm, for nodal displacements, shape (n, 2), mm."""
@@ -91,6 +94,7 @@ class Bench:
                 *(Shape(block, CLAMP, plane) for block in self._clamps),
                 Shape(self._indenter(moved), INDENTER, plane),
                 Shape(moved[self._border], FINGER, plane),
+                *self._dark_layers(moved),
                 *self.discs(displacement),
                 *self.specks(displacement),
                 *occluders,
@@ -121,6 +125,17 @@ class Bench:
             block = rectangle((first - beyond, inner), (last + beyond, outer + depth))
             blocks.append(np.asarray(block @ frame))
         return blocks
+
+    def _dark_layers(self, moved: FloatArray) -> list[Shape]:
+        """Every other layer of the print with nodes at `moved`; none if all are alike."""
+        if not self.layers:
+            return []
+        blue, green, red = ((1 - self.layers) * np.array(FINGER)).tolist()
+        return [Shape(self._layers.edges(moved), (blue, green, red), self.workspace.marker_plane)]
+
+    @cached_property
+    def _layers(self) -> PrintLayers:
+        return PrintLayers.on(self.mesh.points, self.mesh.triangles)
 
     @cached_property
     def _border(self) -> IntArray:
