@@ -72,3 +72,9 @@ class Observations:
     def label(self) -> str:
         """`simulated`, `measured` or `unknown`, for captions."""
         return ("simulated" if self.simulated else "measured") if self.known else "unknown"
+
+    @property
+    def origin(self) -> str:
+        """`source`, opened by the label."""
+        said = self.source.lower().startswith(self.label)
+        return self.source if said else f"{self.label}: {self.source}"

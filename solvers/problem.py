@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
@@ -12,6 +12,7 @@ from geometry.arrays import FloatArray, IntArray
 from geometry.content_hash import content_hash
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
+from geometry.finger.parameters import CheckedModel
 from geometry.mesh.quadrature import segment_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
@@ -21,7 +22,7 @@ SOFTEST, STIFFEST = 1e-6, 1e7
 """Young's moduli of solids, MPa: a thousandth of the softest gels' to eight times diamond's."""
 
 
-class Material(BaseModel):
+class Material(CheckedModel):
     """An isotropic elastic material.
 
     The defaults are those of the paper: Agilus30 and VeroUltra mixed to Shore 85A.
@@ -31,9 +32,10 @@ class Material(BaseModel):
         poisson: Poisson's ratio (the paper's μ).
         plane: Plane "strain" (thick finger) or plane "stress" (the equations that the paper prints).
         law: "linear" (Hooke), or one of finite strain: "neo-hookean", "st-venant-kirchhoff" or "gent".
-    """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    Raises:
+        UserError: If a constant is out of its range, or the law is not given for plane stress.
+    """
 
     young: float = Field(default=11.4, gt=0, description="Young's modulus, MPa")
     poisson: float = Field(default=0.45, gt=-1, lt=0.5, description="Poisson's ratio")
@@ -66,7 +68,7 @@ class Material(BaseModel):
         return lame_constants(self.young, self.poisson, "strain")
 
 
-class Load(BaseModel):
+class Load(CheckedModel):
     """Displacement that the indenter prescribes at the boundary `contact`; a component None is free of force.
 
     Attributes:
@@ -79,9 +81,10 @@ class Load(BaseModel):
         position: Abscissa of the contact's middle on the front face, mm; None means where the mesh has its
             boundary `contact`, whose width the contact has in any case. A `patch` cannot be elsewhere.
         radius: Radius of the cylinder, mm; None for the other kinds.
-    """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    Raises:
+        UserError: If nothing is prescribed, a number is not finite, or a value does not go with the kind.
+    """
 
     kind: Literal["mean", "point", "patch", "cylinder"] = "mean"
     displacement: tuple[float | None, float | None] = (0.0, -10.0)

@@ -7,7 +7,6 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import ValidationError
 
 from geometry.errors import UserError
 from geometry.observations import Observations
@@ -88,10 +87,8 @@ def with_law(material: Material, solver: Solver) -> Material:
     law = material.law if material.law in solver.laws else solver.laws[0]
     try:
         return Material(**{**material.model_dump(), "law": law})
-    except ValidationError as error:
-        raise UnsupportedProblemError(
-            f"{solver.name}: {error.errors()[0]['msg'].removeprefix('Value error, ')}"
-        ) from None
+    except UserError as error:
+        raise UnsupportedProblemError(f"{solver.name}: {error}") from None
 
 
 def solved(solver: Solver, problem: Problem, progress: Progress = silent) -> Solution:

@@ -403,7 +403,7 @@ def test_the_guide_has_every_exit_code():
     from compare.runtime import exits
 
     codes = {int(name) for name in names(table(GUIDE, "code"))}
-    assert codes == {0, 1, exits.BAD_INPUT, exits.NOT_CONVERGED, exits.INTERRUPTED}
+    assert codes == {0, 1, exits.BAD_INPUT, exits.NOT_CONVERGED, exits.INTERRUPTED, exits.UNREAD}
 
 
 def test_the_guide_has_every_command():

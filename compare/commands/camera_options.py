@@ -3,10 +3,9 @@
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from cyclopts import Group, Parameter
-from pydantic import ValidationError
 
 from compare.camera.film import Film
 from compare.commands.options import Flag, Repeated, existing
@@ -87,18 +86,12 @@ class ForceOptions:
         Raises:
             UserError: If a constant is out of its range or given without --force.
         """
-        given: dict[str, object] = {
+        given: dict[str, Any] = {
             name: value for name in ("young", "poisson", "law") if (value := getattr(self, name)) is not None
         }
         if given and not self.force:
             raise UserError(f"--{next(iter(given))} is for --force")
-        if not self.force:
-            return None
-        try:
-            return Material.model_validate(given)
-        except ValidationError as error:
-            first = error.errors()[0]
-            raise UserError(f"--{first['loc'][0]} {first['input']}: {first['msg'].lower()}") from None
+        return Material(**given) if self.force else None
 
 
 @Parameter(name="*", group=CAMERA)

@@ -5,6 +5,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from errno import EDQUOT, ENOSPC
 from functools import partial
 from io import TextIOWrapper
@@ -12,17 +13,18 @@ from pathlib import Path
 from resource import RLIM_INFINITY, RLIMIT_NOFILE, getrlimit, setrlimit
 from shutil import disk_usage
 from tempfile import TemporaryFile, gettempdir
-from typing import Any
+from typing import Any, TextIO
 
 import pydantic
 from cyclopts import CycloptsError, UnusedCliTokensError, ValidationError
 
-from compare.runtime.exits import BAD_INPUT, INTERRUPTED, say
+from compare.runtime.exits import BAD_INPUT, INTERRUPTED, UNREAD, say
 from geometry.errors import UserError
 
 EXIT_CODES = (
     "Exit codes: 0 all well; 1 a fault of the program; 2 bad input, with one line that says what and how to "
-    "mend it; 3 done, but a solver did not converge or --adapt did not reach its tolerance; 130 interrupted."
+    "mend it; 3 done, but a solver did not converge or --adapt did not reach its tolerance; 130 interrupted; "
+    "141 the output went into a pipe that nobody reads any more."
 )
 
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
@@ -45,12 +47,31 @@ def launched(command: Callable[[], Any]) -> int:
 
 
 def guarded(command: Callable[[], Any]) -> int:
-    """Run a command and return its exit code; faults of the program itself pass, with their traceback."""
+    """Run a command and return its exit code; faults of the program itself pass, with their traceback.
+
+    A closed pipe, as of `compare | head -1`, ends it without a message and with a shell's code for SIGPIPE.
+    """
+    try:
+        return _with_messages(command)
+    except (BrokenPipeError, SystemExit) as end:
+        if isinstance(end, SystemExit) and not isinstance(end.__context__, BrokenPipeError):  # Rich's way
+            raise
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError):
+                _flush(stream)
+        return UNREAD
+
+
+def _with_messages(command: Callable[[], Any]) -> int:
+    """Run a command, with errors and warnings as lines on standard error, and return its exit code."""
     with warnings.catch_warnings():
         logging.captureWarnings(True)  # FFCx does when it is imported, which would undo the next line
         warnings.showwarning = lambda message, *_, **__: say(f"warning: {message}")
         try:
-            return int(command() or 0)
+            try:
+                return int(command() or 0)
+            finally:
+                _flush(sys.stdout)
         except UnusedCliTokensError as error:
             say(f"error: {' '.join(error.unused_tokens or ())!r} belongs to no option; see --help")
         except ValidationError as error:  # of settings that are given as options
@@ -60,12 +81,24 @@ def guarded(command: Callable[[], Any]) -> int:
             say(f"error: {'; '.join(said)}")
         except (UserError, CycloptsError) as error:
             say(f"error: {error}")
+        except BrokenPipeError:
+            raise
         except OSError as error:
             say(f"error: {error.filename or _written_to(error)}: {error.strerror or error}")
         except KeyboardInterrupt as interrupt:
             say(f"interrupted; {interrupt}" if interrupt.args else "interrupted")
             return INTERRUPTED
     return BAD_INPUT
+
+
+def _flush(stream: TextIO) -> None:
+    """Write what a stream holds back; if it cannot, drop it: the program's end would fail on it."""
+    try:
+        stream.flush()
+    except OSError:
+        with suppress(OSError), open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), stream.fileno())
+        raise
 
 
 def _written_to(error: OSError) -> str:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Group, Parameter
-from pydantic import ValidationError
 
 from compare.commands.preset_jobs import job_defaults
 from compare.runtime.provenance import cores
@@ -182,21 +181,14 @@ class PhysicsOptions:
         along, into = sin(radians(self.direction)), cos(radians(self.direction))
         kind = self.load or job_defaults(preset).load
         radius = RADIUS if kind == "cylinder" and self.radius is None else self.radius
-        try:
-            return (
-                Material(young=self.young, poisson=self.poisson, plane=self.plane, law=self.law or "linear"),
-                Load(
-                    kind=kind,
-                    displacement=(None if self.slide else self.stroke * along, -self.stroke * into),
-                    radius=radius,
-                ),
-            )
-        except ValidationError as error:
-            first = error.errors()[0]
-            said = first["msg"].removeprefix("Value error, ")
-            if not first["loc"]:  # a rule between options
-                raise UserError(said) from None
-            raise UserError(f"--{first['loc'][0]} {first['input']}: {said[0].lower()}{said[1:]}") from None
+        return (
+            Material(young=self.young, poisson=self.poisson, plane=self.plane, law=self.law or "linear"),
+            Load(
+                kind=kind,
+                displacement=(None if self.slide else self.stroke * along, -self.stroke * into),
+                radius=radius,
+            ),
+        )
 
     def check_law(self, solvers: Sequence[Solver]) -> None:
         """Raise a `UserError` if none of the solvers has the law."""

@@ -31,15 +31,20 @@ SMALLEST = 1e-4
 """Misfit below which nothing is drawn, mm: no camera resolves it."""
 
 
-def draw_held_out(errors: Mapping[str, Mapping[str, Sequence[float]]], simulated: bool) -> Figure:
-    """Draw the mean of |du| + |dv| at every marker where it is held out: a row a layout, a line a solver."""
+def draw_held_out(errors: Mapping[str, Mapping[str, Sequence[float]]], label: str) -> Figure:
+    """Draw the mean of |du| + |dv| at every marker where it is held out: a row a layout, a line a solver.
+
+    Args:
+        errors: By layout and solver.
+        label: `simulated` or `measured`, of the displacements.
+    """
     labels = _labels(errors)
     top = HEAD + legend_height(labels)
     with figure(top + len(errors) * ROW) as drawn:
         heading(
             drawn,
             "Error of each marker when it is held out",
-            f"Mean over seeds, against {'simulated' if simulated else 'measured'} displacements.",
+            f"Mean over seeds, against {label} displacements.",
         )
         for row, (layout, by_label) in enumerate(errors.items()):
             axes = axes_at(drawn, (LEFT, top + row * ROW, WIDTH - LEFT - 0.1, HEIGHT))

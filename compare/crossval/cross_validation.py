@@ -10,7 +10,7 @@ from compare.crossval.folds import LOAD, FoldResult, LoadCase, SeedResults, fold
 from compare.crossval.output_files import write_results
 from compare.crossval.result import Case, CrossvalResult, LayoutResult
 from compare.crossval.solver_folds import SolverTask, run_folds
-from compare.crossval.study import MEASURED, Study, visible_markers
+from compare.crossval.study import Study, visible_markers
 from compare.crossval.true_fields import TrueField, TruthTask, simulate_truth
 from compare.crossval.weight_sweep import SWEPT, sweep_weights
 from compare.evaluation.plausibility import check_positions, displacement_remarks
@@ -45,24 +45,24 @@ def cross_validate(study: Study, stages: Stages | None = None) -> CrossvalResult
     """
     stages = stages or Stages(quiet=True)
     study.check()
-    measured = study.measurements and visible_markers(study.measurements)
-    definition = study.definition(measured)
+    given = study.measurements and visible_markers(study.measurements)
+    definition = study.definition(given)
     check_resumable_folder(study.out / DEFINITION, definition, job="cross-validation")
     with stages.stage("mesh"):
         mesh = finger_mesh(study.design, settings=study.mesh)
-        if measured:
-            check_positions(measured, mesh)
+        if given:
+            check_positions(given, mesh)
         problem = Problem(mesh, study.material, study.load)
-        for remark in displacement_remarks(measured, problem) if measured else ():
+        for remark in displacement_remarks(given, problem) if given else ():
             warnings.warn(remark, stacklevel=2)
-    load_cases = load_cases_of(problem, others=LOAD in study.schemes and measured is None)
+    load_cases = load_cases_of(problem, others=LOAD in study.schemes and given is None)
     study.out.mkdir(parents=True, exist_ok=True)
     with locked(study.out):
         write_json(study.out / DEFINITION, definition)
         mesh.save(study.mesh_file)
-        files = {} if measured else _true_fields(study, load_cases, stages)
-        if measured:
-            observations = {Case(MEASURED, MEASURED): [[measured]] * study.seeds}
+        files = {} if given else _true_fields(study, load_cases, stages)
+        if given:
+            observations = {Case(given.label, given.label): [[given]] * study.seeds}
         else:
             observations = _noisy(study, files, problem)
         folds = {

@@ -72,7 +72,7 @@ def _pictures(
             layout: {label: scores[ONE].per_marker for label, scores in each.scores.items()}
             for layout, each in by_layout.items()
         }
-        yield HELD_OUT, draw_held_out(errors=errors, simulated=result.study.simulated)
+        yield HELD_OUT, draw_held_out(errors=errors, label=result.study.label)
     if result.has_fields:
         scores = {layout: each.scores for layout, each in by_layout.items()}
         yield FIELDS, draw_fields(scores=scores, schemes=result.schemes)

@@ -34,8 +34,8 @@ class Case(NamedTuple):
     """A truth and a layout of its markers.
 
     Attributes:
-        truth: Name of the truth, or `MEASURED`.
-        layout: Name of the layout, or `MEASURED`.
+        truth: Name of the truth; `measured` or `simulated` with measurements.
+        layout: Name of the layout; likewise.
     """
 
     truth: str
@@ -58,7 +58,7 @@ class LayoutResult:
     """The scores of all solvers in one case: with a truth and the markers of one layout.
 
     Attributes:
-        source: One sentence on the source of the markers' displacements.
+        source: One sentence on the source of the markers' displacements, opened by simulated or measured.
         markers: Number of markers.
         folds: The folds of every solver.
         scores: By solver and scheme.
@@ -106,7 +106,7 @@ class LayoutResult:
             for label, each in by_scheme.items()
         }
         return cls(
-            source=observations.source,
+            source=observations.origin,
             markers=len(observations.points),
             folds=folds,
             scores={
@@ -185,7 +185,7 @@ class CrossvalResult:
 
     Attributes:
         study: The study.
-        cases: The scores by truth and layout of the markers; of `MEASURED` alone with measured markers.
+        cases: The scores by truth and layout of the markers; of a single one with measurements.
         true_contacts: Force and place of the contact of each truth at the full load.
     """
 
@@ -195,7 +195,7 @@ class CrossvalResult:
 
     @property
     def truths(self) -> list[str]:
-        """Names of the truths, or `MEASURED`."""
+        """Names of the truths; `measured` or `simulated` with measurements."""
         return list(dict.fromkeys(case.truth for case in self.cases))
 
     def of_truth(self, truth: str) -> dict[str, LayoutResult]:

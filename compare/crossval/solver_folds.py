@@ -43,10 +43,10 @@ class SolverTask:
         layout: Name of the markers' layout.
         variant: The solver.
         load_cases: The loads, the full one first.
-        truths: File of the true fields at each load; empty with measured markers.
+        truths: File of the true fields at each load; empty with measurements.
         observations: For each seed, those at every load.
         folds: The folds.
-        truth: The truth of the true fields; None with measured markers.
+        truth: The truth of the true fields; None with measurements.
     """
 
     study: Study

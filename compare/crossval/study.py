@@ -32,9 +32,6 @@ The discretisation error of `fem` at the markers is then 0.01 mm, a hundredth of
 FEWEST = 3
 """Fewest markers: some to hold out and some to give."""
 
-MEASURED = "measured"
-"""Name in place of a truth and of a layout where the markers were measured."""
-
 EVERY_TRUTH = "all"
 """Name that stands for every truth."""
 
@@ -108,7 +105,7 @@ class Study:
         schemes: Keys of `SCHEMES` other than `ALL`.
         seeds: Number of draws of the noise, and of the solvers' random numbers.
         noise: Standard deviation of a simulated marker's displacement, mm.
-        measurements: Measured marker displacements; None for the virtual experiment.
+        measurements: Marker displacements from elsewhere; None for the virtual experiment.
         processes: Solvers run at a time.
     """
 
@@ -133,7 +130,7 @@ class Study:
 
     @property
     def chosen_truths(self) -> dict[str, Truth]:
-        """The truths by name; none with measured markers."""
+        """The truths by name; none with measurements."""
         if self.measurements is not None:
             return {}
         return {name: TRUTHS[name] for name in self._truth_names}
@@ -153,16 +150,18 @@ class Study:
         return {layout: self._laid_out(layout).markers for layout in layouts}
 
     @property
-    def simulated(self) -> bool:
-        """True if no camera was involved."""
-        return self.measurements is None or self.measurements.simulated
+    def label(self) -> str:
+        """`simulated` or `measured`, for captions."""
+        return "simulated" if self.measurements is None else self.measurements.label
 
     def check(self) -> None:
         """Raise a `UserError` for what cannot be done, before anything is computed."""
         if self.layouts and self.measurements:
-            raise UserError("--layouts: measured markers are where they are; leave out --layouts")
+            raise UserError(
+                "--layouts: the markers of --measurements are where they are; leave out --layouts"
+            )
         if tuple(self.truths) != (SLIDING.name,) and self.measurements:
-            raise UserError("--truth: measured markers have a truth that nobody knows; leave out --truth")
+            raise UserError("--truth is for a simulated experiment; with --measurements leave it out")
         check_truths(self._truth_names, self.design)
         if len(set(self.layouts)) < len(self.layouts):
             raise UserError(f"--layouts: a layout is named twice: {', '.join(self.layouts)}")
@@ -210,7 +209,7 @@ class Study:
             )
         return self.design.replaced(marker_layout=layout)
 
-    def definition(self, measured: Observations | None) -> dict[str, Any]:
+    def definition(self, given: Observations | None) -> dict[str, Any]:
         """Everything that finished folds depend on but the solvers' settings, which are kept with them."""
         return job_definition(
             self.design,
@@ -222,11 +221,10 @@ class Study:
                 "compare.evaluation.truths",
             ],
         ) | {
-            "noise_mm": None if measured else self.noise,
-            "measured": measured
+            "noise_mm": None if given else self.noise,
+            "measurements": given
             and [
-                values.tolist()
-                for values in (measured.points, measured.displacements, measured.standard_deviations)
+                values.tolist() for values in (given.points, given.displacements, given.standard_deviations)
             ],
         }
 

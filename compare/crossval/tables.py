@@ -44,7 +44,7 @@ def grids(result: CrossvalResult) -> list[Grid]:
     ]
     markers = [
         Grid(
-            f"{scheme}: {SCHEMES[scheme]}; mm",
+            f"{scheme}: {SCHEMES[scheme]}; {result.study.label} markers, mm",
             headings,
             _by_case(result, _marker_row, [scheme]),
             CAPTION if scheme == held[-1] else "",

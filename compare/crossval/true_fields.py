@@ -15,7 +15,7 @@ from compare.runtime.provenance import package_versions, sources_digest
 from compare.runtime.tables import Cell
 from geometry.arrays import FloatArray
 from geometry.atomic import write_arrays
-from geometry.cache import cache_folder, finger_mesh
+from geometry.cache import cache_folder, finger_mesh, kept_if_possible
 from geometry.content_hash import content_hash
 from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints
@@ -221,7 +221,7 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Pa
     """Simulate the true field, unless the cache has it, and sample it with the markers of every layout.
 
     Returns:
-        Files in the cache by layout.
+        Files by layout: in the cache, or in the study's folder where the cache cannot be written.
 
     Raises:
         UserError: If the simulation cannot be run or does not reach the full load.
@@ -244,11 +244,17 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Pa
             [*SOURCES, __name__, "compare.evaluation.truths", "compare.evaluation.virtual_experiment"]
         ),
     ]
-    files = {
-        layout: cache_folder() / f"truth-{content_hash([*parts, points.tolist()])}.npz"
-        for layout, points in markers.items()
+    names = {
+        layout: f"truth-{content_hash([*parts, points.tolist()])}.npz" for layout, points in markers.items()
     }
-    missing = [layout for layout, file in files.items() if not file.exists()]
+    folders = cache_folder(), study.out / "truths"
+    files = {
+        layout: file
+        for folder in reversed(folders)
+        for layout, name in names.items()
+        if (file := folder / name).exists()
+    }
+    missing = [layout for layout in names if layout not in files]
     if not missing:
         progress(1.0, "from the cache")
         return files
@@ -260,8 +266,17 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Pa
     for layout in missing:
         sampler = FieldSampler.of(shared, markers[layout], design.marker_radius)
         sampled = sampler.of_solution(solution, shared, truth.changes(drawn))
-        TrueField(sampled, contact).save(files[layout])
+        files[layout] = _kept(TrueField(sampled, contact), *(folder / names[layout] for folder in folders))
     return files
+
+
+def _kept(field: TrueField, entry: Path, own: Path) -> Path:
+    """The file of a true field: an entry of the cache if that can be written, else the study's own."""
+    with kept_if_possible(entry.parent, "the virtual experiment of another study"):
+        field.save(entry)
+        return entry
+    field.save(own)
+    return own
 
 
 def _contact(solution: Solution) -> TrueContact:

@@ -26,7 +26,7 @@ def held_out_scheme(result: CrossvalResult) -> str:
 
 
 def truth_grids(result: CrossvalResult) -> list[Grid]:
-    """Tables of solvers by truths for each layout, as many as fit the truths; none with measured markers."""
+    """Tables of solvers by truths for each layout, as many as fit the truths; none with measurements."""
     if not result.study.chosen_truths:
         return []
     scheme, grids = held_out_scheme(result), []

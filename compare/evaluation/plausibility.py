@@ -105,7 +105,7 @@ def _compared(moved: FloatArray, expected: FloatArray, stroke: float, number: in
             f"the measurements do not fit the load: {mixup}; so changed they would be much like those of "
             f"fem (cosine {likeness[mixup]:.2f}), as they are they are not ({own:.2f})"
         )
-    sized = f"the measured displacements are {ratio:.3g} times those of fem for a stroke of {stroke:g} mm"
+    sized = f"the markers' displacements are {ratio:.3g} times those of fem for a stroke of {stroke:g} mm"
     unit = next((unit for unit, factor in UNITS.items() if 1 / 1.5 < ratio * factor < 1.5), None)
     if unit in IMPOSSIBLE_UNITS and own > UNLIKE:
         raise UserError(f"{sized}; these look like {unit}; give mm")
@@ -117,7 +117,7 @@ def _compared(moved: FloatArray, expected: FloatArray, stroke: float, number: in
         remarks.append(f"marker {number} moved by {far:.4g} mm, {SIZES:g} times farther than any in fem")
     if own < UNLIKE:
         remarks.append(
-            f"the measured displacements are unlike those of fem (cosine {own:.2f}); check markers, columns, "
+            f"the markers' displacements are unlike those of fem (cosine {own:.2f}); check markers, columns, "
             "signs and load"
         )
     elif np.abs(moved[:, 0]).max() > SMALL * stroke and _cosine(moved[:, 0], expected[:, 0]) < OPPOSED:

@@ -84,8 +84,7 @@ def support_sentence(design: Finger) -> str:
 
 def source_sentence(observations: Observations) -> str:
     """Provenance of the marker displacements, opened by `Simulated`, `Measured` or `Unknown`."""
-    said = observations.source.lower().startswith(observations.label)
-    return sentence(observations.source if said else f"{observations.label}: {observations.source}")
+    return sentence(observations.origin)
 
 
 def grouped(provenance: Mapping[str, object]) -> list[tuple[str, list[tuple[str, str]]]]:

@@ -2,7 +2,7 @@
 
 import sys
 
-BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 2, 3, 130
+BAD_INPUT, NOT_CONVERGED, INTERRUPTED, UNREAD = 2, 3, 130, 141
 
 
 def say(message: str) -> None:

@@ -4,10 +4,12 @@ Not `pebble.ProcessPool`: when the program is killed its workers go on until the
 interrupted they are killed before they can save their state, and they cannot report progress.
 """
 
+import logging
 import os
 import signal
+import warnings
 from collections.abc import Callable, Generator, Iterator, Mapping
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
@@ -49,6 +51,13 @@ class _Done(Generic[Output]):
     answer: Output
 
 
+@dataclass(frozen=True)
+class _Warned:
+    """A warning in a process."""
+
+    text: str
+
+
 def in_processes(
     work: Callable[[Input, Progress], Output],
     tasks: Mapping[str, Input],
@@ -63,6 +72,8 @@ def in_processes(
 
     When the iterator is closed or interrupted, or this process is killed, the next progress report of every
     running process raises KeyboardInterrupt there, so that it can save its state.
+
+    Warnings in a process are warnings here, where Python shows a text only once.
 
     Args:
         work: A function of a module, called with a task and a progress report.
@@ -95,6 +106,8 @@ def in_processes(
                     del running[connection]
                     process.join()
                     yield name, message.answer
+                elif isinstance(message, _Warned):
+                    warnings.warn(message.text, RuntimeWarning, stacklevel=2)
                 else:
                     report(name, *message)
     finally:
@@ -161,6 +174,12 @@ def _child(work: Callable[[Input, Progress], Output], task: Input, connection: C
         except OSError:  # nobody listens any more
             raise KeyboardInterrupt from None
 
+    def warn(message: Warning | str, *_: object, **__: object) -> None:
+        with suppress(OSError):  # nobody listens any more, and the next report ends the work
+            connection.send(_Warned(str(message)))
+
+    logging.captureWarnings(True)  # FFCx does when it is imported, which would undo the next line
+    warnings.showwarning = warn
     try:
         answer = work(task, report)
     except KeyboardInterrupt:

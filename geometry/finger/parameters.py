@@ -4,6 +4,7 @@ Invalid values are refused in one line: the parameter, the value, and the allowe
 """
 
 import difflib
+import reprlib
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -192,15 +193,21 @@ def _sentence(problem: ErrorDetails, model: type[BaseModel]) -> str:
     if kind in ("greater_than_equal", "less_than_equal"):
         given = with_unit(float(value), name, model)
         return f"{titled} = {given} is outside its range, {_bounds(name, model)}"
+    titled = f"{titled} = {' '.join(reprlib.repr(value).split())}"  # an array's text has several lines
     if kind in ("int_from_float", "int_parsing", "int_type"):
-        return f"{titled} = {value!r} is not a whole number; give one from {_bounds(name, model)}"
+        return f"{titled} is not a whole number{_advice(name, model)}"
     if kind in ("float_parsing", "float_type", "finite_number"):
-        return f"{titled} = {value!r} is not a finite number; give one from {_bounds(name, model)}"
+        return f"{titled} is not a finite number{_advice(name, model)}"
     if kind == "string_pattern_mismatch":
-        return f"{titled} = {value!r} must be a letter or digit, then only letters, digits, '.', '_', '-'"
-    return f"{titled} = {value!r}: {problem['msg'].lower()}"
+        return f"{titled} must be a letter or digit, then only letters, digits, '.', '_', '-'"
+    return f"{titled}: {context['error'] if kind == 'value_error' else problem['msg'].lower()}"
 
 
 def _bounds(name: str, model: type[BaseModel]) -> str:
     low, high = parameter_info(name, "low", model), parameter_info(name, "high", model)
     return f"{low:g} to {with_unit(high, name, model)}"
+
+
+def _advice(name: str, model: type[BaseModel]) -> str:
+    """The end of a message with the parameter's bounds; empty where it has none."""
+    return f"; give one from {_bounds(name, model)}" if parameter_info(name, "low", model) != "" else ""

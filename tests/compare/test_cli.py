@@ -114,11 +114,11 @@ BAD = [
     ("compare --adapt 0.001 --load point", "a point load has no limit under refinement"),
     ("mesh --adapt 0.001 --load point", "a point load has no limit under refinement"),
     # material and load
-    ("compare --young -1", "--young -1.0: input should be greater than 0"),
+    ("compare --young -1", "young = -1.0: input should be greater than 0"),
     ("compare --young inf", "--young inf"),
-    ("compare --young 1e-300", "--young 1e-300: no solid has this Young's modulus"),
-    ("compare --young 11400000", r"--young 11400000.0: no solid .* MPa \(1 MPa = 10\^6 Pa\)"),  # in pascals
-    ("compare --poisson 0.5", "--poisson 0.5: input should be less than 0.5"),  # incompressible
+    ("compare --young 1e-300", "young = 1e-300: no solid has this Young's modulus"),
+    ("compare --young 11400000", r"young = 11400000.0: no solid .* MPa \(1 MPa = 10\^6 Pa\)"),  # in pascals
+    ("compare --poisson 0.5", "poisson = 0.5: input should be less than 0.5"),  # incompressible
     ("compare --stroke 0", "--stroke 0: the indenter presses"),
     ("compare --stroke -10", "--stroke -10: the indenter presses"),  # not the displacement v
     ("compare --stroke nan", "--stroke nan"),
@@ -131,7 +131,7 @@ BAD = [
     ("compare --load pull", 'Choose from: "mean", "point", "patch"'),
     ("compare --solvers fem --load cylinder", "fem takes .*, not 'cylinder'; `pinnray solvers` lists"),
     ("compare --radius 5", "a radius belongs to the load cylinder, and to no other"),
-    ("solve fem-nonlinear --load cylinder --radius 0", "--radius 0.0: input should be greater than 0"),
+    ("solve fem-nonlinear --load cylinder --radius 0", "radius = 0.0: input should be greater than 0"),
     ("solve fem-nonlinear --load cylinder --slide", "a cylinder .* has no friction"),
     ("compare --plane stress --solvers fem-nonlinear", "fem-nonlinear: .* plane strain only"),
     ("compare --law hooke", 'Choose from: "linear", "neo-hookean", "st-venant-kirchhoff", "gent"'),

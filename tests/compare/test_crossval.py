@@ -33,7 +33,7 @@ from compare.crossval.folds import (
 from compare.crossval.result import Case, CrossvalResult, LayoutResult
 from compare.crossval.scores import Difference, Interval, difference, of_scheme, score
 from compare.crossval.solver_folds import SolverTask, run_folds
-from compare.crossval.study import EVERY_TRUTH, MEASURED, SolverVariant, Study, solver_variants
+from compare.crossval.study import EVERY_TRUTH, SolverVariant, Study, solver_variants
 from compare.crossval.true_fields import FieldSampler, TrueContact, TrueField
 from compare.crossval.truth_summary import truth_grids, verdict_sentences
 from compare.crossval.weight_sweep import sweep_weights
@@ -391,7 +391,9 @@ def test_the_command_writes_what_the_guide_says_and_goes_on(tmp_path, capsys, in
     line = "--solvers fem,gp,fem-asm --schemes tip-out --solver-set fem-asm.choose=given"
     assert run(f"{line} --seeds 1", tmp_path / "out") == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "tip-out: the third of the markers nearest the tip held out together; mm" in said
+    assert (
+        "tip-out: the third of the markers nearest the tip held out together; simulated markers, mm" in said
+    )
     content = json.loads((tmp_path / "out" / "crossval.json").read_text())
     joints = content["truths"]["sliding"]["layouts"]["joints"]
     assert list(joints["solvers"]) == ["fem", "gp", "fem-asm"]
@@ -583,12 +585,58 @@ def test_measured_markers_have_no_truth(tmp_path, capsys, in_line, observations)
     assert list(content["schemes"]) == ["all", "one-out"]
     (gp,) = (
         layout["solvers"]["gp"]["schemes"]["one-out"]
-        for layout in content["truths"][MEASURED]["layouts"].values()
+        for layout in content["truths"]["measured"]["layouts"].values()
     )
     assert len(gp["per_marker"]) == 8
     assert gp["fields"] == {}
     assert not (tmp_path / "out" / "fields.csv").exists()
     assert not (tmp_path / "out" / "fields.png").exists()
+
+
+def test_simulated_markers_of_a_file_are_called_simulated_everywhere(
+    tmp_path, capsys, monkeypatch, in_line, observations
+):
+    from vision.measurements import write_measurements
+
+    headings = []
+    monkeypatch.setattr("compare.crossval.charts.heading", lambda _, *texts: headings.extend(texts))
+    write_measurements(tmp_path / "markers.csv", replace(observations, simulated=True, source="made up"))
+    line = f"--measurements {tmp_path / 'markers.csv'} --solvers fem,gp --schemes one-out --seeds 1"
+    assert run(line, tmp_path / "out") == 0
+    printed = capsys.readouterr()
+    assert "simulated markers, mm" in " ".join(printed.out.split())
+    assert "against simulated displacements" in " ".join(headings)
+    assert "displacements are simulated: made up." in (tmp_path / "out" / "report.html").read_text()
+    written = [path for path in (tmp_path / "out").rglob("*") if path.suffix in (".json", ".csv", ".html")]
+    assert len(written) > 5
+    for path in written:
+        assert "measured" not in str(path.relative_to(tmp_path)), path
+        assert not re.search(r"\bmeasured\b", path.read_text()), path
+    for name in ("held_out.csv", "folds.csv"):
+        assert all(
+            line.startswith("simulated,simulated,")
+            for line in (tmp_path / "out" / name).read_text().splitlines()[1:]
+        ), name
+    assert "measured" not in printed.out + printed.err
+
+
+@pytest.mark.filterwarnings("default:cannot write to the cache folder")
+def test_a_cache_that_cannot_be_written_is_a_warning_and_the_study_keeps_its_truths(
+    tmp_path, capsys, monkeypatch, in_line
+):
+    (tmp_path / "cache").touch()  # a file, not a folder
+    monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path / "cache"))
+    line = "--solvers gp --schemes one-out --seeds 1"
+    assert run(line, tmp_path / "out") == 0
+    assert re.search(
+        r"warning: cannot write to the cache folder .*cache \(File exists\), so that the virtual experiment",
+        capsys.readouterr().err,
+    )
+    (kept,) = (tmp_path / "out" / "truths").iterdir()
+    before = kept.stat().st_mtime_ns
+    assert run(line, tmp_path / "out") == 0
+    assert kept.stat().st_mtime_ns == before
+    assert "virtual experiment" not in capsys.readouterr().err
 
 
 def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, observations):
@@ -603,15 +651,15 @@ def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, 
     )
     result = cross_validate(study)
     assert capsys.readouterr() == ("", "")
-    row = result.table().loc[MEASURED, MEASURED, "gp", ONE]
+    row = result.table().loc["measured", "measured", "gp", ONE]
     assert (
         row["held_out_mae_sum_mm"]
-        == result.cases[MEASURED, MEASURED].scores["gp"][ONE].held_out["mae_sum"].mean
+        == result.cases["measured", "measured"].scores["gp"][ONE].held_out["mae_sum"].mean
     )
     assert np.isnan(row["from_fem_mean_mm"])  # fem is not in the study
     with pytest.raises(UserError, match="there is no scheme 'two-out'"):
         cross_validate(replace(study, schemes=["two-out"]))
-    with pytest.raises(UserError, match="--truth: measured markers have a truth that nobody knows"):
+    with pytest.raises(UserError, match="--truth is for a simulated experiment"):
         cross_validate(replace(study, truths=["stvk"]))
     pulled = replace(study, measurements=None, truths=["mixed"], load=Load(displacement=(1.0, 0.0)))
     with pytest.raises(UserError, match="--truth mixed: a cylinder presses on the finger: prescribe a v"):
@@ -667,7 +715,7 @@ def test_pictures_show_every_solver():
     columns = ("factor", "in_sample_mm", "left_out_mm", *fields)
     sweep = {name: [1e-6, 1e-3, 1.0] for name in columns}
     for layouts in (["joints"], ["front", "joints"]):
-        held_out = draw_held_out(errors=dict.fromkeys(layouts, values), simulated=True)
+        held_out = draw_held_out(errors=dict.fromkeys(layouts, values), label="simulated")
         distances = draw_fields(scores=dict.fromkeys(layouts, scores), schemes=[ALL, ONE])
         page = page_of(draw_weight_sweeps(sweeps=dict.fromkeys(layouts, sweep)))
         assert (page.cut_off(), page.overlaps()) == ([], [])

@@ -1,16 +1,19 @@
 """Tasks in processes of their own: their answers, their end, and what is left of them."""
 
+import logging
 import os
 import signal
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
 import pytest
 
+from compare.commands.launch import guarded
 from compare.runtime.processes import ProcessFailed, in_processes
 from compare.runtime.provenance import cores
 from solvers.solver import Progress
@@ -32,6 +35,11 @@ def ended(number: int, progress: Progress) -> float:
 
 def threads(_: int, progress: Progress) -> str:
     return os.environ["OMP_NUM_THREADS"]
+
+
+def warning(number: int, progress: Progress) -> None:
+    logging.captureWarnings(True)  # as FFCx does when it is imported
+    warnings.warn("the disk\nis full", UserWarning, stacklevel=1)
 
 
 def endless(folder: Path, progress: Progress) -> None:
@@ -131,3 +139,13 @@ def test_processes_share_the_cores(monkeypatch, chosen, expected):
     answers = dict(in_processes(threads, tasks, processes=cores(), report=silent))
     assert set(answers.values()) == {expected}
     assert os.environ.get("OMP_NUM_THREADS") == chosen
+
+
+def test_a_warning_of_several_processes_is_one_line_once(capfd):
+    def command() -> None:
+        list(in_processes(warning, {"a": 1, "b": 2, "c": 3}, processes=2, report=lambda *_: None))
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")  # Python's own, which pytest replaces
+        assert guarded(command) == 0
+    assert capfd.readouterr().err == "warning: the disk is full\n"

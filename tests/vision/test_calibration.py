@@ -160,6 +160,22 @@ def test_photographs_of_other_sizes_are_named_with_a_way_to_leave_them_out():
         calibrate(images.items(), BOARD)
 
 
+@pytest.mark.parametrize(("parts", "hint"), [(2, "count them"), (5, "5 seem to show 4x3")])
+def test_another_board_is_named_only_if_most_photographs_show_it(parts, hint):
+    """Of a board that is hard to see OpenCV may find a part here and there."""
+
+    class Unseen(Board):
+        def find(self, image: np.ndarray) -> None:
+            return None
+
+        def suggest(self, image: np.ndarray) -> str | None:
+            return "4x3" if image[0, 0] else None
+
+    images = {str(number): np.full((9, 9), number < parts, np.uint8) for number in range(8)}
+    with pytest.raises(UserError, match=f"0 of 8 photographs show the board of 9x6 inner corners; {hint}$"):
+        calibrate(images.items(), Unseen(9, 6, 25.0))
+
+
 def test_photographs_without_a_board_are_refused():
     with pytest.raises(UserError, match="0 of 2 photographs show the board of 9x6 inner corners; count them"):
         calibrate(dict.fromkeys("ab", np.zeros((100, 150), np.uint8)).items(), BOARD)

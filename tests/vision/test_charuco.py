@@ -14,9 +14,9 @@ CHARUCO = CharucoBoard(7, 5, 20.0, 15.0, "5X5_100")
 TILTS = [(20, -15, 5), (5, 30, 170)]
 
 
-def pose(angles: tuple[float, float, float], *, shift: float = 0.0) -> Pose:
+def pose(angles: tuple[float, float, float], *, shift: float = 0.0, distance: float = 250.0) -> Pose:
     turn = Rotation.from_euler("xyz", angles, degrees=True)
-    return Pose(turn.as_rotvec(), np.array([shift, 0, 250.0]) - turn.apply((60, 40, 0)))
+    return Pose(turn.as_rotvec(), np.array([shift, 0, distance]) - turn.apply((60, 40, 0)))
 
 
 @pytest.mark.parametrize("board", [CHARUCO, Board(7, 5, 20.0)])
@@ -38,6 +38,16 @@ def test_a_part_of_the_board_is_enough():
     seen = np.isfinite(found).all(axis=1)
     assert 15 < seen.sum() < 35
     np.testing.assert_allclose(found[seen], exact[seen], rtol=0, atol=0.06)
+
+
+@pytest.mark.parametrize("angles", [(55, 10, 30), (10, -55, 80)])
+def test_a_far_board_is_found_where_single_markers_are_not(angles):
+    """Of the tilted board 12 corners or none were found without another look for the markers missed."""
+    image, exact = photographed(CHARUCO, pose(angles, distance=500.0))
+    found = CHARUCO.find(image)
+    seen = np.isfinite(found).all(axis=1)
+    assert seen.sum() > 25  # 33 and 29
+    np.testing.assert_allclose(found[seen], exact[seen], rtol=0, atol=0.15)  # 0.09
 
 
 def test_boards_of_the_layout_before_opencv_4_6_are_found():

@@ -53,7 +53,8 @@ def find_views(
     if len(sizes) > 1:
         raise UserError(_other_sizes(sizes))
     other, votes = others.most_common(1)[0] if others else ("", 0)
-    if len(views) < FEWEST_VIEWS and votes > max(1, len(views)):
+    searched = min(len(boardless), MAX_SUGGESTIONS)
+    if len(views) < FEWEST_VIEWS and votes > max(1, len(views), searched / 2):
         raise UserError(
             f"{len(views)} of {len(views) + len(boardless)} photographs show the board of {board}; "
             f"{votes} seem to show {other}"

@@ -71,9 +71,11 @@ class CharucoBoard(Board):
         which before 4.14 puts corners half a pixel to the right and below; then
         `vision.calibration.corner_refinement`.
         """
+        settings = cv2.aruco.CharucoParameters()
+        settings.tryRefineMarkers = True  # looks for missing markers where the others say they are
         for legacy in (False, True):
             board = self._opencv(legacy=legacy)
-            pixels, numbers, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(image)
+            pixels, numbers, _, _ = cv2.aruco.CharucoDetector(board, settings).detectBoard(image)
             if numbers is not None and len(numbers):
                 break
         else:

@@ -18,6 +18,11 @@ RADII = (2.5, 12.0)
 """Smallest and largest radius of the pixels that a corner is fitted to."""
 LARGE = 1600
 """Longer side of an image, pixels, above which corners are first searched in a smaller one."""
+SEARCHES = ((1, 0), (2, 0), (1, cv2.CALIB_CB_EXHAUSTIVE))
+"""Factors by which an image is shrunk and OpenCV's flags, until a board is found.
+
+The smaller image sharpens a blurred board; the exhaustive search finds boards that a fisheye bends.
+"""
 FEWEST_CORNERS = 4
 """In either half of the corners: enough to determine a pose."""
 
@@ -71,21 +76,24 @@ class Board:
         calibration", BMVC 2018, as in OpenCV; then `vision.calibration.corner_refinement`.
         """
         shrink = max(1.0, max(image.shape) / LARGE)
-        guesses = self._guesses(image, shrink)
-        if guesses is None:
-            guesses = self._guesses(image, 2 * shrink)  # which sharpens a blurred one
-        refined = None if guesses is None else self.refine(image, guesses, EDGE * self.square)
+        for factor, flags in SEARCHES:
+            if (guesses := self._guesses(image, factor * shrink, flags)) is not None:
+                break
+        else:
+            return None
+        refined = self.refine(image, guesses, EDGE * self.square)
         if refined is None:
             return None
         seen = np.isfinite(refined[:, 0]).reshape(self.rows, self.columns)
-        whole = seen.any(axis=0).all() and seen.any(axis=1).all()  # OpenCV adds rows to smaller boards
+        # OpenCV adds rows to smaller boards; its exhaustive search also has false corners in true rows.
+        whole = seen.all() if flags else seen.any(axis=0).all() and seen.any(axis=1).all()
         return refined if whole else None
 
-    def _guesses(self, image: GreyImage, shrink: float) -> FloatArray | None:
+    def _guesses(self, image: GreyImage, shrink: float, flags: int) -> FloatArray | None:
         """Corners that OpenCV finds in an image shrunk by a factor, shape (n, 2), pixels of the image."""
         small = _smaller(image, shrink)
         found, corners = cv2.findChessboardCornersSB(
-            small, (self.columns, self.rows), flags=cv2.CALIB_CB_ACCURACY
+            small, (self.columns, self.rows), flags=cv2.CALIB_CB_ACCURACY | flags
         )
         if not found:
             return None
@@ -127,10 +135,20 @@ class Board:
         return True
 
     def suggest(self, image: GreyImage) -> str | None:
-        """Suggest a size for the board in an image; None if there is no board."""
+        """Suggest a size for the board in an image; None if there is none with all of its corners.
+
+        It may be a part of a board, so that one image alone is no proof.
+        """
         small = _smaller(image, max(image.shape) / LARGE)
-        found, _, cells = cv2.findChessboardCornersSBWithMeta(small, (3, 3), cv2.CALIB_CB_LARGER)
-        return f"{max(cells.shape)}x{min(cells.shape)}" if found else None
+        found, corners, cells = cv2.findChessboardCornersSBWithMeta(small, (3, 3), cv2.CALIB_CB_LARGER)
+        if not found:
+            return None
+        rows, columns = cells.shape
+        other = Board(columns, rows, self.square)
+        refined = other.refine(small, np.reshape(corners, (-1, 2)).astype(np.float64), EDGE * self.square)
+        if refined is None or not np.isfinite(refined).all():  # OpenCV adds rows to smaller boards
+            return None
+        return f"{max(rows, columns)}x{min(rows, columns)}"
 
 
 def _smaller(image: GreyImage, shrink: float) -> GreyImage:
