@@ -55,14 +55,17 @@ class ConstrainedElimination:
         return self.flexibility + self.compliance * np.eye(len(self.rows))
 
     def unstable(self, negative: int) -> int:
-        """Number of directions that keep the constraints and in which the energy falls.
+        """Number of directions that keep the constraints and in which the energy falls, with that of springs.
 
-        The inertia of the whole system is that of K and that of its Schur complement together (Haynsworth).
+        The inertia of the whole system is that of K and that of its Schur complement together (Haynsworth),
+        and that of S and of K with the springs, whose compliance may be negative.
 
         Args:
             negative: Number of negative eigenvalues of K.
         """
-        return negative - int(np.count_nonzero(np.linalg.eigvalsh(self.schur_complement) < 0))
+        schur = np.linalg.eigvalsh(self.schur_complement)
+        springs = np.broadcast_to(self.compliance, len(self.rows))
+        return negative - int(np.count_nonzero(schur < 0)) + int(np.count_nonzero(springs < 0))
 
     def values(self, x: FloatArray) -> FloatArray:
         """C x, shape (k,)."""

@@ -66,6 +66,7 @@ class PinnAsmSolver(MarkerSettings, PinnStdSolver):
     """The network of `PinnStdSolver`, random hidden weights and exact outputs, with the markers' misfit."""
 
     name: ClassVar[str] = "pinn-asm"
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
     refitter = network_refitter
 
 
@@ -74,6 +75,7 @@ class PinnLocalAsmSolver(MarkerSettings, PinnLocalSolver):
     """The network of `PinnLocalSolver` with the markers' misfit, as in `PinnAsmSolver`."""
 
     name: ClassVar[str] = "pinn-local-asm"
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
     refitter = network_refitter
 
 

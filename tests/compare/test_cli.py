@@ -173,7 +173,6 @@ BAD = [
     ("compare --solvers fem --load cylinder", "fem takes the loads mean, point, patch, not 'cylinder'"),
     ("compare --reference fem --load cylinder", "fem takes the loads mean, point, patch, not 'cylinder'"),
     ("compare --solver-set fem.degree=1 --load cylinder", "fem takes the loads mean, point, patch, not 'cyl"),
-    ("compare --load cylinder --plane stress", "statfem takes the loads mean"),  # none can
     (
         "compare --solvers gp --mesh-size 1 --quiet --measurements good.csv",
         "gp .* needs 4 .*, not 1",

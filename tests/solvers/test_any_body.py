@@ -182,7 +182,7 @@ def test_a_rigid_patch_moves_a_curved_front_as_a_whole(body):
 
 def test_a_cylinder_starts_where_it_touches_a_curved_front_from_outside():
     """At R + r from the centre of a ring of radius R, on its top and beside it."""
-    from solvers.fem.finite_strain.cylinder_contact import CylinderContact
+    from solvers.cylinder_contact import CylinderContact
     from solvers.lagrange import LagrangeSpace
 
     mesh = body_mesh("ring", 0.4)

@@ -106,7 +106,7 @@ def test_a_finger_that_bends_leaves_nothing(coarse_mesh):
     assert "STABLE" not in found.status.message
 
 
-@pytest.mark.parametrize("compliance", [0.0, 0.5], ids=["rigid", "springs"])
+@pytest.mark.parametrize("compliance", [0.0, 0.5, -0.5], ids=["rigid", "springs", "negative springs"])
 def test_directions_are_counted_as_by_dense_eigenvalues(compliance):
     """Of the matrix on the subspace that keeps rigid constraints, or with the springs' stiffness."""
     rng = np.random.default_rng(3)

@@ -14,11 +14,11 @@ import ufl
 
 from geometry.arrays import BoolArray, FloatArray
 from solvers.constrained_elimination import ConstrainedElimination
+from solvers.cylinder_contact import CylinderContact
 from solvers.elasticity import deformation_jacobian, energy_density_of
 from solvers.fem.boundary_conditions import dirichlet_displacement, dirichlet_mask
 from solvers.fem.dolfinx_compat import DistributedSpace
 from solvers.fem.finite_strain.constraints import DisplacementConstraints, LoadState
-from solvers.fem.finite_strain.cylinder_contact import CylinderContact
 from solvers.fem.linear_solvers import TOLERANCE, Factorisation, Multigrid
 from solvers.lagrange import NodalSpace
 from solvers.problem import Problem

@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
+from solvers.cylinder_contact import ContactRegion
 from solvers.fem.boundary_conditions import reaction_by_residual_work
 from solvers.fem.finite_strain.constraints import DisplacementConstraints, LoadState
-from solvers.fem.finite_strain.cylinder_contact import ContactRegion
 from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
 from solvers.fem.finite_strain.newton import ConstrainedNewton
 from solvers.lagrange import NodalSpace

@@ -9,9 +9,9 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
+from solvers.cylinder_contact import CONTACT_AT_END, ContactRegion
 from solvers.fem.error_estimate import ErrorEstimator, locking_advice
 from solvers.fem.finite_strain.constraints import DisplacementConstraints
-from solvers.fem.finite_strain.cylinder_contact import ContactRegion
 from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
@@ -161,11 +161,7 @@ def _status(path: LoadPath, regions: Sequence[ContactRegion | None], unstable: i
             "the finger buckles, and there may be other branches"
         )
     if any(region and region.at_end for region in regions):
-        return Status(
-            False,
-            f"{taken}, but the contact reaches an end of the front face, beyond which none is looked for; "
-            "press nearer to its middle or take a smaller stroke or radius",
-        )
+        return Status(False, f"{taken}, but {CONTACT_AT_END}")
     if contact is not None and regions[-1] is None:
         return Status(True, f"{taken}; the cylinder does not touch the finger any more")
     if (region := regions[-1]) is not None:

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 
 from geometry.errors import UserError
-from solvers.fem.finite_strain.cylinder_contact import ContactRegion
+from solvers.cylinder_contact import CONTACT_AT_END, ContactRegion
 from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.ranks import communicator, on_all_ranks
 from solvers.fem.solid.cost import Cost, LinearSolver, affordable, free_memory_gb
@@ -166,11 +166,7 @@ class Fem3dSolver:
                 "take a finer mesh, a wider contact or a smaller stroke",
             )
         if region and region.at_end:
-            return Status(
-                False,
-                "the contact reaches an end of the front face, beyond which none is looked for; "
-                "press nearer to its middle or take a smaller stroke or radius",
-            )
+            return Status(False, CONTACT_AT_END)
         if unstable:
             return Status(False, f"all of the load applied, but {unstable_phrase(unstable)}")
         place = "side face" if self.face == "side" else "middle plane"

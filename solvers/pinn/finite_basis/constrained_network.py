@@ -172,8 +172,9 @@ class ConstrainedNetwork:
         residual = gradient.numpy().ravel()
         factors = hessian.factorised(shift, definite=self.energy.material.law == "linear")
         try:
-            free, *unit = factors.solve(np.concatenate([-residual[None], self.functionals]))
-            return LinearResponse(residual, free, np.array(unit), factors.negative)
+            free, *responses = factors.solve(np.concatenate([-residual[None], self.functionals]))
+            unit = np.reshape(responses, self.functionals.shape)
+            return LinearResponse(residual, free, unit, factors.negative)
         finally:
             factors.close()
 
@@ -205,11 +206,12 @@ class ConstrainedNetwork:
         scaled = np.append(self.compliance[: self.load_count], self.compliance[self.load_count :] / factor)
         springs = replace(springs, compliance=scaled)
         change, forces = springs.solution(free, values)
-        decrement = (forces @ self.functionals - residual) @ change
+        decrement = abs(float((forces @ self.functionals - residual) @ change))
+        work = abs(float(fraction * self.targets @ forces))
         return NewtonIterate(
             output + torch.from_numpy(change).view_as(output),
             forces,
-            float(abs(decrement / (fraction * self.targets @ forces))),
+            decrement / work if work else decrement,
             markers,
             factor,
             springs.unstable(negative),
@@ -257,4 +259,4 @@ def _functionals(basis: FiniteBasis, points: FloatArray, weights: FloatArray, ax
     found = np.zeros((len(axes), len(weights), basis.windows.count, 2, basis.per_window))
     for row, axis in enumerate(axes):
         found[row, :, :, axis] = basis.functionals(points, weights)
-    return found.reshape(len(axes), len(weights), -1)
+    return found.reshape(len(axes), len(weights), 2 * basis.size)

@@ -26,7 +26,7 @@ class LoadConditions(NamedTuple):
 
 
 def load_conditions(problem: Problem) -> LoadConditions:
-    """The functionals of a load.
+    """The functionals of a load; none of a cylinder, which presses only where it touches.
 
     For `patch` they are moments against the tractions T_k(s) / sqrt(1 - s^2) with Chebyshev polynomials T_k,
     which have the singularity of a rigid punch at both ends: the first is that of the punch on a half-plane
@@ -34,6 +34,8 @@ def load_conditions(problem: Problem) -> LoadConditions:
     quadrature makes them sums over its points s = cos(angle), where T_k is cos(k angle); s runs along x.
     """
     values = problem.load.values[:, None]
+    if problem.load.kind == "cylinder":
+        return LoadConditions(np.zeros((1, 2)), np.zeros((0, 1)), np.zeros((2, 0)))
     if problem.load.kind != "patch":
         points, weights = contact_functional(problem)
         return LoadConditions(points, weights[None], values)

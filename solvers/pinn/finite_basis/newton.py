@@ -6,6 +6,7 @@ import numpy as np
 import torch
 
 from geometry.arrays import FloatArray
+from solvers.cylinder_contact import ContactRegion
 from solvers.pinn.finite_basis.constrained_network import REGULARISATION, ConstrainedNetwork, NewtonIterate
 from solvers.solver import Progress
 from solvers.stability import Step, aside, descended
@@ -30,11 +31,13 @@ class LoadStep(NamedTuple):
         fraction: Of the load.
         state: Equilibrium there.
         iterations: Newton iterations so far.
+        region: Where a cylinder touches; None without one, and where it does not.
     """
 
     fraction: float
     state: NewtonIterate
     iterations: int
+    region: ContactRegion | None = None
 
 
 def find_equilibrium(

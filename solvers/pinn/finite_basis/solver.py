@@ -14,6 +14,7 @@ from geometry.mesh.quadrature import body_quadrature
 from solvers.assimilation.marker_forces import MarkerFit
 from solvers.assimilation.marker_weighting import MarkerWeighting
 from solvers.assimilation.misfit import MarkerSettings, Misfit, assimilates, leave_one_out_displacements
+from solvers.cylinder_contact import CONTACT_AT_END
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
 from solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField, Windows
@@ -24,6 +25,7 @@ from solvers.pinn.finite_basis.point_spacing import (
     graded_triangles,
     spread_points,
 )
+from solvers.pinn.finite_basis.pressed_network import PressedNetwork
 from solvers.pinn.threading import pool
 from solvers.problem import Problem
 from solvers.solution import Solution, Status, unstable_phrase
@@ -76,7 +78,7 @@ class FiniteBasisSolver(ABC):
     seed: int = 0
     name: ClassVar[str]
     laws: ClassVar[tuple[str, ...]] = ("linear", "neo-hookean", "st-venant-kirchhoff")
-    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch", "cylinder")
 
     def __post_init__(self) -> None:
         of_markers = {entry.name for entry in fields(MarkerSettings)}
@@ -113,12 +115,22 @@ class FiniteBasisSolver(ABC):
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Train the network; see `Solver`."""
         check_problem(self, problem)
+        last: LoadStep | None = None
 
         def train(
             scale: float, coarse: FiniteBasisField | None, progress: Progress
         ) -> tuple[ConstrainedNetwork, LoadStep]:
+            nonlocal last
             network = self.level(problem, scale)
-            return network, _train(network, coarse, progress)
+            if problem.load.kind == "cylinder":
+                if last is None:
+                    rough = self.level(problem, self.coarser * scale)
+                    last = PressedNetwork.of(rough, problem).followed(progress)
+                    coarse = rough.field(last.state.output)
+                last = _press(PressedNetwork.of(network, problem), last, coarse, progress)
+            else:
+                last = _train(network, coarse, progress)
+            return network, last
 
         with pool():
             return self.trained(problem, train, progress)
@@ -145,8 +157,11 @@ class FiniteBasisSolver(ABC):
             progress((number + 1) / len(scales), f"{field.basis.size} units, energy {energy:.4f} N mm/mm")
             if reached.fraction < 1 or error <= self.tolerance:
                 break
-        reaction = np.zeros(2)
-        reaction[problem.load.prescribed] = network.reaction(state.forces)
+        reaction, region = np.zeros(2), reached.region
+        if region is not None:
+            reaction[:] = region.force
+        elif problem.load.kind != "cylinder":
+            reaction[problem.load.prescribed] = network.reaction(state.forces)
         fit = None if state.markers is None else state.markers.fit(state.factor)
         return Solution(
             solver=self.name,
@@ -154,7 +169,7 @@ class FiniteBasisSolver(ABC):
             field=field,
             energy=energy,
             reaction=reaction,
-            status=self._status(reached, finer, change, error, fit),
+            status=self._status(problem, reached, finer, change, error, fit),
             stats={
                 "seconds": time.perf_counter() - started,
                 "unknowns": field.output.numel(),
@@ -164,6 +179,7 @@ class FiniteBasisSolver(ABC):
                 "newton_iterations": reached.iterations,
                 "unstable_directions": state.unstable,
                 **network.marker_stats(state),
+                **(region.stats() if region else {}),
                 "seed": self.seed,
                 "device": "cpu",
             },
@@ -204,8 +220,19 @@ class FiniteBasisSolver(ABC):
         return ConstrainedNetwork.of(basis, problem, *quadrature, self.weighting)
 
     def _status(
-        self, reached: LoadStep, finer: float, change: float, error: float, fit: MarkerFit | None
+        self,
+        problem: Problem,
+        reached: LoadStep,
+        finer: float,
+        change: float,
+        error: float,
+        fit: MarkerFit | None,
     ) -> Status:
+        region = reached.region
+        if problem.load.kind == "cylinder" and reached.fraction == 1 and region is None:
+            return Status(True, "the cylinder does not touch the finger")
+        if region and region.at_end:
+            return Status(False, CONTACT_AT_END)
         if reached.fraction < 1:
             return Status(
                 False,
@@ -218,6 +245,8 @@ class FiniteBasisSolver(ABC):
         )
         if unstable := reached.state.unstable:
             return Status(False, f"{message}; but {unstable_phrase(unstable)}")
+        if region:
+            message += f"; contact from x = {region.start:.4g} to {region.end:.4g} mm"
         converged = error <= self.tolerance
         advice = "" if converged else "; take a smaller spacing"
         return Status(converged, message + advice + (f"; {fit.phrase}" if fit else ""))
@@ -232,6 +261,16 @@ def _train(network: ConstrainedNetwork, coarse: FiniteBasisField | None, progres
     else:
         state = None
     return follow_load(network, progress) if state is None else LoadStep(1.0, state, iterations)
+
+
+def _press(
+    network: PressedNetwork, last: LoadStep | None, coarse: FiniteBasisField | None, progress: Progress
+) -> LoadStep:
+    """Equilibrium under a cylinder: from that of a coarser network or, if that fails, along the load."""
+    found = None
+    if last is not None and coarse is not None and last.fraction == 1:
+        found = network.refined(last, coarse)
+    return network.followed(progress) if found is None else found
 
 
 def _part(progress: Progress, start: float, share: float) -> Progress:

@@ -10,16 +10,38 @@ In three dimensions the axis is along z, and k of a node is in proportion to its
 """
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
-from solvers.fem.finite_strain.constraints import LoadState
 from solvers.lagrange import NodalSpace
 from solvers.problem import Problem, contact_ends, front_points
 
 STIFFNESS = 10.0
 """k over Young's modulus: a larger one needs fewer updates of the multipliers but more Newton iterations."""
+
+
+CONTACT_AT_END = (
+    "the contact reaches an end of the front face, beyond which none is looked for; "
+    "press nearer to its middle or take a smaller stroke or radius"
+)
+
+
+class ContactState(Protocol):
+    """A stage of the load; of the displacements only those of the front's nodes are read."""
+
+    @property
+    def fraction(self) -> float:
+        """Fraction of the load."""
+
+    @property
+    def nodal(self) -> FloatArray:
+        """Displacements, shape (N, d), mm."""
+
+    @property
+    def contact(self) -> FloatArray:
+        """Multipliers λ: in equilibrium the forces on the nodes of the front, shape (l m,), N/mm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,21 +97,21 @@ class CylinderContact:
         """The fraction of the load in which the cylinder moves by half its radius."""
         return float(0.5 * self.radius / np.linalg.norm(self.travel))
 
-    def gaps(self, state: LoadState) -> tuple[FloatArray, FloatArray]:
+    def gaps(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
         """Distances g from the cylinder, shape (l m,), mm, and its outer normals n there, shape (l m, 2)."""
         away = self._places(state.nodal) - self.centre - state.fraction * self.travel
         distance = np.linalg.norm(away, axis=1)
         return distance - self.radius, away / distance[:, None]
 
-    def forces(self, state: LoadState) -> FloatArray:
+    def forces(self, state: ContactState) -> FloatArray:
         """Forces q along the outer normals, shape (l m,), N/mm, never tension; λ is `state.contact`."""
         return np.maximum(0.0, state.contact - self._stiffness * self.gaps(state)[0])
 
-    def gradient(self, state: LoadState) -> FloatArray:
+    def gradient(self, state: ContactState) -> FloatArray:
         """Residual force - q n, the derivative of Σ (q^2 - λ^2) / 2 k, in the plane, shape (l m, 2), N/mm."""
         return -self.forces(state)[:, None] * self.gaps(state)[1]
 
-    def tangent(self, state: LoadState) -> FloatArray:
+    def tangent(self, state: ContactState) -> FloatArray:
         """Derivative of the gradient, a block k n n^T - q (I - n n^T) / (g + radius) a node, (l m, 2, 2)."""
         (gap, normal), force = self.gaps(state), self.forces(state)
         across = np.einsum("mi,mj->mij", normal, normal)
@@ -171,7 +193,7 @@ class ContactRegion:
         }
 
     @classmethod
-    def of(cls, contact: CylinderContact, state: LoadState) -> "ContactRegion | None":
+    def of(cls, contact: CylinderContact, state: ContactState) -> "ContactRegion | None":
         """The region in a state of equilibrium; none where the cylinder does not touch the finger.
 
         Its ends are taken half way between a point that touches and the next one that does not. In three

@@ -1,0 +1,244 @@
+"""A rigid cylinder pressed on a finite-basis network at finite strain, by an augmented Lagrangian.
+
+The gaps are collocated at the nodes of quadratic elements on the front face: `solvers.cylinder_contact`. A
+node that touches is a pair of springs of the linearised network: along the normal, of the compliance 1 / k,
+and along the cylinder, of the negative compliance -(g + radius) / q, as the force q turns with the normal.
+"""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from scipy.sparse import csr_matrix
+
+from geometry.arrays import FloatArray, IntArray
+from solvers.constrained_elimination import ConstrainedElimination
+from solvers.cylinder_contact import ContactRegion, CylinderContact
+from solvers.lagrange import LagrangeSpace
+from solvers.pinn.finite_basis.constrained_network import REGULARISATION, ConstrainedNetwork, NewtonIterate
+from solvers.pinn.finite_basis.network import FiniteBasisField
+from solvers.pinn.finite_basis.newton import FIRST_STEP, MIN_STEP, LoadStep
+from solvers.problem import Problem
+from solvers.solver import Progress
+
+STIFF, SOFT = 10.0, 0.3
+"""k over Young's modulus, and the same with which the forces of a coarser network are taken over."""
+PENETRATION = 5e-4
+"""Largest gap of a node in contact and penetration of any node, mm."""
+EXACT, ROUGH = 1e-6, 1e-2
+"""Newton stops when a step changes this part of the energy, in equilibrium and on the way to it."""
+ITERATIONS, UPDATES = 20, 20
+"""Newton iterations with the same multipliers, and their updates, before a load step counts as failed."""
+ROUNDING = 1e-12
+"""The same below which the potential may rise by rounding."""
+SHORTEST = 2.0**-10
+"""Share of a Newton step below which the potential does not fall any more."""
+
+
+class Stage(NamedTuple):
+    """A `ContactState` of a network."""
+
+    fraction: float
+    nodal: FloatArray
+    contact: FloatArray
+
+
+class Step(NamedTuple):
+    """A Newton step.
+
+    Attributes:
+        change: Of the output layer, of its shape, mm.
+        size: Work of the imbalance on the change over the energy: small where Newton has converged.
+        unstable: Number of directions in which the potential falls before the step.
+    """
+
+    change: torch.Tensor
+    size: float
+    unstable: int
+
+
+@dataclass(frozen=True, eq=False)
+class PressedNetwork:
+    """A network without other loads, and the cylinder.
+
+    Attributes:
+        network: The network.
+        contact: The cylinder and the m nodes of the front.
+        values: The basis functions at these nodes, shape (m, c (m + 1)).
+        count: Number of nodes of the section's quadratic elements.
+    """
+
+    network: ConstrainedNetwork
+    contact: CylinderContact
+    values: csr_matrix
+    count: int
+
+    @classmethod
+    def of(cls, network: ConstrainedNetwork, problem: Problem) -> "PressedNetwork":
+        """The network of a problem whose load is a `cylinder`."""
+        space = LagrangeSpace(problem.mesh, 2)
+        contact = CylinderContact.of(problem, space)
+        contact = replace(contact, stiffness=STIFF * problem.material.young)
+        points = contact.positions
+        values = network.energy.basis.functionals(points, np.eye(len(points)))
+        values = csr_matrix(values.reshape(len(points), -1))
+        return cls(network, contact, values, len(space.nodes))
+
+    def refined(self, coarse: LoadStep, field: FiniteBasisField) -> LoadStep | None:
+        """Equilibrium under the full load from that of a coarser network; None if it is not found.
+
+        Args:
+            coarse: Of the coarser network, whose forces are taken.
+            field: Its displacement.
+        """
+        output, forces = self.network.project(field), coarse.state.forces
+        gently = replace(self.contact, stiffness=SOFT / STIFF * self.contact.stiffness)
+        soft = replace(self, contact=gently)
+        found, first = soft._minimum(output, 1.0, forces, ROUGH)
+        if found is None:
+            return None
+        forces = gently.forces(soft.stage(found[0], 1.0, forces))
+        state, iterations = self._equilibrium(found[0], 1.0, forces)
+        return None if state is None else self._load_step(1.0, state, first + iterations)
+
+    def followed(self, progress: Progress) -> LoadStep:
+        """Equilibrium along the load; the last one before the full load if one is not found."""
+        rest = NewtonIterate(self.network.zero_output, np.zeros(len(self.contact.positions)), 0.0)
+        last = before = LoadStep(0.0, rest, 0)
+        step = min(FIRST_STEP, self.contact.longest_step)
+        while last.fraction < 1 and step >= MIN_STEP:
+            fraction = min(last.fraction + step, 1.0)
+            if last.fraction > 0:
+                ahead = (fraction - last.fraction) / (last.fraction - before.fraction)
+                guess = (
+                    last.state.output + ahead * (last.state.output - before.state.output),
+                    last.state.forces,
+                )
+            else:
+                guess = self._pressed_at_one_node(fraction)
+            state, iterations = self._equilibrium(guess[0], fraction, guess[1])
+            if state is None:
+                last = last._replace(iterations=last.iterations + iterations)
+                step /= 2
+                continue
+            before, last = last, self._load_step(fraction, state, last.iterations + iterations)
+            progress(fraction, f"{fraction:.0%} of the load, {iterations} Newton iterations")
+            step = min(self.contact.longest_step, 2 * step)
+        return last
+
+    def stage(self, output: torch.Tensor, fraction: float, multipliers: FloatArray) -> Stage:
+        """The contact at an output layer."""
+        nodal = np.zeros((self.count, 2))
+        nodal[self.contact.nodes] = self.values @ output.permute(0, 2, 1).reshape(-1, 2).numpy()
+        return Stage(fraction, nodal, multipliers)
+
+    def _load_step(self, fraction: float, state: NewtonIterate, iterations: int) -> LoadStep:
+        stage = self.stage(state.output, fraction, state.forces)
+        return LoadStep(fraction, state, iterations, ContactRegion.of(self.contact, stage))
+
+    def _equilibrium(
+        self, output: torch.Tensor, fraction: float, multipliers: FloatArray
+    ) -> tuple[NewtonIterate | None, int]:
+        """Equilibrium from a guess, None if the iteration fails, and the Newton iterations taken."""
+        output, iterations = self._held(output, fraction, multipliers), 1
+        for _ in range(UPDATES):
+            found, taken = self._minimum(output, fraction, multipliers, EXACT if fraction == 1 else ROUGH)
+            iterations += taken
+            if found is None:
+                return None, iterations
+            output, step = found
+            stage = self.stage(output, fraction, multipliers)
+            multipliers = self.contact.forces(stage)
+            gap, _ = self.contact.gaps(stage)
+            apart = max(np.abs(gap[multipliers > 0]).max(initial=0.0), -gap.min())
+            if apart <= PENETRATION or fraction < 1:  # on the way a soft contact will do
+                return NewtonIterate(output, multipliers, step.size, unstable=step.unstable), iterations
+        return None, iterations
+
+    def _held(self, output: torch.Tensor, fraction: float, multipliers: FloatArray) -> torch.Tensor:
+        """A guess after a step in which the nodes with forces stay in touch, as far as it can be taken."""
+        touching = np.flatnonzero(multipliers > 0)
+        if not len(touching):
+            return output
+        step = self._step(self.stage(output, fraction, multipliers), output, touching)
+        length = 1.0
+        while step is not None and length > SHORTEST:
+            if np.isfinite(self.network.energy.total(moved := output + length * step.change)):
+                return moved
+            length /= 2
+        return output
+
+    def _minimum(
+        self, output: torch.Tensor, fraction: float, multipliers: FloatArray, tolerance: float
+    ) -> tuple[tuple[torch.Tensor, Step] | None, int]:
+        """The least potential with given multipliers, by Newton's method with a line search."""
+        least = self._potential(output, fraction, multipliers)
+        for iteration in range(1, ITERATIONS + 1):
+            stage = self.stage(output, fraction, multipliers)
+            step = self._step(stage, output, np.flatnonzero(self.contact.forces(stage) > 0))
+            if step is None:
+                return None, iteration
+            if step.size < ROUNDING:
+                return (output, step), iteration
+            length, about = 1.0, (fraction, multipliers)
+            while not (value := self._potential(output + length * step.change, *about)) < least:
+                length /= 2
+                if length < SHORTEST:
+                    return None, iteration
+            output, least = output + length * step.change, value
+            if length == 1 and step.size < tolerance:
+                return (output, step), iteration
+        return None, ITERATIONS
+
+    def _step(self, stage: Stage, output: torch.Tensor, touching: IntArray) -> Step | None:
+        """Newton's step with given multipliers and nodes that touch; None if a point is turned inside out."""
+        gradient, hessian = self.network.energy.derivatives(output)
+        if not torch.isfinite(gradient).all():
+            return None
+        gap, normal = self.contact.gaps(stage)
+        forces = stage.contact - self.contact.stiffness * gap
+        along = self._rows(touching, normal)
+        residual = gradient.numpy().ravel() - forces[touching] @ along
+        turned = touching[forces[touching] > 0]
+        rows = np.concatenate([along, self._rows(turned, normal[:, ::-1] * [-1.0, 1.0])])
+        turning = -(gap + self.contact.radius)[turned] / forces[turned]
+        compliance = np.append(np.full(len(touching), 1 / self.contact.stiffness), turning)
+        factors = hessian.factorised(REGULARISATION, definite=False)
+        try:
+            free, *unit = factors.solve(np.concatenate([-residual[None], rows]))
+            springs = ConstrainedElimination(rows, np.reshape(unit, rows.shape), compliance)
+            change, _ = springs.solution(free)
+            unstable = springs.unstable(factors.negative)
+        finally:
+            factors.close()
+        work = abs(float(residual @ change))
+        size = work / max(self.network.energy.total(output), work) if work else 0.0
+        return Step(torch.from_numpy(change).view_as(output), size, unstable)
+
+    def _potential(self, output: torch.Tensor, fraction: float, multipliers: FloatArray) -> float:
+        """Elastic energy and that of the augmented Lagrangian, N mm / mm; not a number if inside out."""
+        forces = self.contact.forces(self.stage(output, fraction, multipliers))
+        pressed = float((forces**2 - multipliers**2).sum()) / (2 * self.contact.stiffness)
+        return self.network.energy.total(output) + pressed
+
+    def _rows(self, nodes: IntArray, directions: FloatArray) -> FloatArray:
+        """Functionals (t, U) of the displacement of t nodes along directions, (m, 2) of all nodes."""
+        basis = self.network.energy.basis
+        values = self.values[nodes].toarray().reshape(len(nodes), basis.windows.count, 1, basis.per_window)
+        return np.asarray((values * directions[nodes][:, None, :, None]).reshape(len(nodes), 2 * basis.size))
+
+    def _pressed_at_one_node(self, fraction: float) -> tuple[torch.Tensor, FloatArray]:
+        """Output layer and forces (m,) by the linear response to a cylinder that touches the nearest node."""
+        network = self.network
+        rest = self.stage(network.zero_output, fraction, np.zeros(len(self.contact.positions)))
+        gap, normal = self.contact.gaps(rest)
+        nearest = np.array([gap.argmin()])
+        row = self._rows(nearest, normal)
+        _, hessian = network.energy.derivatives(network.zero_output)
+        factors = hessian.factorised(REGULARISATION)
+        pressing = ConstrainedElimination(row, factors.solve(row))
+        factors.close()
+        change, force = pressing.solution(np.zeros(row.shape[1]), np.maximum(-gap[nearest], 0.0))
+        rest.contact[nearest] = force
+        return torch.from_numpy(change).view_as(network.zero_output), rest.contact
