@@ -16,7 +16,7 @@ def with_certificates(evaluations: Sequence[Evaluation], problem: Problem) -> li
     """The evaluations, those of the linear law with a certificate and the verdict that follows from it.
 
     A solver that was given observations pays energy for them, and a body in three dimensions has another
-    energy, so that the least energy of the plane does not judge them; nor does it judge a contact that is found.
+    energy, so that the least energy of the plane does not judge them; nor does it judge a found contact.
     Without DOLFINx there are no certificates, and a warning says so.
 
     Args:
