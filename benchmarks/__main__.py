@@ -28,6 +28,7 @@ BENCHMARKS = {
     "readings": "readings",
     "plane_strain": "plane_strain",
     "paper": "paper_run",
+    "contact": "network_contact",
 }
 """Names and modules; the modules' docstrings have descriptions and times."""
 

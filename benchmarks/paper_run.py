@@ -15,7 +15,8 @@ from math import inf
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from matplotlib.ticker import PercentFormatter
+from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter, PercentFormatter
 from rich.table import Table
 
 from compare.evaluation.evaluation import Evaluation
@@ -24,7 +25,7 @@ from compare.evaluation.virtual_experiment import virtual_experiment
 from compare.runtime.tables import write_csv
 from geometry.atomic import write_text
 from geometry.cache import finger_mesh
-from geometry.figure import MUTED, figure
+from geometry.figure import INK, MUTED, figure
 from geometry.finger.design import Design
 from solvers.fem.linear import FemSolver
 from solvers.pinn.paper.solver import PaperPinnSolver
@@ -172,26 +173,35 @@ def table(looks: list[Look]) -> Table:
 
 def draw(looks: list[Look]) -> None:
     """Energy, differences from `fem` and errors at the markers over the epochs."""
-    with figure(6.4) as drawn:
-        axes = drawn.subplots(3, sharex=True, gridspec_kw={"hspace": 0.18})
-        for number, ((kind, seed), group) in enumerate(groupby(looks, key=lambda look: look[:2])):
-            run = list(group)
-            epochs, colour = [look.epoch for look in run], f"C{number}"
-            label = f"{kind} load, seed {seed}"
-            axes[0].plot(epochs, [look.energy for look in run], "o-", ms=2.5, c=colour, label=label)
-            axes[1].plot(epochs, [look.displacement for look in run], "o-", ms=2.5, c=colour)
-            axes[1].plot(epochs, [look.von_mises for look in run], "s--", ms=2.5, c=colour)
-            for name, style in (("mae_u", "o-"), ("mae_v", "s--")):
-                axes[2].plot(epochs, [getattr(look, name) for look in run], style, ms=2.5, c=colour)
-        last = looks[-1]
-        axes[0].axhline(1, color=MUTED, lw=0.8)
-        for value in (last.fem_mae_u, last.fem_mae_v):
-            axes[2].axhline(value, color=MUTED, lw=0.8)
-        axes[0].set(yscale="log", ylabel="energy over fem’s")
-        axes[1].set(yscale="log", ylabel="difference from fem\n(– displacement, - - von Mises)")
-        axes[1].yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
-        axes[2].set(
-            xscale="log", yscale="log", xlabel="epochs", ylabel="MAE at markers, mm\n(– u, - - v; grey: fem)"
-        )
-        axes[0].legend(loc="upper right")
+    runs = [list(group) for _, group in groupby(looks, key=lambda look: look[:2])]
+    with figure(6.2) as drawn:
+        drawn.subplots_adjust(left=0.12, right=0.97, top=0.97, bottom=0.07, hspace=0.12)
+        energy, differences, markers = drawn.subplots(3, sharex=True)
+        for number, run in enumerate(runs):
+            epochs = [look.epoch for look in run]
+            label = f"{run[0].load} load, seed {run[0].seed}"
+            energy.plot(epochs, [look.energy for look in run], "o-", ms=2.5, c=f"C{number}", label=label)
+            for axes, name, style in (
+                (differences, "displacement", "o-"),
+                (differences, "von_mises", "s--"),
+                (markers, "mae_u", "o-"),
+                (markers, "mae_v", "s--"),
+            ):
+                axes.plot(epochs, [getattr(look, name) for look in run], style, ms=2.5, c=f"C{number}")
+        energy.axhline(1, color=MUTED, lw=0.8)
+        energy.set(yscale="log", ylabel="energy over that of fem")
+        differences.set(yscale="log", ylim=(1e-2, None), ylabel="relative L² difference from fem")
+        markers.set(xscale="log", ylim=(0, None), xlabel="epochs", ylabel="MAE at the markers, mm")
+        for axes in (energy, differences):
+            axes.yaxis.set_minor_formatter(NullFormatter())
+        differences.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
+        for name, style in (("fem_mae_u", "-"), ("fem_mae_v", "--")):
+            markers.axhline(getattr(looks[-1], name), color=MUTED, lw=0.8, ls=style)
+        energy.legend(loc="upper right")
+        for axes, first, second in ((differences, "displacement", "von Mises stress"), (markers, "u", "v")):
+            lines = [Line2D([], [], color=INK, marker="o", ms=2.5, label=first)]
+            lines.append(Line2D([], [], color=INK, marker="s", ms=2.5, ls="--", label=second))
+            if axes is markers:
+                lines.append(Line2D([], [], color=MUTED, lw=0.8, label="the same of fem"))
+            axes.legend(handles=lines, loc="center right" if axes is markers else "lower left")
     drawn.save(PICTURE)

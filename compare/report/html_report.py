@@ -94,5 +94,5 @@ def _entry(evaluation: Evaluation, comparison: Comparison) -> dict[str, object]:
         "reaction": text.without_rounding(evaluation.reaction),
         "seconds": seconds(evaluation),
         "certificate": evaluation.certificate,
-        "certificate_sentences": certificate_sentences(evaluation),
+        "certificate_sentences": certificate_sentences(evaluation, comparison.load.kind),
     }

@@ -9,8 +9,8 @@ from compare.evaluation.number_format import distance, percent
 from compare.evaluation.regions import REGIONS
 
 
-def certificate_sentences(evaluation: Evaluation) -> str:
-    """Sentences on the certificate of a result, or the reason why there is none."""
+def certificate_sentences(evaluation: Evaluation, load: str = "mean") -> str:
+    """Sentences on the certificate of a result under a kind of load, or the reason why there is none."""
     label, certificate = evaluation.label, evaluation.certificate
     if evaluation.law != CERTIFIED_LAW:
         return f"{label} has no certificate: there is one for the {CERTIFIED_LAW} law only."
@@ -18,6 +18,8 @@ def certificate_sentences(evaluation: Evaluation) -> str:
         return f"{label} has no certificate: it pays energy for the markers that it was given."
     if evaluation.solid:
         return f"{label} has no certificate: the least energy of the plane says nothing of three dimensions."
+    if load == "cylinder":
+        return f"{label} has no certificate: the least energy is that of a contact that is given, not found."
     if certificate is None:
         reason = "DOLFINx, which makes it, is not installed" if evaluation.finite else "it is not finite"
         return f"{label} has no certificate: {reason}."

@@ -243,6 +243,15 @@ def test_only_the_linear_law_is_certified(finger: TriangleMesh) -> None:
     assert second is other
 
 
+def test_a_contact_that_is_found_is_not_certified(finger: TriangleMesh) -> None:
+    problem = Problem(finger)
+    evaluation = Evaluation.of(FemSolver().solve(problem), finger)
+    pressed = replace(problem, load=Load(kind="cylinder", radius=5.0))
+    [found] = with_certificates([evaluation], pressed)
+    assert found is evaluation
+    assert "a contact that is given, not found" in certificate_sentences(found, "cylinder")
+
+
 def test_a_verdict_can_only_take_convergence_away(fem: Evaluation, failed: Evaluation) -> None:
     good = perfect()
     assert with_certificate(fem, good).converged

@@ -155,7 +155,7 @@ class FiniteBasisSolver(ABC):
             energy = network.energy.total(state.output)
             history.append((field.basis.size, energy, error, time.perf_counter() - started))
             progress((number + 1) / len(scales), f"{field.basis.size} units, energy {energy:.4f} N mm/mm")
-            if reached.fraction < 1 or error <= self.tolerance:
+            if reached.fraction < 1 or error <= self.tolerance or not displacement.any():
                 break
         reaction, region = np.zeros(2), reached.region
         if region is not None:
