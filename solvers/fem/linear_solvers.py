@@ -1,6 +1,7 @@
 """Solutions of the stiffness: factors by MUMPS, or multigrid for large matrices in little memory."""
 
 from typing import Any, ClassVar
+from weakref import finalize
 
 import numpy as np
 from petsc4py import PETSc
@@ -33,6 +34,9 @@ INDEFINITE = (
 class StiffnessSolver:
     """A symmetric matrix and its solver in PETSc, for any number of right-hand sides.
 
+    On one rank both are freed with this object at the latest: petsc4py would keep them for ever. On several
+    ranks all have to call `destroy` at once.
+
     Args:
         space: The space of right-hand sides and solutions.
         matrix: The assembled matrix.
@@ -43,6 +47,12 @@ class StiffnessSolver:
         self._space, self._matrix, self._clamped = space, matrix, clamped
         self._ksp = PETSc.KSP().create(space.comm)
         self._ksp.setOperators(matrix)
+        self._free_with_this(self._ksp, matrix)
+
+    def _free_with_this(self, *items: PETSc.Object) -> None:
+        if self._space.comm.size == 1:
+            for item in items:
+                finalize(self, item.destroy)
 
     def solve(self, nodal: FloatArray) -> FloatArray:
         """Solve for a right-hand side of shape (N, d); the solution has the same shape."""
@@ -172,6 +182,8 @@ class Multigrid(StiffnessSolver):
         self._tolerance = tolerance
         matrix.setOption(PETSc.Mat.Option.SPD, True)
         self._first = matrix.copy() if tangent else None
+        if self._first is not None:
+            self._free_with_this(self._first)
         self._ksp.setTolerances(rtol=tolerance, max_it=MAX_ITERATIONS)
         preconditioner = self._ksp.getPC()
         preconditioner.setType(PETSc.PC.Type.GAMG)
@@ -198,8 +210,10 @@ class Multigrid(StiffnessSolver):
         nodes = self._space.space.nodes
         positions = matrix.createVecRight()
         self._space.distribute(nodes if nodal is None else nodes + nodal, positions)
-        matrix.setNearNullSpace(PETSc.NullSpace().createRigidBody(positions))
-        positions.destroy()
+        motions = PETSc.NullSpace().createRigidBody(positions)
+        matrix.setNearNullSpace(motions)
+        for item in (motions, positions):
+            item.destroy()  # the names only
         self._ksp.setOperators(self._matrix, matrix)
 
     def destroy(self) -> None:

@@ -1,5 +1,8 @@
 """One factorisation for many loads, and the choice of the linear solver."""
 
+import resource
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -98,3 +101,16 @@ def test_many_unknowns_are_solved_by_iterations(coarse_mesh, monkeypatch):
 def test_an_unknown_linear_solver_is_refused():
     with pytest.raises(UserError, match="direct, iterative, not 'cholesky'"):
         FemSolver(linear_solver="cholesky")
+
+
+def test_factors_that_nobody_holds_any_more_are_freed(coarse_mesh):
+    """Those of one problem take 16 MB."""
+
+    def resident() -> int:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+
+    FemSolver(estimate=False).prepare(Problem(coarse_mesh))
+    before = resident()
+    for _ in range(5):
+        FemSolver(estimate=False).prepare(Problem(coarse_mesh))
+    assert resident() - before < 40e6
