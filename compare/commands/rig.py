@@ -52,7 +52,7 @@ def rig(
     from solvers.problem import Problem
     from solvers.solver import solved, with_law
     from vision.rig.boards import board_poses, board_scene
-    from vision.rig.occluders import cables
+    from vision.rig.occluders import cables, check_covers
     from vision.rig.recording import Recording
     from vision.rig.recording_files import check_codec, photograph, record
     from vision.tracking.workspace import default_workspace
@@ -71,6 +71,8 @@ def rig(
     finger.check_cost(design, mesh_settings, [filmed.name if filmed else EXPERIMENT])
     with Stages() as stages:
         mesh, _ = shared_mesh(design, mesh_settings, stages)
+        bench = scene.bench(mesh, design, workspace)
+        check_covers(covered, len(mesh.marker_nodes))
         if filmed is None:
             problem = Problem(mesh, material, load)
             with stages.stage("virtual experiment") as progress:
@@ -85,7 +87,6 @@ def rig(
             source = f"displacements of {filmed.name}, rendered by the virtual rig; no camera was involved"
         displacement = solution.displacement(mesh.at_nodes())
         course = filmed_course(solution)
-        bench = scene.bench(mesh, design, workspace)
         recording = Recording(
             bench=bench,
             displacement=displacement,

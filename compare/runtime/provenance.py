@@ -5,6 +5,7 @@ import os
 import platform
 import sys
 from collections.abc import Iterable
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -31,11 +32,14 @@ def package_versions() -> dict[str, str]:
     versions = {"python": platform.python_version()}
     for package in PACKAGES:
         try:
-            versions[package] = version(package)
+            versions[package] = _version(package)
         except PackageNotFoundError:
             module = sys.modules.get({"fenics-dolfinx": "dolfinx", "fenics-ufl": "ufl"}.get(package, package))
             versions[package] = str(getattr(module, "__version__", "unknown"))
     return versions
+
+
+_version = cache(version)
 
 
 def program_version() -> str:

@@ -176,6 +176,7 @@ def _base_frame(p: Parameters) -> tuple[FloatArray, FloatArray]:
     return np.array([np.cos(tilt), np.sin(tilt)]), np.array([np.sin(tilt), -np.cos(tilt)])
 
 
+@lru_cache(maxsize=8)  # one finger is asked for by many rules
 def _quadrilaterals(p: Parameters) -> tuple[FloatArray, ...]:
     """Cavities and ribs in turn, from base to tip, each of shape (4, 2), mm."""
     half = p.rib_thickness / (2 * np.cos(np.radians(rib_slope(p))))

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable
+from itertools import islice
 
 import numpy as np
 
@@ -20,6 +21,9 @@ STEP = 0.01
 SCAN = 240
 """Number of values tried within a parameter's bounds before bisection."""
 
+MOST_RANGES = 3
+"""Parameters whose range a message gives."""
+
 
 def check(parameters: Parameters) -> None:
     """Raise a `UserError` with the reason and the allowed ranges if a rule is broken."""
@@ -31,14 +35,13 @@ def check(parameters: Parameters) -> None:
 
 def advice(parameters: Parameters, broken: Rule) -> str:
     """Ranges of the parameters that can remedy a broken rule, each with the others unchanged."""
-    ranges = _ranges(parameters, broken.remedies, RULES)
+    others = [rule for rule in RULES if rule is not broken]
+    ranges = _ranges(parameters, broken.remedies, [broken, *others])  # what fails most, first
     if ranges:
-        return f"allowed with the rest unchanged: {', or '.join(ranges[:3])}"
+        return f"allowed with the rest unchanged: {', or '.join(ranges)}"
     ranges = _ranges(parameters, broken.remedies, [broken])
     alone = (
-        f"this rule alone asks for {', or '.join(ranges[:3])}"
-        if ranges
-        else f"try {', '.join(broken.remedies)}"
+        f"this rule alone asks for {', or '.join(ranges)}" if ranges else f"try {', '.join(broken.remedies)}"
     )
     return f"more than one parameter must change; {alone}"
 
@@ -124,13 +127,10 @@ def _rounded(good: Callable[[float], bool], edge: float, inward: Callable[[float
 
 
 def _ranges(parameters: Parameters, names: Iterable[str], rules: Iterable[Rule]) -> list[str]:
-    """`name low to high unit` for every parameter that has a range."""
-    texts = []
-    for name in names:
-        found = allowed_range(parameters, name, rules)
-        if found is not None:
-            texts.append(_in_words(name, *found))
-    return texts
+    """`name low to high unit` for the first parameters that have a range, at most `MOST_RANGES`."""
+    found = ((name, allowed_range(parameters, name, rules)) for name in names)
+    texts = (_in_words(name, *ends) for name, ends in found if ends is not None)
+    return list(islice(texts, MOST_RANGES))
 
 
 def _in_words(name: str, start: float, stop: float) -> str:

@@ -20,6 +20,11 @@ STRONG = 0.01
 """Weakest coupling within an aggregate in three dimensions, where layers are thicker than elements are wide:
 134 iterations in place of 176 on 235,000 unknowns."""
 
+PLANE_PREFIX = "pinnray_plane_"
+ORDERING, MINIMUM_FILL = "mat_mumps_icntl_7", 2
+"""MUMPS' option to eliminate in the order of approximate minimum fill: its analysis of plane meshes is
+quicker than the usual one, in all 2.5 s in place of 5.5 s at 717,000 unknowns, with 7 % more entries."""
+
 NEGATIVE_PIVOTS = 12
 """Number of MUMPS' output that counts them."""
 EXACT_INERTIA = 13, 1
@@ -91,6 +96,9 @@ class Factorisation(StiffnessSolver):
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         matrix.setOption(PETSc.Mat.Option.SPD, positive_definite)
         self._ksp.setType(PETSc.KSP.Type.PREONLY)
+        if space.dimension == 2:
+            self._ksp.setOptionsPrefix(PLANE_PREFIX)
+            PETSc.Options(PLANE_PREFIX)[ORDERING] = MINIMUM_FILL
         preconditioner = self._ksp.getPC()
         preconditioner.setType(PETSc.PC.Type.CHOLESKY)
         preconditioner.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)

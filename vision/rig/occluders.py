@@ -49,6 +49,23 @@ def cable(
     return Shape(closed(ends), CABLES[paint], z)
 
 
+def check_covers(shares: Mapping[int, float], count: int) -> None:
+    """Refuse shares of markers to cover.
+
+    Args:
+        shares: Share of the diameter that is covered, by the numbers of the markers.
+        count: Number of markers.
+
+    Raises:
+        UserError: If there is no such marker, or a share is not between 0 and 1.
+    """
+    for number, share in shares.items():
+        if not 1 <= number <= count:
+            raise UserError(f"there is no marker {number} to cover; there are 1 to {count}")
+        if not 0 <= share <= 1:
+            raise UserError(f"marker {number} cannot be covered by {share:g} of its diameter; give 0 to 1")
+
+
 def cables(
     bench: Bench,
     course: Course,
@@ -74,12 +91,7 @@ def cables(
     Raises:
         UserError: If there is no such marker, or a share is not between 0 and 1.
     """
-    count = len(bench.mesh.marker_nodes)
-    for number, share in shares.items():
-        if not 1 <= number <= count:
-            raise UserError(f"there is no marker {number} to cover; there are 1 to {count}")
-        if not 0 <= share <= 1:
-            raise UserError(f"marker {number} cannot be covered by {share:g} of its diameter; give 0 to 1")
+    check_covers(shares, len(bench.mesh.marker_nodes))
 
     @cache
     def at(load: float) -> tuple[Shape, ...]:
