@@ -1,5 +1,6 @@
 """The main job: mesh, measure, solve, evaluate; then draw and write."""
 
+import traceback
 from collections import deque
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
@@ -8,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from compare.camera.film import Film
+from compare.evaluation.branches import with_branches
 from compare.evaluation.comparison import Comparison, supported_solvers
 from compare.evaluation.convergence import with_certificates
 from compare.evaluation.evaluation import Evaluation
@@ -36,7 +38,7 @@ from compare.runtime.output_folder import (
 )
 from compare.runtime.provenance import package_versions, sources_digest
 from compare.runtime.stages import Stages
-from geometry.atomic import write_json
+from geometry.atomic import write_json, write_text
 from geometry.content_hash import content_hash, file_digest
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
@@ -47,6 +49,7 @@ from solvers.assimilation.misfit import assimilates
 from solvers.problem import Load, Material, Problem
 from solvers.solver import (
     Solver,
+    SolverFailedError,
     TrainedSolver,
     TrainingContext,
     UnsupportedProblemError,
@@ -58,6 +61,8 @@ from vision.measurements import read_measurements, write_measurements
 
 TRACK = "track"
 """Folder of the files of the marker tracking."""
+ERRORS = "errors"
+"""Folder of the tracebacks of solvers that raised an exception."""
 
 
 @dataclass(frozen=True)
@@ -194,6 +199,8 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
                 observations, remarks = no_displacements(problem, radius, str(error)), [f"no truth: {error}"]
     evaluations: list[Evaluation] = []
     settings: dict[str, dict[str, object]] = {}
+    failed: dict[str, str] = {}
+    fault: SolverFailedError | None = None
     for solver in solvers:
         trained = _in_context(solver, job, folder, evaluations)
         try:
@@ -203,8 +210,19 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
             if solver.name not in job.spare:
                 raise
             left_out[solver.name] = str(error)
+        except SolverFailedError as error:
+            if solver.name == job.reference:
+                raise
+            (folder / ERRORS).mkdir(exist_ok=True)
+            trace = folder / ERRORS / f"{solver.name}.txt"
+            write_text(trace, "".join(traceback.format_exception(error.__cause__)))
+            failed[solver.name] = f"{error}; its traceback is in {trace.relative_to(folder)}"
+            fault = error
+    if fault is not None and not evaluations:
+        raise fault
     with stages.stage("certificate"):
         evaluations = with_certificates(evaluations, problem)
+        evaluations, branches = with_branches(evaluations, problem)
     return Comparison(
         design=job.design,
         mesh=mesh,
@@ -217,7 +235,8 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
         adaptation=adaptation,
         settings=settings,
         left_out=left_out,
-        warnings=remarks,
+        failed=failed,
+        warnings=[*remarks, *branches],
     )
 
 
@@ -290,6 +309,7 @@ def _provenance(folder: Path, job: Job, comparison: Comparison, stages: Stages) 
         "film": job.measurements.provenance() if isinstance(job.measurements, Film) else None,
         "solvers": settings,
         "left_out": comparison.left_out,
+        "failed": comparison.failed,
         "seed": {name: own["seed"] for name, own in settings.items() if "seed" in own},
         "device": {each.solver: each.stats.get("device", "cpu") for each in comparison.evaluations},
         "versions": package_versions(),
@@ -325,13 +345,7 @@ def _evaluate(
                     evaluation.save(kept, key)
                     take_training(solver.name, place, folder)
                     return evaluation
-        try:
-            solution = solved(solver, own, progress)
-        except Exception as error:  # its own fault goes on, with a word on what is left
-            error.add_note(
-                f"solver {solver.name} failed; run again with --resume and without it for the rest"
-            )
-            raise
+        solution = solved(solver, own, progress)
         # A solver that hands its work to another one may return the other's name.
         solution = replace(solution, solver=solver.name)
         evaluation = evaluated(solution, problem.mesh, observations.points)

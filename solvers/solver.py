@@ -1,5 +1,7 @@
 """The interface of a solver: settings live in the solver, the problem is the argument."""
 
+import sys
+import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,6 +25,28 @@ def silent(fraction: float, text: str) -> None:
 
 class UnsupportedProblemError(UserError):
     """The solver does not support the problem."""
+
+
+class SolverFailedError(UserError):
+    """A solver raised an exception, the cause of this one.
+
+    Args:
+        solver: The solver.
+        cause: Its exception, with its traceback.
+    """
+
+    def __init__(self, solver: "Solver", cause: Exception) -> None:
+        kind, place = type(cause).__name__, _place(solver, cause)
+        super().__init__(" ".join(f"solver {solver.name} raised {kind}: {cause} ({place})".split()))
+
+
+def _place(solver: "Solver", cause: Exception) -> str:
+    """File and line of an exception: the innermost ones in the solver's folder, else of all."""
+    frames = traceback.extract_tb(cause.__traceback__)[1:]  # the first is the call
+    home = getattr(sys.modules.get(type(solver).__module__), "__file__", None)
+    own = [frame for frame in frames if home and Path(frame.filename).is_relative_to(Path(home).parent)]
+    last = (own or frames or traceback.extract_tb(cause.__traceback__))[-1]
+    return f"{last.filename}:{last.lineno}"
 
 
 @runtime_checkable
@@ -96,9 +120,14 @@ def solved(solver: Solver, problem: Problem, progress: Progress = silent) -> Sol
 
     Raises:
         UserError: If it is no `Solution`, or an array in it has another shape or is not finite.
+        SolverFailedError: If it raises anything but an error of the input or of the system.
     """
     try:
         solution = solver.solve(problem, progress)
+    except (UserError, OSError):
+        raise
+    except Exception as error:
+        raise SolverFailedError(solver, error) from error
     except SystemExit as ended:
         raise UserError(f"solver {solver.name} ended the program (exit code {ended.code!r})") from ended
     for value, kind in ((solution, Solution), (getattr(solution, "status", None), Status)):

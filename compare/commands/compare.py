@@ -115,9 +115,12 @@ def compare(
             console.print()
         console.print(body_table(comparison))
         console.print(f"report: {job.out / 'report.html'}", soft_wrap=True, highlight=False)
+    for fault in comparison.failed.values():
+        say(f"error: {fault}")
     for evaluation in comparison.unconverged:
         say(f"error: {evaluation.solver} did not converge: {evaluation.message}")
-    return NOT_CONVERGED if comparison.unconverged or not tolerance_reached(comparison.adaptation) else 0
+    done = not (comparison.failed or comparison.unconverged) and tolerance_reached(comparison.adaptation)
+    return 0 if done else NOT_CONVERGED
 
 
 def _optional_solvers(solvers: Sequence[Solver], options: SolverOptions, reference: str | None) -> list[str]:

@@ -23,8 +23,8 @@ from geometry.errors import UserError
 
 EXIT_CODES = (
     "Exit codes: 0 all well; 1 a fault of the program; 2 bad input, with one line that says what and how to "
-    "mend it; 3 done, but a solver did not converge or --adapt did not reach its tolerance; 130 interrupted; "
-    "141 the output went into a pipe that nobody reads any more."
+    "mend it; 3 done, but a solver failed or did not converge, or --adapt did not reach its tolerance; "
+    "130 interrupted; 141 the output went into a pipe that nobody reads any more."
 )
 
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")

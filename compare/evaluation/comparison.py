@@ -45,6 +45,7 @@ class Comparison:
         adaptation: Rounds of mesh refinement, if it was asked for.
         settings: Settings of each solver, by its name.
         left_out: Reasons why solvers were left out, by their names.
+        failed: The exceptions of solvers that raised one, by their names.
         warnings: Remarks of the marker tracking and on unlikely measurements.
     """
 
@@ -59,6 +60,7 @@ class Comparison:
     adaptation: Adaptation | None = None
     settings: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
+    failed: Mapping[str, str] = field(default_factory=dict)
     warnings: Sequence[str] = ()
 
     def __getitem__(self, solver: str) -> Evaluation:

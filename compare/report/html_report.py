@@ -45,7 +45,7 @@ def render(comparison: Comparison, pictures: Sequence[Picture], provenance: Mapp
         truth_sentences=truth_sentences(comparison),
         entries=[_entry(evaluation, comparison) for evaluation in comparison.evaluations],
         presets=text.preset_meanings(comparison.settings),
-        left_out=left_out_remarks(comparison.left_out),
+        left_out=[*left_out_remarks(comparison.left_out), *comparison.failed.values()],
         design_rows=design.facts(),
         headline=text.headline(design),
         has_symbols=any(symbol for _, symbol, _ in design.facts()),

@@ -3,6 +3,7 @@
 import csv
 import hashlib
 import json
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -293,7 +294,7 @@ def test_other_measurements_are_assimilated_again(job, tmp_path):
 # Stopped halfway
 
 STOPS = [
-    pytest.param(RuntimeError("a fault of the solver"), id="error"),
+    pytest.param(OSError("a fault of the system"), id="error"),
     pytest.param(UserError("a problem that it cannot solve"), id="refusal"),
     pytest.param(KeyboardInterrupt(), id="Ctrl-C"),
 ]
@@ -311,10 +312,35 @@ def test_a_run_that_is_stopped_leaves_the_last_result_and_what_it_finished(job, 
     assert [path.name for path in (kept / "solutions").iterdir()] == ["first.npz"]
 
 
-def test_a_solver_with_a_fault_is_named_and_the_rest_can_go_on(job):
-    with pytest.raises(RuntimeError) as caught:
-        compare(job(Scripted("first"), Scripted("second", RuntimeError("a fault"))))
-    assert "solver second failed; run again with --resume" in caught.value.__notes__[0]
+def test_a_run_goes_on_without_a_solver_that_raises(job):
+    """The line names solver, exception and place; the traceback is kept, and so is the rest."""
+    found = compare(
+        job(Scripted("first"), Scripted("second", RuntimeError("a fault\nof two lines")), Scripted("third"))
+    )
+    assert [evaluation.solver for evaluation in found.evaluations] == ["first", "third"]
+    line = found.failed["second"]
+    raised = r"solver second raised RuntimeError: a fault of two lines \(.*test_pipeline\.py:\d+\); .*"
+    assert re.fullmatch(raised, line)
+    out = job().out
+    trace = (out / "errors/second.txt").read_text()
+    assert "raise self.end" in trace
+    assert "RuntimeError: a fault" in trace
+    assert json.loads((out / "run.json").read_text())["failed"] == {"second": line}
+    assert "solver second raised RuntimeError" in (out / "report.html").read_text()
+    compare(job(Scripted("first"), Scripted("third"), resume=True))  # its file is one of the run's own
+
+
+@pytest.mark.parametrize("reference", [None, "second"], ids=["nothing is left", "it is the reference"])
+def test_a_run_without_the_solver_that_it_needs_ends_in_one_line(job, reference):
+    solvers = [Scripted("first")] * (reference is not None) + [Scripted("second", KeyError("x"))]
+    with pytest.raises(UserError, match=r"solver second raised KeyError: 'x' \(.*test_pipeline\.py:\d+\)$"):
+        compare(job(*solvers, reference=reference))
+
+
+def test_several_equilibria_are_told(job, monkeypatch):
+    said = "2 stable equilibria"
+    monkeypatch.setattr("compare.pipeline.with_branches", lambda evaluations, problem: (evaluations, [said]))
+    assert said in compare(job(Scripted("first"))).remarks
 
 
 @pytest.mark.parametrize("stop", STOPS)

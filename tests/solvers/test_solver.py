@@ -1,5 +1,6 @@
 """The border between the program and a solver of another package."""
 
+import re
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,7 +15,7 @@ from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
-from solvers.solver import Progress, silent, solved
+from solvers.solver import Progress, SolverFailedError, silent, solved
 from tests.meshes import permuted
 
 
@@ -118,6 +119,16 @@ def test_what_is_no_solution_is_refused_with_the_solvers_name(
 ) -> None:
     with pytest.raises(UserError, match=f"solver beam .*{said}|solver {said}"):
         solved(Beam(fault), Problem(coarse_mesh))
+
+
+def test_an_exception_tells_the_place_in_the_solvers_own_folder(coarse_mesh: TriangleMesh) -> None:
+    """Not the line of the library that it called."""
+    singular = Beam(lambda solution: np.linalg.inv(np.zeros((2, 2))))
+    with pytest.raises(SolverFailedError) as caught:
+        solved(singular, Problem(coarse_mesh))
+    said = r"solver beam raised LinAlgError: Singular matrix \(.*tests.solvers.test_solver\.py:\d+\)"
+    assert re.fullmatch(said, str(caught.value))
+    assert isinstance(caught.value.__cause__, np.linalg.LinAlgError)
 
 
 def test_a_sound_solution_passes(coarse_mesh: TriangleMesh) -> None:

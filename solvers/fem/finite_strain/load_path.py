@@ -113,6 +113,10 @@ class LoadPath:
         self.equilibrium.constraints = constraints
         return state
 
+    def settled_from(self, nodal: FloatArray) -> LoadState | None:
+        """Equilibrium under the full load from displacements, shape (N, d), mm; None if none is found."""
+        return self._settled(self._newton, replace(self.equilibrium.rest, fraction=1.0, nodal=nodal))
+
     def _stable(self, point: LoadState) -> LoadState:
         """An equilibrium or, if it is unstable, a stable one beside it: of those to either side, the lower.
 
