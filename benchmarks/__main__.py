@@ -29,13 +29,14 @@ BENCHMARKS = {
     "plane_strain": "plane_strain",
     "paper": "paper_run",
     "contact": "network_contact",
+    "trained": "trained_networks",
 }
 """Names and modules; the modules' docstrings have descriptions and times."""
 
 WIDEST = 400
 """Columns of the widest table."""
 SHORT = ("fem", "pinn")
-TIMED = ("deepxde", "recipes", "paper")
+TIMED = ("deepxde", "recipes", "paper", "trained")
 
 
 def show(table: RenderableType, console: Console | None = None) -> None:

@@ -19,10 +19,12 @@ PRESETS = {
     "pinn-std": {
         "fast": "solvers.pinn.finite_basis.standard:PinnStdSolver",
         "paper": "solvers.pinn.paper.solver:PaperPinnSolver",
+        "trained": "solvers.pinn.trained.solver:TrainedPinnSolver",
     },
     "pinn-asm": {
         "fast": "solvers.pinn.assimilating:PinnAsmSolver",
         "paper": "solvers.pinn.assimilating:PaperPinnAsmSolver",
+        "trained": "solvers.pinn.trained.solver:TrainedPinnAsmSolver",
     },
 }
 """Presets of our solvers, the default first. Each is a class with its own settings."""

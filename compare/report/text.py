@@ -34,6 +34,7 @@ def material_rows(material: Material, laws: Mapping[str, str]) -> list[tuple[str
 PRESETS = {
     "fast": "network with random hidden weights, output layer solved exactly (preset fast)",
     "paper": "the paper’s training (preset paper)",
+    "trained": "the paper’s networks, all weights trained by Gauss-Newton steps (preset trained)",
 }
 
 

@@ -401,7 +401,7 @@ def test_a_preset_as_a_setting_changes_the_solver_and_not_the_job(folder, capsys
 
 
 def test_the_seed_reaches_every_preset():
-    for preset in ("fast", "paper"):
+    for preset in ("fast", "paper", "trained"):
         (solver,) = SolverOptions(preset=preset, seed=7).read("pinn-std")
         assert (solver.settings()["preset"], solver.settings()["seed"]) == (preset, 7)
 

@@ -119,7 +119,10 @@ def test_it_says_what_was_compared_and_how_it_came_about(content: Comparison) ->
         assert expected in text.replace("\N{NO-BREAK SPACE}", " ")
 
 
-@pytest.mark.parametrize(("preset", "words"), [("fast", "random hidden weights"), ("paper", "training")])
+@pytest.mark.parametrize(
+    ("preset", "words"),
+    [("fast", "random hidden weights"), ("paper", "training"), ("trained", "all weights")],
+)
 def test_a_network_is_called_what_it_is(content: Comparison, preset: str, words: str) -> None:
     text = Page(render(replace(content, settings={"fem": {}, "pinn-std": {"preset": preset}}))).text
     assert re.search(f"pinn-std: [^.]*{words}[^.]*\\(preset {preset}\\)", text)

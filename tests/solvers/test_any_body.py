@@ -21,13 +21,27 @@ from tests.solvers.test_contract import QUICK
 COARSE, FINE = 1.0, 0.4
 """Element sizes, mm."""
 
+TINY = {
+    "preset": "trained",
+    "width": 6,
+    "layers": 1,
+    "sampled_steps": 2,
+    "sample_points": 60,
+    "subset_steps": 1,
+}
+
 SETTINGS = QUICK | {
     "pinn-std paper": {"preset": "paper", "epochs": 2, "width": 8, "layers": 1, "base_points": 20},
     "pinn-asm paper": {"preset": "paper", "epochs": 2, "width": 8, "layers": 1, "base_points": 20},
+    "pinn-std trained": TINY,
+    "pinn-asm trained": TINY,
     "gp": {"clamp": True},
 }
 
-SOLVERS = [*usable_solvers(), "pinn-std paper", "pinn-asm paper"]
+SOLVERS = [
+    *usable_solvers(),
+    *(f"{name} {preset}" for preset in ("paper", "trained") for name in ("pinn-std", "pinn-asm")),
+]
 
 AGREES = {
     **{"fem": 1e-9, "fem-nonlinear": 0.03, "fem-id": 0.01, "fem-asm": 0.01, "statfem": 0.05},

@@ -1,0 +1,221 @@
+"""Preset `trained` of `pinn-std` and `pinn-asm`: the paper's networks, all weights by Gauss-Newton steps."""
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from typing import ClassVar
+
+import numpy as np
+import torch
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.mesh.boundary import mean_thickness
+from geometry.mesh.point_location import LocatedPoints
+from solvers.assimilation.marker_weighting import MarkerWeighting
+from solvers.assimilation.misfit import Misfit, Weighting, assimilates
+from solvers.energy_and_force import energy_and_force
+from solvers.pinn.paper.modified_mlp import ModifiedMlp
+from solvers.pinn.threading import map_in_threads, pool, slices
+from solvers.pinn.trained.gauss_newton import Step, sampled_steps, subset_steps
+from solvers.pinn.trained.squares import PIECE, Squares
+from solvers.pinn.trained.streams import Streams
+from solvers.problem import Problem
+from solvers.solution import Solution, Status
+from solvers.solver import Progress, check_problem, silent
+
+OUTPUT = 0.7
+"""Standard deviation of the first outputs, in strokes: larger ones make the energy nearly quadratic in the
+weights, smaller ones leave less to undo."""
+
+SETTLED = 0.01
+"""Largest relative decrease of the energy over the last tenth of the steps of a converged training."""
+
+
+@dataclass(frozen=True)
+class TrainedPinnSolver:
+    """The paper's two modified MLPs with hard conditions, every weight trained by Gauss-Newton's method.
+
+    Attributes:
+        width: Neurons in a layer.
+        layers: Gated layers of each network.
+        steepness: Slope of the first neurons over one mean thickness of the body's walls.
+        base_length: Length over which the factor of the clamped base grows to one half, mm.
+        sampled_steps: Steps of all weights, each from a sample of points.
+        sample_points: Points of the largest sample.
+        subset_steps: Steps of some of the weights.
+        subset: Number of them, in each network.
+        matrix_points: Points from which their matrix comes.
+        seed: Of the random numbers.
+    """
+
+    width: int = 64
+    layers: int = 4
+    steepness: float = 1.0
+    base_length: float = 5.0
+    sampled_steps: int = 7
+    sample_points: int = 1800
+    subset_steps: int = 110
+    subset: int = 1500
+    matrix_points: int = 5000
+    seed: int = 0
+    name: ClassVar[str] = "pinn-std"
+    laws: ClassVar[tuple[str, ...]] = ("linear",)
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point")
+
+    def __post_init__(self) -> None:
+        for setting in fields(self):
+            value, least = getattr(self, setting.name), 0 if setting.name in AT_LEAST_ZERO else None
+            if isinstance(value, (int, float)) and not (value > 0 or value == least):
+                wanted = "positive" if least is None else "zero or more"
+                raise UserError(f"{self.name}: {setting.name} must be {wanted}, got {value}")
+        _ = self.weighting
+
+    def settings(self) -> dict[str, object]:
+        """The preset, network, steps and seed."""
+        return {"preset": "trained"} | {entry.name: getattr(self, entry.name) for entry in fields(self)}
+
+    @property
+    def weighting(self) -> MarkerWeighting | None:
+        """The weights of the markers; None for a solver that does not assimilate them."""
+        return MarkerWeighting.of(self) if assimilates(self) else None
+
+    def misfit(self, problem: Problem) -> Misfit | None:
+        """The misfit that is minimised together with the energy, if any; see `MarkerWeighting.misfit`."""
+        return None if self.weighting is None else self.weighting.misfit(problem)
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        """Train on the problem; see `Solver`."""
+        check_problem(self, problem)
+        started = time.perf_counter()
+        shape = ModifiedMlp(width=self.width, layers=self.layers)
+        with pool():
+            squares = Squares.of(problem, shape, self.misfit(problem), base_length=self.base_length)
+            history: list[tuple[float, float, float]] = []
+            parameters = self.initial(squares, problem)
+            for step in self._steps(squares, parameters):
+                parameters = step.parameters
+                history.append((len(history) + 1, step.value, time.perf_counter() - started))
+                share = len(history) / (self.sampled_steps + self.subset_steps)
+                progress(share, f"step {len(history)}, energy {step.value:.4f} N mm/mm")
+            field = TrainedField(squares.with_type(torch.float64), parameters.double())
+            energy, reaction = energy_and_force(problem, field)
+        columns = np.array(history).reshape(-1, 3).T
+        return Solution(
+            solver=self.name,
+            problem=problem,
+            field=field,
+            energy=energy,
+            reaction=reaction,
+            status=training_status(columns[1]),
+            stats={
+                "seconds": time.perf_counter() - started,
+                "steps": len(history),
+                "parameters": parameters.numel(),
+                "quadrature_points": len(squares.body),
+                "seed": self.seed,
+                "device": "cpu",
+            },
+            history=dict(zip(("step", "energy", "seconds"), columns, strict=True)),
+        )
+
+    def _steps(self, squares: Squares, start: torch.Tensor) -> Iterator[Step]:
+        for step in sampled_steps(squares, start, self.sample_points, self.sampled_steps, self.seed):
+            start = step.parameters
+            yield step
+        yield from subset_steps(squares, start, self.subset, self.matrix_points, self.subset_steps, self.seed)
+
+    def initial(self, squares: Squares, problem: Problem) -> torch.Tensor:
+        """First weights, shape (2, parameters).
+
+        The first neurons change fastest at points drawn from the body, in random directions; the other
+        weights are normal, and the outputs have a standard deviation of `OUTPUT` strokes.
+        """
+        shape, frame = squares.shape, squares.frame
+        parameters = shape.initial(self.seed, torch.float64)
+        weights = shape.weights(parameters)
+        first = weights.first
+        generator = torch.Generator().manual_seed(self.seed)
+        turn = torch.rand(first[:, :, 0].shape, generator=generator, dtype=torch.float64) * 2 * math.pi
+        slope = self.steepness / mean_thickness(problem.mesh) * frame.half
+        drawn = torch.multinomial(squares.body.weights, turn.numel(), replacement=True, generator=generator)
+        centres = squares.body.inputs[0, drawn, :2].double().view(*turn.shape, 2)
+        first[:, :, 0], first[:, :, 1] = slope * turn.cos(), slope * turn.sin()
+        first[:, :, 2] = -slope * (turn.cos() * centres[..., 0] + turn.sin() * centres[..., 1])
+        double = squares.with_type(torch.float64)
+        spread = Streams.of(shape, parameters, double.body.inputs).output[:, 0].std(dim=1)
+        stroke = float(np.abs(problem.load.values).max())
+        weights.output.mul_((OUTPUT * stroke / spread)[:, None, None])
+        return parameters.to(squares.body.weights.dtype)
+
+
+AT_LEAST_ZERO = ("sampled_steps", "subset_steps", "seed", "asm_weight", "marker_radius")
+"""Settings that may be zero."""
+
+
+@dataclass(frozen=True)
+class TrainedPinnAsmSolver(TrainedPinnSolver):
+    """The networks and the training of `TrainedPinnSolver`, with the markers' misfit beside the energy.
+
+    Attributes:
+        weights: As in `MarkerSettings`.
+        asm_weight: As there.
+        scale: As there.
+        marker_radius: As there.
+    """
+
+    weights: Weighting = "paper"
+    asm_weight: float = 1000.0
+    scale: float = 1.0
+    marker_radius: float | None = None
+    name: ClassVar[str] = "pinn-asm"
+    assimilates: ClassVar[bool] = True
+
+
+@dataclass(frozen=True, eq=False)
+class TrainedField:
+    """Displacement of trained networks.
+
+    Attributes:
+        squares: The networks' shape, frame and conditions, double precision.
+        parameters: Shape (2, parameters), double precision.
+    """
+
+    squares: Squares
+    parameters: torch.Tensor
+
+    def displacement(self, location: LocatedPoints) -> FloatArray:
+        """Displacement, shape (n, 2), mm."""
+        return self._state(location)[:, :, 0]
+
+    def gradient(self, location: LocatedPoints) -> FloatArray:
+        """Displacement gradient du_i/dx_j, shape (n, 2, 2)."""
+        return self._state(location)[:, :, 1:]
+
+    def _state(self, location: LocatedPoints) -> FloatArray:
+        points, squares = torch.from_numpy(np.array(location.points)), self.squares
+        shift = squares.shift(self.parameters)
+
+        def piece(rows: slice) -> torch.Tensor:
+            ones = torch.ones(len(points[rows]), dtype=points.dtype)
+            sample = squares.frame.sample(points[rows], ones, points.dtype)
+            output = Streams.of(squares.shape, self.parameters, sample.inputs).output
+            return sample.displacement(output, shift)
+
+        parts = map_in_threads(piece, slices(len(points), PIECE))
+        return np.asarray(torch.cat(parts, dim=2).permute(2, 0, 1).numpy())
+
+
+def training_status(energy: FloatArray) -> Status:
+    """Whether the energy has settled, from its values after each step."""
+    tenth = max(len(energy) // 10, 1)
+    fell = 1 - energy[-1] / energy[-1 - tenth] if len(energy) > tenth else math.inf
+    message = f"{len(energy)} steps; over their last tenth the energy fell by {fell:.2%} "
+    message += f"(criterion {SETTLED:.0%}); "
+    if fell <= SETTLED:
+        return Status(
+            True,
+            message + "so the training has settled, which does not say how far it is from the least energy",
+        )
+    return Status(False, message + "so the training has not settled: take more subset_steps")
