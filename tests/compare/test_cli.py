@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
 
 import pytest
@@ -269,9 +270,12 @@ def test_a_drawing_is_not_replaced_by_what_is_drawn_from_it(folder, capsys):
     assert Path("section.svg").read_text() == BEAM
 
 
-@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-"])
-def test_a_closed_stream_is_no_fault(closed):
-    command = f'"{sys.executable}" -m compare.cli solvers {closed}'
+@pytest.mark.parametrize(
+    ("command", "closed"),
+    [("--version", "<&-"), ("solvers", ">&-"), ("--version", "2>&-")],  # a table by Rich where it is closed
+)
+def test_a_closed_stream_is_no_fault(command, closed):
+    command = f'"{sys.executable}" -m compare.cli {command} {closed}'
     done = subprocess.run(
         ["bash", "-c", command], env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, check=False
     )
@@ -626,15 +630,6 @@ def test_the_design_alone(folder, capsys):
 # Surroundings
 
 
-def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[bytes]:
-    return subprocess.run(
-        [sys.executable, "-m", "compare.cli", *arguments],
-        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
-        capture_output=True,
-        check=False,
-    )
-
-
 def test_a_home_that_cannot_be_written_is_not_needed(folder, coarse_mesh, tmp_path_factory):
     """Neither for the mesh nor for what DOLFINx compiles and matplotlib remembers."""
     cache = tmp_path_factory.mktemp("cache")
@@ -651,37 +646,25 @@ def test_a_home_that_cannot_be_written_is_not_needed(folder, coarse_mesh, tmp_pa
     assert {path.name for path in cache.iterdir()} >= {"fenics"}
 
 
-def test_a_terminal_without_greek_letters_shows_the_tables(folder, coarse_mesh):
-    arguments = ("--solvers", "fem", "--mesh-size", "1.0", "--measurements", "good.csv", "--out", "here")
-    done = run("compare", *arguments, PYTHONIOENCODING="ascii", PYTHONUTF8="0")
-    assert done.returncode == 0, done.stderr
-    assert b"Mean absolute error at 1 marker" in done.stdout
-    assert b"?" in done.stdout
+def test_a_terminal_without_greek_letters_shows_the_tables(folder, monkeypatch, without_pictures):
+    with TextIOWrapper(BytesIO(), encoding="ascii") as terminal:
+        monkeypatch.setattr("sys.stdout", terminal)
+        assert main([*SMALL, "--measurements", "good.csv", "--out", "here"]) == 0
+        shown = terminal.buffer.getvalue()
+    assert b"Mean absolute error at 1 marker" in shown
+    assert b"?" in shown
 
 
 # A solver of another package
 
 
-def test_a_plug_in_runs_in_the_main_job(folder, plugin_folder):
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "compare.cli",
-            "compare",
-            "--solvers",
-            "fem,skfem-p2",
-            "--mesh-size",
-            "1.0",
-            "--json",
-        ],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(plugin_folder)])},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    told = json.loads(done.stdout)["solvers"]["skfem-p2"]
-    assert (done.returncode, done.stderr) == (0, "")
+def test_a_plug_in_runs_in_the_main_job(folder, plugin_folder, monkeypatch, capsys, without_pictures):
+    monkeypatch.syspath_prepend(str(plugin_folder))
+    options = "--solvers fem,skfem-p2 --mesh-size 1.0 --measurements good.csv --json"
+    assert main(["compare", *options.split()]) == 0
+    output = capsys.readouterr()
+    assert output.err == ""
+    told = json.loads(output.out)["solvers"]["skfem-p2"]
     assert told["message"] == "solved directly"
     # The same elements as those of `fem`, assembled by another program: rounding.
     assert told["to_reference"]["rel_l2_displacement"] < 1e-8

@@ -8,8 +8,8 @@ import sys
 import pytest
 
 from geometry.worker import child_environment
+from tests.compare.programs import COMMAND, WITHOUT_PICTURES
 
-COMMAND = "import sys; from compare.cli import main; sys.exit(main(sys.argv[1:]))"
 LONG = """
 import sys
 from compare.cli import main
@@ -64,8 +64,10 @@ def test_so_does_a_closed_pipe_of_messages(words, tmp_path):
 
 
 def test_the_results_are_kept(tmp_path):
-    out = tmp_path / "run"
-    done = unread(COMMAND, f"compare --solvers fem --mesh-size 1 --json --out {out}", "stdout")
+    out, markers = tmp_path / "run", tmp_path / "markers.csv"
+    markers.write_text("x_mm,y_mm,u_mm,v_mm\n20,-1,0,-5\n")
+    words = f"compare --solvers fem --mesh-size 1 --measurements {markers} --json --out {out}"
+    done = unread(WITHOUT_PICTURES, words, "stdout")
     assert (done.returncode, done.stderr) == (141, "")
     assert (out / "report.html").stat().st_size > 0
 

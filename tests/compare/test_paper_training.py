@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from io import StringIO
@@ -16,16 +16,19 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from compare.gridsearch.search import GridSearch, search_grid
+from compare.gridsearch.training_run import GridPoint, ReferenceSolution, TrainingRun, TrainingTask, train
 from compare.pipeline import Job, run
 from compare.runtime.exits import NOT_CONVERGED
 from compare.runtime.stages import Stages
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
-from solvers.problem import Load, Material
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.fem.linear import FemSolver
+from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
-from solvers.solver import Progress
+from solvers.solver import Progress, silent
+from tests.compare.programs import WITHOUT_PICTURES
 
 ROOT = Path(__file__).parent.parent.parent
 COARSE = MeshSettings(size=1.0)
@@ -103,16 +106,6 @@ def test_a_checkpoint_of_another_job_is_refused_in_one_line(job):
     assert re.fullmatch(r".*checkpoint\.safetensors belongs to another problem .*", str(refused.value))
 
 
-WITHOUT_PICTURES = """
-import sys
-from compare import pipeline
-from compare.cli import main
-
-pipeline.draw_all = lambda *_, **__: []
-sys.exit(main(sys.argv[1:]))
-"""
-
-
 @pytest.mark.slow
 def test_a_killed_run_ends_as_if_it_had_not_been(job, tmp_path):
     """Killed without notice, it goes on from the last checkpoint that it wrote.
@@ -121,7 +114,7 @@ def test_a_killed_run_ends_as_if_it_had_not_been(job, tmp_path):
     seen to change the last bits.
     """
     line = f"compare --solvers pinn-std --mesh-size 1.0 --quiet --measurements {job.measurements}"
-    line += "".join(f" --solver-set pinn-std.{key}={value}" for key, value in {**TINY, "epochs": 300}.items())
+    line += "".join(f" --solver-set pinn-std.{key}={value}" for key, value in {**TINY, "epochs": 200}.items())
 
     def started(*options: str) -> subprocess.Popen[bytes]:
         return subprocess.Popen(
@@ -132,7 +125,7 @@ def test_a_killed_run_ends_as_if_it_had_not_been(job, tmp_path):
 
     whole, killed = started("--out", str(tmp_path / "whole")), started("--out", str(job.out))
     left = tmp_path / "run.partial" / "training" / "pinn-std"
-    limit = time.monotonic() + 60
+    limit = time.monotonic() + 240
     while not (left / "history.csv").exists() and time.monotonic() < limit:
         time.sleep(0.005)
     killed.kill()
@@ -145,50 +138,49 @@ def test_a_killed_run_ends_as_if_it_had_not_been(job, tmp_path):
     assert record(job.out / "training" / "pinn-std")[: len(before)] == before
 
 
-@pytest.mark.slow
-def test_an_interrupted_search_ends_as_if_it_had_not_been(tmp_path):
-    def wanted(name: str) -> GridSearch:
-        return GridSearch(
-            design=Design(),
-            mesh=COARSE,
-            material=Material(),
-            load=Load(),
-            learning_rates=(1e-3,),
-            bc_weights=(10.0,),
-            settings={**TINY, "epochs": 60},
-            out=tmp_path / name,
-            processes=1,
+@pytest.fixture
+def search_task(tmp_path: Path, coarse_mesh: TriangleMesh) -> Callable[..., TrainingTask]:
+    """`search_task(name, learning_rate, epochs)`: a run of a grid search in a folder of that name."""
+    coarse_mesh.save(tmp_path / "mesh.npz")
+    reference = ReferenceSolution.of(FemSolver(degree=1).solve(Problem(coarse_mesh)))
+
+    def make(name: str, learning_rate: float = 1e-3, epochs: int = 20) -> TrainingTask:
+        return TrainingTask(
+            GridPoint(learning_rate, 10.0),
+            {**TINY, "epochs": epochs},
+            tmp_path / "mesh.npz",
+            Material(),
+            Load(),
+            reference,
+            tmp_path / name,
+            threads=1,
         )
 
-    with quiet() as stages:
-        (whole,) = search_grid(wanted("whole"), stages)
-    run_name = wanted("run").points[0].name
-    with Interrupting(run_name) as stages, pytest.raises(KeyboardInterrupt):
-        search_grid(wanted("run"), stages)
-    before = record(tmp_path / "run" / "runs" / run_name)
-    with quiet() as stages:
-        (resumed,) = search_grid(wanted("run"), stages)
-    assert record(tmp_path / "run" / "runs" / run_name)[: len(before)] == before
+    return make
+
+
+def test_an_interrupted_run_of_a_search_ends_as_if_it_had_not_been(search_task):
+    """In this process; `test_processes` interrupts those of a search."""
+
+    def interrupted(fraction: float, note: str) -> None:
+        if fraction >= 0.5:
+            raise KeyboardInterrupt
+
+    whole, task = train(search_task("whole"), silent), search_task("run")
+    with pytest.raises(KeyboardInterrupt):
+        train(task, interrupted)
+    assert not (task.folder / "result.json").exists()
+    before = record(task.folder)
+    resumed = train(task, silent)
+    assert record(task.folder)[: len(before)] == before
     assert whole.measured is not None
     assert resumed.measured is not None
-    for name in ("rel_l2_displacement", "energy", "loss", "epochs", "boundary_violation"):
-        assert getattr(resumed.measured, name) == getattr(whole.measured, name)
+    assert replace(resumed.measured, seconds=0.0) == replace(whole.measured, seconds=0.0)
 
 
-@pytest.mark.slow
-def test_a_run_of_the_search_that_diverges_is_recorded(tmp_path):
-    wanted = GridSearch(
-        design=Design(),
-        mesh=COARSE,
-        material=Material(),
-        load=Load(),
-        learning_rates=(1e30,),
-        bc_weights=(10.0,),
-        settings={**TINY, "epochs": 20},
-        out=tmp_path / "search",
-        processes=1,
-    )
-    with quiet() as stages:
-        (diverged,) = search_grid(wanted, stages)
+def test_a_run_of_a_search_that_diverges_is_recorded(search_task):
+    task = search_task("run", learning_rate=1e30)
+    diverged = train(task, silent)
     assert diverged.status == "diverged"
     assert "learning_rate" in diverged.message
+    assert TrainingRun.load(task.folder / "result.json") == diverged

@@ -62,12 +62,12 @@ def feet_and_slot() -> tuple[Section, float]:
     return Section(Loop.polygon(corners, names)), 45.0
 
 
-def thin_ribs(thickness: float = 0.8, ribs: int = 6) -> tuple[Section, float]:
+def thin_ribs(thickness: float = 0.8, ribs: int = 3) -> tuple[Section, float]:
     """A wedge with walls of 1.5 mm and thin ribs that lean by 35 degrees."""
-    slope, length, height = tan(radians(35.0)), 80.0, 26.0
+    slope, length, height = tan(radians(35.0)), 52.0, 20.0
     back = lambda x: -height * (1 - x / length)  # noqa: E731
     outline = Loop.polygon([(0, 0), (0, -height), (length, 0)], ["base", "back", "front"])
-    pitch, cavities = 48.0 / ribs, []
+    pitch, cavities = 30.0 / ribs, []
     for rib in range(ribs):
         left, right = 3.0 + rib * pitch, 3.0 + (rib + 1) * pitch - thickness
         corners = []
@@ -75,7 +75,7 @@ def thin_ribs(thickness: float = 0.8, ribs: int = 6) -> tuple[Section, float]:
             lean = -1.5 if top else _meeting(x, slope, back)
             corners.append((x + slope * (-1.5 - lean), lean))
         cavities.append(Loop.polygon([corners[0], corners[3], corners[2], corners[1]]))
-    return Section(outline, tuple(cavities)), 30.0
+    return Section(outline, tuple(cavities)), 20.0
 
 
 def _meeting(x: float, slope: float, back: Callable[[float], float]) -> float:

@@ -14,6 +14,15 @@ from geometry.observations import Observations
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
 
+SHORT = Design(height=50, rib_count=1, tip_length=12, contact_position=20)
+"""A short finger with one rib."""
+
+
+@pytest.fixture(scope="session")
+def short_mesh() -> TriangleMesh:
+    """`SHORT` with elements of 1 mm: half the unknowns of the default finger."""
+    return finger_mesh(SHORT, settings=MeshSettings(size=1.0))
+
 
 @pytest.fixture(scope="session")
 def medium_mesh() -> TriangleMesh:

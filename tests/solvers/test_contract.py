@@ -6,10 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.cache import finger_mesh
 from geometry.errors import OutsideBodyError, UserError
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver, solver_names, usable_solvers
@@ -68,20 +65,13 @@ def solver(request, plugin_folder):
     sys.path.remove(str(plugin_folder))
 
 
-@pytest.fixture(scope="module")
-def coarse_mesh() -> TriangleMesh:
-    """A short finger with one rib, on which networks train quickly."""
-    design = Design(height=50, rib_count=1, tip_length=12, contact_position=20)
-    return finger_mesh(design, settings=MeshSettings(size=1.0))
-
-
 def problem_of(solver: Solver, mesh: TriangleMesh, displacement=(0.0, -2.0)) -> Problem:
     return Problem(mesh, with_law(Material(), solver), Load(displacement=displacement))
 
 
 @pytest.fixture(scope="module")
-def solution(solver, coarse_mesh):
-    return solver.solve(problem_of(solver, coarse_mesh))
+def solution(solver, short_mesh):
+    return solver.solve(problem_of(solver, short_mesh))
 
 
 def relative(difference, reference):
@@ -93,13 +83,13 @@ def test_every_registered_solver_is_in_this_suite(plugin_folder, monkeypatch):
     assert set(usable_solvers()) == {*NAMES, *WITHOUT_MECHANICS} == set(solver_names())
 
 
-def test_the_load_is_met_and_the_base_is_at_rest(solution, coarse_mesh):
+def test_the_load_is_met_and_the_base_is_at_rest(solution, short_mesh):
     from solvers.problem import contact_functional
 
     points, weights = contact_functional(solution.problem)
     atol = MEANT_OVER_DEPTH.get(solution.solver, 1e-6)
     np.testing.assert_allclose(weights @ solution.displacement(points), [0.0, -2.0], atol=atol)
-    base = coarse_mesh.points[np.unique(coarse_mesh.boundary("base"))]
+    base = short_mesh.points[np.unique(short_mesh.boundary("base"))]
     assert np.abs(solution.displacement(base)).max() < 1e-12
 
 
@@ -108,13 +98,13 @@ def test_the_load_is_met_and_the_base_is_at_rest(solution, coarse_mesh):
     [(name, kind) for name, kind in PAIRS if kind in LOADS[name] and kind != "cylinder"],  # test_cylinder.py
     indirect=["solver"],
 )
-def test_every_load_that_the_solver_has_is_met(solver, coarse_mesh, kind):
+def test_every_load_that_the_solver_has_is_met(solver, short_mesh, kind):
     from solvers.problem import contact_functional
 
-    problem = replace(problem_of(solver, coarse_mesh), load=Load(kind=kind, displacement=(0.0, -2.0)))
+    problem = replace(problem_of(solver, short_mesh), load=Load(kind=kind, displacement=(0.0, -2.0)))
     solution = solver.solve(problem)
     if kind == "patch":
-        contact = coarse_mesh.points[np.unique(coarse_mesh.boundary("contact"))]
+        contact = short_mesh.points[np.unique(short_mesh.boundary("contact"))]
         # A network prescribes moments of the displacement.
         assert np.abs(solution.displacement(contact) - [0.0, -2.0]).max() < 0.01
     else:
@@ -123,10 +113,10 @@ def test_every_load_that_the_solver_has_is_met(solver, coarse_mesh, kind):
         np.testing.assert_allclose(weights @ solution.displacement(points), [0.0, -2.0], atol=atol)
 
 
-def test_energy_is_the_integral_of_its_density(solution, coarse_mesh):
+def test_energy_is_the_integral_of_its_density(solution, short_mesh):
     from geometry.mesh.quadrature import body_quadrature
 
-    rule = body_quadrature(coarse_mesh, 4)
+    rule = body_quadrature(short_mesh, 4)
     total = (rule.weights * solution.state(rule.location).energy_density).sum()
     # The network's energy was integrated by a rule of degree 2.
     own = 0.02 if "quadrature_points" in solution.stats else 1e-7
@@ -141,42 +131,40 @@ def test_reaction_does_the_work(solution):
     assert solution.reaction[1] < 0
 
 
-def test_twice_the_travel_is_twice_the_displacement(solver, solution, coarse_mesh):
+def test_twice_the_travel_is_twice_the_displacement(solver, solution, short_mesh):
     if solution.problem.material.law != "linear":
         small, large = (
-            solver.solve(problem_of(solver, coarse_mesh, (0.0, -travel))).displacement(coarse_mesh.markers)
+            solver.solve(problem_of(solver, short_mesh, (0.0, -travel))).displacement(short_mesh.markers)
             / travel
             for travel in (0.01, 0.02)
         )
         assert relative(large - small, small) < 0.01
         return
-    twice = solver.solve(problem_of(solver, coarse_mesh, (0.0, -4.0)))
-    once = solution.displacement(coarse_mesh.markers)
-    assert relative(twice.displacement(coarse_mesh.markers) - 2 * once, once) < 1e-6
+    twice = solver.solve(problem_of(solver, short_mesh, (0.0, -4.0)))
+    once = solution.displacement(short_mesh.markers)
+    assert relative(twice.displacement(short_mesh.markers) - 2 * once, once) < 1e-6
 
 
-def test_numbering_of_the_mesh_does_not_matter(solver, solution, coarse_mesh):
-    renumbered = solver.solve(problem_of(solver, permuted(coarse_mesh, 7)))
-    expected = solution.displacement(coarse_mesh.markers)
-    assert relative(renumbered.displacement(coarse_mesh.markers) - expected, expected) < ACCURACY.get(
+def test_numbering_of_the_mesh_does_not_matter(solver, solution, short_mesh):
+    renumbered = solver.solve(problem_of(solver, permuted(short_mesh, 7)))
+    expected = solution.displacement(short_mesh.markers)
+    assert relative(renumbered.displacement(short_mesh.markers) - expected, expected) < ACCURACY.get(
         solver.name, 0.01
     )
 
 
-def test_mirrored_finger_moves_the_other_way(solver, solution, coarse_mesh):
+def test_mirrored_finger_moves_the_other_way(solver, solution, short_mesh):
     mirror = np.array([1.0, -1.0])
-    mirrored = replace(
-        coarse_mesh, points=coarse_mesh.points * mirror, triangles=coarse_mesh.triangles[:, ::-1]
-    )
+    mirrored = replace(short_mesh, points=short_mesh.points * mirror, triangles=short_mesh.triangles[:, ::-1])
     other = solver.solve(problem_of(solver, mirrored, (0.0, 2.0)))
-    expected = solution.displacement(coarse_mesh.markers) * mirror
+    expected = solution.displacement(short_mesh.markers) * mirror
     assert relative(other.displacement(mirrored.markers) - expected, expected) < ACCURACY.get(
         solver.name, 0.01
     )
 
 
-def test_gradient_is_the_derivative_of_the_displacement(solution, coarse_mesh):
-    centroids = coarse_mesh.at_centroids().points[::50]
+def test_gradient_is_the_derivative_of_the_displacement(solution, short_mesh):
+    centroids = short_mesh.at_centroids().points[::50]
     step = 1e-5
     for axis in range(2):
         shift = step * np.eye(2)[axis]
@@ -191,10 +179,10 @@ def test_points_outside_the_body_are_refused(solution):
         solution.displacement([[10.0, -10.0]])  # in the first cavity
 
 
-def test_one_point_and_many_points_agree(solution, coarse_mesh):
-    many = solution.displacement(coarse_mesh.markers)
+def test_one_point_and_many_points_agree(solution, short_mesh):
+    many = solution.displacement(short_mesh.markers)
     np.testing.assert_allclose(
-        solution.displacement(coarse_mesh.markers[1:2]),
+        solution.displacement(short_mesh.markers[1:2]),
         many[1:2],
         rtol=0,
         atol=1e-6,  # a network leaves out encoders with shares below 1e-8; they give several times the travel
@@ -212,10 +200,10 @@ def test_settings_are_json_and_status_is_a_sentence(solver, solution):
 @pytest.mark.parametrize(
     ("solver", "kind"), [(name, kind) for name, kind in PAIRS if kind not in LOADS[name]], indirect=["solver"]
 )
-def test_a_load_that_the_solver_does_not_have_is_refused(solver, coarse_mesh, kind):
+def test_a_load_that_the_solver_does_not_have_is_refused(solver, short_mesh, kind):
     load = Load(kind=kind, radius=5.0 if kind == "cylinder" else None, displacement=(0.0, -2.0))
     with pytest.raises(UserError, match=f"{solver.name} takes the loads"):
-        solver.solve(replace(problem_of(solver, coarse_mesh), load=load))
+        solver.solve(replace(problem_of(solver, short_mesh), load=load))
 
 
 def test_patch_test(solver):

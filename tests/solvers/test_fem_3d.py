@@ -10,10 +10,7 @@ from compare.crossval.true_fields import FieldSampler
 from compare.evaluation.convergence import with_certificates
 from compare.evaluation.evaluation import Evaluation
 from compare.report.sentences import certificate_sentences
-from geometry.cache import finger_mesh
 from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
 from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
@@ -24,36 +21,36 @@ from solvers.fem.solid.side_face import FaceField
 from solvers.fem.solid.solver import Fem3dSolver
 from solvers.problem import Load, Material, Problem
 from solvers.solution import State
+from tests.solvers.bodies import body_mesh
 from tests.solvers.conftest import bar_mesh
 
 SLIDING = Load(kind="patch", displacement=(None, -4.0))
 
 
 @pytest.fixture(scope="module")
-def short_mesh():
-    """A short finger with one rib, 6 mm deep."""
-    design = Design(height=50, rib_count=1, tip_length=12, contact_position=20, depth=6.0)
-    return finger_mesh(design, settings=MeshSettings(size=1.0))
+def wedge():
+    """A wedge with two cavities whose base leans, 6 mm deep, of elements of 1.5 mm."""
+    return replace(body_mesh("tilted wedge", 1.5), depth=6.0)
 
 
-def test_the_tetrahedra_fill_the_half_body(short_mesh):
-    space = ExtrudedSpace.of(short_mesh, 3, 0.25)
+def test_the_tetrahedra_fill_the_half_body(wedge):
+    space = ExtrudedSpace.of(wedge, 3, 0.25)
     corners = space.nodes[space.vertices][space.cells]
     volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
     assert volumes.min() > 0
-    assert volumes.sum() == pytest.approx(3.0 * short_mesh.areas.sum(), rel=1e-12)
+    assert volumes.sum() == pytest.approx(3.0 * wedge.areas.sum(), rel=1e-12)
     thickness = np.diff(space.faces)
     assert thickness[-1] / thickness[0] == pytest.approx(0.25)
 
 
-def test_neighbouring_tetrahedra_share_whole_faces(short_mesh):
+def test_neighbouring_tetrahedra_share_whole_faces(wedge):
     """Every face belongs to two tetrahedra, or lies on the outline or on one of the two end planes."""
-    space = ExtrudedSpace.of(short_mesh, 2, 0.5)
+    space = ExtrudedSpace.of(wedge, 2, 0.5)
     sides = np.sort(space.cells[:, [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]].reshape(-1, 3), axis=1)
     _, counts = np.unique(sides, axis=0, return_counts=True)
-    rim = len(short_mesh.edges) * 2 - 3 * len(short_mesh.triangles)  # edges with one triangle
+    rim = len(wedge.edges) * 2 - 3 * len(wedge.triangles)  # edges with one triangle
     assert counts.max() == 2
-    assert (counts == 1).sum() == 2 * len(short_mesh.triangles) + 2 * 2 * rim
+    assert (counts == 1).sum() == 2 * len(wedge.triangles) + 2 * 2 * rim
 
 
 def bent(nodes: np.ndarray, curvature: float, ν: float) -> np.ndarray:
@@ -100,20 +97,20 @@ def test_a_narrow_beam_bends_with_youngs_modulus():
 
 
 @pytest.mark.parametrize("law", ["linear", "neo-hookean", "st-venant-kirchhoff"])
-def test_held_side_faces_make_plane_strain(short_mesh, law):
-    problem = Problem(short_mesh, Material(law=law), SLIDING)
+def test_held_side_faces_make_plane_strain(wedge, law):
+    problem = Problem(wedge, Material(law=law), SLIDING)
     solid = Fem3dSolver(sides="held", layers=2).solve(problem)
     plane = (FemSolver(estimate=False) if law == "linear" else FemNonlinearSolver()).solve(problem)
     assert solid.status.converged
     # More unknowns than in the plane, so less energy, by the error of elements of 1 mm.
     assert 0.995 < solid.energy / plane.energy < 1
-    gap = solid.displacement(short_mesh.markers) - plane.displacement(short_mesh.markers)
+    gap = solid.displacement(wedge.markers) - plane.displacement(wedge.markers)
     assert np.abs(gap).max() < 0.005
 
 
-def test_a_cylinder_between_held_side_faces_presses_as_in_the_plane(short_mesh):
+def test_a_cylinder_between_held_side_faces_presses_as_in_the_plane(wedge):
     load = Load(kind="cylinder", radius=5.0, displacement=(0.0, -2.0))
-    problem = Problem(short_mesh, Material(law="neo-hookean"), load)
+    problem = Problem(wedge, Material(law="neo-hookean"), load)
     solid, plane = Fem3dSolver(sides="held", layers=1).solve(problem), FemNonlinearSolver().solve(problem)
     assert solid.status.converged
     assert solid.energy == pytest.approx(plane.energy, rel=0.005)  # elements of 1 mm
@@ -124,35 +121,35 @@ def test_a_cylinder_between_held_side_faces_presses_as_in_the_plane(short_mesh):
     assert solid.stats["penetration_mm"] < 1e-5
 
 
-def test_a_thin_finger_is_in_plane_stress(short_mesh):
-    problem = Problem(
-        replace(short_mesh, depth=0.2), Material(), Load(kind="patch", displacement=(0.0, -2.0))
-    )
+def test_a_thin_finger_is_in_plane_stress(wedge):
+    problem = Problem(replace(wedge, depth=0.2), Material(), Load(kind="patch", displacement=(0.0, -2.0)))
     solid = Fem3dSolver(layers=1).solve(problem)
     plane = FemSolver(estimate=False).solve(replace(problem, material=Material(plane="stress")))
     strain = FemSolver(estimate=False).solve(problem)
     assert solid.energy == pytest.approx(plane.energy, rel=0.01)  # the rest is at corners, clamp and patch
     assert strain.energy > 1.2 * plane.energy
-    location = short_mesh.at_centroids()
+    location = wedge.at_centroids()
     ours, theirs = (each.state(location).von_mises for each in (solid, plane))
     assert np.linalg.norm(ours - theirs) < 0.05 * np.linalg.norm(theirs)
 
 
-def test_the_side_face_carries_no_traction(short_mesh):
-    location, problem = short_mesh.at_centroids(), Problem(short_mesh, load=SLIDING)
-    across = {}
+def test_the_side_face_carries_no_traction():
+    """Beside clamp and patch of a deep ring; 0.12 is the elements', and 0.09 with those of 1 mm."""
+    mesh = replace(body_mesh("ring", 1.5), depth=20.0)
+    location, problem = mesh.at_centroids(), Problem(mesh, load=SLIDING)
+    beside, across = np.abs(location.points[:, 0]) > 12, {}
     for face in ("side", "middle"):
         solution = Fem3dSolver(layers=3, face=face).solve(problem)
-        across[face] = np.linalg.norm(solution.state(location).stress_zz)
-    assert across["side"] < 0.2 * across["middle"]  # the rest is near corners, clamp and patch
+        across[face] = np.linalg.norm(solution.state(location).stress_zz[beside])
+    assert across["side"] < 0.2 * across["middle"]
 
 
-def test_force_is_the_slope_of_the_energy(short_mesh):
+def test_force_is_the_slope_of_the_energy(wedge):
     """Of three equilibria at finite strain, by a central difference."""
     energies = []
     for stroke in (3.99, 4.0, 4.01):
         load = Load(kind="patch", displacement=(None, -stroke))
-        solution = Fem3dSolver(layers=1).solve(Problem(short_mesh, Material(law="neo-hookean"), load))
+        solution = Fem3dSolver(layers=1).solve(Problem(wedge, Material(law="neo-hookean"), load))
         energies.append(solution.energy)
         if stroke == 4.0:
             force = solution.reaction
@@ -160,27 +157,27 @@ def test_force_is_the_slope_of_the_energy(short_mesh):
     assert abs(force[0]) < 1e-8  # u is free
 
 
-def test_a_finger_of_other_depth_is_stiffer_where_it_is_deeper(short_mesh):
+def test_a_finger_of_other_depth_is_stiffer_where_it_is_deeper(wedge):
     forces = [
-        Fem3dSolver(layers=2).solve(Problem(replace(short_mesh, depth=depth), load=SLIDING)).reaction[1]
+        Fem3dSolver(layers=2).solve(Problem(replace(wedge, depth=depth), load=SLIDING)).reaction[1]
         for depth in (2.0, 20.0)
     ]
     assert forces[1] < 1.05 * forces[0] < 0
 
 
-def test_plane_strain_does_not_certify_it(short_mesh):
-    problem = Problem(short_mesh, load=Load(displacement=(0.0, -2.0)))
-    evaluation = Evaluation.of(Fem3dSolver(layers=1).solve(problem), short_mesh)
+def test_plane_strain_does_not_certify_it(wedge):
+    problem = Problem(wedge, load=Load(displacement=(0.0, -2.0)))
+    evaluation = Evaluation.of(Fem3dSolver(layers=1).solve(problem), wedge)
     (judged,) = with_certificates([evaluation], problem)
     assert judged.converged
     assert judged.certificate is None
     assert "three dimensions" in certificate_sentences(judged)
 
 
-def test_cross_validation_does_not_read_its_stress_as_that_of_the_plane(short_mesh):
-    solution = Fem3dSolver(layers=1).solve(Problem(short_mesh, load=SLIDING))
-    sampler = FieldSampler.of(short_mesh, short_mesh.markers, 0.4)
-    sampled = sampler.of_solution(solution, short_mesh)
+def test_cross_validation_does_not_read_its_stress_as_that_of_the_plane(wedge):
+    solution = Fem3dSolver(layers=1).solve(Problem(wedge, load=SLIDING))
+    sampler = FieldSampler.of(wedge, wedge.markers, 0.4)
+    sampled = sampler.of_solution(solution, wedge)
     expected = solution.state(sampler.inside).von_mises
     np.testing.assert_array_equal(sampled.state(solution.problem).von_mises, expected)
     plane = State.from_gradient(sampled.gradient[:, :2, :2], solution.problem).von_mises
@@ -205,16 +202,16 @@ def test_wrong_settings_are_refused(settings, text):
 
 
 @pytest.mark.mpi
-def test_two_ranks_find_what_one_finds(start_ranks, short_mesh, tmp_path):
-    short_mesh.save(tmp_path / "mesh.npz")
+def test_two_ranks_find_what_one_finds(start_ranks, wedge, tmp_path):
+    wedge.save(tmp_path / "mesh.npz")
     process = start_ranks(2, "-m", "tests.solvers.rank_programs", "solid", str(tmp_path / "mesh.npz"))
     output, errors = process.communicate()
     assert process.returncode == 0, errors
     ((energy, displacement),) = json.loads(output)["solutions"]
     load = Load(displacement=(0.0, -2.0))
-    alone = Fem3dSolver(layers=1).solve(Problem(short_mesh, Material(law="neo-hookean"), load))
+    alone = Fem3dSolver(layers=1).solve(Problem(wedge, Material(law="neo-hookean"), load))
     assert energy == pytest.approx(alone.energy, rel=1e-10)
-    np.testing.assert_allclose(displacement, alone.displacement(short_mesh.markers), rtol=0, atol=1e-8)
+    np.testing.assert_allclose(displacement, alone.displacement(wedge.markers), rtol=0, atol=1e-8)
 
 
 @pytest.mark.slow
@@ -226,8 +223,8 @@ def test_two_ranks_find_what_one_finds(start_ranks, short_mesh, tmp_path):
         ("neo-hookean", SLIDING),
     ],
 )
-def test_multigrid_finds_what_factors_find(short_mesh, law, load):
-    problem = Problem(short_mesh, Material(law=law), load)
+def test_multigrid_finds_what_factors_find(wedge, law, load):
+    problem = Problem(wedge, Material(law=law), load)
     direct, iterative = (
         Fem3dSolver(layers=1, linear_solver=method).solve(problem) for method in ("direct", "iterative")
     )
@@ -236,16 +233,16 @@ def test_multigrid_finds_what_factors_find(short_mesh, law, load):
     assert iterative.energy == pytest.approx(
         direct.energy, rel=1e-7
     )  # Newton's criterion is 1e-8 of the force
-    gap = iterative.displacement(short_mesh.markers) - direct.displacement(short_mesh.markers)
+    gap = iterative.displacement(wedge.markers) - direct.displacement(wedge.markers)
     assert np.abs(gap).max() < 1e-5  # mm
 
 
-def test_an_indefinite_matrix_is_solved_by_minres(short_mesh):
-    """The stiffness minus 1e-5 of its diagonal has a negative eigenvalue."""
-    equilibrium = FiniteStrainEquilibrium(Problem(short_mesh), ExtrudedSpace.of(short_mesh, 1, 1.0))
+def test_an_indefinite_matrix_is_solved_by_minres(wedge):
+    """The stiffness minus 4e-6 of its diagonal has a negative eigenvalue."""
+    equilibrium = FiniteStrainEquilibrium(Problem(wedge), ExtrudedSpace.of(wedge, 1, 1.0))
     system = equilibrium.distributed, equilibrium.matrix, equilibrium.clamped
     multigrid = Multigrid(*system, tolerance=1e-6, tangent=True)
-    equilibrium.matrix.setDiagonal((1 - 1e-5) * equilibrium.matrix.getDiagonal())
+    equilibrium.matrix.setDiagonal((1 - 4e-6) * equilibrium.matrix.getDiagonal())
     equilibrium.matrix.assemble()
     force = np.where(equilibrium.clamped, 0.0, 1.0)
     equilibrium.factors.update()

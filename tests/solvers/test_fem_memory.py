@@ -17,13 +17,15 @@ from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
 
 name, law, kind = sys.argv[1:]
-mesh = finger_mesh(Design(), settings=MeshSettings(size=1.5))
+design = Design(height=50, rib_count=1, tip_length=12, contact_position=20)
+mesh = finger_mesh(design, settings=MeshSettings(size=1.5))
 markers = mesh.markers
 deviations, seen = np.full_like(markers, 0.01), np.ones(len(markers), bool)
 observations = Observations(markers, -0.01 * markers, deviations, seen, "test", True, 0.8)
 load = Load(kind=kind, displacement=(0.0, -1.0), radius=5.0 if kind == "cylinder" else None)
 given = observations if "asm" in name else None
-make_solver(name).solve(Problem(mesh, Material(law=law), load, given, Design()), lambda *_: None)
+settings = {"layers": 1} if name == "fem-3d" else {}
+make_solver(name, **settings).solve(Problem(mesh, Material(law=law), load, given, design), lambda *_: None)
 """
 
 CASES = [

@@ -3,9 +3,6 @@
 import numpy as np
 import pytest
 
-from geometry.cache import finger_mesh
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
 from geometry.mesh.wall_motion import WallMotion
 from solvers.elasticity import lame_constants
 from solvers.pinn.finite_basis.standard import PinnStdSolver
@@ -21,10 +18,8 @@ STEP = 1e-5
 
 
 @pytest.fixture(scope="module")
-def mesh():
-    """A short finger with one rib."""
-    design = Design(height=50, rib_count=1, tip_length=12, contact_position=20)
-    return finger_mesh(design, settings=MeshSettings(size=1.0))
+def mesh(short_mesh):
+    return short_mesh
 
 
 @pytest.fixture(scope="module")

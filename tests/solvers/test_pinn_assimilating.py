@@ -11,6 +11,7 @@ from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.quadrature import body_quadrature
+from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
 from solvers.assimilation.misfit import assimilates
 from solvers.fem.assimilating import FemAsmSolver
@@ -25,6 +26,9 @@ from tests.solvers.autograd_reference import PlainPinn
 from tests.solvers.conftest import bar_mesh
 
 QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3, "tolerance": 0.05}
+FINER = QUICK | {"corner_spacing": 0.15}
+"""Within 1 % of finite elements: 0.8 %."""
+
 PINN_ASM = PinnAsmSolver(**QUICK)
 
 
@@ -45,6 +49,15 @@ def observed(problem: Problem, markers: np.ndarray, displacements: np.ndarray) -
 
 
 @pytest.fixture(scope="module")
+def coarse_mesh():
+    """A short finger with one rib and nine markers on its front, on which networks train quickly."""
+    design = Design(
+        height=50, rib_count=1, tip_length=12, contact_position=20, marker_layout="front", marker_count=9
+    )
+    return finger_mesh(design, settings=MeshSettings(size=1.0))
+
+
+@pytest.fixture(scope="module")
 def plain(coarse_mesh):
     return PinnStdSolver(**QUICK).solve(Problem(coarse_mesh))
 
@@ -54,7 +67,7 @@ def problem(coarse_mesh, plain) -> Problem:
     """Markers that went farther than the model goes, by half a millimetre at the tip."""
     markers = coarse_mesh.markers
     return observed(
-        plain.problem, markers, plain.displacement(markers) + [0.2, -0.5] * (markers[:, :1] / 90) ** 2
+        plain.problem, markers, plain.displacement(markers) + [0.2, -0.5] * (markers[:, :1] / 50) ** 2
     )
 
 
@@ -134,18 +147,20 @@ def distances(found, exact, problem: Problem) -> tuple[float, float]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("weights", ["paper", "precision"])
+@pytest.mark.parametrize(
+    "given", [{"weights": "paper"}, {"weights": "precision"}, {"marker_radius": 0.0}], ids=str
+)
 @pytest.mark.parametrize("solver", [PinnAsmSolver, PinnLocalAsmSolver])
-def test_it_is_near_the_exact_minimiser_of_finite_elements(problem, solver, weights):
-    """Within 1 % with few units; the network without the markers is 3 % away."""
-    given = {"weights": weights}
+def test_it_is_near_the_exact_minimiser_of_finite_elements(problem, plain, solver, given):
+    """Within 1 % with few units; the network without the markers is farther away."""
     exact = FemAsmSolver(**given).solve(problem)
-    assert max(distances(solver(**QUICK, **given).solve(problem), exact, problem)) < 0.01
+    assert max(distances(solver(**FINER, **given).solve(problem), exact, problem)) < 0.01
+    assert min(distances(plain, exact, problem)) > 0.02
 
 
 def test_the_curve_is_that_of_finite_elements(problem):
     """Energy and misfits for all weights that matter, within what the few units cost at the ribs' ends."""
-    ours = l_curve(PinnAsmSolver(**QUICK | {"corner_spacing": 0.15}), problem)
+    ours = l_curve(PinnAsmSolver(**FINER), problem)
     exact = FemAsmSolver().solve(problem).history
     assert ours.keys() == exact.keys()
     matter = (ours["weight_factor"] > 1e-8) & (ours["weight_factor"] < 1)
@@ -186,15 +201,15 @@ def test_the_chosen_weights_are_the_best_on_the_curve(problem, choose):
 
 def test_a_contact_that_is_not_certain_is_one_on_springs(problem):
     """Their force is the indenter's; near the same of finite elements, far from a contact that is certain."""
-    settings = {"weights": "precision", "contact_deviation": 0.8, "scale": 0.05}
-    solver = PinnAsmSolver(**QUICK, **settings)
-    # markers that went as if the contact had moved by half a millimetre less
-    less = replace(problem.observations, displacements=0.95 * problem.observations.displacements)
+    settings = {"weights": "precision", "contact_deviation": 0.8, "scale": 0.02}
+    solver = PinnAsmSolver(**FINER, **settings)
+    # markers that went as if the contact had moved by a millimetre less
+    less = replace(problem.observations, displacements=0.9 * problem.observations.displacements)
     problem = replace(problem, observations=less)
     solution, exact = solver.solve(problem), FemAsmSolver(**settings).solve(problem)
     points, weights = contact_functional(problem)
     moved = weights @ solution.displacement(points)
-    np.testing.assert_allclose(0.05 / 0.8**2 * ([0.0, -10.0] - moved), solution.reaction, rtol=1e-6)
+    np.testing.assert_allclose(0.02 / 0.8**2 * ([0.0, -10.0] - moved), solution.reaction, rtol=1e-6)
     assert max(distances(solution, exact, problem)) < 0.01
     np.testing.assert_allclose(solution.left_out, exact.left_out, atol=0.05)
     certain = FemAsmSolver(**{**settings, "contact_deviation": 0.0}).solve(problem)
@@ -214,10 +229,7 @@ def test_no_weights_are_chosen_at_finite_strain(bent):
 @pytest.mark.slow
 @pytest.mark.parametrize("solver", [PinnAsmSolver, PinnLocalAsmSolver])
 def test_simulated_markers_are_met_as_by_finite_elements(solver):
-    """The default finger and settings, where the model cannot follow: 0.05 % and 0.011 mm are usual.
-
-    With the centres in place of the discs the two are 1 % apart, since both have no limit under refinement.
-    """
+    """The default finger and settings, where the model cannot follow: 0.05 % and 0.011 mm are usual."""
     plain = Problem(finger_mesh(Design()))
     problem = replace(plain, observations=virtual_experiment(plain, 0.8)[0])
     found, exact = solver().solve(problem), FemAsmSolver().solve(problem)
@@ -225,8 +237,6 @@ def test_simulated_markers_are_met_as_by_finite_elements(solver):
     assert max(distances(found, exact, problem)) < 0.001
     errors = np.abs(found.displacement(problem.observations.points) - problem.observations.displacements)
     assert errors.mean(axis=0).max() < 0.03
-    at_points, exact_at_points = (kind(marker_radius=0.0).solve(problem) for kind in (solver, FemAsmSolver))
-    assert max(distances(at_points, exact_at_points, problem)) < 0.02
 
 
 def test_markers_are_met_and_energy_pays_for_it(solution, plain, problem):
@@ -312,7 +322,7 @@ def test_the_papers_loss_is_energy_plus_misfit_over_the_area(problem, settings):
             - evaluation.total
             - size * float((evaluation.gradient * direction).sum())
         )
-        for size in (2e-3, 1e-3)
+        for size in (1e-3, 5e-4)
     ]
     assert rest[0] / rest[1] == pytest.approx(4, rel=0.05)
 

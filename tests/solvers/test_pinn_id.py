@@ -7,7 +7,6 @@ import pytest
 
 from geometry.cache import finger_mesh
 from geometry.errors import UserError
-from geometry.finger.design import Design
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
@@ -15,7 +14,7 @@ from solvers.fem.identification.solver import FemIdSolver
 from solvers.identification.identifier import Identifier
 from solvers.pinn.identification.solver import PinnIdSolver
 from solvers.problem import Load, Material, Problem
-from tests.solvers.conftest import observed_at
+from tests.solvers.conftest import SHORT, observed_at
 
 NOISE = 0.01
 SETTINGS = {"coarse": 2.2, "fine": 1.6}
@@ -24,8 +23,7 @@ SETTINGS = {"coarse": 2.2, "fine": 1.6}
 @pytest.fixture(scope="module")
 def problem():
     """A short finger with one rib, and its markers under a sliding patch, with noise."""
-    design = Design(height=50, rib_count=1, tip_length=12, contact_position=20)
-    mesh = finger_mesh(design, settings=MeshSettings(size=0.5))
+    mesh = finger_mesh(SHORT, settings=MeshSettings(size=0.5))
     material = Material(law="neo-hookean")
     truth = FemNonlinearSolver().solve(Problem(mesh, material, Load(kind="patch", displacement=(None, -4.0))))
     moved = truth.displacement(mesh.markers)

@@ -139,12 +139,12 @@ def test_displacement_and_stress_are_those_of_finite_elements():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [PinnStdSolver, PinnLocalSolver])
-def test_a_broken_law_is_seen(coarse_mesh, monkeypatch, kind):
-    """The first Lamé constant of plane stress in place of plane strain's: 20 % in stress; else 6 %.
+def test_a_broken_law_is_seen(short_mesh, monkeypatch, kind):
+    """The first Lamé constant of plane stress in place of plane strain's: 19 % in stress; else 5 or 6 %.
 
     Hardly anything else shows in a finger that is moved by displacements: Young's modulus cancels.
     """
-    solver, problem = kind(wall_spacing=0.8, corner_spacing=0.05), Problem(coarse_mesh)
+    solver, problem = kind(wall_spacing=0.8, corner_spacing=0.1, neurons=4), Problem(short_mesh)
     reference = FemSolver().solve(problem)
     assert errors(solver.solve(problem), reference)[1] < 0.1
     law = network_energy.piola_stress_and_tangent
@@ -157,31 +157,31 @@ def test_a_broken_law_is_seen(coarse_mesh, monkeypatch, kind):
 
 
 @pytest.mark.slow
-def test_same_seed_same_network_other_seed_other_network(coarse_mesh):
-    problem = Problem(coarse_mesh)
+def test_same_seed_same_network_other_seed_other_network(short_mesh):
+    problem = Problem(short_mesh)
     first, again, other = (
-        PinnStdSolver(**QUICK, seed=seed).solve(problem).displacement(coarse_mesh.markers)
+        PinnStdSolver(**QUICK, seed=seed).solve(problem).displacement(short_mesh.markers)
         for seed in (1, 1, 2)
     )
     np.testing.assert_allclose(first, again, rtol=1e-9)
     assert np.abs(first - other).max() > 1e-6
 
 
-def test_energy_falls_from_level_to_level(coarse_mesh):
-    solution = PinnStdSolver(**QUICK).solve(Problem(coarse_mesh))
+def test_energy_falls_from_level_to_level(short_mesh):
+    solution = PinnStdSolver(**QUICK).solve(Problem(short_mesh))
     assert (np.diff(solution.history["energy"]) < 0).all()
     assert (np.diff(solution.history["units"]) > 0).all()
 
 
-def test_too_few_encoders_are_reported_as_not_converged(coarse_mesh):
-    solution = PinnStdSolver(wall_spacing=5.0, corner_spacing=5.0, neurons=2).solve(Problem(coarse_mesh))
+def test_too_few_encoders_are_reported_as_not_converged(short_mesh):
+    solution = PinnStdSolver(wall_spacing=5.0, corner_spacing=5.0, neurons=2).solve(Problem(short_mesh))
     assert not solution.status.converged
     assert "take a smaller spacing" in solution.status.message
 
 
-def test_point_load_of_the_paper_is_met(coarse_mesh):
-    solution = PinnStdSolver(**QUICK).solve(Problem(coarse_mesh, load=Load(kind="point")))
-    np.testing.assert_allclose(solution.displacement([[35.0, 0.0]]), [[0.0, -10.0]], atol=1e-6)
+def test_point_load_of_the_paper_is_met(short_mesh):
+    solution = PinnStdSolver(**QUICK).solve(Problem(short_mesh, load=Load(kind="point")))
+    np.testing.assert_allclose(solution.displacement([[20.0, 0.0]]), [[0.0, -10.0]], atol=1e-6)
 
 
 @pytest.mark.parametrize(
