@@ -175,7 +175,7 @@ def draw(looks: list[Look]) -> None:
     """Energy, differences from `fem` and errors at the markers over the epochs."""
     runs = [list(group) for _, group in groupby(looks, key=lambda look: look[:2])]
     with figure(6.2) as drawn:
-        drawn.subplots_adjust(left=0.12, right=0.97, top=0.97, bottom=0.07, hspace=0.12)
+        drawn.subplots_adjust(left=0.16, right=0.97, top=0.97, bottom=0.07, hspace=0.12)
         energy, differences, markers = drawn.subplots(3, sharex=True)
         for number, run in enumerate(runs):
             epochs = [look.epoch for look in run]
@@ -197,7 +197,7 @@ def draw(looks: list[Look]) -> None:
         differences.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
         for name, style in (("fem_mae_u", "-"), ("fem_mae_v", "--")):
             markers.axhline(getattr(looks[-1], name), color=MUTED, lw=0.8, ls=style)
-        energy.legend(loc="upper right")
+        energy.legend(loc="lower left")
         for axes, first, second in ((differences, "displacement", "von Mises stress"), (markers, "u", "v")):
             lines = [Line2D([], [], color=INK, marker="o", ms=2.5, label=first)]
             lines.append(Line2D([], [], color=INK, marker="s", ms=2.5, ls="--", label=second))

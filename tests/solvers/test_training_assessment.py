@@ -43,6 +43,16 @@ def test_a_free_component_has_no_reaction(medium_fem):
     assert reaction[1] < 0
 
 
+@pytest.mark.parametrize(("share", "hidden"), [(0.6, False), (0.4, True)])
+def test_energy_between_the_collocation_points_is_said(medium_fem, share, hidden):
+    """The network sees a share of its energy; half is the limit."""
+    problem, energies = medium_fem.problem, [share * medium_fem.energy] * 4
+    *_, status = assess_training(problem, medium_fem.field, training(*energies))
+    assert status.converged != hidden
+    assert ("the displacement jumps between the points" in status.message) == hidden
+    assert ("take collocation=elements" in status.message) == hidden
+
+
 @pytest.mark.parametrize(
     ("factor", "energies", "converged"),
     [
