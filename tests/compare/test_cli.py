@@ -159,7 +159,7 @@ BAD = [
     ("compare --solvers fem --solver-set fem.degree=7", "degree 1 and 2, not 7"),
     ("compare --solvers fem --solver-set fem.degree=1 --solver-set fem.degree=2", "fem.degree is set twice"),
     ("compare --seed -1", "--seed -1: give a whole number from 0"),
-    ("compare --preset papre", r"none of the solvers fem,.* has it \(pinn-std has fast, paper, trained; pinn-asm has"),
+    ("compare --preset papre", r"none of the solvers fem,.* has it \(pinn-std has fast, paper, trained;"),
     ("compare --preset paper --solvers fem", "--preset paper: none of the solvers fem has it"),
     ("compare --solver-set pinn-std.ridges=7", "pinn-std: the setting 'ridges' is now called 'neurons'"),
     ("compare --solver-set pinn-std.preset=slow", "pinn-std has no preset 'slow'; it has fast, paper"),
