@@ -25,6 +25,13 @@ def short_mesh() -> TriangleMesh:
 
 
 @pytest.fixture(scope="session")
+def marked_mesh() -> TriangleMesh:
+    """The same finger with nine markers along its front."""
+    design = SHORT.replaced(marker_layout="front", marker_count=9)
+    return finger_mesh(design, settings=MeshSettings(size=1.0))
+
+
+@pytest.fixture(scope="session")
 def medium_mesh() -> TriangleMesh:
     """The default finger with elements of 0.5 mm."""
     return finger_mesh(Design(), settings=MeshSettings(size=0.5))

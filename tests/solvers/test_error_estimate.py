@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from geometry.cache import finger_mesh
-from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.error_estimate import ErrorEstimator
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
@@ -15,7 +14,7 @@ from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, State
-from tests.solvers.conftest import bar_mesh
+from tests.solvers.conftest import SHORT, bar_mesh
 
 
 class Effectivity(NamedTuple):
@@ -51,18 +50,29 @@ def effectivity(solution: Solution, finer: Solution) -> Effectivity:
 
 
 @pytest.fixture(scope="module")
+def medium_mesh():
+    """The short finger with elements of 0.5 mm."""
+    return finger_mesh(SHORT, settings=MeshSettings(size=0.5))
+
+
+@pytest.fixture(scope="module")
+def medium_fem(medium_mesh):
+    return FemSolver().solve(Problem(medium_mesh))
+
+
+@pytest.fixture(scope="module")
 def graded():
     """Finer by far where it counts: the energy error of the meshes below is in the corners."""
-    return finger_mesh(Design(), settings=MeshSettings(size=0.4, corner_size=0.01, contact_size=0.05))
+    return finger_mesh(SHORT, settings=MeshSettings(size=0.4, corner_size=0.01, contact_size=0.05))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["mean", "patch"])
 @pytest.mark.parametrize("degree", [1, 2])
-def test_estimates_on_the_finger_are_within_a_factor_of_two(coarse_mesh, medium_mesh, graded, kind, degree):
-    """Seen: 0.94 to 1.09 in energy, 0.83 to 1.39 for displacements, 0.97 to 1.58 for the von Mises stress."""
+def test_estimates_on_the_finger_are_within_a_factor_of_two(short_mesh, medium_mesh, graded, kind, degree):
+    """Seen: 0.93 to 1.05 in energy, 0.79 to 1.22 for displacements, 0.90 to 1.45 for the von Mises stress."""
     finer = FemSolver(estimate=False).solve(Problem(graded, load=Load(kind=kind)))
-    for mesh in (coarse_mesh, medium_mesh):
+    for mesh in (short_mesh, medium_mesh):
         found = effectivity(FemSolver(degree).solve(Problem(mesh, load=Load(kind=kind))), finer)
         assert 0.8 < found.energy_norm < 1.25
         assert 0.5 < min(found) < max(found) < 2
@@ -100,23 +110,23 @@ def test_the_estimate_of_a_smooth_problem_is_exact_in_the_limit(degree):
     assert 0.9 < error.energy_norm / true < 1.1
 
 
-def test_one_solve_gives_what_the_dual_problem_of_each_marker_gives(coarse_mesh):
+def test_one_solve_gives_what_the_dual_problem_of_each_marker_gives(short_mesh):
     """c(R u, R z) with the dual solution z of the functional, against the estimated error at the marker."""
-    problem, space = Problem(coarse_mesh), LagrangeSpace(coarse_mesh, 2)
+    problem, space = Problem(short_mesh), LagrangeSpace(short_mesh, 2)
     equilibrium = LinearEquilibrium.of(LinearElasticity.of(problem, space))
     nodal, estimator = equilibrium.solution(), ErrorEstimator(problem, space)
     error = estimator.estimate(nodal, equilibrium.response)
     stress = State.from_gradient(estimator.gradient_error(nodal), problem).stress
-    for marker, axis in ((0, 0), (4, 1)):
+    for marker, axis in ((0, 0), (2, 1)):
         functional = np.zeros_like(nodal)
-        functional[coarse_mesh.marker_nodes[marker], axis] = 1.0
+        functional[short_mesh.marker_nodes[marker], axis] = 1.0
         dual = estimator.gradient_error(equilibrium.response(functional))
         products = estimator.rule.weights * np.einsum("qij,qij->q", stress, dual)
         assert products.sum() == pytest.approx(error.markers[marker, axis], rel=1e-8)
 
 
 def test_the_improved_field_is_nearer_to_the_exact_one(medium_fem, graded):
-    """Over the markers by half: the estimate has the right sign there, too. Seen: 0.0025 to 0.0011 mm."""
+    """Over the markers by half: the estimate has the right sign there, too. Seen: 0.0011 to 0.0001 mm."""
     finer = FemSolver(estimate=False).solve(Problem(graded))
     markers = medium_fem.problem.mesh.markers
     exact, place = finer.displacement(markers), medium_fem.problem.mesh.locate(markers)
@@ -129,23 +139,23 @@ def test_the_status_states_the_estimate(medium_fem):
     assert f"{medium_fem.error.at_markers:.2g} mm at the markers" in medium_fem.status.message
 
 
-def test_a_point_load_has_no_estimate_and_says_why(coarse_mesh):
-    solution = FemSolver().solve(Problem(coarse_mesh, load=Load(kind="point")))
+def test_a_point_load_has_no_estimate_and_says_why(short_mesh):
+    solution = FemSolver().solve(Problem(short_mesh, load=Load(kind="point")))
     assert solution.error is None
     assert "no limit under refinement" in solution.status.message
 
 
-def test_the_estimate_can_be_left_out(coarse_mesh):
-    solution = FemSolver(estimate=False).solve(Problem(coarse_mesh, Material(plane="stress")))
+def test_the_estimate_can_be_left_out(short_mesh):
+    solution = FemSolver(estimate=False).solve(Problem(short_mesh, Material(plane="stress")))
     assert solution.error is None
     assert "was not estimated" in solution.status.message
 
 
-def test_at_a_small_stroke_the_finite_strain_estimate_is_the_linear_one(coarse_mesh):
+def test_at_a_small_stroke_the_finite_strain_estimate_is_the_linear_one(short_mesh):
     """Up to the ratio of stroke and size; the von Mises error is of first order in the error there."""
     load = Load(displacement=(0.0, -1e-3))
-    linear = FemSolver().solve(Problem(coarse_mesh, load=load)).error
-    finite = FemNonlinearSolver().solve(Problem(coarse_mesh, Material(law="neo-hookean"), load)).error
+    linear = FemSolver().solve(Problem(short_mesh, load=load)).error
+    finite = FemNonlinearSolver().solve(Problem(short_mesh, Material(law="neo-hookean"), load)).error
     assert finite.energy_norm == pytest.approx(linear.energy_norm, rel=1e-3)
     assert finite.displacement == pytest.approx(linear.displacement, rel=1e-3)
     assert finite.von_mises == pytest.approx(linear.von_mises, rel=0.15)
@@ -154,13 +164,15 @@ def test_at_a_small_stroke_the_finite_strain_estimate_is_the_linear_one(coarse_m
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "load", [Load(), Load(kind="patch", displacement=(None, -10.0))], ids=["mean", "slide"]
+    "load",
+    [Load(displacement=(0.0, -5.0)), Load(kind="patch", displacement=(None, -5.0))],
+    ids=["mean", "slide"],
 )
-def test_estimates_at_finite_strain_are_within_a_factor_of_two(coarse_mesh, graded, load):
+def test_estimates_at_finite_strain_are_within_a_factor_of_two(short_mesh, graded, load):
     """Seen: 1.03 in energy, 1.03 to 1.11 for displacements, 1.5 to 1.6 for the von Mises stress."""
     material, solver = Material(law="neo-hookean"), FemNonlinearSolver()
     finer = solver.solve(Problem(graded, material, load))
-    solution = solver.solve(Problem(coarse_mesh, material, load))
+    solution = solver.solve(Problem(short_mesh, material, load))
     found = effectivity(solution, finer)
     assert 0.8 < found.energy_norm < 1.25
     assert 0.5 < min(found) < max(found) < 2
@@ -168,11 +180,11 @@ def test_estimates_at_finite_strain_are_within_a_factor_of_two(coarse_mesh, grad
 
 
 @pytest.mark.slow
-def test_a_finite_strain_solution_that_stops_early_or_has_no_limit_has_no_estimate(coarse_mesh):
+def test_a_finite_strain_solution_that_stops_early_or_has_no_limit_has_no_estimate(short_mesh):
     material = Material(law="neo-hookean")
-    point = Problem(coarse_mesh, material, Load(kind="point", displacement=(0.0, -0.1)))
+    point = Problem(short_mesh, material, Load(kind="point", displacement=(0.0, -0.1)))
     assert FemNonlinearSolver().solve(point).error is None
-    torn = Problem(coarse_mesh, material, Load(displacement=(0.0, -80.0)))
+    torn = Problem(short_mesh, material, Load(displacement=(0.0, -50.0)))
     stopped = FemNonlinearSolver(min_step=0.05).solve(torn)
     assert not stopped.status.converged
     assert stopped.error is None

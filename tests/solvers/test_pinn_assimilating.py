@@ -11,7 +11,6 @@ from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.quadrature import body_quadrature
-from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
 from solvers.assimilation.misfit import assimilates
 from solvers.fem.assimilating import FemAsmSolver
@@ -49,23 +48,14 @@ def observed(problem: Problem, markers: np.ndarray, displacements: np.ndarray) -
 
 
 @pytest.fixture(scope="module")
-def coarse_mesh():
-    """A short finger with one rib and nine markers on its front, on which networks train quickly."""
-    design = Design(
-        height=50, rib_count=1, tip_length=12, contact_position=20, marker_layout="front", marker_count=9
-    )
-    return finger_mesh(design, settings=MeshSettings(size=1.0))
+def plain(marked_mesh):
+    return PinnStdSolver(**QUICK).solve(Problem(marked_mesh))
 
 
 @pytest.fixture(scope="module")
-def plain(coarse_mesh):
-    return PinnStdSolver(**QUICK).solve(Problem(coarse_mesh))
-
-
-@pytest.fixture(scope="module")
-def problem(coarse_mesh, plain) -> Problem:
+def problem(marked_mesh, plain) -> Problem:
     """Markers that went farther than the model goes, by half a millimetre at the tip."""
-    markers = coarse_mesh.markers
+    markers = marked_mesh.markers
     return observed(
         plain.problem, markers, plain.displacement(markers) + [0.2, -0.5] * (markers[:, :1] / 50) ** 2
     )
@@ -269,9 +259,9 @@ def test_as_the_weight_goes_to_zero_so_do_the_markers(problem, plain):
     assert far / near == pytest.approx(10, rel=0.05)
 
 
-def test_without_observations_it_is_the_network_without_markers(coarse_mesh, plain):
-    found = PINN_ASM.solve(Problem(coarse_mesh)).displacement(coarse_mesh.markers)
-    np.testing.assert_allclose(found, plain.displacement(coarse_mesh.markers), rtol=1e-9)
+def test_without_observations_it_is_the_network_without_markers(marked_mesh, plain):
+    found = PINN_ASM.solve(Problem(marked_mesh)).displacement(marked_mesh.markers)
+    np.testing.assert_allclose(found, plain.displacement(marked_mesh.markers), rtol=1e-9)
 
 
 def test_neither_order_nor_unseen_markers_matter(problem, solution):

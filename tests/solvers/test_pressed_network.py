@@ -10,7 +10,7 @@ from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.lagrange import LagrangeSpace
 from solvers.pinn.finite_basis import pressed_network
 from solvers.pinn.finite_basis.local import PinnLocalSolver
-from solvers.pinn.finite_basis.pressed_network import PENETRATION
+from solvers.pinn.finite_basis.pressed_network import PENETRATION, PressedNetwork
 from solvers.problem import Load, Material, Problem
 
 LOCAL = PinnLocalSolver(wall_spacing=0.7, corner_spacing=0.1, tolerance=0.1)
@@ -57,6 +57,30 @@ def test_the_cylinder_only_presses_and_is_not_entered(local, problem):
     assert gap.min() >= -PENETRATION
     assert np.count_nonzero(np.abs(gap) <= PENETRATION) >= 1
     assert local.stats["unstable_directions"] == 0
+
+
+def test_a_newton_step_is_that_of_the_residual_by_differences(problem, local):
+    """Out of equilibrium, so that the nodes that touch also slide: forces turn with the normal."""
+    pressed = PressedNetwork.of(LOCAL.level(problem, 2.0), problem)
+    output = pressed.network.project(local.field)
+    middle = len(pressed.contact.positions) // 3
+    multipliers = np.zeros(len(pressed.contact.positions))
+    multipliers[middle : middle + 3] = 20.0
+
+    def residual(output):
+        stage = pressed.stage(output, 1.0, multipliers)
+        gradient, _ = pressed.network.energy.derivatives(output)
+        pressing = pressed.values.T @ pressed.contact.gradient(stage)
+        return gradient.numpy() + pressing.reshape(len(output), -1, 2).swapaxes(1, 2)
+
+    stage = pressed.stage(output, 1.0, multipliers)
+    touching = np.flatnonzero(pressed.contact.forces(stage) > 0)
+    step = pressed._step(stage, output, touching)
+    assert step is not None
+    assert len(touching) >= 3
+    part = 1e-4
+    slope = (residual(output + part * step.change) - residual(output - part * step.change)) / (2 * part)
+    np.testing.assert_allclose(slope, -residual(output), atol=1e-6 * np.abs(residual(output)).max())
 
 
 @pytest.mark.slow
