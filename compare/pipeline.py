@@ -47,6 +47,7 @@ from geometry.observations import Observations
 from solvers.adaptation import check_adaptable
 from solvers.assimilation.misfit import assimilates
 from solvers.problem import Load, Material, Problem
+from solvers.shared_work import SharedWork
 from solvers.solver import (
     Solver,
     SolverFailedError,
@@ -201,10 +202,12 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
     settings: dict[str, dict[str, object]] = {}
     failed: dict[str, str] = {}
     fault: SolverFailedError | None = None
+    work = SharedWork()
     for solver in solvers:
         trained = _in_context(solver, job, folder, evaluations)
         try:
-            evaluations.append(_evaluate(job, trained, problem, observations, folder, stages))
+            with work.used():
+                evaluations.append(_evaluate(job, trained, problem, observations, folder, stages))
             settings[solver.name] = solver.settings()
         except UnsupportedProblemError as error:
             if solver.name not in job.spare:

@@ -98,7 +98,7 @@ def torch_threads(count: int) -> Iterator[int]:
         torch.set_num_threads(before)
 
 
-PATCH = 96
+PATCH = 192
 """Points in a patch: with fewer, a window is in more patches; with more, it is far from some points."""
 
 MANY, MOST = 1000, 1024

@@ -6,19 +6,14 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from geometry.arrays import FloatArray, IntArray
+from geometry.arrays import FloatArray
 from solvers.assimilation.marker_forces import MarkerForces
 from solvers.assimilation.marker_weighting import MarkerWeighting
-from solvers.assimilation.misfit import Misfit
 from solvers.constrained_elimination import ConstrainedElimination
-from solvers.pinn.finite_basis.energy import NetworkEnergy
+from solvers.pinn.finite_basis.energy import REGULARISATION, NetworkEnergy
 from solvers.pinn.finite_basis.load_conditions import load_conditions
 from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
 from solvers.problem import Problem
-
-REGULARISATION = 1e-12
-"""Added to the unit diagonal of the scaled system, against nearly dependent basis functions."""
-
 
 INVERSE_ITERATIONS = 3
 """Enough to leave soft directions of an unstable equilibrium, not only the softest."""
@@ -34,6 +29,7 @@ class NewtonIterate(NamedTuple):
         markers: The forces at the markers for all factors of their weights; None at finite strain.
         factor: The factor taken.
         unstable: Number of directions in which the energy falls at the output layer before the step.
+        energy: Elastic energy per depth, N mm/mm, where it is quadratic and so half of the forces' work.
     """
 
     output: torch.Tensor
@@ -42,6 +38,7 @@ class NewtonIterate(NamedTuple):
     markers: MarkerForces | None = None
     factor: float = 1.0
     unstable: int = 0
+    energy: float | None = None
 
 
 class LinearResponse(NamedTuple):
@@ -51,12 +48,14 @@ class LinearResponse(NamedTuple):
         residual: First derivative of the energy there, shape (U,), N/mm.
         free: Newton's step without springs, shape (U,), mm.
         unit: Steps by unit forces of the springs, shape (n, U), mm per N/mm.
+        damping: Diagonal that regularised the second derivative, shape (U,), N/mm^2.
         negative: Number of negative eigenvalues of the second derivative.
     """
 
     residual: FloatArray
     free: FloatArray
     unit: FloatArray
+    damping: FloatArray
     negative: int
 
 
@@ -86,14 +85,12 @@ class ConstrainedNetwork:
     @classmethod
     def of(
         cls,
-        basis: FiniteBasis,
+        energy: NetworkEnergy,
         problem: Problem,
-        points: FloatArray,
-        weights: FloatArray,
         weighting: MarkerWeighting | None = None,
     ) -> "ConstrainedNetwork":
-        """The network of a basis with a quadrature: points (q, 2), mm, and weights (q,), mm^2."""
-        conditions = load_conditions(problem)
+        """The network of an energy under the load and, with a weighting, the markers of a problem."""
+        basis, conditions = energy.basis, load_conditions(problem)
         functionals = _functionals(basis, conditions.points, conditions.weights, problem.load.prescribed)
         size, targets = functionals.shape[-1], conditions.values.ravel()
         functionals, compliance = functionals.reshape(-1, size), np.zeros(len(targets))
@@ -104,7 +101,7 @@ class ConstrainedNetwork:
             targets = np.concatenate([targets, misfit.observed.ravel()])
             compliance = np.concatenate([compliance + weighting.slack, 1 / misfit.weights.ravel()])
         return cls(
-            NetworkEnergy.of(basis, problem.material, points, weights),
+            energy,
             functionals,
             targets,
             compliance,
@@ -166,39 +163,38 @@ class ConstrainedNetwork:
 
     def linear_response(self, output: torch.Tensor, shift: float = REGULARISATION) -> LinearResponse | None:
         """One factorisation, and one solve for every spring; None as in `step`."""
-        gradient, hessian = self.energy.derivatives(output)
-        if not torch.isfinite(gradient).all():
-            return None
+        if self.energy.quadratic and shift == REGULARISATION and not output.any():
+            gradient, factors = output, self.energy.factors_at_rest
+        else:
+            gradient, hessian = self.energy.derivatives(output)
+            if not torch.isfinite(gradient).all():
+                return None
+            factors = hessian.factorised(shift, definite=self.energy.material.law == "linear")
         residual = gradient.numpy().ravel()
-        factors = hessian.factorised(shift, definite=self.energy.material.law == "linear")
-        try:
-            free, *responses = factors.solve(np.concatenate([-residual[None], self.functionals]))
-            unit = np.reshape(responses, self.functionals.shape)
-            return LinearResponse(residual, free, unit, factors.negative)
-        finally:
-            factors.close()
+        free, *responses = factors.solve(np.concatenate([-residual[None], self.functionals]))
+        unit = np.reshape(responses, self.functionals.shape)
+        return LinearResponse(residual, free, unit, factors.damping, factors.negative)
 
     def softest(self, output: torch.Tensor) -> FloatArray:
         """A soft direction at an output layer, of its shape, by inverse iteration under the constraints."""
         _, hessian = self.energy.derivatives(output)
         factors = hessian.factorised(REGULARISATION, definite=False)
-        try:
-            springs = ConstrainedElimination(
-                self.functionals, factors.solve(self.functionals), self.compliance
-            )
-            found = np.random.default_rng(0).standard_normal(self.functionals.shape[1])
-            for _ in range(INVERSE_ITERATIONS):
-                found, _ = springs.solution(factors.solve(found[None])[0])
-                found /= np.abs(found).max()
-        finally:
-            factors.close()
+        springs = ConstrainedElimination(self.functionals, factors.solve(self.functionals), self.compliance)
+        found = np.random.default_rng(0).standard_normal(self.functionals.shape[1])
+        for _ in range(INVERSE_ITERATIONS):
+            found, _ = springs.solution(factors.solve(found[None])[0])
+            found /= np.abs(found).max()
         return found.reshape(output.shape)
 
     def constrained_step(
         self, output: torch.Tensor, response: LinearResponse, fraction: float = 1.0
     ) -> NewtonIterate:
-        """The Newton step by the springs' forces that close their gaps."""
-        residual, free, unit, negative = response
+        """The Newton step by the springs' forces that close their gaps.
+
+        At the end of the step s the derivative of a quadratic energy is f_k b_k less the damping's D s, and
+        the energy half of its product with the output layer.
+        """
+        residual, free, unit, damping, negative = response
         springs = ConstrainedElimination(self.functionals, unit, self.compliance)
         values = fraction * self.targets - springs.values(output.numpy())
         markers = self._marker_forces(springs, values - springs.values(free))
@@ -208,13 +204,16 @@ class ConstrainedNetwork:
         change, forces = springs.solution(free, values)
         decrement = abs(float((forces @ self.functionals - residual) @ change))
         work = abs(float(fraction * self.targets @ forces))
+        reached = output + torch.from_numpy(change).view_as(output)
+        derivative = forces @ self.functionals - damping * change
         return NewtonIterate(
-            output + torch.from_numpy(change).view_as(output),
+            reached,
             forces,
             decrement / work if work else decrement,
             markers,
             factor,
             springs.unstable(negative),
+            0.5 * float(derivative @ reached.numpy().ravel()) if self.energy.quadratic else None,
         )
 
     def energy_with_springs(self, output: torch.Tensor, fraction: float = 1.0) -> float:
@@ -224,19 +223,9 @@ class ConstrainedNetwork:
         gaps = fraction * self.targets - flat @ output.numpy().ravel()
         return self.energy.total(output) + 0.5 * float((gaps[soft] ** 2 / self.compliance[soft]).sum())
 
-    def with_misfit(self, misfit: Misfit, rows: IntArray) -> "ConstrainedNetwork":
-        """The network with some of its springs, all of the load's among them, and another misfit's values."""
-        count = self.load_count
-        return replace(
-            self,
-            functionals=self.functionals[rows],
-            targets=np.concatenate([self.targets[:count], misfit.observed.ravel()]),
-            compliance=np.concatenate([self.compliance[:count], 1 / misfit.weights.ravel()]),
-        )
-
     def _marker_forces(self, springs: ConstrainedElimination, gap: FloatArray) -> MarkerForces | None:
         """The forces at the markers, the load's forces eliminated, of springs that close gaps (n,), mm."""
-        if self.energy.material.law != "linear" or self.weighting is None:
+        if not self.energy.quadratic or self.weighting is None:
             return None
         load, soft = slice(self.load_count), slice(self.load_count, None)
         flexibility, stiff = springs.flexibility, springs.schur_complement[load, load]

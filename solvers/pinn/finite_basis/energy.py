@@ -6,6 +6,8 @@ Source of stress and tangent: J. Bonet, R. D. Wood, Nonlinear Continuum Mechanic
 
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
+from functools import cached_property
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -15,9 +17,12 @@ from scipy.sparse import csr_matrix
 from geometry.arrays import FloatArray, IntArray
 from solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
 from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
-from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
+from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix, Factors
 from solvers.pinn.threading import boxes_around, imap_in_threads
 from solvers.problem import Material
+
+REGULARISATION = 1e-12
+"""Added to the unit diagonal of the scaled Hessian, against nearly dependent basis functions."""
 
 KEPT = 2**30
 """Most bytes of basis gradients that an energy of finite strain keeps for its next evaluation.
@@ -26,14 +31,17 @@ The two levels of `pinn-std` on the default finger have 0.12 and 0.4 GB of them.
 computed anew for every evaluation.
 """
 
+STRIP = 8
+"""Windows whose rows of blocks are computed at a time: blocks below the diagonal are in few of these."""
+
 
 class QuadraturePatch(NamedTuple):
     """A few neighbouring quadrature points.
 
     Attributes:
         points: Shape (p, 2), mm.
-        near: Numbers of the windows that reach them, (w,).
-        pairs: Numbers of the blocks of all pairs of these windows, (w w,); see `NetworkEnergy`.
+        near: Numbers of the windows that reach them, ascending, (w,).
+        pairs: Numbers of the blocks of the pairs of these windows, (w, w); see `NetworkEnergy`.
         rows: Of the points among those of all patches.
     """
 
@@ -49,8 +57,9 @@ class NetworkEnergy:
 
     Every patch adds a small dense Hessian of the output weights that reach it. With the derivatives Z_x and
     Z_y of the basis functions and the tangent A, the block of the components i and k is the sum over j and l
-    of Z_j^T w A_ijkl Z_l; one matrix product gives all blocks. Those of the windows (a, b) have the number of
-    the pair's row and column if a <= b, else that of (b, a) plus the number of rows.
+    of Z_j^T w A_ijkl Z_l. Where A is the same everywhere it follows from the sums of Z_j^T w Z_l, which take
+    half of the products. Windows (a, b) with a <= b have the number of the pair's row and column; the others,
+    whose blocks are the transposes, have a number beyond all of these.
 
     Attributes:
         basis: The basis functions.
@@ -79,16 +88,18 @@ class NetworkEnergy:
         """The energy by a quadrature rule: points (q, 2), mm, and weights (q,), mm^2."""
         cuts, keys, count = basis.patches(points), [], basis.windows.count
         for _, _, near in cuts:
-            keys.append((torch.minimum(near, near[:, None]) * count + near.maximum(near[:, None])).flatten())
+            row, column = torch.triu_indices(len(near), len(near))
+            keys.append(near[row] * count + near[column])
         diagonal = torch.arange(count) * (count + 1)
         known, number = torch.unique(torch.cat([*keys, diagonal]), return_inverse=True)
         patches, used, start = [], 0, 0
-        for (_, places, near), pairs in zip(
+        for (_, places, near), upper in zip(
             cuts, number[:-count].split([len(key) for key in keys]), strict=True
         ):
-            below = torch.ones(len(near), len(near), dtype=torch.int64).tril_(-1).flatten()
+            pairs = torch.full((len(near), len(near)), len(known))
+            pairs[*torch.triu_indices(len(near), len(near))] = upper
             rows = slice(start, start + len(places))
-            patches.append(QuadraturePatch(places, near, pairs + len(known) * below, rows))
+            patches.append(QuadraturePatch(places, near, pairs, rows))
             start = rows.stop
             used += 16 * len(places) * len(near) * basis.per_window
         order = np.concatenate([numbers for numbers, *_ in cuts])
@@ -121,7 +132,20 @@ class NetworkEnergy:
         """
         gradient = self.gradients(output[None])[0]
         stress, tangent = piola_stress_and_tangent(gradient, self.material.lame, self.material.law)
-        return self.forces(stress[None])[0], self.hessian(tangent)
+        constant = self.material.law == "linear"
+        return self.forces(stress[None])[0], self.hessian(tangent[:1] if constant else tangent)
+
+    @property
+    def quadratic(self) -> bool:
+        """Whether the energy is a quadratic form of the output layer, with its least value at zero."""
+        return self.material.law == "linear" and self.origin is None
+
+    @cached_property
+    def factors_at_rest(self) -> Factors:
+        """Factors of the Hessian of a quadratic energy, kept for every load and set of markers."""
+        rest = torch.zeros(1, 2, 2, dtype=torch.float64)
+        _, tangent = piola_stress_and_tangent(rest, self.material.lame, self.material.law)
+        return self.hessian(tangent).factorised(REGULARISATION)
 
     def gradients(self, outputs: torch.Tensor) -> torch.Tensor:
         """Gradients less the origin's at the points, (s, q, 2, 2), of output layers (s, c, 2, m + 1)."""
@@ -184,25 +208,31 @@ class NetworkEnergy:
         return csr_matrix((values, columns, starts), shape=(2 * self.points, self.basis.size))
 
     def hessian(self, tangent: torch.Tensor) -> BlockMatrix:
-        """Second derivative by the output layer, N/mm^2, of a tangent at the points, (q, 2, 2, 2, 2), MPa."""
-        count, functions = len(self.rows), self.basis.per_window
-        blocks = tangent.new_zeros(2 * count, functions, 3, functions)
-        weighted = self.weights[:, None, None, None, None] * tangent
+        """Second derivative by the output layer, N/mm^2.
 
-        def task(number: int) -> tuple[torch.Tensor, torch.Tensor]:
-            patch = self.patches[number]
-            return patch.pairs, _blocks(self._along(number), weighted[patch.rows])
+        Args:
+            tangent: At the quadrature points, shape (q, 2, 2, 2, 2), or of all of them, (1, 2, 2, 2, 2), MPa.
+        """
+        count, functions, constant = len(self.rows), self.basis.per_window, len(tangent) == 1
+        sums = tangent.new_zeros(count + 1, 4 * functions**2)
+        weighted = self.weights[:, None, None, None, None] * (1 if constant else tangent)
 
-        for pairs, here in imap_in_threads(task, range(len(self.patches))):
-            blocks.index_add_(0, pairs, here)
-        upper, lower = blocks.split(count)
-        diagonal = torch.from_numpy(self.rows == self.columns)
-        lower[diagonal] = upper[diagonal]
-        whole = tangent.new_empty(count, 2, functions, 2, functions)
-        whole[:, 0, :, 0], whole[:, 0, :, 1], whole[:, 1, :, 1] = upper.unbind(2)
-        whole[:, 1, :, 0] = lower[:, :, 1].mT
+        def task(number: int) -> list[tuple[torch.Tensor, torch.Tensor]]:
+            patch, along = self.patches[number], self._along(number)
+            weights = weighted[patch.rows]
+            return _strips(patch.pairs, *(_products if constant else _tangent_products)(along, weights))
+
+        for strips in imap_in_threads(task, range(len(self.patches))):
+            for pairs, here in strips:
+                sums.index_add_(0, pairs, here)
+        if constant:
+            whole = torch.einsum(
+                "ijkl,bjflg->bifkg", tangent[0], sums[:count].view(count, 2, functions, 2, functions)
+            )
+        else:
+            whole = sums[:count].view(count, functions, 2, 2, functions).permute(0, 2, 1, 3, 4)
         # Windows that reach one patch need not overlap; one that reaches none keeps its empty diagonal.
-        filled = (whole.abs().amax(dim=(1, 2, 3, 4)) > 0) | diagonal
+        filled = (sums[:count].abs().amax(dim=1) > 0) | torch.from_numpy(self.rows == self.columns)
         parts = (self.rows[filled], self.columns[filled], whole[filled].flatten(1, 2).flatten(2).numpy())
         return BlockMatrix(self.basis.windows.count, *parts)
 
@@ -216,24 +246,54 @@ class NetworkEnergy:
         return self.kept[number]
 
 
-def _blocks(along: torch.Tensor, tangent: torch.Tensor) -> torch.Tensor:
-    """Blocks of all pairs of windows, (w w, m + 1, 3, m + 1), N/mm^2: of the components uu, uv and vv.
+def _products(along: torch.Tensor, weights: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Factors (p, w, 2 (m + 1)) of which the windows' products have the sums of Z_j^T w Z_l, by j and l.
 
-    NumPy's matrix product was measured to take 0.6 of the time of torch's on AMD's processors.
+    Args:
+        along: Derivatives of the basis functions, shape (2, p, w, m + 1), 1/mm.
+        weights: Of the points, shape (p, 1, 1, 1, 1), mm^2.
+    """
+    factor = (along.permute(1, 2, 0, 3) * weights[..., 0].sqrt()).contiguous().flatten(2)
+    return factor, factor
+
+
+def _tangent_products(along: torch.Tensor, tangent: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Factors (2 p, w, m + 1) and (2 p, w, 4 (m + 1)) with products Z_j^T w A_ijkl Z_l, by i and k.
 
     Args:
         along: Derivatives of the basis functions, shape (2, p, w, m + 1), 1/mm.
         tangent: Weights times the tangent, shape (p, 2, 2, 2, 2), N.
     """
     _, points, windows, functions = along.shape
-    right = along.new_empty(2, points, windows, 3, functions)
-    for part, (i, k) in enumerate(((0, 0), (0, 1), (1, 1))):
-        for j in range(2):
-            torch.mul(tangent[:, i, j, k, 0, None, None], along[0], out=right[j, :, :, part])
-            right[j, :, :, part].addcmul_(tangent[:, i, j, k, 1, None, None], along[1])
-    left = along.flatten(2).flatten(0, 1).numpy().T
-    product = torch.from_numpy(left @ right.flatten(0, 1).flatten(1).numpy())
-    return product.view(windows, functions, windows, 3, functions).transpose(1, 2).flatten(0, 1)
+    right = along.new_empty(2, points, windows, 4, functions)
+    for j, i, k in product(range(2), repeat=3):
+        part = right[j, :, :, 2 * i + k]
+        torch.mul(tangent[:, i, j, k, 0, None, None], along[0], out=part)
+        part.addcmul_(tangent[:, i, j, k, 1, None, None], along[1])
+    return along.flatten(0, 1), right.flatten(0, 1).flatten(2)
+
+
+def _strips(
+    pairs: torch.Tensor, left: torch.Tensor, right: torch.Tensor
+) -> list[tuple[torch.Tensor, torch.Tensor]]:
+    """Numbers of blocks and the blocks, (b, x y), of a few rows of windows at a time, which stay in a cache.
+
+    NumPy's matrix product was measured to take 0.6 of the time of torch's on AMD's processors.
+
+    Args:
+        pairs: Numbers of the blocks, shape (w, w).
+        left: Factors of the rows, shape (n, w, x).
+        right: Factors of the columns, shape (n, w, y).
+    """
+    (_, windows, x), (_, _, y) = left.shape, right.shape
+    rows, columns = left.flatten(1).numpy(), right.flatten(1).numpy()
+    found = []
+    for start in range(0, windows, STRIP):
+        end = min(start + STRIP, windows)
+        here = torch.from_numpy(rows[:, x * start : x * end].T @ columns[:, y * start :])
+        blocks = here.view(end - start, x, windows - start, y).transpose(1, 2)
+        found.append((pairs[start:end, start:].flatten(), blocks.flatten(0, 1).flatten(1)))
+    return found
 
 
 def energy_density(gradient: torch.Tensor, lame: Lame, law: LawName) -> torch.Tensor:

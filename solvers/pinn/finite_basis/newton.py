@@ -7,7 +7,8 @@ import torch
 
 from geometry.arrays import FloatArray
 from solvers.cylinder_contact import ContactRegion
-from solvers.pinn.finite_basis.constrained_network import REGULARISATION, ConstrainedNetwork, NewtonIterate
+from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
+from solvers.pinn.finite_basis.energy import REGULARISATION
 from solvers.solver import Progress
 from solvers.stability import Step, aside, descended
 

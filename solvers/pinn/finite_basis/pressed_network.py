@@ -16,7 +16,8 @@ from geometry.arrays import FloatArray, IntArray
 from solvers.constrained_elimination import ConstrainedElimination
 from solvers.cylinder_contact import ContactRegion, CylinderContact
 from solvers.lagrange import LagrangeSpace
-from solvers.pinn.finite_basis.constrained_network import REGULARISATION, ConstrainedNetwork, NewtonIterate
+from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
+from solvers.pinn.finite_basis.energy import REGULARISATION
 from solvers.pinn.finite_basis.network import FiniteBasisField
 from solvers.pinn.finite_basis.newton import FIRST_STEP, MIN_STEP, LoadStep
 from solvers.problem import Problem

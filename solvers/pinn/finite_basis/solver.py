@@ -3,7 +3,7 @@
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import ClassVar
 
 import numpy as np
@@ -16,6 +16,7 @@ from solvers.assimilation.marker_weighting import MarkerWeighting
 from solvers.assimilation.misfit import MarkerSettings, Misfit, assimilates, leave_one_out_displacements
 from solvers.cylinder_contact import CONTACT_AT_END
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
+from solvers.pinn.finite_basis.energy import NetworkEnergy
 from solvers.pinn.finite_basis.hard_constraint import HardConstraint
 from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField, Windows
 from solvers.pinn.finite_basis.newton import LoadStep, find_equilibrium, follow_load
@@ -28,6 +29,7 @@ from solvers.pinn.finite_basis.point_spacing import (
 from solvers.pinn.finite_basis.pressed_network import PressedNetwork
 from solvers.pinn.threading import pool
 from solvers.problem import Problem
+from solvers.shared_work import shared
 from solvers.solution import Solution, Status, unstable_phrase
 from solvers.solver import Progress, check_problem, silent
 
@@ -152,7 +154,7 @@ class FiniteBasisSolver(ABC):
             finer = scales[max(number - 1, 0)] / scale
             error = change / (finer**ORDER - 1) if number else float("inf")
             before = displacement
-            energy = network.energy.total(state.output)
+            energy = network.energy.total(state.output) if state.energy is None else state.energy
             history.append((field.basis.size, energy, error, time.perf_counter() - started))
             progress((number + 1) / len(scales), f"{field.basis.size} units, energy {energy:.4f} N mm/mm")
             if reached.fraction < 1 or error <= self.tolerance or not displacement.any():
@@ -197,6 +199,14 @@ class FiniteBasisSolver(ABC):
             scale: Of the spacings.
             single: Share of a quadrature cell below which an element of the mesh has one point.
         """
+        of_markers = {entry.name for entry in fields(MarkerSettings)}
+        settings = {name: value for name, value in asdict(self).items() if name not in of_markers}
+        bare = replace(problem, observations=None)
+        key = (type(self).windows, *settings.items(), bare.digest, scale, single)
+        energy = shared(key, lambda: self._energy(bare, scale, single))
+        return ConstrainedNetwork.of(energy, problem, self.weighting)
+
+    def _energy(self, problem: Problem, scale: float, single: float) -> NetworkEnergy:
         mesh = problem.mesh
         spacing = PointSpacing.of(
             problem,
@@ -217,7 +227,7 @@ class FiniteBasisSolver(ABC):
             rng=rng,
         )
         quadrature = graded_quadrature(triangles, spacing, self.cell, single)
-        return ConstrainedNetwork.of(basis, problem, *quadrature, self.weighting)
+        return NetworkEnergy.of(basis, problem.material, *quadrature)
 
     def _status(
         self,

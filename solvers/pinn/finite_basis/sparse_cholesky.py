@@ -76,7 +76,7 @@ class BlockMatrix:
         if failed:
             preconditioner.destroy()
             raise UserError("MUMPS cannot factorise the output layer; take fewer neurons")
-        return Factors(scale.ravel(), preconditioner)
+        return Factors(scale.ravel(), preconditioner, regularisation)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,10 +86,12 @@ class Factors:
     Attributes:
         scale: One over the roots of the diagonal, shape (n b,).
         preconditioner: PETSc's object that holds them.
+        regularisation: That was added to the unit diagonal of the scaled matrix.
     """
 
     scale: FloatArray
     preconditioner: Any
+    regularisation: float
 
     def __post_init__(self) -> None:
         finalize(self, self.preconditioner.destroy)
@@ -108,6 +110,11 @@ class Factors:
         finally:
             given.destroy()
             found.destroy()
+
+    @property
+    def damping(self) -> FloatArray:
+        """What the regularisation added to the diagonal of the matrix, shape (n b,)."""
+        return self.regularisation / self.scale**2
 
     @property
     def negative(self) -> int:

@@ -19,8 +19,12 @@ from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.wall_motion import WallMotion
 from solvers.elasticity import Lame, deformation_jacobian
-from solvers.pinn.finite_basis.constrained_network import REGULARISATION
-from solvers.pinn.finite_basis.energy import NetworkEnergy, energy_density, piola_stress_and_tangent
+from solvers.pinn.finite_basis.energy import (
+    REGULARISATION,
+    NetworkEnergy,
+    energy_density,
+    piola_stress_and_tangent,
+)
 from solvers.pinn.finite_basis.network import FiniteBasisField
 from solvers.pinn.finite_basis.solver import FiniteBasisSolver
 from solvers.pinn.finite_basis.sparse_cholesky import Factors
