@@ -11,7 +11,6 @@ Source: M. Benzi, G. H. Golub, J. Liesen, Numerical solution of saddle point pro
 1-137, section 5 (Schur complement reduction, for the multipliers -f).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -33,16 +32,6 @@ class ConstrainedElimination:
     rows: FloatArray
     responses: FloatArray
     compliance: FloatArray | float = 0.0
-
-    @classmethod
-    def of(
-        cls,
-        solve: Callable[[FloatArray], FloatArray],
-        rows: FloatArray,
-        compliance: FloatArray | float = 0.0,
-    ) -> "ConstrainedElimination":
-        """Solve once for each constraint; `solve` is K⁻¹ of an array of the shape of x."""
-        return cls(rows, np.array([solve(row) for row in rows]).reshape(rows.shape), compliance)
 
     @cached_property
     def flexibility(self) -> FloatArray:

@@ -56,7 +56,8 @@ class MarkerCompliance:
         """
         space = LagrangeSpace(problem.mesh, degree)
         equilibrium = LinearEquilibrium.of(LinearElasticity.of(problem, space), slack)
-        markers = ConstrainedElimination.of(equilibrium.response, marker_functionals(misfit, space))
+        rows = marker_functionals(misfit, space)
+        markers = ConstrainedElimination(rows, equilibrium.responses(rows))
         return cls(equilibrium, equilibrium.solution(), markers)
 
     def of_markers(self, chosen: BoolArray) -> "MarkerCompliance":

@@ -106,7 +106,8 @@ class LinearEquilibrium:
         problem, space = elasticity.problem, elasticity.distributed.space
         clamped = dirichlet_mask(problem, space)
         factors = elasticity.factorise(clamped)
-        load = ConstrainedElimination.of(factors.solve, load_functionals(problem, space), slack)
+        rows = load_functionals(problem, space)
+        load = ConstrainedElimination(rows, factors.solve_all(rows), slack)
         return cls(elasticity, clamped, factors, load)
 
     def of_problem(self, problem: Problem) -> "LinearEquilibrium":
@@ -119,7 +120,7 @@ class LinearEquilibrium:
             return LinearEquilibrium.of(elasticity)
         load, functionals = self.load, load_functionals(problem, space)
         if not np.array_equal(functionals, load.rows):
-            load = ConstrainedElimination.of(self.factors.solve, functionals)
+            load = ConstrainedElimination(functionals, self.factors.solve_all(functionals))
         return replace(self, elasticity=elasticity, load=load)
 
     def solution(self) -> FloatArray:
@@ -142,6 +143,10 @@ class LinearEquilibrium:
     def response(self, force: FloatArray) -> FloatArray:
         """Displacement under nodal forces, N/mm, while all given values are zero: both (N, 2), in mm."""
         return self.load.solution(self.factors.solve(force))[0]
+
+    def responses(self, forces: FloatArray) -> FloatArray:
+        """The same for several at once, shape (r, N, 2)."""
+        return np.array([self.load.solution(free)[0] for free in self.factors.solve_all(forces)])
 
     def residual(self, internal: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residual of internal forces, shape (N, 2), N/mm, under the best forces of the functionals.

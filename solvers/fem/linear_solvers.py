@@ -69,6 +69,10 @@ class StiffnessSolver:
         solution.destroy()
         return values
 
+    def solve_all(self, nodal: FloatArray) -> FloatArray:
+        """Solve for several right-hand sides, shape (r, N, d); the solutions have the same shape."""
+        return np.array([self.solve(each) for each in nodal]).reshape(nodal.shape)
+
     def destroy(self) -> None:
         """Free the factors or the preconditioner, and the matrix."""
         self._ksp.destroy()
@@ -137,9 +141,9 @@ class Factorisation(StiffnessSolver):
         return found
 
     def solve_all(self, nodal: FloatArray) -> FloatArray:
-        """Solve for several right-hand sides at once, shape (r, N, d); the solutions have the same shape."""
+        """Solve for several right-hand sides at once; see `StiffnessSolver`."""
         if self._space.comm.size > 1 or not len(nodal):
-            return np.array([self.solve(each) for each in nodal]).reshape(nodal.shape)
+            return super().solve_all(nodal)
         right = PETSc.Mat().createDense((nodal[0].size, len(nodal)), comm=self._space.comm)
         right.setUp()
         held = self._matrix.createVecRight()

@@ -130,9 +130,8 @@ class FiniteStrainEquilibrium:
         self.elimination = self._elimination()
 
     def _elimination(self) -> ConstrainedElimination:
-        return ConstrainedElimination.of(
-            self.factors.solve, self.constraints.functionals, self.constraints.slacks
-        )
+        rows, slacks = self.constraints.functionals, self.constraints.slacks
+        return ConstrainedElimination(rows, self.factors.solve_all(rows), slacks)
 
     def response(self, force: FloatArray) -> FloatArray:
         """Displacements, mm, under nodal forces, N/mm, by the factorised tangent: both (N, d)."""
@@ -216,7 +215,7 @@ class FiniteStrainEquilibrium:
         line = np.arange(nearest % len(contact.positions), len(gap), len(contact.positions))
         functional = np.zeros((1, *self.clamped.shape))
         functional[0, contact.nodes[line], :2] = contact.shares[:, None] * normal[nearest]
-        pressing = ConstrainedElimination.of(self.factors.solve, functional)
+        pressing = ConstrainedElimination(functional, self.factors.solve_all(functional))
         nodal, force = pressing.solution(rest.nodal, np.maximum(-gap[[nearest]], 0.0))
         rest.contact[line] = force[0] * contact.shares
         return replace(rest, nodal=nodal)

@@ -29,8 +29,8 @@ PENETRATION = 1e-5
 class LoadPath:
     """Equilibria of a problem as its load grows.
 
-    Every step starts from the last two states extrapolated, the first from the linear solution. A step whose
-    Newton iteration fails is halved.
+    Every step starts from the last three states extrapolated (two with a cylinder), the first from the linear
+    solution. A step whose Newton iteration fails is halved.
 
     Args:
         problem: With the full load.
@@ -162,18 +162,20 @@ class LoadPath:
         return None, hardest
 
     def _guess(self, fraction: float) -> LoadState:
-        """The state at a fraction of the load, by the guide or by extrapolation of the last two."""
+        """The state at a fraction of the load, by the guide or by extrapolation of the last ones."""
         last = self.points[-1]
         if self._guide is not None:
-            before, after, times = self._guide(last.fraction), self._guide(fraction), 1.0
-        elif len(self.points) == 1:
+            before, after = self._guide(last.fraction), self._guide(fraction)
+            nodal, forces = after.nodal - before.nodal, after.forces - before.forces
+            return LoadState(fraction, last.nodal + nodal, last.forces + forces, after.contact)
+        if len(self.points) == 1:
             return self.equilibrium.linear_guess(fraction)
-        else:
-            before, after = self.points[-2:]
-            times = (fraction - last.fraction) / (last.fraction - before.fraction)
-        nodal = last.nodal + times * (after.nodal - before.nodal)
-        forces = last.forces + times * (after.forces - before.forces)
-        return LoadState(fraction, nodal, forces, last.contact if self._guide is None else after.contact)
+        known = self.points[-3 if self.equilibrium.contact is None else -2 :]  # contact starts with a kink
+        at = np.array([point.fraction for point in known])
+        shares = [np.prod((fraction - (rest := np.delete(at, k))) / (at[k] - rest)) for k in range(len(at))]
+        nodal = sum(share * point.nodal for share, point in zip(shares, known, strict=True))
+        forces = sum(share * point.forces for share, point in zip(shares, known, strict=True))
+        return LoadState(fraction, nodal, forces, last.contact)
 
     def reaction(self, point: LoadState) -> FloatArray:
         """Force of the indenter on the finger, shape (2,), N/mm."""

@@ -24,9 +24,9 @@ from solvers.solver import Progress, check_problem, silent
 class FemNonlinearSolver:
     """Neo-Hookean or St Venant-Kirchhoff plane strain by Newton's method, the load applied in adaptive steps.
 
-    Every step starts from the last two states extrapolated; the first from the linear solution. A step whose
-    Newton iteration fails, or turns an element inside out, is halved. A `patch` whose tangential component is
-    free slides. A `cylinder` presses without friction.
+    Every step starts from the last three states extrapolated; the first from the linear solution. A step
+    whose Newton iteration fails, or turns an element inside out, is halved. A `patch` whose tangential
+    component is free slides. A `cylinder` presses without friction.
 
     Attributes:
         degree: Degree of the elements, 1 or 2.

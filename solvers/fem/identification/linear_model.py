@@ -55,7 +55,8 @@ class LinearModel:
         body = self._stiffness(*problem.material.lame[:2], named)
         stiffness = body + self._layer(problem, named)
         self._factorise(stiffness)
-        load = ConstrainedElimination.of(self._solve, load_functionals(problem, self.space))
+        rows = load_functionals(problem, self.space)
+        load = ConstrainedElimination(rows, np.array([self._solve(row) for row in rows]))
         nodal, forces = load.solution(np.zeros(self._free.shape), problem.load.values)
 
         def force_slope(name: str) -> FloatArray:
