@@ -8,9 +8,12 @@ from scipy.special import softmax
 from geometry.arrays import BoolArray, FloatArray, IntArray
 from vision.discs.disc_image_model import (
     BLUR,
+    CONTRAST,
     EDGES,
+    GLARE,
     HALO,
     LIGHT,
+    OUTLINE,
     RADIUS,
     SHADE_X,
     SHADE_Y,
@@ -33,6 +36,10 @@ OUTLINE_DEVIATION, OUTLINE_STEP = 0.05, 0.05
 """The same for the waves of an irregular outline, over the radius."""
 HALO_DEVIATION, HALO_STEP = 1.0, 0.3
 """The same for the halo of a sharpened edge, over the contrast."""
+GLARE_DEVIATIONS = (2.0, 2.0, 0.2, 0.2, 0.2)
+"""The same for the terms of a glare, grey levels."""
+BRIGHTER = 3.0
+"""Largest light at a disc over the median, and the median over the least; beyond, a level is no measure."""
 CLIPPED = 100.0
 """Prior standard deviation of a clipped level, grey levels."""
 CLIPPED_SHADE = 0.002
@@ -66,14 +73,17 @@ class Known(NamedTuple):
     def lit(self, fit: DiscFit, trusted: BoolArray) -> "Known":
         """The same with the gradient of the light at a disc from the trusted others in the picture.
 
-        The gradients scatter normally about a mean; the variance of the scatter is its expectation over
-        `SCATTERS`, which are equally probable before.
+        The gradients, which are relative, times the light itself, by the levels within the discs, scatter
+        normally about a mean; the variance of the scatter is its expectation over `SCATTERS`, which are
+        equally probable before.
 
         Source: A. Gelman et al., Bayesian Data Analysis, third edition, 2013, section 5.4.
         """
-        precision = np.where(trusted[:, None], fit.shade_precision, 0.0)
-        variances = 1 / np.maximum(precision, 1e-3)
-        fitted = fit.parameters[:, [SHADE_X, SHADE_Y]]
+        within = np.maximum(fit.parameters[:, LIGHT] - fit.parameters[:, CONTRAST], 1.0)
+        light = np.clip(within / np.median(within), 1 / BRIGHTER, BRIGHTER)[:, None]
+        precision = np.where(trusted[:, None], np.maximum(fit.shade_precision, 1e-3), 1e-3)
+        fitted = light * fit.parameters[:, [SHADE_X, SHADE_Y]]
+        variances = light**2 / precision
         weights = 1 / (SCATTERS[:, None, None] ** 2 + variances)
         total = weights.sum(axis=1) + CLIPPED_SHADE**-2.0
         mean = (weights * fitted).sum(axis=1) / total
@@ -83,7 +93,8 @@ class Known(NamedTuple):
         weights = 1 / (scatter + variances)
         others = weights.sum(axis=0) - weights + CLIPPED_SHADE**-2.0
         shade = ((weights * fitted).sum(axis=0) - weights * fitted) / others
-        return self._replace(shade=shade, shade_deviation=np.sqrt(scatter + 1 / others))
+        deviation = np.sqrt(scatter + 1 / others)
+        return self._replace(shade=shade / light, shade_deviation=deviation / light)
 
 
 def prior_and_limits(
@@ -105,6 +116,8 @@ def prior_and_limits(
     mean[:, waves], deviations[:, waves], limits[:, waves] = 0, OUTLINE_DEVIATION, OUTLINE_STEP
     if len(waves):
         deviations[:, HALO], limits[:, HALO] = HALO_DEVIATION, HALO_STEP
+    if len(waves) == OUTLINE:
+        deviations[:, GLARE], limits[:, GLARE] = GLARE_DEVIATIONS, 1e3
     clipped = start[:, LIGHT] >= LIGHTEST
     deviations[clipped, LIGHT] = CLIPPED
     for column, shade, deviation in zip(

@@ -3,15 +3,16 @@
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
+from vision.discs.correlated_noise import absorbed_noise, correlated_noise
 from vision.discs.disc_image_model import BLUR, CONTRAST, COUNT, LIGHT, RADIUS, Array, X, Y
 from vision.discs.fit_priors import Known, prior_and_limits
+from vision.discs.ground_texture import without_waves
 from vision.discs.hough import HoughVotes, sector, vote_for_centres
 from vision.discs.irregular_outlines import better_outlines
 from vision.discs.least_squares import (
     NEAR,
     DiscFit,
     coherent_pixels,
-    correlated_variance,
     fit_disc_model,
     refined_fit,
 )
@@ -30,6 +31,11 @@ REFINEMENTS = 3
 LOOSE, STRICT = 0.25, 0.45
 """Votes that a trusted sector of the edge must have, over those of the better sectors: in the first fit, and
 in the second fit of discs whose first fit disagrees with the image."""
+WAVES = 3
+"""Largest number of waves of brightness that are taken out of the ground around a disc."""
+UNSURE = 0.25
+"""Standard deviation of the shift of a centre by a wave, over the shift: a wave is cut off at an edge that is
+known less well than the ground."""
 CHANGED = 0.03
 """Share of disagreeing pixels near the edge from which on a disc is fitted again, ..."""
 WRONG = 2.0
@@ -49,6 +55,27 @@ def fit_discs_of_one_size(grey: GreyImage, guesses: FloatArray, radii: FloatArra
     votes = vote_for_centres(grey, guesses, radii, reach, known=known.tolerance < np.inf)
     inner, outer = votes.radii.min() - MARGIN, votes.radii.max() + MARGIN
     window = PixelWindows.of(grey, votes.centres, inner, outer)
+    fit = _fit_windows(window, votes, known)
+    doubt, waved, smooth = np.zeros_like(fit.covariances), np.arange(len(radii)), window
+    for _ in range(WAVES):
+        smooth, found = without_waves(smooth, fit.parameters[waved])
+        if not len(found):
+            break
+        waved = waved[found]
+        before, now = fit.at(waved), _fit_windows(smooth, votes.at(waved), known.at(waved))
+        (better,) = np.nonzero(now.settled & (now.variance < before.variance) | ~before.settled)
+        smooth, waved, now = smooth.at(better), waved[better], now.at(better)
+        astray = UNSURE * (now.parameters - before.at(better).parameters)[:, [X, Y]]
+        doubt[waved] += astray[:, :, None] * astray[:, None]
+        fit.put(waved, now)
+        if not len(waved):
+            break
+    fit.covariances += doubt
+    return fit
+
+
+def _fit_windows(window: PixelWindows, votes: HoughVotes, known: Known) -> DiscFit:
+    """Fit discs to the pixels around them, from their votes."""
     trusted = _trusted(window, votes, LOOSE)
     first, residuals = _first_fit(window, votes, trusted, known)
     chosen = coherent_pixels(window, first, residuals)
@@ -56,9 +83,10 @@ def fit_discs_of_one_size(grey: GreyImage, guesses: FloatArray, radii: FloatArra
     near = np.abs(outside) < NEAR
     changed = ((chosen != trusted) & near).sum(axis=1) > CHANGED * near.sum(axis=1)
     chosen &= trusted
-    variance = correlated_variance(window, first, residuals, chosen, outside)
+    absorbed = absorbed_noise(window, first, chosen, votes.radii, known)
+    noise = correlated_noise(window, first, residuals, chosen, outside, absorbed)
     noisy = first.variance > WRONG * np.maximum(window.noise**2, QUANTISATION)
-    (again,) = np.nonzero(changed | (variance > WRONG) | noisy | ~first.settled)
+    (again,) = np.nonzero(changed | (noise.of_each > WRONG) | noisy | ~first.settled)
     if len(again):
         some, votes, their = window.at(again), votes.at(again), known.at(again)
         initial = first.at(again)
@@ -72,19 +100,20 @@ def fit_discs_of_one_size(grey: GreyImage, guesses: FloatArray, radii: FloatArra
             other = _refined(few[0], *second, few[1].radii, few[2])
             (better,) = np.nonzero(_deviation(other) < _deviation(either.at(fewer)))
             first.put(again[fewer[better]], other.at(better))
-        irregular, outlines, left = better_outlines(
+        irregular, outlines, left, absorbed = better_outlines(
             first.at(again), initial.parameters, some, votes.radii, their
         )
         again = again[irregular]
         if len(again):
             first.put(again, outlines)
             residuals[again], chosen[again] = left, window.within[again]
-            variance = correlated_variance(window, first, residuals, chosen, outside)
-    # The median over the discs leaves out the errors of the model that only some ellipses have.
-    usual = float(np.nanmedian(variance)) if np.isfinite(variance).any() else 1.0
-    inflation = np.full(len(variance), usual)
-    inflation[again] = np.fmax(variance[again], usual)
+            own = correlated_noise(window.at(again), outlines, left, chosen[again], outside[again], absorbed)
+            noise.variance[again], noise.squares[again] = own
+    usual = noise.usual
+    inflation = np.full(len(residuals), usual.max())
+    inflation[again] = noise.pooled(usual)[again]
     first.covariances *= inflation[:, None, None]
+    first.shade_precision /= inflation[:, None]
     return first
 
 

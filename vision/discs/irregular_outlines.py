@@ -11,13 +11,17 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
+from vision.discs.correlated_noise import Absorbed, absorbed_noise
 from vision.discs.disc_image_model import (
     BLUR,
     CONTRAST,
     COUNT,
     EDGE,
     EDGES,
+    GLARE,
+    GLARES,
     HALO,
+    LIGHT,
     LOBES,
     OUTLINE,
     RADIUS,
@@ -32,8 +36,18 @@ from vision.discs.disc_image_model import (
 )
 from vision.discs.fit_priors import MISSING, Known, prior_and_limits
 from vision.discs.hough import SECTORS, sector
-from vision.discs.least_squares import NEAR, DiscFit, coherent_pixels, fit_disc_model, misfit, refined_fit
-from vision.discs.pixel_windows import PixelWindows
+from vision.discs.least_squares import (
+    FAINT,
+    NEAR,
+    NONE,
+    DiscFit,
+    DiscPrior,
+    coherent_pixels,
+    fit_disc_model,
+    misfit,
+    refined_fit,
+)
+from vision.discs.pixel_windows import DARKEST, LIGHTEST, PixelWindows
 from vision.discs.straight_edges import with_edges
 
 PENALTY = 40.0
@@ -48,6 +62,9 @@ ROUGH = 0.06
 """Largest residual of a printed dot, root mean square over the contrast, without the noise."""
 LEAST_SEEN = 0.7
 """Share of an irregular outline that must support its fit."""
+GLOSSY, LEAST_GLOSSY = 0.02, 0.45
+"""Largest residual, as above, and least share of the outline, of a dot before a glare is sought on it: half a
+dot and a glare could fit as well."""
 OTHER_SIZE = 5.0
 """Deviation of a known radius, in standard deviations, from which on a disc counts as partly hidden."""
 OTHER_CONTRAST = 0.5
@@ -62,7 +79,7 @@ AGREED = 0.9
 
 def better_outlines(
     ellipses: DiscFit, start: FloatArray, window: PixelWindows, radii: FloatArray, known: Known
-) -> tuple[IntArray, DiscFit, Array]:
+) -> tuple[IntArray, DiscFit, Array, Absorbed]:
     """Fits of irregular outlines that explain the pixels better than ellipses do.
 
     Args:
@@ -74,7 +91,7 @@ def better_outlines(
 
     Returns:
         The numbers of these discs, shape (k,), their fits, whose centres are the centroids of the outlines,
-        and the residuals of their pixels, shape (k, p).
+        and the residuals of their pixels, shape (k, p), and the shares of the noise that they took up.
     """
     outlines, residuals = _outlined(window, start, radii, known)
     noise = np.maximum(np.minimum(ellipses.variance, outlines.variance), window.noise**2)
@@ -91,11 +108,14 @@ def better_outlines(
         residuals[tried] = left
         good[tried] = _whole(window.at(tried), lenient, radii[tried], known.tolerance)
     (better,) = np.nonzero(good)
+    absorbed = absorbed_noise(window, outlines, window.within, radii, known)
     outlines, residuals = outlines.at(better), residuals[better]
     parameters = outlines.parameters.copy()
     parameters[:, [X, Y]] += outline_centroid(parameters)
+    curved = parameters[:, GLARE][:, [power + other == 2 and power != 1 for power, other in GLARES]]
+    parameters[:, LIGHT] += curved.sum(axis=1) * parameters[:, RADIUS] ** 2 / 2  # its mean along the edge
     columns = [*range(COUNT), *range(COUNT + OUTLINE, parameters.shape[1])]
-    return better, replace(outlines, parameters=parameters[:, columns]), residuals
+    return better, replace(outlines, parameters=parameters[:, columns]), residuals, absorbed
 
 
 def _whole(window: PixelWindows, outlines: DiscFit, radii: FloatArray, tolerance: float) -> BoolArray:
@@ -150,11 +170,40 @@ def _outlined(
         start = _by_moments(window, start)
     start, present = with_edges(window, start, window.within)
     prior, limits = prior_and_limits(start, present, radii, known)
-    plain = prior._replace(precision=prior.precision.copy())
-    plain.precision[:, HALO] = MISSING**-2.0  # a halo is sought after the outline
+    matt, plain = (prior._replace(precision=prior.precision.copy()) for _ in range(2))
+    matt.precision[:, GLARE] = MISSING**-2.0
+    plain.precision[:, [HALO, *GLARE]] = MISSING**-2.0  # a halo is sought after the outline
     if lenient:
         return fit_disc_model(window, start, plain, limits, window.within, lenient=True)
-    return refined_fit(window, [plain, *[prior] * (REFINEMENTS - 1)], start, limits, window.within)
+    priors = [plain, *[matt] * (REFINEMENTS - 1)]
+    fit, residuals = refined_fit(window, priors, start, limits, window.within)
+    rough = np.sqrt(np.maximum(fit.variance - window.noise**2, 0)) / np.abs(fit.parameters[:, CONTRAST])
+    likely = fit.settled & (rough < GLOSSY) & (fit.seen > LEAST_GLOSSY)
+    (glossy,) = np.nonzero(likely & (_gain_of_glare(window, fit, residuals, prior) > PENALTY))
+    if len(glossy):
+        some, start, own = window.at(glossy), fit.parameters[glossy], prior.at(glossy)
+        part, left = refined_fit(some, [own] * (REFINEMENTS - 1), start, limits[glossy], some.within)
+        fit.put(glossy, part)
+        residuals[glossy] = left
+    return fit, residuals
+
+
+def _gain_of_glare(window: PixelWindows, fit: DiscFit, residuals: Array, prior: DiscPrior) -> FloatArray:
+    """Gain in logarithmic likelihood by a glare, to first order, beside the other parameters, shape (n,)."""
+    _, derivatives = disc_image(fit.parameters.astype(np.float32), window.x, window.y)
+    noise = np.sqrt(fit.variance)[:, None]
+    counted = window.within & (np.abs(residuals) < NONE * noise)
+    counted &= (window.values > DARKEST) & (window.values < LIGHTEST)
+    weighted = derivatives * (counted / noise**2).astype(np.float32)[:, None]
+    normal = (weighted @ derivatives.transpose(0, 2, 1)).astype(np.float64)
+    diagonal = range(normal.shape[1])
+    normal[:, diagonal, diagonal] *= 1 + FAINT
+    normal[:, diagonal, diagonal] += prior.precision + FAINT
+    pull = (weighted @ residuals[:, :, None])[:, :, 0] + prior.precision * (prior.mean - fit.parameters)
+    inverse = np.linalg.inv(normal)
+    steps = (inverse @ pull[:, :, None])[:, GLARE]
+    own = inverse[:, GLARE][:, :, GLARE]
+    return np.asarray((steps.transpose(0, 2, 1) @ np.linalg.solve(own, steps))[:, 0, 0] / 2)
 
 
 def _by_moments(window: PixelWindows, start: FloatArray) -> FloatArray:

@@ -20,6 +20,8 @@ from vision.discs.disc_image_model import (
     BLUR,
     CONTRAST,
     EDGE,
+    GLARE,
+    OUTLINE,
     RADIUS,
     SHADE_X,
     SHADE_Y,
@@ -50,12 +52,12 @@ DOUBT = 10
 """Grey levels from those that may be clipped to those that a codec may leave of clipped ones."""
 SURE = 8.0
 """Distance from a limit, in standard deviations, from which on a clipped pixel tells all."""
-NEIGHBOURS = 3
-"""Side of the squares whose means show correlated noise, pixels."""
-NEAR, PROFILE = 2.0, 0.5
-"""Pixels from the edge within which the noise matters most, and width of the classes of that distance."""
+NEAR = 2.0
+"""Pixels from the edge within which the noise matters most."""
 SHARPEST = 0.3
 """Width of an edge without any blur, pixels: that of the pixels themselves."""
+ABSENT = 1e5
+"""Precision of a parameter from which on it is held at its mean, zero."""
 FAINT = 1e-5
 """Precision, relative and absolute, that is added for every parameter; it decides where few pixels do."""
 
@@ -65,6 +67,10 @@ class DiscPrior(NamedTuple):
 
     mean: FloatArray
     precision: FloatArray
+
+    def at(self, places: IntArray) -> "DiscPrior":
+        """The prior of some discs."""
+        return DiscPrior(self.mean[places], self.precision[places])
 
 
 @dataclass
@@ -130,7 +136,7 @@ def fit_disc_model(
     Returns:
         The fit and the residuals of the pixels, shape (n, p).
     """
-    if len(kept := _columns(start)) < start.shape[1]:
+    if len(kept := _columns(start, prior)) < start.shape[1]:
         fewer = DiscPrior(prior.mean[:, kept], prior.precision[:, kept])
         fit, residuals = fit_disc_model(
             window, start[:, kept], fewer, limits[:, kept], chosen, lenient=lenient
@@ -218,11 +224,13 @@ def behind_clipping(values: Array, levels: Array, variance: FloatArray) -> tuple
     return expected, known
 
 
-def _columns(start: FloatArray) -> list[int]:
-    """Columns of the parameters without those of the straight edges that no disc has."""
-    first = irregular_columns(start.shape[1])[1]
+def _columns(start: FloatArray, prior: DiscPrior) -> list[int]:
+    """Columns of the parameters without a glare and straight edges that no disc has."""
+    waves, first = irregular_columns(start.shape[1])
     edges = [range(edge, edge + EDGE) for edge in range(first, start.shape[1], EDGE)]
-    return [*range(first), *(column for edge in edges if start[:, edge].any() for column in edge)]
+    present = [column for edge in edges if start[:, edge].any() for column in edge]
+    matt = len(waves) == OUTLINE and (prior.precision[:, GLARE] >= ABSENT).all()
+    return [*range(GLARE.start if matt else first), *present]
 
 
 def refined_fit(
@@ -248,7 +256,7 @@ def refined_fit(
         part, left = fit_disc_model(
             window.at(moving),
             result.parameters[moving],
-            DiscPrior(prior.mean[moving], prior.precision[moving]),
+            prior.at(moving),
             limits[moving],
             chosen[moving],
         )
@@ -277,38 +285,3 @@ def misfit(window: PixelWindows, parameters: FloatArray, variance: FloatArray) -
     levels, _ = disc_image(parameters.astype(np.float32), window.x, window.y)
     squares = (window.values - np.clip(levels, 0, 255)) ** 2 / np.maximum(variance, QUANTISATION)[:, None]
     return np.asarray((np.minimum(squares, NONE**2) * window.within).sum(axis=1) / 2, dtype=np.float64)
-
-
-def correlated_variance(
-    window: PixelWindows, fitted: DiscFit, residuals: Array, chosen: BoolArray, outside: FloatArray
-) -> FloatArray:
-    """Variance of the noise near the edge that counts for the centres, over that of the fit, shape (n,).
-
-    It is the variance of means over neighbours times their number, which is that of single pixels if the
-    noise differs from pixel to pixel. Cameras and codecs that smooth, or quantise in blocks, leave correlated
-    noise, and more of it near edges. The means of the residuals at every distance from the edge are left out:
-    those of an edge that is sharpened, or has another profile, do not move a centre. Not a number where too
-    few pixels count.
-
-    Args:
-        window: The pixels.
-        fitted: The fit to them.
-        residuals: Of the pixels, shape (n, p).
-        chosen: Pixels that belong to the model, shape (n, p).
-        outside: Distance of the pixels from the edge, shape (n, p), pixels.
-    """
-    chosen = chosen & (residuals != 0)  # clipped pixels
-    inner = window.smoothed(chosen.astype(np.float32), NEIGHBOURS) > 1 - 1e-3
-    inner &= np.abs(outside) < NEAR
-    scaled = residuals / (fitted.variance[:, None] ** 0.5).astype(np.float32)
-    scaled = np.clip(scaled, -NONE, NONE)
-    bins, ends = np.floor(outside / PROFILE), int(NEAR / PROFILE)
-    for number in range(-ends - 2, ends + 2):
-        here = (bins == number) & chosen
-        mean = (scaled * here).sum(axis=1, keepdims=True) / np.maximum(here.sum(axis=1, keepdims=True), 1)
-        scaled = scaled - mean * here
-    means = window.smoothed(scaled, NEIGHBOURS)
-    count = inner.sum(axis=1)
-    squares, single = (((part * inner) ** 2).sum(axis=1) for part in (means, scaled))
-    known = np.maximum(NEIGHBOURS**2 * squares, single) / np.maximum(count - 2 * ends, 1)
-    return np.where(count > 2 * ends, known, np.nan)

@@ -47,9 +47,17 @@ class Exposure(CheckedModel):
     )
     monochrome: bool = Field(default=False, description="A camera without colours")
 
+    def lamp(self, size: tuple[int, int]) -> Light:
+        """Illumination relative to that in the middle of the image, on a grid of so many columns and rows."""
+        width, height = size
+        angle = np.deg2rad(self.gradient_direction)
+        x = (np.arange(width, dtype=np.float32) - (width - 1) / 2) * np.cos(angle)
+        y = (np.arange(height, dtype=np.float32) - (height - 1) / 2) * np.sin(angle)
+        return np.asarray(np.maximum(1 + self.gradient * (x + y[:, None]) / (width / 2), 0), np.float32)
+
     def develop(self, light: Light, rng: np.random.Generator) -> Image:
         """The image from light on the pixels, shape (height, width, 3), or (height, width) if monochrome."""
-        grey = self.white * self._lamp(light.shape[1::-1])[:, :, None] * light
+        grey = self.white * light
         if self.glare:
             grey += self.glare * self._reflection(light.shape[1::-1])[:, :, None]
         if self.monochrome:
@@ -68,11 +76,3 @@ class Exposure(CheckedModel):
         width, height = size
         x, y = (np.arange(width) - 0.6 * width) / GLARE, (np.arange(height) - 0.5 * height) / GLARE
         return np.asarray(np.exp(-(x**2 + y[:, None] ** 2) / (2 * width**2)), np.float32)
-
-    def _lamp(self, size: tuple[int, ...]) -> Light:
-        """Illumination relative to that in the middle of the image, shape (height, width)."""
-        width, height = size
-        angle = np.deg2rad(self.gradient_direction)
-        x = (np.arange(width) - (width - 1) / 2) * np.cos(angle)
-        y = (np.arange(height) - (height - 1) / 2) * np.sin(angle)
-        return np.asarray(np.maximum(1 + self.gradient * (x + y[:, None]) / (width / 2), 0), np.float32)

@@ -150,7 +150,7 @@ class Recording:
         """Mean light of the states with these shares of the load, and their truth."""
         states = [self.displaced(load) for load in loads]
         scenes = [self.bench.scene(state, occluders) for state in states]
-        light = mean_light(scenes, self.camera, self.pose, self.exposure.blur)
+        light = mean_light(scenes, self.camera, self.pose, self.exposure.blur, self.exposure.lamp)
         worlds = [self.bench.markers(state) for state in states]
         discs = self.bench.discs(states[len(states) // 2])
         truth = FrameTruth(

@@ -5,7 +5,7 @@ its own pixel the part of dy to its right; cumulative sums along the rows give t
 Source: R. Levien, "Inside the fastest font renderer in the world", 2016.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import cv2
@@ -34,7 +34,7 @@ def render(
     Returns:
         Shape (height, width, 3), BGR, or (height, width) if the exposure is monochrome.
     """
-    light = mean_light([scene], camera, pose, exposure.blur)
+    light = mean_light([scene], camera, pose, exposure.blur, exposure.lamp)
     return exposure.develop(light, noise_of(seed, frame))
 
 
@@ -43,10 +43,17 @@ def noise_of(seed: int, frame: int) -> np.random.Generator:
     return np.random.default_rng([seed, frame])
 
 
-def mean_light(scenes: Sequence[Scene], camera: Camera, pose: Pose, blur: float) -> Light:
+def mean_light(
+    scenes: Sequence[Scene],
+    camera: Camera,
+    pose: Pose,
+    blur: float,
+    lamp: Callable[[tuple[int, int]], Light] | None = None,
+) -> Light:
     """The mean light of scenes on the pixels: its integral over each, through a lens with this blur, pixels.
 
-    Several scenes are a finger that moves while the shutter is open.
+    Several scenes are a finger that moves while the shutter is open. A lamp lights the scenes; it gives its
+    light on a grid of so many columns and rows over the picture.
     """
     cells = int(np.clip(np.ceil(2 / blur), 2, 4)) if blur else 1  # along a side of a pixel
     size = (camera.width * cells, camera.height * cells)
@@ -54,6 +61,8 @@ def mean_light(scenes: Sequence[Scene], camera: Camera, pose: Pose, blur: float)
     for scene in scenes[1:]:
         canvas += _painted(scene, camera, pose, cells, size)
     canvas /= len(scenes)
+    if lamp is not None:
+        canvas *= lamp(size)[:, :, None]
     return _on_pixels(canvas, blur, cells)
 
 

@@ -99,6 +99,24 @@ def test_light_grows_towards_the_side_it_comes_from():
     np.testing.assert_array_equal(picture[0, [0, -1]], [96, 144])
 
 
+def test_the_lens_blurs_the_light_that_the_lamp_throws_on_the_scene():
+    """A lamp that lit the picture would leave the centroid of a disc, once divided out, where it is."""
+    blur, slope = 2.0, 0.01
+    lamp = Exposure(gradient=60 * slope, gradient_direction=0).lamp
+    disc = Scene(BLACK, [Shape(closed(circle((0.0, 0.0), 0.85)), WHITE)])
+    x, middle = (
+        np.arange(120) - (120 - 1) / 2,
+        PINHOLE.project([[0.0, 0.0, 0.0]], ABOVE)[0, 0] - (120 - 1) / 2,
+    )
+    seen = mean_light([disc], PINHOLE, ABOVE, blur, lamp)[:, :, 1].astype(np.float64).sum(axis=0)
+    even = seen / (1 + slope * x)
+    found = (even * x).sum() / even.sum() - middle
+    # The blurred product is the product of lamp and blurred disc and blur² times that of their slopes. A
+    # pixel, over which light is summed, adds a twelfth to blur²; the lamp's level changes it by 1.5 % across
+    # the disc.
+    assert found == pytest.approx(-slope * (blur**2 + 1 / 12) / (1 + slope * middle), rel=0.03)
+
+
 def test_the_same_seed_and_frame_give_the_same_picture_and_others_do_not():
     scene, noisy = Scene((0.6,) * 3, []), Exposure(noise=4)
 
