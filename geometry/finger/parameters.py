@@ -5,6 +5,7 @@ Invalid values are refused in one line: the parameter, the value, and the allowe
 
 import difflib
 import reprlib
+from textwrap import shorten
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -25,6 +26,8 @@ def bounded(default: Any, low: float, high: float, unit: str, symbol: str, meani
     )
 
 
+MAX_NAMES = 120
+"""Characters of the names that a message lists."""
 NUMERIC = (int, float, int | None, float | None)
 
 
@@ -32,12 +35,17 @@ class CheckedModel(BaseModel):
     """A frozen model that refuses invalid values in one line.
 
     Raises:
-        UserError: With the parameter, the value and what would be right; semicolons between several.
+        UserError: With the parameter, the value and what would be right; semicolons between several. Likewise
+            if a value is given without its name.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    def __init__(self, **values: Any) -> None:
+    def __init__(self, *unnamed: Any, **values: Any) -> None:
+        if unnamed:
+            names = shorten(", ".join(type(self).model_fields), MAX_NAMES, placeholder=" ...")
+            given = " ".join(reprlib.repr(unnamed[0]).split())
+            raise UserError(f"{type(self).__name__} takes values by name only ({names}), not {given}")
         for name, value in values.items():
             field = type(self).model_fields.get(name)
             if isinstance(value, bool) and field and field.annotation in NUMERIC:

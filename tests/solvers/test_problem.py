@@ -83,6 +83,11 @@ def test_a_contact_beyond_the_finger_is_refused(coarse_mesh):
         (lambda: Material(youngs=1), "unknown parameter 'youngs'; did you mean young"),
         (lambda: Load(displacement=(0.0, float("nan"))), "displacement = nan is not a finite number$"),
         (lambda: Load(displacement=(None, None)), "leaves both components free"),
+        (
+            lambda: Load((0.0, -3.0)),
+            r"by name only \(kind, displacement, position, radius\), not \(0.0, -3.0\)$",
+        ),
+        (lambda: Load(np.ones((9, 9))), r"Load takes values by name only .*, not array"),  # many lines
         (lambda: Load(displacement=-3), "displacement = -3: input should be a valid tuple"),
         (lambda: Load(kind="magnet"), "kind = 'magnet': .* 'mean', 'point', 'patch' or 'cylinder'"),
         (lambda: Load(kind="cylinder", radius=0), "radius = 0: input should be greater than 0"),

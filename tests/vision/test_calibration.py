@@ -160,6 +160,14 @@ def test_photographs_of_other_sizes_are_named_with_a_way_to_leave_them_out():
         calibrate(images.items(), BOARD)
 
 
+def test_all_photographs_of_other_sizes_are_in_the_way_to_leave_them_out():
+    images = {f"{number}.png": np.zeros((40, 60 if number < 9 else 50), np.uint8) for number in range(17)}
+    with pytest.raises(UserError, match=r"13\.png 50x40 and 3 more; leave those out by") as refused:
+        calibrate(images.items(), BOARD)
+    _, *left_out = str(refused.value).split(" --without ")
+    assert left_out == [f"{number}.png" for number in range(9, 17)]
+
+
 @pytest.mark.parametrize(("parts", "hint"), [(2, "count them"), (5, "5 seem to show 4x3")])
 def test_another_board_is_named_only_if_most_photographs_show_it(parts, hint):
     """Of a board that is hard to see OpenCV may find a part here and there."""

@@ -17,7 +17,7 @@ from vision.frames.frame import GreyImage
 
 FEWEST_VIEWS = 4
 MAX_NAMED = 5
-"""Photographs of other sizes that a message names."""
+"""Photographs of other sizes whose sizes a message names."""
 MAX_SUGGESTIONS = 8
 """Photographs without the expected board that are searched for another one."""
 
@@ -68,7 +68,7 @@ def _other_sizes(sizes: Mapping[tuple[int, int], Sequence[str]]) -> str:
     others = [(name, size) for size, names in sizes.items() if size != usual for name in names]
     named = ", ".join(f"{name} {width}x{height}" for name, (width, height) in others[:MAX_NAMED])
     rest = f" and {len(others) - MAX_NAMED} more" if len(others) > MAX_NAMED else ""
-    without = " ".join(f"--without {name}" for name, _ in others[:MAX_NAMED])
+    without = " ".join(f"--without {name}" for name, _ in others)
     return (
         f"photographs for one calibration must have one size: {len(sizes[usual])} have "
         f"{usual[0]}x{usual[1]} pixels, {named}{rest}; leave those out by {without}"
