@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from compare.evaluation.comparison import Comparison
+from solvers.shared_work import SharedWork
 
 FORMATS = ("svg", "pdf")
 """Formats of pictures for print."""
@@ -48,9 +49,12 @@ def draw_all(
     from compare.figures.gallery import DRAWINGS
 
     pictures: list[Picture] = []
+    work = SharedWork()
     for number, (name, (what, draw)) in enumerate(DRAWINGS.items()):
         progress(number / len(DRAWINGS), what)
-        if (drawing := draw(comparison)) is not None:
+        with work.used():
+            drawing = draw(comparison)
+        if drawing is not None:
             path = drawing.figure.save(folder / f"{name}.png")
             for kind in formats:
                 drawing.figure.save(folder / f"{name}.{kind}")

@@ -8,12 +8,13 @@ from collections.abc import Iterable
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
 
 from compare.figures.canvas import Canvas, Extent, Pixels
 from compare.figures.colours import Scale
 from geometry.arrays import FloatArray, IntArray
 from geometry.figure import INK, MUTED, SMALL
-from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 PIXELS = 1800
@@ -82,8 +83,8 @@ def panel(
     """The undeformed body in the colours of its triangles, shape (t, 3), with its outline, title and note."""
     prepare(axes, canvas.extent)
     show(axes, canvas, colours)
-    outline(axes, boundary_edges(mesh.triangles), mesh.points, width=0.35)
-    axes.set_title(title, size=8.5, pad=2, weight="bold" if bold else "normal")
+    outline(axes, canvas.outline, mesh.points, width=0.35)
+    axes.set_title(title, size=8.5, pad=2, y=1.0, weight="bold" if bold else "normal")
     write_note(axes, canvas.extent, note)
 
 
@@ -95,18 +96,17 @@ def write_note(axes: Axes, extent: Extent, note: str) -> None:
 
 def outline(
     axes: Axes,
-    edges: IntArray,
+    paths: Iterable[IntArray],
     points: FloatArray,
     *,
     colour: str = INK,
     width: float = 0.5,
     zorder: float = 2,
 ) -> None:
-    """Draw edges, shape (b, 2), of nodes at `points`, shape (n, 2), mm."""
-    lines = LineCollection(
-        list(points[edges]), colors=colour, linewidths=width, capstyle="round", zorder=zorder
-    )
-    axes.add_collection(lines, autolim=False)
+    """Draw lines, each given by the numbers of its nodes, (k,), of nodes at `points`, shape (n, 2), mm."""
+    lines = Path.make_compound_path(*(Path(points[path]) for path in paths))
+    style = {"capstyle": "round", "joinstyle": "round", "zorder": zorder}
+    axes.add_artist(PathPatch(lines, fc="none", ec=colour, lw=width, **style))
 
 
 def base_lines(mesh: TriangleMesh) -> list[FloatArray]:

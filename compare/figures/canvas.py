@@ -1,12 +1,15 @@
-"""Triangles to pixels: PyVista off the screen, colours and camera given exactly, no text.
+"""Triangles to pixels: PyVista off the screen, with a camera given exactly and no text.
 
-Type, axes and legends are matplotlib's; both use the same extent in mm, so that they fit to the pixel.
+VTK draws every triangle in its number, in quarters of pixels, and colours are given to the numbers: a body
+that is drawn in many colours is rendered once. Type, axes and legends are matplotlib's; both use the same
+extent in mm, so that they fit to the pixel.
 """
 
 import os
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
-from typing import NamedTuple, Self
+from functools import cached_property
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +19,10 @@ os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 import pyvista
 from vtkmodules.vtkCommonCore import vtkLogger
 
-from geometry.arrays import FloatArray
+from geometry.arrays import FloatArray, IntArray
+from geometry.mesh.boundary import boundary_edges, edge_paths
 from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.shared_work import shared
 
 Pixels = NDArray[np.uint8]
 
@@ -48,21 +53,51 @@ class Extent(NamedTuple):
         return self.top - self.bottom
 
 
+class Cover(NamedTuple):
+    """The pixels that a mesh covers.
+
+    Attributes:
+        pixels: Numbers of the pixels with any triangle, row by row, shape (k,).
+        quarters: Number of the triangle in each of their quarters, or that of triangles where it has none,
+            shape (4, k).
+    """
+
+    pixels: IntArray
+    quarters: IntArray
+
+
 class Canvas(AbstractContextManager["Canvas"]):
-    """A picture of a mesh that is coloured triangle by triangle, again and again; to be closed after use."""
+    """A picture of a mesh that is coloured triangle by triangle, again and again; to be closed after use.
+
+    Attributes:
+        extent: What the picture shows.
+        outline: Numbers of the nodes along each line of the mesh's boundary.
+    """
 
     def __init__(self, mesh: TriangleMesh, extent: Extent, *, width: int) -> None:
-        """Set the camera: `extent` fills a picture of `width` pixels, seen from the front."""
+        """Show `extent` in a picture of `width` pixels, seen from the front."""
+        self.extent, self.outline = extent, edge_paths(boundary_edges(mesh.triangles))
+        self._mesh, self._size = mesh, (round(width * extent.height / extent.width), width)
+
+    @cached_property
+    def _surface(self) -> Any:
+        """The triangles, each in the colour of its number."""
+        triangles = self._mesh.triangles
+        faces = np.insert(triangles, 0, 3, axis=1)
+        surface = pyvista.PolyData(np.pad(self._mesh.points, ((0, 0), (0, 1))), faces.ravel())
+        numbers = np.arange(len(triangles), dtype="<u4").view(np.uint8).reshape(-1, 4)
+        surface.cell_data["number"] = numbers[:, :3]
+        return surface
+
+    @cached_property
+    def _plotter(self) -> Any:
         pyvista.OFF_SCREEN = True
-        self.extent = extent
-        faces = np.insert(mesh.triangles, 0, 3, axis=1)
-        self._surface = pyvista.PolyData(np.pad(mesh.points, ((0, 0), (0, 1))), faces.ravel())
-        self._surface.cell_data["colour"] = np.zeros((len(faces), 3), dtype=np.uint8)
-        size = (width, round(width * extent.height / extent.width))
+        extent, (height, width) = self.extent, self._size
         with _without_warnings():
-            self._plotter = pyvista.Plotter(off_screen=True, window_size=list(size))
-            self._plotter.add_mesh(self._surface, scalars="colour", rgb=True, lighting=False)
-        camera = self._plotter.camera
+            plotter = pyvista.Plotter(off_screen=True, window_size=[2 * width, 2 * height])
+            plotter.disable_anti_aliasing()  # a mean of two numbers is the number of a third triangle
+            plotter.add_mesh(self._surface, scalars="number", rgb=True, lighting=False)
+        camera = plotter.camera
         middle = ((extent.left + extent.right) / 2, (extent.bottom + extent.top) / 2)
         camera.parallel_projection = True
         camera.focal_point = (*middle, 0.0)
@@ -70,10 +105,12 @@ class Canvas(AbstractContextManager["Canvas"]):
         camera.up = (0.0, 1.0, 0.0)
         camera.parallel_scale = extent.height / 2
         camera.clipping_range = (50.0, 150.0)
+        return plotter
 
     def __exit__(self, *_: object) -> None:
         """Free the graphics memory."""
-        self._plotter.close()
+        if "_plotter" in self.__dict__:
+            self._plotter.close()
 
     def picture(self, colours: Pixels, points: FloatArray | None = None) -> Pixels:
         """The mesh in those colours, transparent where it is not.
@@ -85,14 +122,36 @@ class Canvas(AbstractContextManager["Canvas"]):
         Returns:
             Red, green, blue and opacity, shape (height, width, 4).
         """
-        if points is not None:
-            self._surface.points = np.pad(points, ((0, 0), (0, 1)))
-        self._surface.cell_data["colour"] = colours
-        self._surface.Modified()  # VTK would show the picture before
+        if points is None:
+            at_rest = ("cover", self._mesh.digest, self.extent, self._size)
+            cover = shared(at_rest, lambda: self._cover(self._mesh.points))
+        else:
+            cover = self._cover(points)
+        opaque = np.zeros((len(colours) + 1, 4), dtype=np.uint16)
+        opaque[:-1, :3], opaque[:-1, 3] = colours, 255
+        packed = opaque.view(np.uint64).ravel()  # four numbers at a time: the sum of four bytes fits each
+        first, second, third, fourth = cover.quarters
+        sums = (
+            (packed[first] + packed[second] + packed[third] + packed[fourth]).view(np.uint16).reshape(-1, 4)
+        )
+        image = np.zeros((*self._size, 4), dtype=np.uint8)
+        seen = image.reshape(-1, 4)
+        seen[cover.pixels, :3] = sums[:, :3].astype(np.uint32) * 255 // sums[:, 3:]
+        seen[cover.pixels, 3] = sums[:, 3] // 4
+        return image
+
+    def _cover(self, points: FloatArray) -> Cover:
+        """The pixels covered with the nodes at points of shape (n, 2), mm."""
+        self._surface.points = np.pad(points, ((0, 0), (0, 1)))
         self._plotter.render()
         with _without_warnings():
             image = self._plotter.screenshot(None, transparent_background=True, return_img=True)
-        return np.array(image, dtype=np.uint8)
+        count, (height, width) = self._surface.n_cells, self._size
+        words = np.ascontiguousarray(image, dtype=np.uint8).view("<u4")
+        number = np.where(words >> 24, words & 0xFFFFFF, count)
+        quarters = number.reshape(height, 2, width, 2).transpose(1, 3, 0, 2).reshape(4, -1)
+        pixels = np.flatnonzero((quarters < count).any(axis=0))
+        return Cover(pixels, quarters[:, pixels].astype(np.int64))
 
 
 @contextmanager

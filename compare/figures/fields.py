@@ -108,7 +108,7 @@ def draw_field(comparison: Comparison, quantity: Quantity) -> Figure:
     scale = field_scale(quantity, mesh, reference)
     total = HEAD + len(ordered) * (PANEL_TITLE + height) + FOOT
     base = quantity.values(reference)
-    size = f"$|{quantity.symbol}|$" if quantity.signed else f"${quantity.symbol}$"
+    largest = "largest magnitude" if quantity.signed else "largest"
 
     with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // 2) as canvas:
         heading(drawn, f"{quantity.title}, undeformed body")
@@ -117,14 +117,14 @@ def draw_field(comparison: Comparison, quantity: Quantity) -> Figure:
             axes = axes_at(drawn, (MARGIN, top, width, height))
             values = quantity.values(evaluation)
             means = evaluation.per_triangle(values)
-            note = f"largest {size} = {significant(np.abs(means).max(), 3)} {quantity.unit}"
+            note = f"{largest} {significant(np.abs(means).max(), 3)} {quantity.unit}"
             body.panel(axes, canvas, mesh, scale.paint(means), evaluation.label, note)
             beside = (2 * MARGIN + width, top, width, height)
             if evaluation is not reference:
                 axes = axes_at(drawn, beside)
                 own = difference_scale(quantity, mesh, evaluation, reference)
                 distance = percent(field_difference(values, base, reference.weights).rel_l2)
-                note = f"rel. $L^2$ {distance}; scale ±{significant(own.high, 2)} {quantity.unit}"
+                note = f"rel. L² {distance}; scale ±{significant(own.high, 2)} {quantity.unit}"
                 colours = own.paint(evaluation.per_triangle(values - base))
                 body.panel(axes, canvas, mesh, colours, f"minus {reference.label}", note, bold=False)
             elif columns == 2:

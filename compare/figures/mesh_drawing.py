@@ -10,7 +10,7 @@ from compare.figures.canvas import Extent
 from compare.figures.style import HALO, axes_at, heading
 from geometry.arrays import FloatArray
 from geometry.figure import CONTACT, INK, MEASURED, SMALL, WIDTH, Figure, figure
-from geometry.mesh.boundary import boundary_edges
+from geometry.mesh.boundary import boundary_edges, edge_paths
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 MARGIN = 0.1
@@ -141,8 +141,8 @@ def _draw(axes: Axes, mesh: TriangleMesh, window: Extent, width: float) -> None:
     )
     inside = ~beyond.any(axis=1)
     axes.add_collection(LineCollection(list(ends[inside]), colors=LINE, linewidths=width), autolim=False)
-    body.outline(
-        axes, boundary_edges(mesh.triangles), mesh.points, colour=INK, width=0.5 if width < 0.3 else 1.0
-    )
-    body.outline(axes, mesh.boundary("contact"), mesh.points, colour=CONTACT, width=2.2, zorder=4)
+    boundary = edge_paths(boundary_edges(mesh.triangles))
+    body.outline(axes, boundary, mesh.points, colour=INK, width=0.5 if width < 0.3 else 1.0)
+    contact = edge_paths(mesh.boundary("contact"))
+    body.outline(axes, contact, mesh.points, colour=CONTACT, width=2.2, zorder=4)
     axes.plot(*mesh.markers.T, "o", ms=2.5, mfc=MEASURED, mec="white", mew=0.5, zorder=4)

@@ -15,7 +15,6 @@ from compare.figures.colours import Scale
 from compare.figures.style import arrow, axes_at, heading, legend_below_heading
 from geometry.arrays import FloatArray
 from geometry.figure import INK, MEASURED, MUTED, WIDTH, Figure, figure
-from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 MARGIN = 0.12
@@ -89,12 +88,11 @@ def _magnitude(mesh: TriangleMesh, evaluation: Evaluation) -> FloatArray:
 
 def _panel(axes: Axes, canvas: Canvas, scale: Scale, comparison: Comparison, evaluation: Evaluation) -> None:
     mesh, observations = comparison.mesh, comparison.observations
-    edges = boundary_edges(mesh.triangles)
     deformed = mesh.points + evaluation.node_displacement
     body.prepare(axes, canvas.extent)
-    body.outline(axes, edges, mesh.points, colour="#9a9a9a", width=0.6, zorder=0)
+    body.outline(axes, canvas.outline, mesh.points, colour="#9a9a9a", width=0.6, zorder=0)
     body.show(axes, canvas, scale.paint(_magnitude(mesh, evaluation)), deformed)
-    body.outline(axes, edges, deformed, width=0.4)
+    body.outline(axes, canvas.outline, deformed, width=0.4)
     body.clamp(axes, body.base_lines(mesh), size=body.hatch_size(mesh.points))
     seen = observations.visible
     observed = observations.points[seen] + observations.displacements[seen]
@@ -103,7 +101,7 @@ def _panel(axes: Axes, canvas: Canvas, scale: Scale, comparison: Comparison, eva
     axes.plot(*observed.T, "o", ms=5, mfc="none", mec=MEASURED, mew=1.1, zorder=5)
     axes.plot(*computed.T, "x", ms=4, color="white", mew=2.0, zorder=4)
     axes.plot(*computed.T, "x", ms=4, color=INK, mew=0.9, zorder=5)
-    axes.set_title(evaluation.label_at_markers, size=9, pad=3, weight="bold")
+    axes.set_title(evaluation.label_at_markers, size=9, pad=3, y=1.0, weight="bold")
     if observations.known:
         errors = marker_errors(evaluation, observations)
         note = f"MAE{', given' * evaluation.in_sample}  u {errors.mae_u:.3f},  v {errors.mae_v:.3f} mm"

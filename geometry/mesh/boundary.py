@@ -206,7 +206,7 @@ def _distance(mesh: TriangleMesh, face: str, points: FloatArray) -> FloatArray:
 def evenly_spaced_points(mesh: TriangleMesh, name: str, count: int) -> FloatArray:
     """Points at equal distances along all pieces of a named boundary, both ends included, (count, 2), mm."""
     places, corners, travelled = [], [], 0.0
-    for path in _paths(mesh.boundary(name)):
+    for path in edge_paths(mesh.boundary(name)):
         points = mesh.points[path]
         steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
         places.append(travelled + np.append(0.0, steps.cumsum()))
@@ -217,7 +217,7 @@ def evenly_spaced_points(mesh: TriangleMesh, name: str, count: int) -> FloatArra
     return np.column_stack([np.interp(wanted, along, points[:, axis]) for axis in range(2)])
 
 
-def _paths(edges: IntArray) -> list[IntArray]:
+def edge_paths(edges: IntArray) -> list[IntArray]:
     """The nodes along every connected piece of edges (k, 2); a closed piece ends where it starts."""
     nodes, local, degree = np.unique(edges, return_inverse=True, return_counts=True)
     one, other = local.reshape(-1, 2).T

@@ -52,3 +52,23 @@ def test_the_body_is_drawn_where_its_nodes_have_gone(canvas: Canvas, mesh: Trian
     image = canvas.picture(halves(mesh), mesh.points + np.array([0, 0.8]))
     assert at(image, 3, 0.5)[3] == 255
     assert at(image, 3, -3.8)[3] == 0
+
+
+def test_the_body_at_rest_is_where_the_mesh_has_it_after_it_was_elsewhere(
+    canvas: Canvas, mesh: TriangleMesh
+) -> None:
+    canvas.picture(halves(mesh), mesh.points + np.array([0, 0.8]))
+    np.testing.assert_array_equal(canvas.picture(halves(mesh)), canvas.picture(halves(mesh), mesh.points))
+
+
+def test_pixels_on_an_edge_are_means_of_the_triangles_in_their_quarters(mesh: TriangleMesh) -> None:
+    """Five pixels a mm, of a body moved by half a pixel: halves and quarters of red, blue and nothing."""
+    with Canvas(mesh, Extent(-1, 13, -5, 1), width=70) as coarse:
+        image = coarse.picture(halves(mesh), mesh.points + 0.1).astype(int)
+    covered = image[image[:, :, 3] > 0]
+    quarters = np.arange(5)[:, None] / 4
+    mixtures = quarters * RED + (1 - quarters) * BLUE
+    assert set(np.unique(covered[:, 3])) == {63, 127, 255}
+    distance = np.abs(covered[:, None, :3] - mixtures).max(axis=2).min(axis=1)
+    assert (distance <= 1).mean() == 1  # a byte is rounded down
+    assert (np.abs(covered[:, None, :3] - (RED, BLUE)).max(axis=2).min(axis=1) > 1).any()

@@ -244,7 +244,7 @@ def test_the_number_beside_a_field_is_its_largest_mean_of_a_triangle(
 ) -> None:
     peak = replace(fem, von_mises=np.zeros(len(fem.weights)))
     peak.von_mises[0] = 3.0  # at one of a triangle's three points, which have equal weights
-    assert "= 1 MPa" in page_of(draw(compared(peak), "von_mises").figure).text
+    assert "largest 1 MPa" in page_of(draw(compared(peak), "von_mises").figure).text
 
 
 def test_ticks_of_six_characters_leave_room_for_the_labels(
