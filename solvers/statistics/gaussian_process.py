@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from geometry.arrays import FloatArray
 from geometry.mesh.boundary import evenly_spaced_points
@@ -157,7 +158,8 @@ def _fit(misfit: Misfit, deviations: FloatArray, base: FloatArray, kernel: Kerne
     processes = []
     for axis in (0, 1):
         process = GaussianProcessRegressor(covariance, alpha=deviations[:, axis] ** 2)
-        with warnings.catch_warnings():
+        with threadpool_limits(1, user_api="blas"), warnings.catch_warnings():
+            # On small matrices BLAS's threads wait for one another.
             # An end of the search range is a valid result: constant over the finger, or the markers alone.
             warnings.simplefilter("ignore", ConvergenceWarning)
             processes.append(process.fit(points, observed[:, axis]))

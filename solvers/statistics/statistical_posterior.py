@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_solve
 from scipy.optimize import minimize
+from threadpoolctl import threadpool_limits
 
 from geometry.arrays import FloatArray, IntArray
 from geometry.mesh.point_location import LocatedPoints
@@ -88,10 +89,11 @@ class Posterior:
             return float(0.5 * residual @ coefficients + np.log(np.diag(cholesky)).sum())
 
         bounds = np.log([FACTORS, SPREADS, SPREADS, LENGTHS])
-        found = [
-            minimize(minus_log_likelihood, np.log(values), method="L-BFGS-B", bounds=bounds)
-            for values in START
-        ]
+        with threadpool_limits(1, user_api="blas"):  # on small matrices its threads wait for one another
+            found = [
+                minimize(minus_log_likelihood, np.log(values), method="L-BFGS-B", bounds=bounds)
+                for values in START
+            ]
         best = min(found, key=lambda result: result.fun)
         constants = Hyperparameters.of(best.x)
         cholesky, _, coefficients = _condition(data, given, constants)
