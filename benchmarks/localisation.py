@@ -199,15 +199,15 @@ def _other_edge(image: DiscImage, number: int, edge: Edge, name: str, change: fl
 
 
 def _milliseconds(image: DiscImage, count: int = 16) -> float:
-    """Time of a batch on one core, the best of twenty."""
+    """Processor time of a batch on one core, the best of twenty."""
     cv2.setNumThreads(1)
     picture, centres = _sheet(Case(image), count, np.random.default_rng(SEED))
     guesses = np.column_stack([centres + 0.5, np.full(count, image.radius)])
     seconds = []
     for _ in range(20):
-        started = time.perf_counter()
+        started = time.process_time()
         fit_discs(picture, guesses, radii=image.radius)
-        seconds.append(time.perf_counter() - started)
+        seconds.append(time.process_time() - started)
     return 1e3 * min(seconds)
 
 
@@ -241,7 +241,7 @@ def _report(rows: list[tuple[str, ...]], speeds: dict[str, float]) -> str:
         "",
         f"Made by `python -m benchmarks localisation` on {datetime.now(UTC):%Y-%m-%d}: {platform.machine()}, "
         f"Python {platform.python_version()}, numpy {version('numpy')}, OpenCV {cv2.__version__}, "
-        f"seed {SEED}; on one core {_speed(speeds)}, the best of twenty.",
+        f"seed {SEED}; on one core {_speed(speeds)} of processor time, the best of twenty.",
         "",
         f"{PLACES} discs each at random places within a pixel; unless a row says otherwise of radius 8 px, "
         "levels 180 around and 60 within, blur 0.8 px besides the pixels' own width, noise 2. "

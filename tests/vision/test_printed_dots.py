@@ -125,7 +125,7 @@ def test_the_layers_of_a_print_are_told_from_the_edges_of_its_dots(radius, perio
     """0.3 to 0.6 times the error of a plain centroid; 0.4 to 2 times with the layers left in."""
     monkeypatch.setattr(printed_dots, "LAYER", period)
     discs, errors, plain = measured(PrintedDots(radius, 0.03, layers=0.1, count=COUNTED, seed=3))
-    assert discs.found.sum() >= COUNTED - 1
+    assert discs.found.sum() >= COUNTED - 2  # two small dots on layers of their own size could be hidden
     found = errors[discs.found]
     assert rms(found) < 0.75 * rms(plain)
     assert covered(discs, errors) > 0.85  # 0.89 to 0.97; 0.7 to 0.8 with the layers left in

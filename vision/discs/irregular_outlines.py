@@ -165,10 +165,12 @@ def _outlined(
     start = start[:, :COUNT].copy()
     start[:, [STRETCH, SLANT]] = 0
     start[:, RADIUS] = radii
-    start = np.concatenate([start, np.zeros((len(start), OUTLINE))], axis=1)
+    matte = GLARE.start if lenient else GLARE.stop  # beside the glare an occluder's edge is not seen
+    start = np.concatenate([start, np.zeros((len(start), matte - COUNT))], axis=1)
     for _ in range(2):
         start = _by_moments(window, start)
     start, present = with_edges(window, start, window.within)
+    start = np.insert(start, [GLARE.start] * (GLARE.stop - matte), 0.0, axis=1)
     prior, limits = prior_and_limits(start, present, radii, known)
     matt, plain = (prior._replace(precision=prior.precision.copy()) for _ in range(2))
     matt.precision[:, GLARE] = MISSING**-2.0
