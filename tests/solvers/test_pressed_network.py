@@ -75,7 +75,7 @@ def test_a_newton_step_is_that_of_the_residual_by_differences(problem, local):
 
     stage = pressed.stage(output, 1.0, multipliers)
     touching = np.flatnonzero(pressed.contact.forces(stage) > 0)
-    step = pressed._step(stage, output, touching)
+    step = pressed._step(stage, output, touching, pressed._tangent(output))
     assert step is not None
     assert len(touching) >= 3
     part = 1e-4

