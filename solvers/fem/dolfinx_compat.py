@@ -2,9 +2,11 @@
 
 import inspect
 import logging
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
+from time import time
 from typing import Any, Generic, TypeVar
 
 import dolfinx
@@ -67,16 +69,42 @@ def _rows(table: Any, width: int) -> IntArray:
     return np.asarray(getattr(table, "array", table)).reshape(-1, width)
 
 
-@contextmanager
-def _quiet_compiler() -> Iterator[None]:
-    """Compile forms without the build log that distutils would print through the root logger."""
-    before = logging.root.manager.disable
+T = TypeVar("T")
+
+
+def _compiled(build: Callable[[], T]) -> T:
+    """What a call of DOLFINx gives, without the build log that distutils prints through the root logger.
+
+    Nothing half compiled stays behind an interruption: later runs would wait for it and fail. After a kill
+    it does stay; what is older than `ABANDONED_S` is compiled again.
+    """
+    before, began = logging.root.manager.disable, time()
     logging.disable(logging.INFO)
     try:
-        yield
+        while True:
+            _forget_half_compiled(lambda changed: changed < time() - ABANDONED_S)
+            try:
+                return build()
+            except TimeoutError:  # of FFCx, which has waited; several ranks have another error
+                continue
+    except KeyboardInterrupt:  # of other exceptions FFCx takes care
+        _forget_half_compiled(lambda changed: changed >= began)
+        raise
     finally:
         logging.disable(before)
 
+
+def _forget_half_compiled(chosen: Callable[[float], bool]) -> None:
+    """Delete sources that FFCx has not compiled to the end, chosen by the time of their last change, s."""
+    options: Any = getattr(dolfinx.jit, "get_options", None) or dolfinx.jit.get_parameters  # until 0.5
+    for source in Path(options()["cache_dir"]).glob("libffcx_*.c"):
+        with suppress(OSError):  # another process may have deleted it
+            if not source.with_suffix(".c.cached").exists() and chosen(source.stat().st_mtime):
+                source.unlink()
+
+
+ABANDONED_S = 120.0
+"""Age at which a form that is not compiled has been given up, s."""
 
 SIMPLICES = {2: "triangle", 3: "tetrahedron"}
 
@@ -105,8 +133,7 @@ class DistributedSpace(Generic[SpaceT]):
         self.space, self.comm, self.dimension = space, communicator(), space.nodes.shape[1]
         share = slice(None) if self.comm.rank == 0 else slice(0, 0)
         self.domain = _create_mesh(self.comm, space.cells[share], space.nodes[space.vertices][share])
-        with _quiet_compiler():
-            self.dolfinx_space = _vector_space(self.domain, space.degree)
+        self.dolfinx_space = _compiled(lambda: _vector_space(self.domain, space.degree))
         self.function = dolfinx.fem.Function(self.dolfinx_space)
         self._node_of_dof = _nodes_of_dofs(space, self.domain, self.dolfinx_space)
         self._owned = self.dolfinx_space.dofmap.index_map.size_local
@@ -118,8 +145,7 @@ class DistributedSpace(Generic[SpaceT]):
 
     def form(self, expression: Any) -> Any:
         """Compile a UFL form."""
-        with _quiet_compiler():
-            return dolfinx.fem.form(expression)
+        return _compiled(lambda: dolfinx.fem.form(expression))
 
     def derivatives(self, energy: Any) -> tuple[Any, Any]:
         """Compile the first and the second derivative of an energy, a UFL form, by `function`."""
@@ -176,8 +202,7 @@ class DistributedSpace(Generic[SpaceT]):
 
     def node_function(self) -> "NodeFunction":
         """A continuous vector field, linear in every triangle, that forms can be written with; zero."""
-        with _quiet_compiler():
-            space = _vector_space(self.domain, 1)
+        space = _compiled(lambda: _vector_space(self.domain, 1))
         nodes = _nodes_of_dofs(LagrangeSpace(self.space.mesh, 1), self.domain, space)
         return NodeFunction(dolfinx.fem.Function(space), nodes)
 
