@@ -10,7 +10,7 @@ from errno import EDQUOT, ENOSPC
 from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
-from resource import RLIM_INFINITY, RLIMIT_NOFILE, getrlimit, setrlimit
+from resource import RLIM_INFINITY, RLIMIT_FSIZE, RLIMIT_NOFILE, getrlimit, setrlimit
 from shutil import disk_usage
 from tempfile import TemporaryFile, gettempdir
 from typing import Any, TextIO
@@ -32,6 +32,9 @@ SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
 
 MIN_FILES = 128
 """Open files that a run needs: a comparison has opened up to 40 at once, MPI's included."""
+
+MIN_LENGTH = 2**24
+"""Bytes that a file must be allowed to have: MPI needs between 4 and 12 million."""
 
 MIN_SPACE = 2**20
 """Bytes left on a disk below which it counts as full."""
@@ -147,7 +150,18 @@ def _give_libraries_a_cache() -> None:
 
 
 def _with_enough_files(command: Callable[[], Any]) -> Any:
-    """Run a command, with the limit of open files raised as far as needed: MPI aborts without a reason."""
+    """Run a command, with the limit of open files raised as far as needed: MPI aborts without a reason.
+
+    So it does where files may not become long, of which `ulimit -f` sets the hard limit, too. DOLFINx, while
+    it is imported, fails on arguments that are not UTF-8, and JSON files cannot hold them.
+    """
+    for given in sys.argv:
+        if given != given.encode(errors="replace").decode():
+            raise UserError(f"the argument {given!a} is not UTF-8; take another name")
+    if -1 < (longest := getrlimit(RLIMIT_FSIZE)[1]) < MIN_LENGTH:  # -1: RLIM_INFINITY
+        raise UserError(
+            f"files may not become longer than {longest} bytes; allow {MIN_LENGTH} (ulimit -f 16384)"
+        )
     own, most = getrlimit(RLIMIT_NOFILE)
     if most != RLIM_INFINITY and most < MIN_FILES:
         raise UserError(f"the limit of open files is {most}; allow {MIN_FILES} (ulimit -n {MIN_FILES})")

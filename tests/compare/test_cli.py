@@ -296,6 +296,30 @@ def test_too_few_open_files_are_one_line(folder):
     assert (done.returncode, done.stderr) == (BAD_INPUT, said)
 
 
+@pytest.mark.parametrize(
+    ("before", "argument", "said"),
+    [
+        (
+            "ulimit -f 8; ",
+            "out",
+            "files may not become longer than 8192 bytes; allow 16777216 (ulimit -f 16384)",
+        ),
+        ("", r"$'a\xff'", r"the argument 'a\udcff' is not UTF-8; take another name"),
+    ],
+)
+def test_what_the_libraries_cannot_start_with_is_one_line(folder, before, argument, said):
+    """MPI is killed by SIGXFSZ, and DOLFINx ends in a traceback."""
+    command = f'{before}"{sys.executable}" -m compare.cli compare --solvers fem --out {argument}'
+    done = subprocess.run(
+        ["bash", "-c", command],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (BAD_INPUT, f"error: {said}\n")
+
+
 def test_bad_input_of_a_process_has_no_traceback(folder):
     done = subprocess.run(
         [sys.executable, "-m", "compare.cli", "compare", "--solvers", "fen"],
