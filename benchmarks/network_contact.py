@@ -1,4 +1,4 @@
-"""Networks under a rigid cylinder against finite elements at finite strain; seventeen minutes beside other work.
+"""Networks under a rigid cylinder against finite elements at finite strain; takes up to twenty minutes.
 
 The default finger, neo-Hookean, stroke 10 mm. The reference has quadratic elements graded to 0.02 mm at the
 corners and 0.1 mm at the contact; `fem-nonlinear` on the shared mesh stands beside the networks.
