@@ -38,6 +38,7 @@ def finger_mesh(
     settings: MeshSettings | None = None,
     cache_dir: Path | None = None,
     timeout_s: float = TIMEOUT_S,
+    keep: bool = True,
 ) -> TriangleMesh:
     """The mesh of a finger, from the cache if it was made before.
 
@@ -48,6 +49,7 @@ def finger_mesh(
         settings: Element sizes; the default ones if None.
         cache_dir: Folder of the cache; by default `cache_folder()`.
         timeout_s: Time limit, s.
+        keep: Whether the cache keeps the mesh.
 
     Raises:
         UserError: If meshing fails or takes too long.
@@ -61,7 +63,7 @@ def finger_mesh(
     if isinstance(finger, DrawnFinger) and finger.mesh is not None and settings == MeshSettings():
         return replace(finger.mesh, depth=finger.depth)
     task["finger"] = finger.definition()
-    return _cached(finger.digest, task, ".npz", TriangleMesh.load, cache_dir, timeout_s)
+    return _cached(finger.digest, task, ".npz", TriangleMesh.load, cache_dir, timeout_s, keep)
 
 
 def drawn_finger(
@@ -178,6 +180,7 @@ def _cached(
     load: Callable[[Path], _Result],
     cache_dir: Path | None,
     timeout_s: float,
+    keep: bool = True,
 ) -> _Result:
     """Load the task's result; make it first if it is missing or cannot be read."""
     folder = cache_dir or cache_folder()
@@ -196,8 +199,9 @@ def _cached(
         result, content = load(made), made.read_bytes()
     finally:
         made.unlink(missing_ok=True)
-    with kept_if_possible(folder, str(task["what"])):
-        write_bytes(entry, content)
+    if keep:
+        with kept_if_possible(folder, str(task["what"])):
+            write_bytes(entry, content)
     return result
 
 

@@ -21,7 +21,6 @@ from queue import SimpleQueue
 from typing import IO, Any
 
 from geometry.errors import UserError
-from geometry.finger.finger import Finger
 
 FOREIGN_PREFIXES = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "I_MPI_", "MPI_", "HYDRA_", "MPIEXEC_")
 """Environment variables that would make the child a member of the parent's MPI run."""
@@ -143,7 +142,9 @@ def perform(task: Mapping[str, Any]) -> None:
 
         load_drawing(task["file"], Description(**task["description"])).save(output)
         return
-    finger = _finger(task["finger"])
+    from geometry.drawing.definition import finger_from
+
+    finger = finger_from(task["finger"])
     if task["kind"] == "mesh":
         from geometry.mesh.mesher import build_mesh
         from geometry.mesh.settings import MeshSettings
@@ -155,17 +156,6 @@ def perform(task: Mapping[str, Any]) -> None:
         write_archive(finger, task["formats"], output)
     else:
         raise UserError(f"unknown task {task['kind']!r}; there are 'mesh', 'cad' and 'drawing'")
-
-
-def _finger(definition: Mapping[str, Any]) -> Finger:
-    """The finger of a definition, with parameters or from a drawing."""
-    if "section" in definition:
-        from geometry.drawing.drawn_finger import DrawnFinger
-
-        return DrawnFinger.from_definition(definition)
-    from geometry.finger.design import Design
-
-    return Design(**definition)
 
 
 def main() -> None:

@@ -1,6 +1,7 @@
 """The boundary-value problem: the argument of every solver."""
 
 from dataclasses import dataclass
+from math import cos, inf, radians, sin
 from typing import Literal, Self
 
 import numpy as np
@@ -17,6 +18,11 @@ from geometry.mesh.quadrature import segment_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.elasticity import Lame, LawName, lame_constants
+
+LoadKind = Literal["mean", "point", "patch", "cylinder"]
+
+RADIUS = 5.0
+"""Default radius of the cylinder, mm."""
 
 SOFTEST, STIFFEST = 1e-6, 1e7
 """Young's moduli of solids, MPa: a thousandth of the softest gels' to eight times diamond's."""
@@ -86,7 +92,7 @@ class Load(CheckedModel):
         UserError: If nothing is prescribed, a number is not finite, or a value does not go with the kind.
     """
 
-    kind: Literal["mean", "point", "patch", "cylinder"] = "mean"
+    kind: LoadKind = "mean"
     displacement: tuple[float | None, float | None] = (0.0, -10.0)
     position: float | None = None
     radius: float | None = Field(default=None, gt=0, allow_inf_nan=False)
@@ -106,6 +112,41 @@ class Load(CheckedModel):
         if self.kind == "cylinder" and not any(self.displacement):
             raise ValueError("the cylinder does not move; prescribe a displacement (mm)")
         return self
+
+    @classmethod
+    def of_travel(
+        cls,
+        kind: LoadKind = "mean",
+        *,
+        stroke: float = 10.0,
+        direction: float = 0.0,
+        slide: bool = False,
+        radius: float | None = None,
+    ) -> Self:
+        """The load of an indenter that travels in one direction.
+
+        Args:
+            kind: See the class.
+            stroke: Travel, mm.
+            direction: Of the travel, degrees: 0 into the finger, 90 along it to the tip.
+            slide: Whether the contact slides along the finger: u is free.
+            radius: Of a cylinder, mm; None means `RADIUS`.
+
+        Raises:
+            UserError: If the indenter does not press, or a value does not go with the kind.
+        """
+        if not 0 < stroke < inf:
+            raise UserError(f"stroke {stroke:g}: the indenter presses; give its travel, above 0 mm")
+        if not -90 < direction < 90:
+            raise UserError(f"direction {direction:g}: give an angle between -90 and 90 degrees")
+        if slide and direction:
+            raise UserError("slide leaves the travel along the finger free, so that direction says nothing")
+        along, into = sin(radians(direction)), cos(radians(direction))
+        return cls(
+            kind=kind,
+            displacement=(None if slide else stroke * along, -stroke * into),
+            radius=RADIUS if kind == "cylinder" and radius is None else radius,
+        )
 
     @property
     def prescribed(self) -> list[int]:

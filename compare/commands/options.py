@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import cos, inf, radians, sin
+from math import inf
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -21,12 +21,9 @@ from geometry.finger.presets import load_design, parse_overrides
 from geometry.mesh.settings import MeshSettings
 from geometry.text_files import parse_toml
 from solvers.elasticity import LawName
-from solvers.problem import Load, Material
+from solvers.problem import Load, LoadKind, Material
 from solvers.registry import PRESETS, make_solver
 from solvers.solver import Solver
-
-RADIUS = 5.0
-"""Default radius of the cylinder, mm."""
 
 FINGER = Group("Finger", sort_key=1)
 PHYSICS = Group("Physics", sort_key=2)
@@ -160,7 +157,7 @@ class PhysicsOptions:
     poisson: float = 0.45
     plane: Literal["strain", "stress"] = "strain"
     law: LawName | None = None
-    load: Literal["mean", "point", "patch", "cylinder"] | None = None
+    load: LoadKind | None = None
     radius: float | None = None
     stroke: float = 10.0
     direction: float = 0.0
@@ -168,27 +165,20 @@ class PhysicsOptions:
 
     def read(self, preset: str | None = None) -> tuple[Material, Load]:
         """The material and the load; a preset of the solvers may choose the kind of load."""
-        if not 0 < self.stroke < inf:
-            raise UserError(f"--stroke {self.stroke:g}: the indenter presses; give its travel, above 0 mm")
         if self.young == inf:
             raise UserError("--young inf: a rigid finger does not bend; give a finite Young's modulus, MPa")
-        if not -90 < self.direction < 90:
-            raise UserError(f"--direction {self.direction:g}: give an angle between -90 and 90 degrees")
-        if self.slide and self.direction:
-            raise UserError(
-                "--slide leaves the travel along the finger free, so that --direction says nothing"
-            )
-        along, into = sin(radians(self.direction)), cos(radians(self.direction))
         kind = self.load or job_defaults(preset).load
-        radius = RADIUS if kind == "cylinder" and self.radius is None else self.radius
-        return (
-            Material(young=self.young, poisson=self.poisson, plane=self.plane, law=self.law or "linear"),
-            Load(
-                kind=kind,
-                displacement=(None if self.slide else self.stroke * along, -self.stroke * into),
-                radius=radius,
-            ),
+        try:
+            load = Load.of_travel(
+                kind, stroke=self.stroke, direction=self.direction, slide=self.slide, radius=self.radius
+            )
+        except UserError as error:
+            known = ("stroke", "direction", "slide")
+            raise UserError(f"--{error}" if str(error).startswith(known) else str(error)) from None
+        material = Material(
+            young=self.young, poisson=self.poisson, plane=self.plane, law=self.law or "linear"
         )
+        return material, load
 
     def check_law(self, solvers: Sequence[Solver]) -> None:
         """Raise a `UserError` if none of the solvers has the law."""

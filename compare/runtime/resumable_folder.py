@@ -1,7 +1,7 @@
 """A folder that keeps the finished parts of a long job, so that the same job can go on from them."""
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -37,13 +37,16 @@ def job_definition(
     }
 
 
-def check_resumable_folder(file: Path, definition: Mapping[str, Any], *, job: str) -> None:
+def check_resumable_folder(
+    file: Path, definition: Mapping[str, Any], *, job: str, free: Collection[str] = ()
+) -> None:
     """Refuse a folder that holds a job with another definition, or something else.
 
     Args:
         file: The definition of the job in the folder, if there is one.
         definition: The definition of this job.
         job: The kind of job, such as "grid search".
+        free: Entries that may differ, such as `study.samples`.
     """
     out = file.parent
     if out.exists() and not out.is_dir():
@@ -57,7 +60,8 @@ def check_resumable_folder(file: Path, definition: Mapping[str, Any], *, job: st
             f"{out} holds files that are not of a {job}; name another folder with --out"
         ) from None
     now = _flat(to_jsonable_python(definition))
-    if differing := [name for name in {**before, **now} if before.get(name) != now.get(name)]:
+    names = [name for name in {**before, **now} if name not in free]
+    if differing := [name for name in names if before.get(name) != now.get(name)]:
         raise UserError(
             f"{out} holds a {job} with other settings ({', '.join(differing)}); "
             "name another folder with --out, or remove that one"

@@ -33,6 +33,12 @@ def check(parameters: Parameters) -> None:
             raise UserError(f"{finding.sentence}; {advice(parameters, rule)}")
 
 
+def broken_rule(parameters: Parameters) -> str | None:
+    """The fault of a finger that breaks a rule, without the ranges, which take a second; else None."""
+    findings = (rule.check(parameters) for rule in RULES)
+    return next((each.sentence for each in findings if each.margin < ROUNDING), None)
+
+
 def advice(parameters: Parameters, broken: Rule) -> str:
     """Ranges of the parameters that can remedy a broken rule, each with the others unchanged."""
     others = [rule for rule in RULES if rule is not broken]

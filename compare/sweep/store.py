@@ -1,0 +1,81 @@
+"""The journal of a sweep: an SQLite file with one row for every finished sample.
+
+Only the process that runs the sweep writes to it, a row in a transaction: after a kill at any moment a sample
+is in it as a whole or not at all.
+"""
+
+import json
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+from compare.sweep.measurement import Measurement
+from geometry.errors import UserError
+
+_TABLE = """
+create table if not exists samples (
+    number integer primary key,
+    state text not null,
+    message text not null,
+    seconds real not null,
+    quantities text not null
+)
+"""
+
+
+class Journal:
+    """Finished samples on disk; made by `opened`."""
+
+    def __init__(self, connection: sqlite3.Connection) -> None:
+        self._connection = connection
+        with connection:
+            connection.execute(_TABLE)
+
+    def add(self, measurement: Measurement) -> None:
+        """Keep a sample's result.
+
+        Raises:
+            sqlite3.IntegrityError: If it has one already.
+        """
+        row = (measurement.number, measurement.state, measurement.message, measurement.seconds)
+        with self._connection:
+            self._connection.execute(
+                "insert into samples values (?, ?, ?, ?, ?)", (*row, json.dumps(measurement.values))
+            )
+
+    def forget(self, state: str) -> int:
+        """Remove the samples that ended in a state, and return how many there were."""
+        with self._connection:
+            return self._connection.execute("delete from samples where state = ?", (state,)).rowcount
+
+    def numbers(self) -> set[int]:
+        """Numbers of the samples that have a result."""
+        return {number for (number,) in self._connection.execute("select number from samples")}
+
+    def measurements(self) -> list[Measurement]:
+        """Every result, ordered by the samples' numbers."""
+        rows = self._connection.execute(
+            "select number, state, message, seconds, quantities from samples order by number"
+        )
+        return [
+            Measurement(number, state, message, seconds, json.loads(values))
+            for number, state, message, seconds, values in rows
+        ]
+
+
+@contextmanager
+def opened(file: Path) -> Iterator[Journal]:
+    """The journal in a file, which is made if it does not exist.
+
+    Raises:
+        UserError: If the file is no journal or cannot be written.
+    """
+    try:
+        with closing(sqlite3.connect(file)) as connection:
+            yield Journal(connection)
+    except sqlite3.DatabaseError as error:
+        raise UserError(
+            f"cannot use {file}: {error}; free some space if the disk is full, else remove the file to run "
+            "every sample again"
+        ) from None

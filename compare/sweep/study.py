@@ -1,0 +1,306 @@
+"""A parameter study as its file describes it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from geometry.cache import drawn_finger
+from geometry.drawing.description import description_beside, load_description
+from geometry.errors import UserError
+from geometry.finger.parameters import SYMBOLS, CheckedModel, Parameters, parameter_info, unknown_parameter
+from geometry.finger.presets import load_design
+from geometry.text_files import read_toml
+from solvers.assimilation.misfit import assimilates
+from solvers.problem import Load, LoadKind, Material
+from solvers.registry import make_solver
+from solvers.solver import Solver, check_load
+
+MATERIAL = ("young", "poisson", "plane", "law")
+LOAD = ("load", "stroke", "direction", "slide", "radius")
+PHYSICS = (*MATERIAL, *LOAD)
+"""Parameters of material and load, by the names of the options of `compare`."""
+
+DRAWN = ("depth", "contact", "contact_width")
+"""Parameters of a drawing that a study can change."""
+
+WHOLE = tuple(name for name, field in Parameters.model_fields.items() if field.annotation is int)
+"""Parameters of a design that are whole numbers."""
+
+MOST = 1_000_000
+"""Largest number of samples of a study."""
+
+Value = bool | int | float | str
+
+
+class Range(CheckedModel):
+    """Values between two ends, or a list of choices.
+
+    Attributes:
+        low: Smallest value (`from` in the file).
+        high: Largest value (`to`).
+        count: Number of values on a grid, evenly spaced; None on no grid.
+        values: The choices instead.
+    """
+
+    low: float | None = Field(default=None, alias="from")
+    high: float | None = Field(default=None, alias="to")
+    count: int | None = Field(default=None, ge=2, le=MOST)
+    values: tuple[Value, ...] | None = Field(default=None, min_length=1)
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        ends = (self.low, self.high)
+        if self.values is not None:
+            if ends != (None, None) or self.count is not None:
+                raise ValueError("give either values, or from and to")
+            if len(set(map(repr, self.values))) < len(self.values):
+                raise ValueError("a value is given twice")
+        elif self.low is None or self.high is None:
+            raise ValueError("give from and to, or values")
+        elif self.low >= self.high:
+            raise ValueError(f"from = {self.low:g} must be below to = {self.high:g}")
+        return self
+
+
+class Study(CheckedModel):
+    """Fingers to sample, and the solver that judges them.
+
+    Attributes:
+        name: What pages and folders call it; the file's name by default.
+        design: Preset or .toml file from which the fingers differ by the parameters below.
+        solver: Name of the solver.
+        settings: Its settings that differ from the default.
+        mesh_size: Element size in walls and ribs, mm.
+        density: Of the material, g/cm^3; the default is that of a printed polyurethane.
+        sampling: `grid`: every combination; `latin`: a Latin hypercube; `sobol`: a scrambled Sobol sequence,
+            which can be continued.
+        samples: Number of samples, unless on a grid.
+        seed: Of the samples.
+        fixed: Parameters with one value for all samples.
+        varied: Parameters with a range of values.
+    """
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
+    design: str = "default"
+    solver: str = "fem"
+    settings: dict[str, Value] = Field(default_factory=dict)
+    mesh_size: float = Field(default=0.5, ge=0.02, le=20)
+    density: float = Field(default=1.2, gt=0, le=30)
+    sampling: Literal["grid", "latin", "sobol"] = "sobol"
+    samples: int | None = Field(default=None, ge=1, le=MOST)
+    seed: int = Field(default=0, ge=0)
+    fixed: dict[str, Value] = Field(default_factory=dict)
+    varied: dict[str, Range] = Field(min_length=1)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _ranges(cls, values: Any) -> Any:
+        if not isinstance(values, Mapping):
+            return values
+        read = dict(values)
+        for group in ("fixed", "varied"):
+            entries = read.get(group, {})
+            if not isinstance(entries, Mapping):
+                raise ValueError(f"[{group}] must be a table of parameters")
+            read[group] = {SYMBOLS.get(name, name): entry for name, entry in entries.items()}
+        for name, entry in read["varied"].items():
+            if not isinstance(entry, Mapping | Range):
+                raise ValueError(
+                    f"varied.{name}: write {{from = LOW, to = HIGH}} or {{values = [...]}}, not {entry!r}"
+                )
+            try:
+                read["varied"][name] = entry if isinstance(entry, Range) else Range(**entry)
+            except UserError as error:
+                raise ValueError(f"varied.{name}: {error}") from None
+        return read
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        for name in (*self.fixed, *self.varied):
+            _check_name(name, drawn="section" in {*self.fixed, *self.varied})
+        if both := sorted(self.fixed.keys() & self.varied.keys()):
+            raise ValueError(f"{both[0]} is both fixed and varied; give it once")
+        for name, values in self.varied.items():
+            _check_range(name, values, self.sampling)
+        if self.sampling == "grid":
+            if self.samples is not None:
+                raise ValueError("a grid has no samples to choose; leave samples out")
+        elif self.samples is None:
+            raise ValueError(f"sampling = {self.sampling}: give the number of samples, such as samples = 256")
+        self.made_solver()
+        return self
+
+    def made_solver(self) -> Solver:
+        """The solver with its settings."""
+        solver = make_solver(self.solver, **self.settings)
+        if assimilates(solver):
+            raise UserError(f"solver {self.solver} needs measured markers, which a study does not have")
+        return solver
+
+
+@dataclass(frozen=True)
+class Task:
+    """One sample as a worker gets it.
+
+    Attributes:
+        number: Of the sample in its study.
+        definition: Of the finger; rules are checked by the worker.
+        mesh_size: Element size in walls and ribs, mm.
+        material: Values of `Material`.
+        load: Arguments of `Load.of_travel`.
+        solver: Name of the solver.
+        settings: Its settings.
+        density: Of the material, g/cm^3.
+    """
+
+    number: int
+    definition: dict[str, Any]
+    mesh_size: float
+    material: dict[str, Any]
+    load: dict[str, Any]
+    solver: str
+    settings: dict[str, Value]
+    density: float
+
+
+def load_study(path: Path) -> Study:
+    """The study in a TOML file.
+
+    Raises:
+        UserError: If it cannot be read, or something in it is wrong.
+    """
+    content = read_toml(path, "study")
+    try:
+        return Study(**{"name": path.stem, **content})
+    except UserError as error:
+        raise UserError(f"study {path}: {error}") from None
+
+
+class TaskMaker:
+    """Makes tasks of samples; reads the design and the drawings of a study once.
+
+    Args:
+        study: The study.
+        folder: Folder from which paths in the study are meant.
+
+    Raises:
+        UserError: If a file cannot be read, or the solver does not take the load.
+    """
+
+    def __init__(self, study: Study, folder: Path) -> None:
+        self._study = study
+        self._folder = folder
+        self._drawn: dict[tuple[str, ...], dict[str, Any]] = {}
+        near = folder / study.design
+        self._base = load_design(near if near.suffix == ".toml" and near.is_file() else study.design)
+        kinds = study.varied["load"].values if "load" in study.varied else None
+        for kind in kinds or (study.fixed.get("load", "mean"),):
+            check_load(study.made_solver(), Load.of_travel(_kind(kind)))
+
+    def task(self, number: int, sample: Mapping[str, Value]) -> Task:
+        """The task of a sample."""
+        values = {**self._study.fixed, **sample}
+        material = {name: values[name] for name in MATERIAL if name in values}
+        load = {"kind" if name == "load" else name: values[name] for name in LOAD if name in values}
+        shape = {name: value for name, value in values.items() if name not in PHYSICS}
+        if "section" in shape:
+            definition = self._drawing(shape)
+        else:
+            definition = {**self._base.definition(), **shape, "name": f"{self._study.name}-{number}"}
+        return Task(
+            number,
+            definition,
+            self._study.mesh_size,
+            material,
+            load,
+            self._study.solver,
+            self._study.settings,
+            self._study.density,
+        )
+
+    def _drawing(self, shape: Mapping[str, Value]) -> dict[str, Any]:
+        """The definition of a drawn finger."""
+        lines = tuple(f"{name} = {value}" for name, value in shape.items() if name != "section")
+        key = (str(shape["section"]), *lines)
+        if key not in self._drawn:
+            file = self._folder / key[0]
+            self._drawn[key] = drawn_finger(
+                file, load_description(description_beside(file), lines)
+            ).definition()
+        return self._drawn[key]
+
+
+def material_of(task: Task) -> Material:
+    """The material of a task."""
+    return Material(**task.material)
+
+
+def load_of(task: Task) -> Load:
+    """The load of a task."""
+    return Load.of_travel(**task.load)
+
+
+def title(name: str) -> str:
+    """A parameter's name with its unit, for headings: `rib_thickness_mm`."""
+    unit = unit_of(name)
+    return f"{name}_{unit}" if unit else name
+
+
+def unit_of(name: str) -> str:
+    """Unit of a parameter; empty where it has none."""
+    physics = {"young": "MPa", "stroke": "mm", "direction": "deg", "radius": "mm"}
+    if name in Parameters.model_fields:
+        return str(parameter_info(name, "unit"))
+    return physics.get(name, "")
+
+
+def _kind(value: Value) -> LoadKind:
+    known: tuple[LoadKind, ...] = ("mean", "point", "patch", "cylinder")
+    for kind in known:
+        if value == kind:
+            return kind
+    raise UserError(f"load = {value!r}: give one of {', '.join(known)}")
+
+
+def _check_name(name: str, *, drawn: bool) -> None:
+    """Refuse a parameter that the study cannot change."""
+    if name in PHYSICS or name == "section":
+        return
+    if drawn:
+        if name not in DRAWN:
+            raise ValueError(f"{name}: of a drawing a study changes {', '.join(DRAWN)}, material and load")
+    elif name not in Parameters.model_fields or name == "name":
+        hint = unknown_parameter(name, Parameters)
+        raise ValueError(f"{hint}; of material and load there are {', '.join(PHYSICS)}")
+
+
+def _check_range(name: str, values: Range, sampling: str) -> None:
+    """Refuse values that the parameter or the sampling does not have."""
+    if values.values is None:
+        if name in ("plane", "law", "load", "slide", "section", "rib_reference", "marker_layout"):
+            raise ValueError(f"{name} has no numbers between two others; give values = [...]")
+        for end in (values.low, values.high):
+            low, high = parameter_limits(name)
+            if end is not None and not low <= end <= high:
+                raise ValueError(
+                    f"{name} = {end:g} is outside its range, {low:g} to {high:g} {unit_of(name)}"
+                )
+        if sampling == "grid" and values.count is None and name not in WHOLE:
+            raise ValueError(f"{name}: a grid needs the number of values, such as count = 5")
+        if sampling != "grid" and values.count is not None:
+            raise ValueError(f"{name}: count belongs to sampling = 'grid'")
+        if name in WHOLE and not (
+            float(values.low or 0).is_integer() and float(values.high or 0).is_integer()
+        ):
+            raise ValueError(f"{name} is a whole number; give whole ends")
+
+
+def parameter_limits(name: str) -> tuple[float, float]:
+    """Smallest and largest value of a parameter that is a number."""
+    if name in Parameters.model_fields:
+        return float(parameter_info(name, "low")), float(parameter_info(name, "high"))
+    limits = {"young": (1e-6, 1e7), "poisson": (-0.99, 0.4999), "direction": (-89.0, 89.0)}
+    return limits.get(name, (1e-6, 1e4))

@@ -1,0 +1,124 @@
+"""Run a study: every sample once, whatever happens to the workers or to the program."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from compare.runtime.output_folder import locked
+from compare.runtime.provenance import package_versions, sources_digest
+from compare.runtime.resumable_folder import check_resumable_folder
+from compare.runtime.stages import Stages
+from compare.sweep.measurement import Measurement
+from compare.sweep.sampling import samples
+from compare.sweep.store import opened
+from compare.sweep.study import Study, TaskMaker, Value
+from compare.sweep.workers import answers, workers
+from geometry.atomic import write_json
+from geometry.errors import UserError
+from geometry.text_files import read_json
+
+STUDY_FILE, JOURNAL = "sweep.json", "journal.sqlite"
+
+
+@dataclass(frozen=True)
+class SweepJob:
+    """A sweep to run, and its output folder.
+
+    Attributes:
+        study: The study.
+        folder: Folder from which paths in the study are meant.
+        out: Output folder; samples that an earlier start finished there are kept.
+        processes: Worker processes on this machine.
+        scheduler: Address of a Dask scheduler whose workers are used instead.
+    """
+
+    study: Study
+    folder: Path
+    out: Path
+    processes: int
+    scheduler: str | None = None
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The finished samples of a study.
+
+    Attributes:
+        study: The study.
+        samples: Values of the varied parameters of every sample.
+        measurements: Results, ordered by the samples' numbers.
+    """
+
+    study: Study
+    samples: list[dict[str, Value]]
+    measurements: list[Measurement]
+
+    @property
+    def good(self) -> list[Measurement]:
+        """The converged results."""
+        return [each for each in self.measurements if each.state == "done"]
+
+
+def run_sweep(job: SweepJob, stages: Stages | None = None) -> Sweep:
+    """Run every sample of a study that has no result yet, and keep each result at once.
+
+    Samples that failed by an error of the program are tried again; refused ones are not, because the same
+    design is refused again.
+
+    Raises:
+        UserError: If the study cannot be run, or the folder holds another one.
+    """
+    stages = stages or Stages(quiet=True)
+    all_samples = samples(job.study)
+    maker = TaskMaker(job.study, job.folder)
+    tasks = {number: maker.task(number, sample) for number, sample in enumerate(all_samples)}
+    definition = _definition(job, tasks[0].definition)
+    free = {"study.samples"} if job.study.sampling == "sobol" else set()  # which may be continued
+    check_resumable_folder(job.out / STUDY_FILE, definition, job="sweep", free=free)
+    job.out.mkdir(parents=True, exist_ok=True)
+    with locked(job.out), opened(job.out / JOURNAL) as journal:
+        write_json(job.out / STUDY_FILE, definition)
+        journal.forget("failed")
+        known = journal.numbers()
+        if missing := {number: task for number, task in tasks.items() if number not in known}:
+            with stages.stage("samples") as progress, workers(job.processes, job.scheduler) as client:
+                done, bad = len(known), 0
+                for answer in answers(client, missing):
+                    journal.add(answer)
+                    done, bad = done + 1, bad + (answer.state != "done")
+                    progress(
+                        done / len(tasks), f"{done} of {len(tasks)}" + (f", {bad} without" if bad else "")
+                    )
+        return Sweep(
+            job.study, all_samples, [each for each in journal.measurements() if each.number in tasks]
+        )
+
+
+def _definition(job: SweepJob, first: dict[str, Any]) -> dict[str, Any]:
+    """The study, and everything else on which its results depend."""
+    modules = ["compare.sweep.quantities", "compare.sweep.measurement", "compare.sweep.sampling"]
+    return {
+        "schema": 1,
+        "study": job.study.model_dump(mode="json", by_alias=True, exclude_none=True),
+        "finger": {name: value for name, value in first.items() if name not in job.study.varied},
+        "versions": package_versions(),
+        "program_sha256": sources_digest([*modules, "geometry", "solvers"]),
+    }
+
+
+def load_sweep(folder: Path) -> Sweep:
+    """The finished samples of a sweep's folder.
+
+    Raises:
+        UserError: If the folder holds no sweep, or one without results.
+    """
+    if not (folder / JOURNAL).is_file():
+        raise UserError(f"{folder} holds no sweep; make one by `pinnray sweep STUDY.toml`")
+    try:
+        study = Study(**read_json(folder / STUDY_FILE, "sweep")["study"])
+    except (KeyError, TypeError):
+        raise UserError(f"{folder / STUDY_FILE} is no description of a sweep") from None
+    every = samples(study)
+    with opened(folder / JOURNAL) as journal:
+        found = [each for each in journal.measurements() if each.number < len(every)]
+    return Sweep(study, every, found)
