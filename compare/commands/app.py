@@ -15,6 +15,7 @@ from compare.commands.quiet import quietable
 from compare.commands.rig import rig
 from compare.commands.solve import solve
 from compare.commands.solvers import solvers
+from compare.commands.sweep import sweep
 from compare.commands.track import track
 from compare.runtime.provenance import program_version
 
@@ -27,7 +28,7 @@ pinnray = App(
     suppress_keyboard_interrupt=False,
 )
 COMMANDS = (
-    *(compare, design, mesh, solve, gridsearch, crossval, solvers),
+    *(compare, design, mesh, solve, sweep, gridsearch, crossval, solvers),
     *(fiducials, calibrate, pick, rig, track),
 )
 for command in COMMANDS:

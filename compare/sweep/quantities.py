@@ -131,9 +131,9 @@ def wrap_angle(solution: Solution) -> float:
     comes around the indenter, negative if it gives way more than the chord before the contact does. A finger
     that moves as a rigid body has none.
     """
-    before = _kink_points(solution.problem)
+    before = kink_points(solution.problem)
     after = before + solution.displacement(before)
-    return _turn(after) - _turn(before)
+    return turn(after) - turn(before)
 
 
 def largest_away_from_corners(solution: Solution) -> tuple[float, float]:
@@ -205,14 +205,14 @@ def _front_ends(problem: Problem) -> FloatArray:
     return nodes[[nodes[:, 0].argmin(), nodes[:, 0].argmax()]]
 
 
-def _kink_points(problem: Problem) -> FloatArray:
+def kink_points(problem: Problem) -> FloatArray:
     """The front's end at the base, the contact's middle and the front's end at the tip, shape (3, 2), mm."""
     base, tip = _front_ends(problem)
     middle = front_points(problem.mesh, np.array([0.5 * sum(contact_ends(problem))]))
     return np.concatenate([[base], middle, [tip]])
 
 
-def _turn(points: FloatArray) -> float:
+def turn(points: FloatArray) -> float:
     """Angle from the chord between the first two of three points to that between the last two, degrees."""
     (x0, y0), (x1, y1) = np.diff(points, axis=0)
     return float(np.degrees(np.arctan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1)))

@@ -19,6 +19,9 @@ from geometry.text_files import read_json
 
 STUDY_FILE, JOURNAL = "sweep.json", "journal.sqlite"
 
+POOLS = 50
+"""Most times that the worker processes are started anew, because some of them died while they started."""
+
 
 @dataclass(frozen=True)
 class SweepJob:
@@ -79,19 +82,24 @@ def run_sweep(job: SweepJob, stages: Stages | None = None) -> Sweep:
     with locked(job.out), opened(job.out / JOURNAL) as journal:
         write_json(job.out / STUDY_FILE, definition)
         journal.forget("failed")
-        known = journal.numbers()
-        if missing := {number: task for number, task in tasks.items() if number not in known}:
-            with stages.stage("samples") as progress, workers(job.processes, job.scheduler) as client:
-                done, bad = len(known), 0
-                for answer in answers(client, missing):
-                    journal.add(answer)
-                    done, bad = done + 1, bad + (answer.state != "done")
-                    progress(
-                        done / len(tasks), f"{done} of {len(tasks)}" + (f", {bad} without" if bad else "")
-                    )
-        return Sweep(
-            job.study, all_samples, [each for each in journal.measurements() if each.number in tasks]
-        )
+        with stages.stage("samples") as progress:
+            for _ in range(POOLS):
+                known = journal.numbers()
+                missing = {number: task for number, task in tasks.items() if number not in known}
+                if not missing:
+                    break
+                with workers(job.processes, job.scheduler) as client:
+                    for answer in answers(client, missing):
+                        journal.add(answer)
+                        known.add(answer.number)
+                        progress(len(known) / len(tasks), f"{len(known)} of {len(tasks)} samples")
+            else:
+                raise UserError(
+                    f"worker processes died while they started, {POOLS} times; the same command goes on with "
+                    f"the {len(missing)} samples that are left"
+                )
+        found = [each for each in journal.measurements() if each.number in tasks]
+        return Sweep(job.study, all_samples, found)
 
 
 def _definition(job: SweepJob, first: dict[str, Any]) -> dict[str, Any]:

@@ -5,6 +5,7 @@ workers is taken to be their cause.
 """
 
 import logging
+import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -15,7 +16,7 @@ from compare.sweep.study import Task
 from geometry.errors import UserError
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, LocalCluster
 
 DEATHS = 8
 """Deaths of its worker after which a sample counts as failed.
@@ -30,6 +31,18 @@ AHEAD = 2
 WAIT_S = 20
 """Time to reach a scheduler, s."""
 
+WARM_S = 300
+"""Time to compile the forms of FEniCS, s; it takes some ten seconds."""
+
+LOOK_S = 5
+"""Time between two looks whether workers are there, s."""
+
+AWAY_S = 15
+"""Time for which fewer workers of this machine than were started are taken to be starting, s."""
+
+STARTS = 3
+"""Attempts to start the worker processes."""
+
 
 @contextmanager
 def workers(count: int, scheduler: str | None = None) -> Iterator["Client"]:
@@ -43,7 +56,7 @@ def workers(count: int, scheduler: str | None = None) -> Iterator["Client"]:
         UserError: If the scheduler does not answer, or has no workers.
     """
     import dask
-    from distributed import Client, LocalCluster
+    from distributed import Client
 
     spawn = "distributed.nanny.pre-spawn-environ"  # one thread of OpenMP and BLAS a worker, among others
     dask.config.set(
@@ -67,18 +80,28 @@ def workers(count: int, scheduler: str | None = None) -> Iterator["Client"]:
                 raise UserError(f"--scheduler {scheduler}: the scheduler has no workers; start some first")
             yield client
         return
-    with (
-        LocalCluster(
-            n_workers=count,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address=None,
-            memory_limit=0,
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        Client(cluster) as client,
-    ):
+    with _local_cluster(count) as cluster, Client(cluster) as client:
         yield client
+
+
+def _local_cluster(count: int) -> "LocalCluster":
+    """Worker processes on this machine; a worker that dies while it starts is no reason to give up."""
+    from distributed import LocalCluster
+
+    for attempt in range(STARTS):
+        try:
+            return LocalCluster(
+                n_workers=count,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address="127.0.0.1:0",
+                memory_limit=0,
+                silence_logs=logging.CRITICAL,
+            )
+        except RuntimeError as error:
+            if attempt == STARTS - 1:
+                raise UserError(f"the worker processes do not start: {_first_line(error)}") from None
+    raise AssertionError
 
 
 def answers(client: "Client", tasks: Mapping[int, Task]) -> Iterator[Measurement]:
@@ -86,50 +109,64 @@ def answers(client: "Client", tasks: Mapping[int, Task]) -> Iterator[Measurement
 
     The first task runs alone on one worker of each machine: it compiles the forms of FEniCS, which parallel
     starts with an empty cache would compile all at once.
+
+    Ends early if workers on this machine stay away: one that dies while it starts is not started again. Those
+    of a scheduler may come and go.
     """
-    from distributed import KilledWorker, as_completed
+    from distributed import KilledWorker, wait
 
-    waiting = iter(tasks.items())
+    waiting = iter(tasks)
     deaths: Counter[int] = Counter()
-    number_of: dict[Any, int] = {}
+    running: dict[Any, int] = {}
 
-    def submit(number: int) -> Any:
-        future = client.submit(measured, tasks[number], pure=False)
-        number_of[future] = number
-        return future
+    def submit(number: int) -> None:
+        running[client.submit(measured, tasks[number], pure=False)] = number
 
-    for future in _warm(client, tasks[next(iter(tasks))]):
-        with suppress(KilledWorker):
-            future.result()
-    running = as_completed([])
-    pending = 0
+    _warm(client, tasks[next(iter(tasks))])
+    wanted = _threads(client) if client.cluster is not None else 0
+    complete = time.monotonic()
     while True:
-        room = max(sum(client.nthreads().values()), 1) * AHEAD
-        while pending < room and (entry := next(waiting, None)) is not None:
-            running.add(submit(entry[0]))
-            pending += 1
-        if not pending:
+        while len(running) < max(_threads(client), 1) * AHEAD and (number := next(waiting, None)) is not None:
+            submit(number)
+        if not running:
             return
-        future = next(running)
-        number = number_of.pop(future)
         try:
-            answer = future.result()
-        except KilledWorker:
-            deaths[number] += 1
-            if deaths[number] < DEATHS:
-                running.add(submit(number))
-                continue
-            answer = Measurement(number, "failed", f"its worker process died {DEATHS} times", 0.0)
-        pending -= 1
-        yield answer
+            finished = wait(list(running), timeout=LOOK_S, return_when="FIRST_COMPLETED").done
+        except TimeoutError:
+            finished = set()
+        if _threads(client) >= wanted:
+            complete = time.monotonic()
+        elif time.monotonic() > complete + AWAY_S:
+            return
+        for future in finished:
+            number = running.pop(future)
+            try:
+                answer = future.result()
+            except KilledWorker:
+                deaths[number] += 1
+                if deaths[number] < DEATHS:
+                    submit(number)
+                    continue
+                answer = Measurement(number, "failed", f"its worker process died {DEATHS} times", 0.0)
+            yield answer
 
 
-def _warm(client: "Client", task: Task) -> list[Any]:
-    """The task on one worker of each machine."""
+def _threads(client: "Client") -> int:
+    return sum(client.nthreads().values())
+
+
+def _warm(client: "Client", task: Task) -> None:
+    """Run the task on one worker of each machine."""
+    from distributed import KilledWorker
+
     one_each: dict[str, str] = {}
     for address in client.nthreads():
         one_each.setdefault(address.rpartition(":")[0], address)
-    return [client.submit(measured, task, pure=False, workers=[address]) for address in one_each.values()]
+    started = [client.submit(measured, task, pure=False, workers=[address]) for address in one_each.values()]
+    for future in started:
+        with suppress(KilledWorker, TimeoutError):
+            future.result(timeout=WARM_S)
+        future.cancel()
 
 
 def _first_line(error: Exception) -> str:

@@ -87,7 +87,7 @@ BAD = [
     ("compare --frobnicate", "Unknown option: --frobnicate"),
     (
         "frobnicate",
-        "Unknown command .* commands: compare, design, mesh, solve, gridsearch, crossval, solvers",
+        "Unknown command .* commands: compare, design, mesh, solve, sweep, gridsearch, crossval",
     ),
     ("compare slender", "'slender' belongs to no option"),  # forgot --design
     ("compare --seed", "--seed requires an argument"),

@@ -1,0 +1,223 @@
+"""A sweep as a whole: nothing lost, nothing twice, failures told, and the command."""
+
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from compare.cli import main
+from compare.sweep.measurement import Measurement, measured
+from compare.sweep.sampling import samples
+from compare.sweep.store import opened
+from compare.sweep.study import Study, TaskMaker, load_study
+from compare.sweep.sweep import JOURNAL, SweepJob, load_sweep, run_sweep
+from compare.sweep.tables import failure_grid, table
+from geometry.errors import UserError
+from tests.compare.programs import COMMAND
+
+STUDY = """
+mesh_size = 2.0
+sampling = "sobol"
+samples = {samples}
+[fixed]
+marker_diameter = 0.4
+[varied]
+rib_count = {{from = 2, to = 5}}
+rib_thickness = {{from = 1.0, to = 2.5}}
+front_thickness = {{from = 0.3, to = 2.0}}
+"""
+
+
+def study_file(folder: Path, count: int) -> Path:
+    path = folder / "ribs.toml"
+    path.write_text(STUDY.format(samples=count), encoding="utf-8")
+    return path
+
+
+def test_a_sample_is_kept_once(tmp_path: Path) -> None:
+    with opened(tmp_path / JOURNAL) as journal:
+        journal.add(Measurement(3, "done", "fine", 0.1, {"force": 1.5}))
+    with opened(tmp_path / JOURNAL) as journal:
+        assert journal.numbers() == {3}
+        assert journal.measurements() == [Measurement(3, "done", "fine", 0.1, {"force": 1.5})]
+        with pytest.raises(sqlite3.IntegrityError):
+            journal.add(Measurement(3, "done", "again", 0.1))
+
+
+def test_a_damaged_journal_is_told_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / JOURNAL).write_bytes(b"no database at all, but longer than a header" * 9)
+    with (
+        pytest.raises(UserError, match=r"cannot use .*journal.sqlite: file is not a database"),
+        opened(tmp_path / JOURNAL),
+    ):
+        pass
+
+
+def test_what_goes_wrong_with_a_sample_is_its_answer(tmp_path: Path) -> None:
+    study = load_study(study_file(tmp_path, 1))
+    maker = TaskMaker(study, tmp_path)
+    refused = measured(maker.task(0, {"rib_count": 30, "rib_thickness": 2.5, "front_thickness": 1.0}))
+    assert (refused.state, refused.values) == ("refused", {})
+    assert "ribs" in refused.message
+    task = maker.task(1, {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0})
+    assert measured(task).state == "done"
+    object.__setattr__(task, "mesh_size", "broken")
+    assert measured(task).state in ("refused", "failed")
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a sweep of six samples, two of whose workers were killed."""
+    folder = tmp_path_factory.mktemp("sweep")
+    study = study_file(folder, 6)
+    out = folder / "out"
+    process = subprocess.Popen(
+        [sys.executable, "-c", COMMAND, "sweep", str(study), "--out", str(out), "--processes", "2"],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    killed: set[int] = set()
+    while process.poll() is None:  # at its start, which Dask does not mend, and in its work
+        done = finished(out)
+        if len(killed) < (1 if done == 0 else 2) and (workers := children(process.pid) - killed):
+            with suppress(ProcessLookupError):
+                os.kill(min(workers), signal.SIGKILL)
+            killed.add(min(workers))
+        time.sleep(0.1)
+    assert process.stderr is not None
+    assert process.returncode == 0, process.stderr.read()
+    assert len(killed) == 2
+    return folder
+
+
+def finished(out: Path) -> int:
+    """The number of finished samples."""
+    try:
+        return len(load_sweep(out).measurements)
+    except UserError:
+        return 0
+
+
+def children(parent: int) -> set[int]:
+    """Worker processes of a sweep."""
+    listed = subprocess.run(["pgrep", "-P", str(parent), "-f", "spawn_main"], capture_output=True, text=True)
+    return {int(word) for word in listed.stdout.split()}
+
+
+def test_the_death_of_a_worker_loses_no_sample(swept: Path) -> None:
+    sweep = load_sweep(swept / "out")
+    assert [each.number for each in sweep.measurements] == list(range(6))
+    assert {each.state for each in sweep.measurements} == {"done"}
+
+
+def test_the_tables_have_a_row_for_each_sample(swept: Path) -> None:
+    frame = pd.read_parquet(swept / "out" / "samples.parquet")
+    again = pd.read_csv(swept / "out" / "samples.csv")
+    assert list(frame.columns) == list(again.columns)
+    assert {"rib_thickness_mm", "force_N", "wrap_deg", "compliance_across_mm_per_N"} <= set(frame.columns)
+    assert (frame["force_N"] == again["force_N"]).all()
+    assert list(frame["sample"]) == list(range(6))
+
+
+def test_the_page_has_pictures_and_every_quantity(swept: Path) -> None:
+    page = (swept / "out" / "sweep.html").read_text(encoding="utf-8")
+    assert page.count("<img alt=") == 2  # six samples are too few for sensitivities
+    assert "6 of 6 samples of a Sobol sequence were run; 6 have a converged result" in page
+    assert "compliance_across" in page
+
+
+def test_a_second_start_goes_on_and_does_nothing_twice(swept: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(swept / "out", out)
+    before = load_sweep(out).measurements
+    study = load_study(study_file(tmp_path, 8))
+    study = study.model_copy(update={"name": "ribs"})
+    after = run_sweep(SweepJob(study, tmp_path, out, 1)).measurements
+    assert after[:6] == before
+    assert [each.number for each in after] == list(range(8))
+
+
+def test_another_study_in_the_folder_is_refused(
+    swept: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "ribs.toml"
+    path.write_text(STUDY.format(samples=6).replace("mesh_size = 2.0", "mesh_size = 1.9"), encoding="utf-8")
+    assert main(["sweep", str(path), "--out", str(swept / "out")]) == 2
+    assert "holds a sweep with other settings (study.mesh_size)" in capsys.readouterr().err
+
+
+def test_a_sample_that_always_kills_its_worker_is_listed_as_failed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("compare.sweep.workers.measured", die_at_one)
+    monkeypatch.setattr("compare.sweep.workers.DEATHS", 2)
+    study = load_study(study_file(tmp_path, 4))
+    sweep = run_sweep(SweepJob(study, tmp_path, tmp_path / "out", 1))
+    assert [each.state for each in sweep.measurements] == ["done", "failed", "done", "done"]
+    assert sweep.measurements[1].message == "its worker process died 2 times"
+    assert failure_grid(sweep).rows == [("failed", "1", "its worker process died", "1")]
+    assert list(table(sweep)["state"]) == ["done", "failed", "done", "done"]
+    monkeypatch.setattr("compare.sweep.workers.measured", answered)
+    again = run_sweep(SweepJob(study, tmp_path, tmp_path / "out", 1))
+    assert {each.state for each in again.measurements} == {"done"}
+
+
+def die_at_one(task: object) -> Measurement:
+    if getattr(task, "number", None) == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return answered(task)
+
+
+def answered(task: object) -> Measurement:
+    return Measurement(getattr(task, "number", -1), "done", "", 0.0, {"force": 1.0})
+
+
+REFUSED: dict[str, tuple[Callable[[Path], list[str]], str]] = {
+    "no file": (lambda folder: [str(folder / "none.toml")], "cannot read the study"),
+    "no scheduler": (
+        lambda folder: [str(study_file(folder, 2)), "--scheduler", "tcp://127.0.0.1:9"],
+        "--scheduler tcp://127.0.0.1:9: no Dask scheduler answers there",
+    ),
+    "no address": (
+        lambda folder: [str(study_file(folder, 2)), "--scheduler", "nowhere"],
+        "--scheduler nowhere: no Dask scheduler answers there",
+    ),
+    "no workers": (lambda folder: [str(study_file(folder, 2)), "--processes", "0"], "--processes 0"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "message"), REFUSED.values(), ids=REFUSED)
+def test_the_command_refuses_in_one_line(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: Callable[[Path], list[str]],
+    message: str,
+) -> None:
+    monkeypatch.setattr("compare.sweep.workers.WAIT_S", 1)
+    assert main(["sweep", *arguments(tmp_path), "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.count("\n") == 1
+
+
+def test_an_empty_folder_is_no_sweep(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"holds no sweep; make one by `pinnray sweep STUDY.toml`"):
+        load_sweep(tmp_path)
+
+
+def test_the_same_study_has_the_same_results(swept: Path, tmp_path: Path) -> None:
+    study = load_study(swept / "ribs.toml")
+    first = load_sweep(swept / "out").measurements[0]
+    again = measured(TaskMaker(study, tmp_path).task(0, samples(study)[0]))
+    assert again.values == first.values
+    assert isinstance(study, Study)
