@@ -11,6 +11,7 @@ from compare.commands.gridsearch import gridsearch
 from compare.commands.launch import EXIT_CODES
 from compare.commands.mesh import mesh
 from compare.commands.pick import pick
+from compare.commands.predict import predict
 from compare.commands.quiet import quietable
 from compare.commands.rig import rig
 from compare.commands.solve import solve
@@ -28,7 +29,7 @@ pinnray = App(
     suppress_keyboard_interrupt=False,
 )
 COMMANDS = (
-    *(compare, design, mesh, solve, sweep, gridsearch, crossval, solvers),
+    *(compare, design, mesh, solve, sweep, predict, gridsearch, crossval, solvers),
     *(fiducials, calibrate, pick, rig, track),
 )
 for command in COMMANDS:

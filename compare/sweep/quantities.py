@@ -10,9 +10,8 @@ from geometry.arrays import FloatArray
 from geometry.finger.finger import Finger
 from geometry.mesh.boundary import mean_thickness, singular_points
 from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.section.loop import Loop
 from geometry.section.section import Section
-from geometry.section.thickness import wall_thickness
+from geometry.section.thickness import cavity_widths, wall_thickness
 from solvers.fem.linear import FactorisedProblem, FemSolver
 from solvers.problem import Load, Problem, contact_ends, contact_nodes, front_points
 from solvers.solution import Solution, State
@@ -161,16 +160,7 @@ def thinnest_wall(section: Section) -> float:
 
 def narrowest_gap(section: Section) -> float:
     """Smallest clear width of a cavity, mm, by the same rays across the cavity; infinite without cavities."""
-    widths = [
-        float(wall_thickness(Section(_reversed(cavity)), RAY_SPACING)[1].min(initial=np.inf))
-        for cavity in section.cavities
-    ]
-    return min(widths, default=np.inf)
-
-
-def _reversed(loop: Loop) -> Loop:
-    """The same curve run the other way round."""
-    return Loop(loop.points[::-1], -np.roll(loop.bulges[::-1], -1), ("",) * len(loop.points))
+    return float(cavity_widths(section, RAY_SPACING)[1].min(initial=np.inf))
 
 
 def _compliances(prepared: FactorisedProblem, position: float | None, depth: float) -> tuple[float, float]:

@@ -1,5 +1,6 @@
 """Local wall thickness: the way through the material from one boundary to the facing one."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -61,18 +62,60 @@ def wall_thickness(
         Points of the boundary, shape (n, 2), mm, and the thickness there, shape (n,), mm; both empty for a
         triangle without cavities.
     """
-    samples = boundary_samples(section, spacing)
-    crossing = through(section, samples.points, samples.normals)
+    return _widths(section.loops, spacing, corners=corners)
+
+
+def cavity_widths(section: Section, spacing: float) -> tuple[FloatArray, FloatArray]:
+    """Clear widths of the cavities along their boundaries, by rays into the cavity; see `wall_thickness`.
+
+    Returns:
+        Points of the cavities' boundaries, shape (n, 2), mm, and the width there, shape (n,), mm.
+    """
+    if not section.cavities:
+        return np.empty((0, 2)), np.empty(0)
+    return _widths([_reversed(cavity) for cavity in section.cavities], spacing)
+
+
+def _reversed(loop: Loop) -> Loop:
+    """The same curve run the other way round, without names."""
+    return Loop(loop.points[::-1], -np.roll(loop.bulges[::-1], -1), ("",) * len(loop.points))
+
+
+def _widths(loops: Sequence[Loop], spacing: float, *, corners: bool = False) -> tuple[FloatArray, FloatArray]:
+    """Lengths of the rays to the left of curves up to the next one of them."""
+    samples = _samples(loops, spacing)
+    crossing = _through(loops, samples.points, samples.normals)
     kept = np.isfinite(crossing.lengths)
     if not corners:
-        kept &= ~_beyond_corner(section, samples, crossing.pieces)
+        kept &= ~_beyond_corner(loops, samples, crossing.pieces)
     return samples.points[kept], crossing.lengths[kept]
 
 
 def boundary_samples(section: Section, spacing: float) -> Samples:
     """Points on every piece of the section, at most `spacing` mm apart and half of that from its ends."""
+    return _samples(section.loops, spacing)
+
+
+def _samples(loops: Sequence[Loop], spacing: float) -> Samples:
+    pieces = _Pieces.of(loops)
+    if (np.abs(pieces.bulges) <= STRAIGHT).all():
+        return _samples_of_lines(pieces.start, pieces.end, spacing)
+    return _samples_of_curves(loops, spacing)
+
+
+def _samples_of_lines(start: FloatArray, end: FloatArray, spacing: float) -> Samples:
+    along = end - start
+    lengths = np.hypot(*along.T)
+    counts = np.maximum(np.ceil(lengths / spacing), 1).astype(int)
+    which = np.repeat(np.arange(len(counts)), counts)
+    share = (np.arange(len(which)) - (np.cumsum(counts) - counts)[which] + 0.5) / counts[which]
+    left = np.stack([-along[:, 1], along[:, 0]], axis=1) / lengths[:, None]
+    return Samples(start[which] + share[:, None] * along[which], left[which], which, share)
+
+
+def _samples_of_curves(loops: Sequence[Loop], spacing: float) -> Samples:
     points, normals, pieces, fractions, number = [], [], [], [], 0
-    for loop in section.loops:
+    for loop in loops:
         counts = np.maximum(np.ceil(loop.lengths / spacing), 1).astype(int)
         for which, count in enumerate(counts):
             share = (np.arange(count) + 0.5) / count
@@ -97,7 +140,11 @@ def inner_normals(loop: Loop, which: int, fractions: ArrayLike) -> FloatArray:
 def through(section: Section, points: ArrayLike, directions: ArrayLike) -> Crossing:
     """Rays from points (n, 2), mm, along unit vectors (n, 2), to the first boundary ahead."""
     start, ahead = (np.asarray(each, dtype=np.float64).reshape(-1, 2) for each in (points, directions))
-    pieces = _Pieces.of(section)
+    return _through(section.loops, start, ahead)
+
+
+def _through(loops: Sequence[Loop], start: FloatArray, ahead: FloatArray) -> Crossing:
+    pieces = _Pieces.of(loops)
     step = max(AT_ONCE // len(pieces.bulges), 1)
     found = [
         _first(pieces, start[first : first + step], ahead[first : first + step])
@@ -118,9 +165,9 @@ class _Pieces(NamedTuple):
     radii: FloatArray
 
     @classmethod
-    def of(cls, section: Section) -> "_Pieces":
-        ends = np.concatenate([loop.ends for loop in section.loops])
-        bulges = np.concatenate([loop.bulges for loop in section.loops])
+    def of(cls, loops: Sequence[Loop]) -> "_Pieces":
+        ends = np.concatenate([loop.ends for loop in loops])
+        bulges = np.concatenate([loop.bulges for loop in loops])
         start, end = ends[:, 0], ends[:, 1]
         safe = np.where(np.abs(bulges) > STRAIGHT, bulges, np.nan)
         left = np.stack([start[:, 1] - end[:, 1], end[:, 0] - start[:, 0]], axis=1)
@@ -140,11 +187,14 @@ def _first(pieces: _Pieces, start: FloatArray, ahead: FloatArray) -> Crossing:
 
 def _to_lines(first: FloatArray, last: FloatArray, start: FloatArray, ahead: FloatArray) -> FloatArray:
     """Lengths of rays (n, 2) to straight pieces (p, 2), shape (n, p), mm; infinite where they miss."""
-    side, apart = last - first, first - start[:, None]
-    across = _cross(ahead[:, None], side)
+    side = last - first
+    side_x, side_y = side.T
+    ahead_x, ahead_y = ahead.T[..., None]
+    apart_x, apart_y = first[:, 0] - start[:, :1], first[:, 1] - start[:, 1:]
+    across = ahead_x * side_y - ahead_y * side_x
     with np.errstate(divide="ignore", invalid="ignore"):
-        length = _cross(apart, side) / across
-        share = _cross(apart, ahead[:, None]) / across
+        length = (apart_x * side_y - apart_y * side_x) / across
+        share = (apart_x * ahead_y - apart_y * ahead_x) / across
     slack = 1e-9 / np.linalg.norm(side, axis=1)
     hit = (length > TOUCH) & (share >= -slack) & (share <= 1 + slack)
     return np.asarray(np.where(hit, length, np.inf))
@@ -165,12 +215,12 @@ def _to_arcs(arcs: _Pieces, start: FloatArray, ahead: FloatArray) -> FloatArray:
     return best
 
 
-def _beyond_corner(section: Section, samples: Samples, met: IntArray) -> BoolArray:
+def _beyond_corner(loops: Sequence[Loop], samples: Samples, met: IntArray) -> BoolArray:
     """Mask of the samples whose ray ends on the next or previous piece, beyond a corner of 90 degrees."""
-    following = np.empty(sum(len(loop.bulges) for loop in section.loops), dtype=np.int64)
+    following = np.empty(sum(len(loop.bulges) for loop in loops), dtype=np.int64)
     sharp = np.empty(len(following), dtype=bool)
     number = 0
-    for loop in section.loops:
+    for loop in loops:
         own = slice(number, number + len(loop.bulges))
         sides, turn = loop.ends[:, 1] - loop.ends[:, 0], 2 * np.arctan(loop.bulges)
         angle = np.arctan2(sides[:, 1], sides[:, 0])

@@ -1,0 +1,179 @@
+"""A finger as a plane frame of beams: walls and ribs by Timoshenko's theory, in a millisecond.
+
+It misses the size of the joints and the solid ends, but follows the parameters as the body does: what is left
+for an emulator to learn is smaller and smoother than the quantities. Young's modulus and depth are one.
+
+Source: J. S. Przemieniecki, Theory of Matrix Structural Analysis, McGraw-Hill 1968, section 5.6.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from geometry.arrays import FloatArray, IntArray
+from geometry.finger.parameters import Parameters
+from geometry.finger.section import back_line, base_line, front_line, rib_axes, tip_line
+from solvers.problem import Material
+
+SHEAR_SHARE = 5 / 6
+"""Shear correction factor of a rectangle."""
+
+SHORTEST = 0.1
+"""Smallest length of a beam, mm."""
+
+TIP_THICKNESS = 0.5
+"""Thickness of the beams of the solid tip over its length."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Beams of n fingers with the same number of ribs.
+
+    The nodes are the ends of the rib axes on the front wall, the contact, the front wall's two ends; the rib
+    axes' ends on the back wall and its two ends; the apex.
+
+    Attributes:
+        points: Nodes, shape (n, k, 2), mm.
+        beams: Numbers of the nodes of every beam, shape (n, b, 2).
+        thickness: Of the beams, shape (n, b), mm.
+        ribs: Number of ribs.
+    """
+
+    points: FloatArray
+    beams: IntArray
+    thickness: FloatArray
+    ribs: int
+
+    @classmethod
+    def of(cls, fingers: Sequence[Parameters]) -> "Frame":
+        """The frames of fingers with the same number of ribs."""
+        ribs = fingers[0].rib_count
+        points = np.stack([_nodes(each) for each in fingers])
+        front, back = np.arange(ribs + 3), np.arange(ribs + 3, 2 * ribs + 5)
+        front_order = points[:, front, 0].argsort(axis=1)
+        back_order = back[points[:, back, 0].argsort(axis=1)]
+        tips = np.array([[ribs + 2, 2 * ribs + 4], [ribs + 2, 2 * ribs + 5], [2 * ribs + 4, 2 * ribs + 5]])
+        across = np.stack([front[:ribs], back[:ribs]], axis=1)
+        beams = np.concatenate(
+            [
+                np.stack([front_order[:, :-1], front_order[:, 1:]], axis=2),
+                np.stack([back_order[:, :-1], back_order[:, 1:]], axis=2),
+                np.broadcast_to(np.concatenate([across, tips]), (len(fingers), ribs + 3, 2)),
+            ],
+            axis=1,
+        )
+        counts = (ribs + 2, ribs + 1, ribs, 3)
+        names = ("front_thickness", "back_thickness", "rib_thickness", "tip_length")
+        thickness = np.array([[getattr(each, name) for name in names] for each in fingers])
+        thickness[:, 3] *= TIP_THICKNESS
+        return cls(points, beams, np.repeat(thickness, counts, axis=1), ribs)
+
+    def response(self, material: Material, travel: tuple[float | None, float | None]) -> "FrameResponse":
+        """What the frames do if their contact moves by `travel`, mm; None is free of force."""
+        start, end = (np.take_along_axis(self.points, self.beams[:, :, side, None], 1) for side in (0, 1))
+        length = np.maximum(np.linalg.norm(end - start, axis=2), SHORTEST)
+        turn = _rotations((end - start) / length[..., None])
+        local = _stiffness(length, self.thickness, material)
+        degrees = (3 * self.beams[..., None] + np.arange(3)).reshape(*length.shape, 6)
+        count, size = len(self.points), 3 * self.points.shape[1]
+        whole = np.zeros((count, size, size))
+        finger = np.arange(count)[:, None, None]
+        turned = turn.transpose(0, 1, 3, 2) @ local @ turn
+        np.add.at(whole, (finger[..., None], degrees[..., :, None], degrees[..., None, :]), turned)
+        clamped = [3 * node + part for node in (self.ribs, 2 * self.ribs + 3) for part in range(3)]
+        free = np.setdiff1d(np.arange(size), clamped)
+        contact, apex = 3 * (self.ribs + 1), 3 * (2 * self.ribs + 5)
+        unit = np.zeros((count, size, 2))
+        unit[:, contact, 0] = unit[:, contact + 1, 1] = 1.0
+        moved = np.zeros_like(unit)
+        moved[:, free] = np.linalg.solve(whole[:, free[:, None], free], unit[:, free])
+        compliance = moved[:, contact : contact + 2]
+        axes = [axis for axis, value in enumerate(travel) if value is not None]
+        values = np.array([value for value in travel if value is not None])
+        force = np.zeros((count, 2, 1))
+        given = np.broadcast_to(values[:, None], (count, len(axes), 1))
+        force[:, axes] = np.linalg.solve(compliance[:, axes][:, :, axes], given)
+        state = (moved @ force)[..., 0]
+        ends = (local @ turn @ state[finger, degrees][..., None])[..., 0]
+        moment = np.maximum(np.abs(ends[..., 2]), np.abs(ends[..., 5]))
+        stress = np.abs(ends[..., 3]) / self.thickness + 6 * moment / self.thickness**2
+        parts = np.cumsum([0, self.ribs + 2, self.ribs + 1, self.ribs])
+        return FrameResponse(
+            force=force[:, axes, 0] @ (values / np.linalg.norm(values)),
+            compliance=np.diagonal(compliance, axis1=1, axis2=2),
+            contact=state[:, contact : contact + 2],
+            tip=state[:, apex : apex + 2],
+            stress=np.stack(
+                [stress[:, first:last].max(axis=1, initial=0.0) for first, last in pairwise(parts)],
+                axis=1,
+            ),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class FrameResponse:
+    """What n frames of Young's modulus and depth one do.
+
+    Attributes:
+        force: Of the indenter along its travel, shape (n,), mm^2.
+        compliance: Displacement of the contact per force, along and across, shape (n, 2).
+        contact: Displacement of the contact, shape (n, 2), mm.
+        tip: Displacement of the apex, shape (n, 2), mm.
+        stress: Largest at the ends of the beams of front wall, back wall and ribs, shape (n, 3).
+    """
+
+    force: FloatArray
+    compliance: FloatArray
+    contact: FloatArray
+    tip: FloatArray
+    stress: FloatArray
+
+
+def _nodes(p: Parameters) -> FloatArray:
+    """The nodes of a finger's frame, shape (k, 2), mm."""
+    axes = rib_axes(p)
+    front, back = front_line(p.front_thickness / 2), back_line(p, p.back_thickness / 2)
+    ends = [base_line(p, p.base_thickness / 2), tip_line(p)]
+    contact = np.array([p.contact_abscissa, -p.front_thickness / 2])
+    return np.array(
+        [
+            *(*axes[:, 0], ends[0].meets(front), contact, ends[1].meets(front)),
+            *(*axes[:, 1], ends[0].meets(back), ends[1].meets(back)),
+            np.array([p.height, 0.0]),
+        ]
+    )
+
+
+def _rotations(along: FloatArray) -> FloatArray:
+    """Rotations from the frame's axes to those of beams along unit vectors (..., 2), shape (..., 6, 6)."""
+    turn = np.zeros((*along.shape[:-1], 6, 6))
+    c, s = along[..., 0], along[..., 1]
+    for first in (0, 3):
+        turn[..., first, first] = turn[..., first + 1, first + 1] = c
+        turn[..., first, first + 1], turn[..., first + 1, first] = s, -s
+        turn[..., first + 2, first + 2] = 1.0
+    return turn
+
+
+def _stiffness(length: FloatArray, thickness: FloatArray, material: Material) -> FloatArray:
+    """Stiffness of beams in their own axes, shape (..., 6, 6)."""
+    modulus = 1 / (1 - material.poisson**2) if material.plane == "strain" else 1.0
+    shear = SHEAR_SHARE * thickness / (2 * (1 + material.poisson))
+    bending = modulus * thickness**3 / 12
+    phi = 12 * bending / (shear * length**2)
+    part = bending / ((1 + phi) * length**3)
+    local = np.zeros((*length.shape, 6, 6))
+    stretch = modulus * thickness / length
+    local[..., 0, 0] = local[..., 3, 3] = stretch
+    local[..., 0, 3] = local[..., 3, 0] = -stretch
+    side = 6 * length * part
+    for i, j, value in (
+        *((1, 1, 12 * part), (4, 4, 12 * part), (1, 4, -12 * part)),
+        *((1, 2, side), (1, 5, side), (2, 4, -side), (4, 5, -side)),
+        *((2, 2, (4 + phi) * length**2 * part), (5, 5, (4 + phi) * length**2 * part)),
+        (2, 5, (2 - phi) * length**2 * part),
+    ):
+        local[..., i, j] = local[..., j, i] = value
+    return local
