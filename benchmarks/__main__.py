@@ -30,6 +30,7 @@ BENCHMARKS = {
     "paper": "paper_run",
     "contact": "network_contact",
     "trained": "trained_networks",
+    "predict": "emulators",
 }
 """Names and modules; the modules' docstrings have descriptions and times."""
 
