@@ -1,7 +1,7 @@
 """A finger as a plane frame of beams: walls and ribs by Timoshenko's theory, in a millisecond.
 
-It misses the size of the joints and the solid ends, but follows the parameters as the body does: what is left
-for an emulator to learn is smaller and smoother than the quantities. Young's modulus and depth are one.
+It misses the shape of joints and solid ends, but follows the parameters as the body does: what is left for an
+emulator to learn is smaller and smoother than the quantities. Young's modulus and depth are one.
 
 Source: J. S. Przemieniecki, Theory of Matrix Structural Analysis, McGraw-Hill 1968, section 5.6.
 """
@@ -25,6 +25,13 @@ SHORTEST = 0.1
 
 TIP_THICKNESS = 0.5
 """Thickness of the beams of the solid tip over its length."""
+
+
+JOINT = 0.5
+"""Share of half the crossing wall or rib by which a beam is rigid at a joint: the size of the joint."""
+
+ELASTIC = 0.2
+"""Least share of a beam that is not rigid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,12 +77,26 @@ class Frame:
         thickness[:, 3] *= TIP_THICKNESS
         return cls(points, beams, np.repeat(thickness, counts, axis=1), ribs)
 
+    def rigid(self, length: FloatArray) -> FloatArray:
+        """Rigid lengths at both ends of the beams, shape (n, b, 2), mm."""
+        ribs, walls = self.ribs, 2 * self.ribs + 3
+        found = np.zeros((*length.shape, 2))
+        if not ribs:
+            return found
+        joints = np.zeros(self.points.shape[1])
+        joints[:ribs] = joints[ribs + 3 : 2 * ribs + 3] = 1.0
+        rib = self.thickness[:, walls, None, None]
+        found[:, :walls] = 0.5 * JOINT * rib * joints[self.beams[:, :walls]]
+        found[:, walls : walls + ribs] = 0.5 * JOINT * self.thickness[:, None, [0, ribs + 2]]
+        share = (1 - ELASTIC) * length / np.maximum(found.sum(axis=2), 1e-12)
+        return np.asarray(found * np.minimum(share, 1.0)[..., None])
+
     def response(self, material: Material, travel: tuple[float | None, float | None]) -> "FrameResponse":
         """What the frames do if their contact moves by `travel`, mm; None is free of force."""
         start, end = (np.take_along_axis(self.points, self.beams[:, :, side, None], 1) for side in (0, 1))
         length = np.maximum(np.linalg.norm(end - start, axis=2), SHORTEST)
         turn = _rotations((end - start) / length[..., None])
-        local = _stiffness(length, self.thickness, material)
+        local = _stiffness(length, self.rigid(length), self.thickness, material)
         degrees = (3 * self.beams[..., None] + np.arange(3)).reshape(*length.shape, 6)
         count, size = len(self.points), 3 * self.points.shape[1]
         whole = np.zeros((count, size, size))
@@ -157,7 +178,18 @@ def _rotations(along: FloatArray) -> FloatArray:
     return turn
 
 
-def _stiffness(length: FloatArray, thickness: FloatArray, material: Material) -> FloatArray:
+def _stiffness(
+    length: FloatArray, rigid: FloatArray, thickness: FloatArray, material: Material
+) -> FloatArray:
+    """Stiffness of beams in their own axes, shape (..., 6, 6), rigid near their ends (..., 2), mm."""
+    local = _elastic_stiffness(length - rigid.sum(axis=-1), thickness, material)
+    offset = np.zeros_like(local)
+    offset[..., range(6), range(6)] = 1.0
+    offset[..., 1, 2], offset[..., 4, 5] = rigid[..., 0], -rigid[..., 1]
+    return np.asarray(np.swapaxes(offset, -1, -2) @ local @ offset)
+
+
+def _elastic_stiffness(length: FloatArray, thickness: FloatArray, material: Material) -> FloatArray:
     """Stiffness of beams in their own axes, shape (..., 6, 6)."""
     modulus = 1 / (1 - material.poisson**2) if material.plane == "strain" else 1.0
     shear = SHEAR_SHARE * thickness / (2 * (1 + material.poisson))
