@@ -10,6 +10,7 @@ from compare.commands.fiducials import fiducials
 from compare.commands.gridsearch import gridsearch
 from compare.commands.launch import EXIT_CODES
 from compare.commands.mesh import mesh
+from compare.commands.optimise import optimise
 from compare.commands.pick import pick
 from compare.commands.predict import predict
 from compare.commands.quiet import quietable
@@ -29,7 +30,8 @@ pinnray = App(
     suppress_keyboard_interrupt=False,
 )
 COMMANDS = (
-    *(compare, design, mesh, solve, sweep, predict, gridsearch, crossval, solvers),
+    *(compare, design, mesh, solve, sweep, predict, optimise),
+    *(gridsearch, crossval, solvers),
     *(fiducials, calibrate, pick, rig, track),
 )
 for command in COMMANDS:

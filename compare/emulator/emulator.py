@@ -135,17 +135,17 @@ class Emulator:
         return Predictions(chosen, *whole.transpose(1, 2, 0))
 
 
-def fitted(sweep: Sweep, inputs: Inputs, stages: Stages | None = None) -> Emulator:
-    """The emulator of a sweep's converged samples.
+def fitted(sweep: Sweep, inputs: Inputs, stages: Stages | None = None, *, fewest: int = FEWEST) -> Emulator:
+    """The emulator of a sweep's converged samples, of which it needs `fewest`.
 
     Raises:
         UserError: If there are too few of them.
     """
     good = sweep.good
-    if len(good) < FEWEST:
+    if len(good) < fewest:
         raise UserError(
             f"the sweep {sweep.study.name} has {len(good)} converged samples, and an emulator needs at least "
-            f"{FEWEST}; let `pinnray sweep` finish, or raise samples in the study"
+            f"{fewest}; let `pinnray sweep` finish, or raise samples in the study"
         )
     order = np.random.default_rng(0).permutation(len(good))[:MOST]
     fingers = [sweep.samples[good[place].number] for place in order]
@@ -154,7 +154,7 @@ def fitted(sweep: Sweep, inputs: Inputs, stages: Stages | None = None) -> Emulat
         for name in QUANTITIES
         if name not in EXACT
     }
-    known = {name: column for name, column in table.items() if np.isfinite(column).sum() >= FEWEST}
+    known = {name: column for name, column in table.items() if np.isfinite(column).sum() >= fewest}
     ratios = _proportional(known)
     numbers = inputs.numbers(fingers, [inputs.parameters(finger) for finger in fingers])
     learnt: dict[str, Learnt] = {}

@@ -41,7 +41,7 @@ def write_page(sweep: Sweep, maker: TaskMaker, folder: Path, record: dict[str, A
     failures = failure_grid(sweep)
     page = (
         template_environment()
-        .get_template("sweep.html.j2")
+        .get_template("designs.html.j2")
         .render(
             sweep=sweep,
             summary=summary(sweep),

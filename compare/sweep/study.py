@@ -10,7 +10,14 @@ from pydantic import Field, model_validator
 from geometry.cache import drawn_finger
 from geometry.drawing.description import description_beside, load_description
 from geometry.errors import UserError
-from geometry.finger.parameters import SYMBOLS, CheckedModel, Parameters, parameter_info, unknown_parameter
+from geometry.finger.parameters import (
+    SYMBOLS,
+    CheckedModel,
+    Parameters,
+    bounded,
+    parameter_info,
+    unknown_parameter,
+)
 from geometry.finger.presets import load_design
 from geometry.text_files import read_toml
 from solvers.assimilation.misfit import assimilates
@@ -47,7 +54,7 @@ class Range(CheckedModel):
 
     low: float | None = Field(default=None, alias="from")
     high: float | None = Field(default=None, alias="to")
-    count: int | None = Field(default=None, ge=2, le=MOST)
+    count: int | None = bounded(None, 2, MOST, "", "", "Number of values on a grid")
     values: tuple[Value, ...] | None = Field(default=None, min_length=1)
 
     @model_validator(mode="after")
@@ -87,11 +94,11 @@ class Study(CheckedModel):
     design: str = "default"
     solver: str = "fem"
     settings: dict[str, Value] = Field(default_factory=dict)
-    mesh_size: float = Field(default=0.5, ge=0.02, le=20)
-    density: float = Field(default=1.2, gt=0, le=30)
+    mesh_size: float = bounded(0.5, 0.02, 20, "mm", "", "Largest element in the walls and ribs")
+    density: float = bounded(1.2, 1e-3, 30, "g/cm^3", "", "Density of the material")
     sampling: Literal["grid", "latin", "sobol"] = "sobol"
-    samples: int | None = Field(default=None, ge=1, le=MOST)
-    seed: int = Field(default=0, ge=0)
+    samples: int | None = bounded(None, 1, MOST, "", "", "Number of samples")
+    seed: int = bounded(0, 0, 2**32 - 1, "", "", "Seed of the samples")
     fixed: dict[str, Value] = Field(default_factory=dict)
     varied: dict[str, Range] = Field(min_length=1)
 

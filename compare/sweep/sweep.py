@@ -1,5 +1,6 @@
 """Run a study: every sample once, whatever happens to the workers or to the program."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,12 +11,13 @@ from compare.runtime.resumable_folder import check_resumable_folder
 from compare.runtime.stages import Stages
 from compare.sweep.measurement import Measurement
 from compare.sweep.sampling import samples
-from compare.sweep.store import opened
-from compare.sweep.study import Study, TaskMaker, Value
+from compare.sweep.store import Journal, opened
+from compare.sweep.study import Study, Task, TaskMaker, Value
 from compare.sweep.workers import answers, workers
 from geometry.atomic import write_json
 from geometry.errors import UserError
 from geometry.text_files import read_json
+from solvers.solver import Progress, silent
 
 STUDY_FILE, JOURNAL = "sweep.json", "journal.sqlite"
 
@@ -83,23 +85,45 @@ def run_sweep(job: SweepJob, stages: Stages | None = None) -> Sweep:
         write_json(job.out / STUDY_FILE, definition)
         journal.forget("failed")
         with stages.stage("samples") as progress:
-            for _ in range(POOLS):
-                known = journal.numbers()
-                missing = {number: task for number, task in tasks.items() if number not in known}
-                if not missing:
-                    break
-                with workers(job.processes, job.scheduler) as client:
-                    for answer in answers(client, missing):
-                        journal.add(answer)
-                        known.add(answer.number)
-                        progress(len(known) / len(tasks), f"{len(known)} of {len(tasks)} samples")
-            else:
-                raise UserError(
-                    f"worker processes died while they started, {POOLS} times; the same command goes on with "
-                    f"the {len(missing)} samples that are left"
-                )
+            finish(tasks, journal, progress, processes=job.processes, scheduler=job.scheduler)
         found = [each for each in journal.measurements() if each.number in tasks]
         return Sweep(job.study, all_samples, found)
+
+
+def finish(
+    tasks: Mapping[int, Task],
+    journal: Journal,
+    progress: Progress = silent,
+    *,
+    processes: int,
+    scheduler: str | None = None,
+) -> None:
+    """Run the tasks that have no result in the journal, and keep each result at once.
+
+    Args:
+        tasks: By the samples' numbers.
+        journal: Where the results are kept.
+        progress: Called with the share that is done and a note.
+        processes: Worker processes on this machine.
+        scheduler: Address of a Dask scheduler whose workers are used instead.
+
+    Raises:
+        UserError: If the workers die whenever they start.
+    """
+    for _ in range(POOLS):
+        known = journal.numbers() & tasks.keys()
+        missing = {number: task for number, task in tasks.items() if number not in known}
+        if not missing:
+            return
+        with workers(min(processes, len(missing)), scheduler) as client:
+            for answer in answers(client, missing):
+                journal.add(answer)
+                known.add(answer.number)
+                progress(len(known) / len(tasks), f"{len(known)} of {len(tasks)} samples")
+    raise UserError(
+        f"worker processes died while they started, {POOLS} times; the same command goes on with the "
+        f"{len(missing)} samples that are left"
+    )
 
 
 def _definition(job: SweepJob, first: dict[str, Any]) -> dict[str, Any]:

@@ -58,6 +58,10 @@ REFUSED = {
         'samples = 4\n[fixed]\nsection = "a.dxf"\n[varied]\nrib_count = {from = 2, to = 4}\n',
         "rib_count: of a drawing a study changes depth",
     ),
+    "no elements": ("mesh_size = 0\n" + GOOD, "mesh_size = 0 mm is outside its range, 0.02 to 20 mm"),
+    "no samples": (GOOD.replace("= 4", "= 0"), "samples = 0 is outside its range, 1 to 1e"),
+    "negative seed": ("seed = -1\n" + GOOD, "seed = -1 is outside its range"),
+    "unknown sampling": (GOOD.replace("sobol", "random"), "sampling"),
     "not TOML": ("samples = [", "cannot read the study"),
 }
 
