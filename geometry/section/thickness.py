@@ -217,17 +217,14 @@ def _to_arcs(arcs: _Pieces, start: FloatArray, ahead: FloatArray) -> FloatArray:
 
 def _beyond_corner(loops: Sequence[Loop], samples: Samples, met: IntArray) -> BoolArray:
     """Mask of the samples whose ray ends on the next or previous piece, beyond a corner of 90 degrees."""
-    following = np.empty(sum(len(loop.bulges) for loop in loops), dtype=np.int64)
-    sharp = np.empty(len(following), dtype=bool)
-    number = 0
-    for loop in loops:
-        own = slice(number, number + len(loop.bulges))
-        sides, turn = loop.ends[:, 1] - loop.ends[:, 0], 2 * np.arctan(loop.bulges)
-        angle = np.arctan2(sides[:, 1], sides[:, 0])
-        bend = np.roll(angle - turn, -1) - (angle + turn)
-        sharp[own] = (bend + np.pi) % (2 * np.pi) - np.pi >= np.pi / 2 - 1e-9
-        following[own] = np.roll(np.arange(own.start, own.stop), -1)
-        number = own.stop
+    pieces = _Pieces.of(loops)
+    counts = np.array([len(loop.bulges) for loop in loops])
+    following = np.arange(counts.sum()) + 1
+    following[np.cumsum(counts) - 1] = np.cumsum(counts) - counts
+    sides, turn = pieces.end - pieces.start, 2 * np.arctan(pieces.bulges)
+    angle = np.arctan2(sides[:, 1], sides[:, 0])
+    bend = (angle - turn)[following] - (angle + turn)
+    sharp = (bend + np.pi) % (2 * np.pi) - np.pi >= np.pi / 2 - 1e-9
     previous = np.argsort(following)
     ahead = (met == following[samples.pieces]) & sharp[samples.pieces]
     behind = (met == previous[samples.pieces]) & sharp[previous[samples.pieces]]
