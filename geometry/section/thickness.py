@@ -73,7 +73,19 @@ def cavity_widths(section: Section, spacing: float) -> tuple[FloatArray, FloatAr
     """
     if not section.cavities:
         return np.empty((0, 2)), np.empty(0)
+    if all(len(cavity.straight) == len(cavity.bulges) for cavity in section.cavities):
+        return _widths([_Lines(each.ends[::-1, ::-1], each.bulges) for each in section.cavities], spacing)
     return _widths([_reversed(cavity) for cavity in section.cavities], spacing)
+
+
+class _Lines(NamedTuple):
+    """A closed curve of straight pieces: ends (p, 2, 2) and bulges (p,), without the checks of a `Loop`."""
+
+    ends: FloatArray
+    bulges: FloatArray
+
+
+_Curves = Sequence[Loop] | Sequence[_Lines]
 
 
 def _reversed(loop: Loop) -> Loop:
@@ -81,7 +93,7 @@ def _reversed(loop: Loop) -> Loop:
     return Loop(loop.points[::-1], -np.roll(loop.bulges[::-1], -1), ("",) * len(loop.points))
 
 
-def _widths(loops: Sequence[Loop], spacing: float, *, corners: bool = False) -> tuple[FloatArray, FloatArray]:
+def _widths(loops: _Curves, spacing: float, *, corners: bool = False) -> tuple[FloatArray, FloatArray]:
     """Lengths of the rays to the left of curves up to the next one of them."""
     samples = _samples(loops, spacing)
     crossing = _through(loops, samples.points, samples.normals)
@@ -96,11 +108,11 @@ def boundary_samples(section: Section, spacing: float) -> Samples:
     return _samples(section.loops, spacing)
 
 
-def _samples(loops: Sequence[Loop], spacing: float) -> Samples:
+def _samples(loops: _Curves, spacing: float) -> Samples:
     pieces = _Pieces.of(loops)
     if (np.abs(pieces.bulges) <= STRAIGHT).all():
         return _samples_of_lines(pieces.start, pieces.end, spacing)
-    return _samples_of_curves(loops, spacing)
+    return _samples_of_curves([loop for loop in loops if isinstance(loop, Loop)], spacing)
 
 
 def _samples_of_lines(start: FloatArray, end: FloatArray, spacing: float) -> Samples:
@@ -143,7 +155,7 @@ def through(section: Section, points: ArrayLike, directions: ArrayLike) -> Cross
     return _through(section.loops, start, ahead)
 
 
-def _through(loops: Sequence[Loop], start: FloatArray, ahead: FloatArray) -> Crossing:
+def _through(loops: _Curves, start: FloatArray, ahead: FloatArray) -> Crossing:
     pieces = _Pieces.of(loops)
     step = max(AT_ONCE // len(pieces.bulges), 1)
     found = [
@@ -165,7 +177,7 @@ class _Pieces(NamedTuple):
     radii: FloatArray
 
     @classmethod
-    def of(cls, loops: Sequence[Loop]) -> "_Pieces":
+    def of(cls, loops: _Curves) -> "_Pieces":
         ends = np.concatenate([loop.ends for loop in loops])
         bulges = np.concatenate([loop.bulges for loop in loops])
         start, end = ends[:, 0], ends[:, 1]
@@ -215,7 +227,7 @@ def _to_arcs(arcs: _Pieces, start: FloatArray, ahead: FloatArray) -> FloatArray:
     return best
 
 
-def _beyond_corner(loops: Sequence[Loop], samples: Samples, met: IntArray) -> BoolArray:
+def _beyond_corner(loops: _Curves, samples: Samples, met: IntArray) -> BoolArray:
     """Mask of the samples whose ray ends on the next or previous piece, beyond a corner of 90 degrees."""
     pieces = _Pieces.of(loops)
     counts = np.array([len(loop.bulges) for loop in loops])
