@@ -134,8 +134,13 @@ def solved(solver: Solver, problem: Problem, progress: Progress = silent) -> Sol
         if not isinstance(value, kind):
             said = f"{_named(value)} as its {kind.__name__}"
             raise UserError(f"solver {solver.name} returned {said}; see docs/own-solver.md")
-    if fault := _fault(solution, problem):
-        raise UserError(f"solver {solver.name} returned a {fault}; see docs/own-solver.md")
+    try:
+        fault = _fault(solution, problem)
+    except Exception as error:  # of the field's own methods
+        raise SolverFailedError(solver, error) from error
+    if fault:
+        article = "an" if fault.startswith("energy") else "a"
+        raise UserError(f"solver {solver.name} returned {article} {fault}; see docs/own-solver.md")
     # A solver that passes on another one's solution would be a second row of that name.
     return solution if solution.solver == solver.name else replace(solution, solver=solver.name)
 
@@ -157,10 +162,16 @@ def _named(value: object) -> str:
 
 def _fault(solution: Solution, problem: Problem) -> str | None:
     """A number or array of a solution that cannot be, with the reason; None if there is none."""
+    if not isinstance(solution.problem, Problem):
+        return f"Solution of {_named(solution.problem)}; it must have the problem that it was given"
     if solution.problem.mesh.digest != problem.mesh.digest:
         return "Solution on another mesh; it must be of the problem that it was given"
-    if not isinstance(solution.stats, Mapping):
-        return f"stats that are {_named(solution.stats)}, not a dictionary"
+    for part, columns in (("stats", solution.stats), ("history", solution.history)):
+        if not isinstance(columns, Mapping):
+            return f"{part} that {'are' if part == 'stats' else 'is'} {_named(columns)}, not a dictionary"
+    for method in ("displacement", "gradient"):
+        if not callable(getattr(solution.field, method, None)):
+            return f"field that is {_named(solution.field)}, without a method {method}"
     lengths = {name: len(column) for name, column in solution.history.items()}
     if len(set(lengths.values())) > 1:
         return f"history whose columns differ in length: {lengths}"

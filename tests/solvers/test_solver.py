@@ -102,6 +102,13 @@ def spoilt(array: Any) -> Any:
         ),
         (lambda solution: replace(solution, reaction=["0", "1"]), "reaction that is of type <U1"),
         (lambda solution: replace(solution, stats=None), "stats that are None, not a dictionary"),
+        (lambda solution: replace(solution, history=None), "history that is None, not a dictionary"),
+        (lambda solution: replace(solution, problem=None), "Solution of None; it must have the problem"),
+        (lambda solution: replace(solution, field=None), "field that is None, without a method displacement"),
+        (
+            lambda solution: replace(solution, field=Field(gradient=lambda gradient: gradient["x"])),
+            "raised IndexError",
+        ),
         (
             lambda solution: replace(solution, history={"energy": [1, 2], "epoch": [1]}),
             "history whose columns differ in length",
