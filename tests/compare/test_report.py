@@ -321,6 +321,17 @@ def test_held_out_errors_come_first_as_a_phone_shows_no_more(content) -> None:
     assert cells[4:] == 4 * ["–"]  # fem is given no markers
 
 
+def test_a_phone_shows_whole_captions_and_the_lines_of_the_first_column(content) -> None:
+    """A caption is as wide as its table, and a cell that stays in place leaves collapsed borders behind."""
+    html = render(content)
+    phone = html[html.index("@media (max-width: 34rem)") : html.index("@media print")]
+    (caption,) = re.findall(r"\.scroll caption \{(.*?)\}", phone)
+    assert "position: sticky" in caption
+    assert "max-width: calc(100vw" in caption
+    (table,) = re.findall(r"\.scroll table \{(.*?)\}", phone)
+    assert "border-collapse: separate" in table
+
+
 def test_a_reader_who_wants_it_dark_has_it_dark_but_not_on_paper(content) -> None:
     html = render(content)
     style = html[html.index("<style>") : html.index("</style>")]
