@@ -6,6 +6,8 @@ import sys
 
 from rich.console import Console, RenderableType
 
+from geometry.errors import UserError
+
 BENCHMARKS = {
     "fem": "fem_against_scikit_fem",
     "million": "million_triangles",
@@ -38,6 +40,7 @@ WIDEST = 400
 """Columns of the widest table."""
 SHORT = ("fem", "pinn")
 TIMED = ("deepxde", "recipes", "paper", "trained")
+ROWED = ("stress",)
 
 
 def show(table: RenderableType, console: Console | None = None) -> None:
@@ -49,23 +52,28 @@ def show(table: RenderableType, console: Console | None = None) -> None:
 
 
 def main() -> int:
-    """Entry of `python -m benchmarks [NAME ...] [--seconds S]`."""
+    """Entry of `python -m benchmarks [NAME ...] [--seconds S] [--rows WORDS]`."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument(
         "names", nargs="*", metavar="NAME", help=f"{', '.join(BENCHMARKS)}; default: fem pinn"
     )
     parser.add_argument("--seconds", type=float, help=f"budget of each training in {' and '.join(TIMED)}")
+    parser.add_argument("--rows", default="", help=f"words in the names of the rows of {' and '.join(ROWED)}")
     arguments = parser.parse_args()
     unknown = [name for name in arguments.names if name not in BENCHMARKS]
     if unknown:
         parser.error(f"no benchmark {unknown[0]!r}; there are {', '.join(BENCHMARKS)}")
     for name in arguments.names or SHORT:
-        budget = {"seconds": arguments.seconds} if arguments.seconds and name in TIMED else {}
+        options = {"seconds": arguments.seconds} if arguments.seconds and name in TIMED else {}
+        options |= {"rows": arguments.rows} if arguments.rows and name in ROWED else {}
         try:
             module = importlib.import_module(f"benchmarks.{BENCHMARKS[name]}")
-            show(module.main(**budget))
+            show(module.main(**options))
         except ModuleNotFoundError as error:
             print(f"error: {name} needs {error.name}; pip install 'pinn-ray[bench]'", file=sys.stderr)
+            return 2
+        except UserError as error:
+            print(f"error: {error}", file=sys.stderr)
             return 2
     return 0
 

@@ -1,8 +1,9 @@
 """The tracker under one or several disturbances: errors; markers missed, swapped, invented.
 
 The default finger is filmed by the virtual rig at rest, while it is pressed, and held; two films for every
-case, whose noise and tilt differ. The camera is known exactly. Both methods see the same films. Six minutes
-on two cores; writes `benchmarks/tracker_stress.md`.
+case, whose noise and tilt differ. The camera is known exactly. Both methods see the same films. Half an hour
+on two cores; writes every finished row to `benchmarks/tracker_stress.md`, with its date. `--rows blur,codec`
+runs only the rows whose names hold one of these words: the others stay.
 """
 
 import platform
@@ -159,7 +160,7 @@ CASES: dict[tuple[str, str], Case] = {
 
 HEADER = (
     *("varied", "to", "error, mm", "worst marker", "hidden", "missed", "swapped", "invented"),
-    *("std, mm", "below 1 std, %", "1.96 std", "Hough: error, mm", "missed", "swapped", "invented"),
+    *("std, mm", "below 1 std, %", "1.96 std", "Hough: error, mm", "missed", "swapped", "invented", "of"),
 )
 
 SHOWN = 8
@@ -174,21 +175,33 @@ class Outcome(NamedTuple):
     count: int
 
 
-def main() -> Table:
-    """Film and track all, and write the report."""
-    fingers = {layout: Finger.pressed(Design(marker_layout=layout)) for layout in ("front", "joints")}
-    jobs = list(product(CASES, range(FILMS)))
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn"), initializer=_alone) as pool:
-        outcomes = list(pool.map(partial(_outcome, fingers), jobs))
-    rows = [
-        (*name, *_row([outcome for (case, _), outcome in zip(jobs, outcomes, strict=True) if case == name]))
-        for name in CASES
-    ]
-    REPORT.write_text(_report(rows), encoding="utf-8")
+def main(rows: str = "") -> Table:
+    """Film and track all rows, or those whose names hold one of some words, and write the report."""
+    words = [word.strip() for word in rows.split(",") if word.strip()] or [""]
+    chosen = [name for name in CASES if any(word in " ".join(name) for word in words)]
+    if not chosen:
+        raise UserError(f"no row holds {rows!r}; there are {', '.join(' '.join(name) for name in CASES)}")
     table = Table(*HEADER[:SHOWN], title=f"The tracker under stress; all columns are in {REPORT}")
-    for row in rows:
-        table.add_row(*row[:SHOWN])
+    fingers = {layout: Finger.pressed(Design(marker_layout=layout)) for layout in ("front", "joints")}
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn"), initializer=_alone) as pool:
+        outcomes = pool.map(partial(_outcome, fingers), product(chosen, range(FILMS)))
+        for name in chosen:
+            row = [*name, *_row([next(outcomes) for _ in range(FILMS)]), f"{datetime.now(UTC):%Y-%m-%d}"]
+            lines = reported(REPORT.read_text(encoding="utf-8") if REPORT.exists() else "")
+            lines[name] = row
+            REPORT.write_text(_report([lines[case] for case in CASES if case in lines]), encoding="utf-8")
+            table.add_row(*row[:SHOWN])
     return table
+
+
+def reported(text: str) -> dict[tuple[str, str], list[str]]:
+    """Rows of a report by the names of their cases."""
+    found = {}
+    for line in text.splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if len(cells) == len(HEADER) and (cells[0], cells[1]) in CASES:
+            found[cells[0], cells[1]] = cells
+    return found
 
 
 def filmed(case: Case, finger: Finger, number: int) -> Recording:
@@ -287,7 +300,7 @@ def _report(rows: Sequence[Sequence[str]]) -> str:
     lines = [
         "# The tracker under stress",
         "",
-        f"Made by `python -m benchmarks stress` on {datetime.now(UTC):%Y-%m-%d}: {platform.machine()}, "
+        f"`python -m benchmarks stress`, each row on the day in its last column: {platform.machine()}, "
         f"Python {platform.python_version()}, numpy {version('numpy')}, OpenCV {cv2.__version__}.",
         "",
         f"{FILMS} films of the default finger a row, with nine markers each, by the virtual rig. Base: "
