@@ -13,6 +13,11 @@ from geometry.atomic import write_text
 
 PAGE = "sweep.html"
 
+FILES = (
+    "samples.parquet and samples.csv (a row for each sample, units in the headings), sweep.json (the study, "
+    "versions and hashes), journal.sqlite (from which the same command goes on)"
+)
+
 SAMPLED = {"grid": "on a grid", "latin": "of a Latin hypercube", "sobol": "of a Sobol sequence"}
 
 
@@ -43,10 +48,11 @@ def write_page(sweep: Sweep, maker: TaskMaker, folder: Path, record: dict[str, A
         template_environment()
         .get_template("designs.html.j2")
         .render(
-            sweep=sweep,
+            title=f"Sweep {sweep.study.name}",
             summary=summary(sweep),
             grids=[quantity_grid(sweep), *([failures] if failures.rows else [])],
             pictures=pictures,
+            files=FILES,
             provenance=f"Started {record['started']}.",
         )
     )

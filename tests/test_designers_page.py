@@ -1,0 +1,68 @@
+"""The page for designers against the program: its tutorial, tables and example files."""
+
+import shlex
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.test_docs import DOCS, blocks, names, table
+
+PAGE = DOCS / "designers.md"
+
+
+def test_the_page_has_every_quantity_with_its_unit_and_meaning() -> None:
+    from compare.sweep.quantities import QUANTITIES
+
+    rows = table(PAGE, "quantity")
+    assert names(rows) == list(QUANTITIES)
+    for row, quantity in zip(rows, QUANTITIES.values(), strict=True):
+        assert row[1] == (quantity.unit.replace("mm2", "mm²") or "–")
+        assert row[2] == quantity.meaning
+
+
+def test_the_page_has_every_key_of_a_study_and_of_a_question() -> None:
+    from compare.optimum.question import Question
+    from compare.sweep.study import Study
+
+    assert names(table(PAGE, "key of a study")) == list(Study.model_fields)
+    own = [name for name in Question.model_fields if name != "study"]
+    assert names(table(PAGE, "key of a question")) == own
+
+
+@pytest.mark.parametrize("name", ["ribs.toml"])
+def test_the_example_study_can_be_read(name: str) -> None:
+    from compare.sweep.study import load_study
+
+    load_study(DOCS / "examples" / name)
+
+
+@pytest.mark.parametrize("name", ["wrap.toml", "wrap-cylinder.toml"])
+def test_the_example_questions_can_be_read(name: str) -> None:
+    from compare.optimum.question import load_question
+
+    load_question(DOCS / "examples" / name)
+
+
+@pytest.mark.slow
+def test_the_tutorial_runs_from_the_parameters_to_the_printed_finger(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from compare.cli import compare_main, main
+
+    shutil.copytree(DOCS / "examples", tmp_path / "docs" / "examples")
+    monkeypatch.chdir(tmp_path)
+    for line in blocks(PAGE)[0].text.splitlines():
+        program, *arguments = shlex.split(line)
+        run = {"pinnray": main, "compare": compare_main}[program]
+        assert run(arguments) == 0, line
+    written = {path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*")}
+    assert {f"ribs/{name}" for name in files("file of a sweep")} <= written
+    assert {f"wrap/{name.replace('NN', '01')}" for name in files("file of a search")} <= written
+    assert {"first/report.html", "print/finger-body.stl", "print/finger-markers.stl"} <= written
+
+
+def files(heading: str) -> set[str]:
+    """The files that a table of the page names."""
+    texts = (row[0].replace("`", "") for row in table(PAGE, heading))
+    return {name.strip() for text in texts for name in text.split(",")}
