@@ -32,7 +32,9 @@ BENCHMARKS = {
     "paper": "paper_run",
     "contact": "network_contact",
     "trained": "trained_networks",
+    "sweep": "sweeping",
     "predict": "emulators",
+    "optimise": "fronts",
 }
 """Names and modules; the modules' docstrings have descriptions and times."""
 

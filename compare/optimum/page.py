@@ -70,7 +70,7 @@ def write_front(optimum: Optimum, maker: TaskMaker, folder: Path, record: dict[s
         "front": (draw_front(optimum, shown), "The objectives of every run, with the Pareto front."),
         "fingers": (
             draw_front_fingers(optimum, solutions),
-            "Fingers on the front at rest and under the load; the numbers are those of the front's picture.",
+            "Fingers on the front at rest and under the load, numbered as in the table.",
         ),
         "growth": (draw_growth(optimum), "Hypervolume of the front over the number of runs."),
     }
@@ -95,18 +95,14 @@ def summary(optimum: Optimum) -> list[str]:
     """The search in sentences."""
     question, study = optimum.question, optimum.question.study
     senses = " and ".join(f"{sense} {name}" for name, sense in question.objectives.items())
-    limits = [
-        " and ".join(
-            f"{words} {bound:g}"
-            for words, bound in (("at least", limit.at_least), ("at most", limit.at_most))
-            if bound is not None
-        )
-        + f" for {name}"
-        for name, limit in question.constraints.items()
-    ]
+    limits = []
+    for name, limit in question.constraints.items():
+        bounds = (("at least", limit.at_least), ("at most", limit.at_most))
+        words = " and ".join(f"{word} {bound:g}" for word, bound in bounds if bound is not None)
+        limits.append(f"{name} {words} {QUANTITIES[name].unit}".rstrip())
     load = {name: value for name, value in study.fixed.items() if name in ("load", "stroke", "radius", "law")}
     said = ", ".join(f"{name} = {value}" for name, value in load.items())
-    allowed = f", allowed {'; '.join(limits)}" if limits else ""
+    allowed = f", with {', '.join(limits)}" if limits else ""
     return [
         f"Wanted: {senses}{allowed}. {len(optimum.front)} of {len(optimum.measurements)} runs of "
         f"{study.solver} ({said + ', ' if said else ''}elements of {study.mesh_size:g} mm) are on the front: "

@@ -27,24 +27,20 @@ def draw_front(optimum: Optimum, shown: Sequence[int]) -> Figure:
         heading(drawn, f"Pareto front: {senses}", note)
         axes = axes_at(drawn, (0.7, 0.55, WIDTH - 0.9, 2.75))
         others = [each for each in optimum.measurements if each.number not in optimum.front and each.values]
-        for allowed, marker, label in ((True, "o", "other runs"), (False, "x", "against a constraint")):
-            points = [
-                (each.values[first], each.values[second])
-                for each in others
-                if (each.state == "done" and optimum.question.allows(each.values)) is allowed
-            ]
-            if points:
-                face = "none" if marker == "o" else MUTED
-                x, y = np.transpose(points)
-                axes.scatter(x, y, s=14, marker=marker, fc=face, ec=MUTED, lw=0.7, label=label)
+        good = [each.state == "done" and optimum.question.allows(each.values) for each in others]
+        allowed = np.array(good, dtype=bool)
+        points = np.array([[each.values[name] for name in (first, second)] for each in others]).reshape(-1, 2)
+        axes.plot(*points[allowed].T, "o", ms=3.5, mfc="none", c=MUTED, label="other runs")
+        if not allowed.all():
+            axes.plot(*points[~allowed].T, "x", ms=3.5, c=MUTED, label="against a constraint")
         on_front = [optimum.measurements[run].values for run in optimum.front]
         best = np.array([[values[name] for name in (first, second)] for values in on_front])
         axes.plot(*best.T, "-" if not third else "", color=BLUE, lw=0.8)
         axes.scatter(best[:, 0], best[:, 1], s=18, color=BLUE, zorder=3, label="front")
-        for number, run in enumerate(shown, start=1):
+        for run in shown:
             values = optimum.measurements[run].values
             axes.annotate(
-                str(number),
+                str(optimum.place(run)),
                 (values[first], values[second]),
                 xytext=(5, 4),
                 textcoords="offset points",
@@ -104,8 +100,16 @@ def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution]) -> Figu
             text = ", ".join(
                 f"{name} {values[name]:.3g} {_unit(name)}" for name in optimum.question.objectives
             )
-            axes.text(0, 1.03, f"{place + 1}", size=9, weight="bold", color=CONTACT, transform=axes.transAxes)
-            axes.text(0.06, 1.03, text, size=SMALL, transform=axes.transAxes)
+            axes.text(
+                0,
+                1.03,
+                f"{optimum.place(run)}",
+                size=9,
+                weight="bold",
+                color=CONTACT,
+                transform=axes.transAxes,
+            )
+            axes.text(0.08, 1.03, text, size=SMALL, transform=axes.transAxes)
     return drawn
 
 

@@ -78,6 +78,10 @@ class Optimum:
     volumes: FloatArray
     reference: dict[str, float]
 
+    def place(self, run: int) -> int:
+        """Place of a run on the front, from 1: its number in the table and in the names of the files."""
+        return 1 + self.front.index(run)
+
 
 def search_front(job: OptimumJob, stages: Stages | None = None) -> Optimum:
     """Search for the Pareto front with a given number of runs of the solver.

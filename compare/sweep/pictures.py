@@ -25,6 +25,9 @@ SHOWN = ("force", "wrap", "tip_v", "compliance_across", "von_mises", "mass")
 MOST_DOTS = 2_000
 """Largest number of samples drawn in a panel."""
 
+WIDE = 6
+"""Largest number of columns that have room for long words."""
+
 COLUMNS = 3
 """Fingers in a row of the drawing: with the least, the median and the largest value."""
 
@@ -65,7 +68,7 @@ def draw_pairs(sweep: Sweep) -> Figure:
                     labels = axes.set_xticklabels(ends)
                     labels[0].set_horizontalalignment("left")
                     labels[-1].set_horizontalalignment("right")
-                    axes.set_xlabel(_wrapped(parameter), labelpad=2)
+                    axes.set_xlabel(_wrapped(parameter, narrow=len(parameters) > WIDE), labelpad=2)
     return drawn
 
 
@@ -86,9 +89,11 @@ def draw_sensitivity(found: Mapping[str, Sensitivity]) -> Figure:
         for row, name in enumerate(names):
             for column, parameter in enumerate(parameters):
                 total, first = (100 * share[parameter] for share in (found[name].total, found[name].first))
-                text = f"{total:.0f}" + (f" ({first:.0f})" if len(parameters) <= 6 else f"\n({first:.0f})")
+                text = f"{total:.0f}" + (f" ({first:.0f})" if len(parameters) <= WIDE else f"\n({first:.0f})")
                 axes.text(column, row, text, ha="center", va="center", size=SMALL, linespacing=0.95)
-        axes.set_xticks(range(len(parameters)), [_wrapped(name) for name in parameters])
+        axes.set_xticks(
+            range(len(parameters)), [_wrapped(name, narrow=len(parameters) > WIDE) for name in parameters]
+        )
         axes.set_yticks(range(len(names)), [name + _doubt(found[name]) for name in names])
         axes.xaxis.tick_top()
         axes.tick_params(length=0)
@@ -183,13 +188,14 @@ def _varies(sweep: Sweep, name: str) -> bool:
 
 def _label(name: str) -> str:
     unit = QUANTITIES[name].unit.replace("deg", "°")
-    return _wrapped(name, of_parameter=False) + (f"\n{unit}" if unit else "")
+    return name.replace("_", "\n") + (f"\n{unit}" if unit else "")
 
 
-def _wrapped(name: str, *, of_parameter: bool = True) -> str:
-    """A name with a line for each of its words, and its unit."""
-    unit = unit_of(name).replace("deg", "°") if of_parameter else ""
-    return name.replace("_", "\n").replace("thickness", "thick-\nness") + (f"\n{unit}" if unit else "")
+def _wrapped(parameter: str, *, narrow: bool) -> str:
+    """A parameter with a line for each of its words, and its unit; long words are cut for a narrow column."""
+    unit = unit_of(parameter).replace("deg", "°")
+    words = parameter.replace("_", "\n")
+    return (words.replace("thickness", "thick-\nness") if narrow else words) + (f"\n{unit}" if unit else "")
 
 
 def _ends(sweep: Sweep, parameter: str) -> tuple[str, str]:
