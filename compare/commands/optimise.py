@@ -23,7 +23,7 @@ def optimise(
     Args:
         question: TOML file with objectives, constraints, the ranges of the parameters and the solver.
         processes: Worker processes on this machine; default: one per core.
-        scheduler: Address of a Dask scheduler whose workers are used instead, such as tcp://host:8786.
+        scheduler: Address of a Dask scheduler whose workers are used, such as tcp://host:8786; default: none.
         out: Output folder; default out/optimum-NAME.
     """
     from compare.optimum.page import front_grid, write_front

@@ -23,7 +23,7 @@ def sweep(
     Args:
         study: TOML file with the ranges of the parameters, the sampling and the solver.
         processes: Worker processes on this machine; default: one per core.
-        scheduler: Address of a Dask scheduler whose workers are used instead, such as tcp://host:8786.
+        scheduler: Address of a Dask scheduler whose workers are used, such as tcp://host:8786; default: none.
         out: Output folder; default out/sweep-NAME.
     """
     from compare.runtime.stages import Stages

@@ -21,6 +21,7 @@ from compare.sweep.sampling import samples
 from compare.sweep.store import Journal, opened
 from compare.sweep.study import Study, TaskMaker, Value
 from compare.sweep.sweep import JOURNAL, Sweep, finish
+from compare.sweep.workers import Workers
 from geometry.arrays import FloatArray
 from geometry.atomic import write_json
 from geometry.errors import UserError
@@ -98,7 +99,11 @@ def search_front(job: OptimumJob, stages: Stages | None = None) -> Optimum:
     definition = _definition(question, maker)
     check_resumable_folder(job.out / QUESTION_FILE, definition, job="search")
     job.out.mkdir(parents=True, exist_ok=True)
-    with locked(job.out), opened(job.out / JOURNAL) as journal:
+    with (
+        locked(job.out),
+        opened(job.out / JOURNAL) as journal,
+        Workers(job.processes, job.scheduler) as workers,
+    ):
         write_json(job.out / QUESTION_FILE, definition)
         journal.forget("failed")
         fingers = _known_fingers(job.out / FINGERS_FILE)
@@ -110,7 +115,7 @@ def search_front(job: OptimumJob, stages: Stages | None = None) -> Optimum:
         while True:
             with stages.stage(f"runs {done + 1} to {len(fingers)}") as progress:
                 tasks = {n: maker.task(n, finger) for n, finger in enumerate(fingers)}
-                finish(tasks, journal, progress, processes=job.processes, scheduler=job.scheduler)
+                finish(tasks, journal, workers, progress)
             done = len(fingers)
             if done >= question.runs:
                 return _optimum(question, fingers, journal)

@@ -13,7 +13,7 @@ from compare.sweep.measurement import Measurement
 from compare.sweep.sampling import samples
 from compare.sweep.store import Journal, opened
 from compare.sweep.study import Study, Task, TaskMaker, Value
-from compare.sweep.workers import answers, workers
+from compare.sweep.workers import Workers
 from geometry.atomic import write_json
 from geometry.errors import UserError
 from geometry.text_files import read_json
@@ -84,28 +84,22 @@ def run_sweep(job: SweepJob, stages: Stages | None = None) -> Sweep:
     with locked(job.out), opened(job.out / JOURNAL) as journal:
         write_json(job.out / STUDY_FILE, definition)
         journal.forget("failed")
-        with stages.stage("samples") as progress:
-            finish(tasks, journal, progress, processes=job.processes, scheduler=job.scheduler)
+        with stages.stage("samples") as progress, Workers(job.processes, job.scheduler) as workers:
+            finish(tasks, journal, workers, progress)
         found = [each for each in journal.measurements() if each.number in tasks]
         return Sweep(job.study, all_samples, found)
 
 
 def finish(
-    tasks: Mapping[int, Task],
-    journal: Journal,
-    progress: Progress = silent,
-    *,
-    processes: int,
-    scheduler: str | None = None,
+    tasks: Mapping[int, Task], journal: Journal, workers: Workers, progress: Progress = silent
 ) -> None:
     """Run the tasks that have no result in the journal, and keep each result at once.
 
     Args:
         tasks: By the samples' numbers.
         journal: Where the results are kept.
+        workers: The processes that do the work.
         progress: Called with the share that is done and a note.
-        processes: Worker processes on this machine.
-        scheduler: Address of a Dask scheduler whose workers are used instead.
 
     Raises:
         UserError: If the workers die whenever they start.
@@ -115,11 +109,12 @@ def finish(
         missing = {number: task for number, task in tasks.items() if number not in known}
         if not missing:
             return
-        with workers(min(processes, len(missing)), scheduler) as client:
-            for answer in answers(client, missing):
-                journal.add(answer)
-                known.add(answer.number)
-                progress(len(known) / len(tasks), f"{len(known)} of {len(tasks)} samples")
+        for answer in workers.answers(missing):
+            journal.add(answer)
+            known.add(answer.number)
+            progress(len(known) / len(tasks), f"{len(known)} of {len(tasks)} samples")
+        if len(known) < len(tasks):
+            workers.stop()  # some of them died while they started
     raise UserError(
         f"worker processes died while they started, {POOLS} times; the same command goes on with the "
         f"{len(missing)} samples that are left"

@@ -8,8 +8,8 @@ import logging
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any, Self
 
 from compare.sweep.measurement import Measurement, measured
 from compare.sweep.study import Task
@@ -31,9 +31,6 @@ AHEAD = 2
 WAIT_S = 20
 """Time to reach a scheduler, s."""
 
-WARM_S = 300
-"""Time to compile the forms of FEniCS, s; it takes some ten seconds."""
-
 LOOK_S = 5
 """Time between two looks whether workers are there, s."""
 
@@ -44,44 +41,125 @@ STARTS = 3
 """Attempts to start the worker processes."""
 
 
-@contextmanager
-def workers(count: int, scheduler: str | None = None) -> Iterator["Client"]:
-    """Worker processes, connected.
+class Workers:
+    """Worker processes, which are started when they are first needed; a context manager that ends them.
 
     Args:
         count: Number of processes on this machine, if there is no scheduler.
         scheduler: Address of a Dask scheduler whose workers are used instead, such as tcp://host:8786.
-
-    Raises:
-        UserError: If the scheduler does not answer, or has no workers.
     """
-    import dask
-    from distributed import Client
 
-    spawn = "distributed.nanny.pre-spawn-environ"  # one thread of OpenMP and BLAS a worker, among others
-    dask.config.set(
-        {
-            spawn: {**dask.config.get(spawn), "DASK_LOGGING__DISTRIBUTED": "critical"},
-            "distributed.scheduler.allowed-failures": 0,  # the deaths are counted here
-            "distributed.scheduler.worker-saturation": 1.0,
+    def __init__(self, count: int, scheduler: str | None = None) -> None:
+        self._count = count
+        self._scheduler = scheduler
+        self._stack = ExitStack()
+        self._client: Client | None = None
+        self._warm: set[str] = set()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def stop(self) -> None:
+        """End the processes of this machine, and the connection to a scheduler."""
+        self._stack.close()
+        self._client = None
+        self._warm.clear()
+
+    def answers(self, tasks: Mapping[int, Task]) -> Iterator[Measurement]:
+        """Run tasks and yield their results as they come, each once.
+
+        The first tasks run alone, one on each machine that has not run any: they compile the forms of FEniCS,
+        which parallel starts with an empty cache would compile all at once.
+
+        Ends early if workers of this machine stay away: one that dies while it starts is not started again.
+        Those of a scheduler may come and go.
+
+        Raises:
+            UserError: If the workers do not start, or the scheduler does not answer or has no workers.
+        """
+        from distributed import KilledWorker, wait
+
+        client = self._client = self._client or self._connected()
+        waiting = iter(tasks)
+        deaths: Counter[int] = Counter()
+        running: dict[Any, int] = {}
+
+        def submit(number: int, machine: list[str] | None = None) -> Any:
+            future = client.submit(
+                measured, tasks[number], pure=False, workers=machine, allow_other_workers=machine is not None
+            )
+            running[future] = number
+            return future
+
+        warming = {
+            submit(number, [address]) for address, number in zip(self._cold(client), waiting, strict=False)
         }
-    )
-    for name in ("distributed", "tornado"):
-        logging.getLogger(name).setLevel(logging.CRITICAL)
-    if scheduler is not None:
+        complete = time.monotonic()
+        while True:
+            room = 0 if warming & running.keys() else max(_threads(client), 1) * AHEAD
+            while len(running) < room and (number := next(waiting, None)) is not None:
+                submit(number)
+            if not running:
+                return
+            try:
+                finished = wait(list(running), timeout=LOOK_S, return_when="FIRST_COMPLETED").done
+            except TimeoutError:
+                finished = set()
+            if self._scheduler is not None or _threads(client) >= self._count:
+                complete = time.monotonic()
+            elif time.monotonic() > complete + AWAY_S:
+                return
+            for future in finished:
+                number = running.pop(future)
+                try:
+                    answer = future.result()
+                except KilledWorker:
+                    deaths[number] += 1
+                    if deaths[number] < DEATHS:
+                        submit(number)
+                        continue
+                    answer = Measurement(number, "failed", f"its worker process died {DEATHS} times", 0.0)
+                yield answer
+
+    def _cold(self, client: "Client") -> list[str]:
+        """One worker of each machine that has not run any task, which is taken to be warm from now on."""
+        one_each: dict[str, str] = {}
+        for address in client.nthreads():
+            one_each.setdefault(address.rpartition(":")[0], address)
+        cold = [address for machine, address in one_each.items() if machine not in self._warm]
+        self._warm |= one_each.keys()
+        return cold
+
+    def _connected(self) -> "Client":
+        import dask
+        from distributed import Client
+
+        spawn = "distributed.nanny.pre-spawn-environ"  # one thread of OpenMP and BLAS a worker, among others
+        dask.config.set(
+            {
+                spawn: {**dask.config.get(spawn), "DASK_LOGGING__DISTRIBUTED": "critical"},
+                "distributed.scheduler.allowed-failures": 0,  # the deaths are counted here
+                "distributed.scheduler.worker-saturation": 1.0,
+            }
+        )
+        for name in ("distributed", "tornado"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+        if self._scheduler is None:
+            cluster = self._stack.enter_context(_local_cluster(self._count))
+            local: Client = self._stack.enter_context(Client(cluster))
+            return local
         try:
-            client = Client(scheduler, timeout=WAIT_S)
+            client: Client = self._stack.enter_context(Client(self._scheduler, timeout=WAIT_S))
         except (OSError, ValueError) as error:
             raise UserError(
-                f"--scheduler {scheduler}: no Dask scheduler answers there ({_first_line(error)})"
+                f"--scheduler {self._scheduler}: no Dask scheduler answers there ({_first_line(error)})"
             ) from None
-        with client:
-            if not client.nthreads():
-                raise UserError(f"--scheduler {scheduler}: the scheduler has no workers; start some first")
-            yield client
-        return
-    with _local_cluster(count) as cluster, Client(cluster) as client:
-        yield client
+        if not client.nthreads():
+            raise UserError(f"--scheduler {self._scheduler}: the scheduler has no workers; start some first")
+        return client
 
 
 def _local_cluster(count: int) -> "LocalCluster":
@@ -104,69 +182,8 @@ def _local_cluster(count: int) -> "LocalCluster":
     raise AssertionError
 
 
-def answers(client: "Client", tasks: Mapping[int, Task]) -> Iterator[Measurement]:
-    """Run tasks and yield their results as they come, each once.
-
-    The first task runs alone on one worker of each machine: it compiles the forms of FEniCS, which parallel
-    starts with an empty cache would compile all at once.
-
-    Ends early if workers on this machine stay away: one that dies while it starts is not started again. Those
-    of a scheduler may come and go.
-    """
-    from distributed import KilledWorker, wait
-
-    waiting = iter(tasks)
-    deaths: Counter[int] = Counter()
-    running: dict[Any, int] = {}
-
-    def submit(number: int) -> None:
-        running[client.submit(measured, tasks[number], pure=False)] = number
-
-    _warm(client, tasks[next(iter(tasks))])
-    wanted = _threads(client) if client.cluster is not None else 0
-    complete = time.monotonic()
-    while True:
-        while len(running) < max(_threads(client), 1) * AHEAD and (number := next(waiting, None)) is not None:
-            submit(number)
-        if not running:
-            return
-        try:
-            finished = wait(list(running), timeout=LOOK_S, return_when="FIRST_COMPLETED").done
-        except TimeoutError:
-            finished = set()
-        if _threads(client) >= wanted:
-            complete = time.monotonic()
-        elif time.monotonic() > complete + AWAY_S:
-            return
-        for future in finished:
-            number = running.pop(future)
-            try:
-                answer = future.result()
-            except KilledWorker:
-                deaths[number] += 1
-                if deaths[number] < DEATHS:
-                    submit(number)
-                    continue
-                answer = Measurement(number, "failed", f"its worker process died {DEATHS} times", 0.0)
-            yield answer
-
-
 def _threads(client: "Client") -> int:
     return sum(client.nthreads().values())
-
-
-def _warm(client: "Client", task: Task) -> None:
-    """Run the task on one worker of each machine."""
-    from distributed import KilledWorker
-
-    one_each: dict[str, str] = {}
-    for address in client.nthreads():
-        one_each.setdefault(address.rpartition(":")[0], address)
-    started = [client.submit(measured, task, pure=False, workers=[address]) for address in one_each.values()]
-    for future in started:
-        with suppress(KilledWorker, TimeoutError):
-            future.result(timeout=WARM_S)
-        future.cancel()
 
 
 def _first_line(error: Exception) -> str:

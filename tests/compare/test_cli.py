@@ -87,7 +87,7 @@ BAD = [
     ("compare --frobnicate", "Unknown option: --frobnicate"),
     (
         "frobnicate",
-        "Unknown command .* commands: compare, design, mesh, solve, sweep, gridsearch, crossval",
+        "Unknown command .* commands: compare, design, mesh, solve, sweep, predict, optimise, gridsearch",
     ),
     ("compare slender", "'slender' belongs to no option"),  # forgot --design
     ("compare --seed", "--seed requires an argument"),

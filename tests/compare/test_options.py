@@ -10,7 +10,7 @@ from compare.commands.app import pinnray
 NAMES = [name for name in pinnray if not name.startswith("-")]
 
 NOTHING = {
-    *("--section", "--set", "--solver-set", "--without", "--cover"),  # nothing is chosen or changed
+    *("--section", "--set", "--solver-set", "--without", "--cover", "--csv"),  # nothing is chosen or changed
     *(
         "--adapt",
         "--measurements",

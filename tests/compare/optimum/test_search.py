@@ -17,7 +17,6 @@ from compare.sweep.store import Journal
 from compare.sweep.study import Study, Task
 from geometry.errors import UserError
 from geometry.finger.presets import load_design
-from solvers.solver import Progress, silent
 
 VARIED = {
     "rib_count": {"from": 2, "to": 6},
@@ -41,7 +40,7 @@ def judged(task: Task) -> dict[str, float]:
     return dict.fromkeys(QUANTITIES, 1.0) | {"force": force, "wrap": wrap, "von_mises": rib + 0.1 * count}
 
 
-def judge(tasks: Mapping[int, Task], journal: Journal, progress: Progress = silent, **_: object) -> None:
+def judge(tasks: Mapping[int, Task], journal: Journal, *_: object) -> None:
     """Stands for the workers."""
     for number in sorted(tasks.keys() - journal.numbers()):
         journal.add(Measurement(number, "done", "", 0.0, judged(tasks[number])))
@@ -91,9 +90,7 @@ def test_the_same_seed_has_the_same_runs_to_the_bit(
 def test_a_search_that_was_stopped_goes_on_to_the_same_runs(
     found: Optimum, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupted(
-        tasks: Mapping[int, Task], journal: Journal, progress: Progress = silent, **_: object
-    ) -> None:
+    def interrupted(tasks: Mapping[int, Task], journal: Journal, *_: object) -> None:
         if len(tasks) > 30:
             raise KeyboardInterrupt
         judge(tasks, journal)

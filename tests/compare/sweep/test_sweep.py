@@ -76,7 +76,7 @@ def test_what_goes_wrong_with_a_sample_is_its_answer(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a sweep of six samples, two of whose workers were killed."""
+    """The folder of a sweep of six samples, one of whose workers was killed."""
     folder = tmp_path_factory.mktemp("sweep")
     study = study_file(folder, 6)
     out = folder / "out"
@@ -86,25 +86,16 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
         text=True,
     )
     killed: set[int] = set()
-    while process.poll() is None:  # at its start, which Dask does not mend, and in its work
-        done = finished(out)
-        if len(killed) < (1 if done == 0 else 2) and (workers := children(process.pid) - killed):
+    while process.poll() is None:  # at its start, which Dask does not mend
+        if not killed and (workers := children(process.pid)):
             with suppress(ProcessLookupError):
                 os.kill(min(workers), signal.SIGKILL)
             killed.add(min(workers))
         time.sleep(0.1)
     assert process.stderr is not None
     assert process.returncode == 0, process.stderr.read()
-    assert len(killed) == 2
+    assert killed
     return folder
-
-
-def finished(out: Path) -> int:
-    """The number of finished samples."""
-    try:
-        return len(load_sweep(out).measurements)
-    except UserError:
-        return 0
 
 
 def children(parent: int) -> set[int]:
@@ -160,6 +151,8 @@ def test_a_sample_that_always_kills_its_worker_is_listed_as_failed(
 ) -> None:
     monkeypatch.setattr("compare.sweep.workers.measured", die_at_one)
     monkeypatch.setattr("compare.sweep.workers.DEATHS", 2)
+    monkeypatch.setattr("compare.sweep.workers.AWAY_S", 6)
+    monkeypatch.setattr("compare.sweep.workers.LOOK_S", 1)
     study = load_study(study_file(tmp_path, 4))
     sweep = run_sweep(SweepJob(study, tmp_path, tmp_path / "out", 1))
     assert [each.state for each in sweep.measurements] == ["done", "failed", "done", "done"]
