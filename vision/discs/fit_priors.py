@@ -44,7 +44,7 @@ CLIPPED = 100.0
 """Prior standard deviation of a clipped level, grey levels."""
 CLIPPED_SHADE = 0.002
 """Prior standard deviation of the mean relative gradient of the light, 1/pixel."""
-SCATTERS = np.geomspace(1e-4, 5e-3, 24)
+SCATTERS = np.geomspace(1e-5, 5e-3, 32)
 """Standard deviations of the gradient at discs from its mean that are weighed, 1/pixel."""
 
 

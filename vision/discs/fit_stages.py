@@ -3,7 +3,7 @@
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
-from vision.discs.correlated_noise import absorbed_noise, correlated_noise
+from vision.discs.correlated_noise import correlated_noise
 from vision.discs.disc_image_model import BLUR, CONTRAST, COUNT, LIGHT, RADIUS, Array, X, Y
 from vision.discs.fit_priors import Known, prior_and_limits
 from vision.discs.ground_texture import without_waves
@@ -83,10 +83,9 @@ def _fit_windows(window: PixelWindows, votes: HoughVotes, known: Known) -> DiscF
     near = np.abs(outside) < NEAR
     changed = ((chosen != trusted) & near).sum(axis=1) > CHANGED * near.sum(axis=1)
     chosen &= trusted
-    absorbed = absorbed_noise(window, first, chosen, votes.radii, known)
-    noise = correlated_noise(window, first, residuals, chosen, outside, absorbed)
+    noise = correlated_noise(window, first, residuals, chosen, votes.radii, known)
     noisy = first.variance > WRONG * np.maximum(window.noise**2, QUANTISATION)
-    (again,) = np.nonzero(changed | (noise.of_each > WRONG) | noisy | ~first.settled)
+    (again,) = np.nonzero(changed | (noise.misfit > WRONG) | noisy | ~first.settled)
     if len(again):
         some, votes, their = window.at(again), votes.at(again), known.at(again)
         initial = first.at(again)
@@ -100,18 +99,14 @@ def _fit_windows(window: PixelWindows, votes: HoughVotes, known: Known) -> DiscF
             other = _refined(few[0], *second, few[1].radii, few[2])
             (better,) = np.nonzero(_deviation(other) < _deviation(either.at(fewer)))
             first.put(again[fewer[better]], other.at(better))
-        irregular, outlines, left, absorbed = better_outlines(
+        irregular, outlines, own = better_outlines(
             first.at(again), initial.parameters, some, votes.radii, their
         )
         again = again[irregular]
         if len(again):
             first.put(again, outlines)
-            residuals[again], chosen[again] = left, window.within[again]
-            own = correlated_noise(window.at(again), outlines, left, chosen[again], outside[again], absorbed)
-            noise.variance[again], noise.squares[again] = own
-    usual = noise.usual
-    inflation = np.full(len(residuals), usual.max())
-    inflation[again] = noise.pooled(usual)[again]
+            noise.variance[again], noise.squares[again] = own.variance, own.squares
+    inflation = noise.pooled
     first.covariances *= inflation[:, None, None]
     first.shade_precision /= inflation[:, None]
     return first

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
-from vision.discs.correlated_noise import Absorbed, absorbed_noise
+from vision.discs.correlated_noise import CorrelatedNoise, correlated_noise
 from vision.discs.disc_image_model import (
     BLUR,
     CONTRAST,
@@ -79,7 +79,7 @@ AGREED = 0.9
 
 def better_outlines(
     ellipses: DiscFit, start: FloatArray, window: PixelWindows, radii: FloatArray, known: Known
-) -> tuple[IntArray, DiscFit, Array, Absorbed]:
+) -> tuple[IntArray, DiscFit, CorrelatedNoise]:
     """Fits of irregular outlines that explain the pixels better than ellipses do.
 
     Args:
@@ -91,7 +91,7 @@ def better_outlines(
 
     Returns:
         The numbers of these discs, shape (k,), their fits, whose centres are the centroids of the outlines,
-        and the residuals of their pixels, shape (k, p), and the shares of the noise that they took up.
+        and the noise that counts for them.
     """
     outlines, residuals = _outlined(window, start, radii, known)
     noise = np.maximum(np.minimum(ellipses.variance, outlines.variance), window.noise**2)
@@ -108,14 +108,14 @@ def better_outlines(
         residuals[tried] = left
         good[tried] = _whole(window.at(tried), lenient, radii[tried], known.tolerance)
     (better,) = np.nonzero(good)
-    absorbed = absorbed_noise(window, outlines, window.within, radii, known)
-    outlines, residuals = outlines.at(better), residuals[better]
+    outlines, own = outlines.at(better), window.at(better)
+    counted = correlated_noise(own, outlines, residuals[better], own.within, radii[better], known.at(better))
     parameters = outlines.parameters.copy()
     parameters[:, [X, Y]] += outline_centroid(parameters)
     curved = parameters[:, GLARE][:, [power + other == 2 and power != 1 for power, other in GLARES]]
     parameters[:, LIGHT] += curved.sum(axis=1) * parameters[:, RADIUS] ** 2 / 2  # its mean along the edge
     columns = [*range(COUNT), *range(COUNT + OUTLINE, parameters.shape[1])]
-    return better, replace(outlines, parameters=parameters[:, columns]), residuals, absorbed
+    return better, replace(outlines, parameters=parameters[:, columns]), counted
 
 
 def _whole(window: PixelWindows, outlines: DiscFit, radii: FloatArray, tolerance: float) -> BoolArray:
