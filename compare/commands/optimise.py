@@ -44,9 +44,9 @@ def optimise(
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"the same command goes on from what {folder} keeps") from None
     grid = front_grid(found)
-    count = 2 + len(read.names)
-    shown = [row[:count] for row in grid.rows]
-    Console().print(terminal_table(grid.title, grid.headings[:count], shown))
+    columns = [0, *range(2, 2 + len(read.objectives))]  # the table in the file is too wide for a terminal
+    rows = [[row[column] for column in columns] for row in grid.rows]
+    Console().print(terminal_table(grid.title, [grid.headings[column] for column in columns], rows))
     for path in [*files.paths, files.designs[0], files.designs[-1]]:
         print(path)
     return 0

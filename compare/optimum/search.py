@@ -187,13 +187,14 @@ def _optimum(question: Question, fingers: list[dict[str, Value]], journal: Journ
     measured = journal.measurements()
     allowed = [each for each in measured if each.state == "done" and question.allows(each.values)]
     if not allowed:
-        converged = sum(each.state == "done" for each in measured)
+        found = sum(each.state == "done" for each in measured)
         raise UserError(
-            f"none of {len(measured)} runs obeys the constraints ({converged} converged); relax a constraint "
+            f"none of {len(measured)} runs obeys the constraints ({found} converged); relax a constraint "
             "or widen the ranges"
         )
     costs = np.array([question.costs(each.values) for each in allowed])
-    reference = reference_point(np.array([question.costs(each.values) for each in measured if each.values]))
+    converged = [question.costs(each.values) for each in measured if each.state == "done"]
+    reference = reference_point(np.array(converged))
     on_front = [each.number for each, best in zip(allowed, unbeaten(costs), strict=True) if best]
     first = next(iter(question.objectives))
     on_front.sort(key=lambda number: measured[number].values[first])
