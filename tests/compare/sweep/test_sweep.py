@@ -21,7 +21,9 @@ from compare.sweep.store import opened
 from compare.sweep.study import Study, TaskMaker, load_study
 from compare.sweep.sweep import JOURNAL, SweepJob, load_sweep, run_sweep
 from compare.sweep.tables import failure_grid, table
+from geometry.cache import cad_files
 from geometry.errors import UserError
+from geometry.finger.design import Design
 from tests.compare.programs import COMMAND
 
 STUDY = """
@@ -214,3 +216,22 @@ def test_the_same_study_has_the_same_results(swept: Path, tmp_path: Path) -> Non
     again = measured(TaskMaker(study, tmp_path).task(0, samples(study)[0]))
     assert again.values == first.values
     assert isinstance(study, Study)
+
+
+def test_drawings_are_samples_too(tmp_path: Path) -> None:
+    for name, ribs in (("few", 2), ("many", 6)):
+        cad_files(Design(rib_count=ribs), tmp_path / name, formats=["dxf"])
+        (tmp_path / name / "section.dxf").rename(tmp_path / f"{name}.dxf")
+    path = tmp_path / "drawn.toml"
+    path.write_text(
+        'mesh_size = 2.0\nsampling = "grid"\n[varied]\nsection = {values = ["few.dxf", "many.dxf"]}\n'
+        "depth = {values = [10.0, 20.0]}\n",
+        encoding="utf-8",
+    )
+    study = load_study(path)
+    maker = TaskMaker(study, tmp_path)
+    found = [measured(maker.task(number, sample)) for number, sample in enumerate(samples(study))]
+    assert [each.state for each in found] == ["done"] * 4
+    areas = [Design(rib_count=ribs).section.area for ribs in (2, 2, 6, 6)]
+    assert [each.values["area"] for each in found] == pytest.approx(areas, rel=1e-6)
+    assert found[1].values["force"] == pytest.approx(2 * found[0].values["force"], rel=1e-9)
