@@ -1,4 +1,4 @@
-"""What is to be optimised, as its file describes it."""
+"""Objectives and constraints of an optimisation, and their TOML file."""
 
 from collections.abc import Mapping
 from pathlib import Path

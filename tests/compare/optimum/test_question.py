@@ -1,4 +1,4 @@
-"""What a question may ask, and the line for what it may not."""
+"""Questions that are read, and the line for each that is refused."""
 
 from pathlib import Path
 

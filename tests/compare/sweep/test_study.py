@@ -1,4 +1,4 @@
-"""What a study may say, and the line for what it may not."""
+"""Studies that are read, and the line for each that is refused."""
 
 from pathlib import Path
 
