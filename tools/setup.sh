@@ -17,7 +17,7 @@ elsewhere='Ways on that need neither root nor Debian:
 
 os_release=${OS_RELEASE:-/etc/os-release}
 system=$(. "$os_release" 2>/dev/null && echo "${ID:-}${VERSION_ID:-}") || true
-apt=requirements/$system.apt lock=requirements/$system.txt
+apt=requirements/$system.apt lock=requirements/$system.txt dev=requirements/$system-dev.apt # dev: what tests need
 if [[ ! -f $apt || ! -f $lock ]]; then
     name=$(. "$os_release" 2>/dev/null && echo "${PRETTY_NAME:-}") || true
     stop "this is ${name:-an unknown system}; DOLFINx is set up on Debian 12 and 13 only.
@@ -25,11 +25,11 @@ $elsewhere"
 fi
 
 # Everything that decides what is installed, and where.
-state=$(sha256sum tools/setup.sh pyproject.toml "$apt" "$lock" requirements/dev.txt; pwd; echo "${TORCH_INDEX:-}")
+state=$(sha256sum tools/setup.sh pyproject.toml "$apt" "$dev" "$lock" requirements/dev.txt; pwd; echo "${TORCH_INDEX:-}")
 [[ $state == "$(cat .venv/setup-state 2>/dev/null)" ]] && exit 0
 SECONDS=0
 
-mapfile -t wanted < "$apt"
+mapfile -t wanted < <(cat "$apt" "$dev")
 missing=()
 for package in "${wanted[@]}"; do
     [[ $(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null) == installed ]] || missing+=("$package")

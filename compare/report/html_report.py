@@ -13,7 +13,9 @@ from compare.evaluation.number_format import distance, number, percent
 from compare.evaluation.regions import NEAR
 from compare.figures import Picture
 from compare.report import text
+from compare.report.metrics_json import metrics
 from compare.report.sentences import certificate_sentences, truth_sentences
+from compare.report.summary import answers
 from compare.report.tables import millimetres, printed_rows, seconds, table_one
 from compare.runtime.html import template_environment
 from geometry.atomic import write_text
@@ -35,6 +37,7 @@ def render(comparison: Comparison, pictures: Sequence[Picture], provenance: Mapp
     return _template().render(
         comparison=comparison,
         observations=comparison.observations,
+        answers=answers(metrics(comparison), left_out=comparison.left_out, failed=comparison.failed),
         reference=reference,
         reference_label=reference.label,
         own=reference.uncertainty,

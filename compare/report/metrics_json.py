@@ -66,7 +66,8 @@ def _solver(evaluation: Evaluation, comparison: Comparison) -> dict[str, Any]:
             "ae_v": errors.ae_v.tolist(),
             **_means(errors),
         },
-        "held_out": held_out and _means(held_out),
+        "held_out": held_out
+        and {"ae_u": held_out.ae_u.tolist(), "ae_v": held_out.ae_v.tolist(), **_means(held_out)},
         "uncertainty": _own_uncertainty(evaluation),
         "to_reference": _differences(differences)
         | {"reference_uncertainty": reference.uncertainty and _differences(reference.uncertainty)},

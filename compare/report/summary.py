@@ -1,0 +1,271 @@
+"""The answers that a report opens with, in words and numbers from `metrics.json`.
+
+Every number is read from the metrics; a question that they cannot answer is not asked.
+"""
+
+from collections.abc import Mapping, Sequence
+from math import hypot, isfinite, nan
+from typing import Any, NamedTuple
+
+from compare.evaluation.number_format import NONE, number, percent
+
+Numbers = Mapping[str, Any]
+"""A part of `metrics.json`, or of what `metrics` gives."""
+
+MODEL_SHARE = 0.1
+"""Ratio of the distances from reference and simulated finger below which the latter is the model's error."""
+
+
+FIELDS = ("displacement", "von Mises stress", "force")
+"""What is compared with the simulated finger, in the order of `_to_truth`."""
+
+HELD_OUT = (
+    "Held out: mean |Δu| + |Δv| at markers that the solver was not given, each predicted from the others. "
+    "The range is over neighbouring markers under one load and no confidence interval; those are from "
+    "pinnray crossval."
+)
+
+
+class Answer(NamedTuple):
+    """An answer to a question about a run.
+
+    Attributes:
+        question: The question.
+        verdict: The answer in a sentence.
+        sentences: The numbers that it rests on, each in a sentence.
+        heads: Headings of a table of them, if there is one.
+        rows: Its cells.
+        caption: Its caption.
+    """
+
+    question: str
+    verdict: str
+    sentences: list[str]
+    heads: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+    caption: str = ""
+
+
+def answers(
+    metrics: Numbers, *, left_out: Mapping[str, str] | None = None, failed: Mapping[str, str] | None = None
+) -> list[Answer]:
+    """The answers of a run.
+
+    Args:
+        metrics: The content of `metrics.json`.
+        left_out: Reasons why solvers were left out, by their names.
+        failed: Messages of solvers that raised an exception, by their names.
+    """
+    label = {
+        name: name if own["status"] == "converged" else f"{name} (not converged)"
+        for name, own in metrics["solvers"].items()
+    }
+    solvers = {label[name]: own for name, own in metrics["solvers"].items()}
+    metrics = {**metrics, "solvers": solvers, "reference": label[metrics["reference"]]}
+    found = [_trust(metrics), _markers(metrics), _convergence(metrics, left_out or {}, failed or {})]
+    return [answer for answer in found if answer is not None]
+
+
+def _trust(metrics: Numbers) -> Answer | None:
+    """Whether the networks that were given no markers solve the equations of the reference."""
+    solvers, reference = metrics["solvers"], metrics["reference"]
+    networks = {name: own for name, own in solvers.items() if name.startswith("pinn")}
+    if not networks or reference in networks:
+        return None
+    plain = {name: own for name, own in networks.items() if not own["markers"]["in_sample"]}
+    verdicts = [_verdict(name, own, metrics) for name, own in plain.items()]
+    sentences = [said for name, own in plain.items() for said in _against_reference(name, own, metrics)]
+    for name, own in networks.items():
+        twin = name.replace("pinn-local", "fem").replace("pinn", "fem")
+        if name not in plain and twin in solvers:
+            sentences.append(_beside_twin(name, own, twin, solvers[twin], metrics["measurements"]["source"]))
+    return Answer("May the network be trusted here?", " ".join(verdicts), list(filter(None, sentences)))
+
+
+def _verdict(name: str, own: Numbers, metrics: Numbers) -> str:
+    reference, to = metrics["reference"], own["to_reference"]
+    if own["status"] != "converged":
+        return f"No, not with {name}."
+    if own["law"] != metrics["solvers"][reference]["law"]:
+        return f"{name} has another material law than {reference}, so that this run does not tell."
+    known = to["reference_uncertainty"]
+    if known and to["rel_l2_displacement"] < known["rel_l2_displacement"]:
+        return (
+            f"Yes, as a solver: {name} and {reference} differ by less than {reference}’s own error in "
+            "displacement."
+        )
+    away = percent(to["rel_l2_displacement"], 2)
+    return f"As a solver to {away}: that far is {name} from {reference} in displacement."
+
+
+def _against_reference(name: str, own: Numbers, metrics: Numbers) -> list[str]:
+    reference, to, certificate = metrics["reference"], own["to_reference"], own["certificate"]
+    known = to["reference_uncertainty"] or {}
+    fields = ", ".join(
+        f"{_plus_minus(to[key], known.get(key))} in {field}"
+        for key, field in (("rel_l2_displacement", "displacement"), ("rel_l2_von_mises", "von Mises stress"))
+    )
+    own_error = f"; after ± the estimated error of {reference} itself" if known else ""
+    said = [f"{name} is {fields} away from {reference} (relative L² over the body{own_error})."]
+    if certificate and certificate["rel_excess"] > 0:
+        above = percent(certificate["rel_excess"], 2)
+        said.append(f"On the shared mesh its energy is {above} above the least that is possible.")
+    true, model = own["to_truth"], metrics["solvers"][reference]
+    if true:
+        sentence = (
+            f"In displacement, von Mises stress and force, {name} is {_truth_numbers(own)} away from the "
+            f"simulated finger, {reference} {_truth_numbers(model)}."
+        )
+        if to["rel_l2_displacement"] < MODEL_SHARE * true["displacement"]["rel_l2"]:
+            sentence += " That is the error of the model and its load, not of the network."
+        said.append(sentence)
+    return said
+
+
+def _beside_twin(name: str, own: Numbers, twin: str, other: Numbers, source: str) -> str:
+    if not (own["held_out"] and other["held_out"]):
+        return ""
+    off, of_twin = own["held_out"]["mae_sum"], other["held_out"]["mae_sum"]
+    return (
+        f"{name}, which is given the markers, is {off:.3f} mm off (mean |Δu| + |Δv|) at held-out {source} "
+        f"markers; {twin}, its twin by finite elements, {of_twin:.3f} mm."
+    )
+
+
+def _markers(metrics: Numbers) -> Answer | None:
+    """Whether solvers that were given the markers are nearer than the reference, at held-out markers."""
+    solvers, reference = metrics["solvers"], metrics["reference"]
+    plain, source = solvers[reference], metrics["measurements"]["source"]
+    given = {name: own for name, own in solvers.items() if own["markers"]["in_sample"]}
+    if not given or plain["markers"]["in_sample"] or not plain["held_out"]:
+        return None
+    told = {name: own for name, own in given.items() if own["held_out"]}
+    listed = {reference: plain, **given}
+    nearer, inside = [], []
+    heads, columns = ["Solver"], [list(listed)]
+    if told:
+        heads += ["held out, mm", "least to largest"]
+        columns += [list(column) for column in zip(*map(_held_out_cells, listed.values()), strict=True)]
+        better = [name for name, own in told.items() if _held_out(own)[0] < _held_out(plain)[0]]
+        nearer.append(f"at held-out {source} markers {_those(better, told)}")
+    for place, field in enumerate(FIELDS if plain["to_truth"] else ()):
+        found = {name: _to_truth(own)[place] for name, own in listed.items()}
+        heads.append(field)
+        columns.append([_signed(share, field == "force") for share in found.values()])
+        better = [name for name in given if abs(found[name]) < abs(found[reference])]
+        inside.append(f"in {field} {_those(better, given)}")
+    if inside:
+        nearer.append(f"over the simulated body {', '.join(inside)}")
+    sentences = [HELD_OUT] if told else []
+    if not plain["to_truth"]:
+        sentences.append("Whether stress and force are nearer is unknown: no camera tells them.")
+    sentences += filter(None, (_force_interval(name, own, metrics) for name, own in given.items()))
+    verdict = f"Nearer than {reference}: {'; '.join(nearer)}." if nearer else "This run does not tell."
+    caption = f"Errors at {source} markers that were not given"
+    if plain["to_truth"]:
+        caption += ", and distance from the simulated finger over the whole body"
+    rows = [list(row) for row in zip(*columns, strict=True)]
+    return Answer("Did the markers help?", verdict, sentences, heads, rows, caption)
+
+
+def _held_out(own: Numbers) -> tuple[float, float, float]:
+    """Mean, least and largest |Δu| + |Δv| at held-out markers, mm; NaN where there are none."""
+    means = own["held_out"]
+    if not means:
+        return nan, nan, nan
+    pairs = zip(means.get("ae_u", ()), means.get("ae_v", ()), strict=True)
+    each = [u + v for u, v in pairs if u is not None and v is not None and isfinite(u + v)] or [nan]
+    return means["mae_sum"], min(each), max(each)
+
+
+def _held_out_cells(own: Numbers) -> list[str]:
+    mean, least, largest = _held_out(own)
+    return [f"{mean:.3f}", f"{least:.3f} to {largest:.3f}"] if isfinite(least) else [NONE, NONE]
+
+
+def _force_interval(name: str, own: Numbers, metrics: Numbers) -> str:
+    """The force that a solver found, with its 95 % interval, beside the true one where that is known."""
+    low, high = own["stats"].get("force_low"), own["stats"].get("force_high")
+    if low is None or high is None:
+        return ""
+    size, source = hypot(*own["reaction"]), metrics["measurements"]["source"]
+    interval = f"95 % interval {number(low, 3)} to {number(high, 3)}"
+    said = f"{name} finds a force of {number(size, 3)} N/mm ({interval})"
+    if own["force_to_truth_rel"] is None:
+        return f"{said} from the {source} markers."
+    true = size / (1 + own["force_to_truth_rel"])
+    where = "inside" if low <= true <= high else "outside"
+    return f"{said} from the {source} markers; that of the simulated finger is {number(true, 3)}, {where} it."
+
+
+def _convergence(metrics: Numbers, left_out: Mapping[str, str], failed: Mapping[str, str]) -> Answer:
+    """The solvers that did not converge, and how far the others are from the exact solution."""
+    solvers, reference = metrics["solvers"], metrics["reference"]
+    faulty = {name: own["message"] for name, own in solvers.items() if own["status"] != "converged"}
+    sentences = [f"{name}: {message.rstrip('. ')}." for name, message in faulty.items()]
+    sentences += [f"{name} failed: {message.rstrip('. ')}." for name, message in failed.items()]
+    sentences += [f"{name} was left out: {message.rstrip('. ')}." for name, message in left_out.items()]
+    bad = [*faulty, *failed]
+    count = len(solvers) + len(failed)
+    verdict = (
+        f"{len(bad)} of {count} solvers: {_listed(bad)}."
+        if bad
+        else f"Nothing: {'the solver' if count == 1 else f'all {count} solvers'} met the own criterion."
+    )
+    own = solvers[reference]["uncertainty"]
+    if own:
+        sentences.append(
+            f"The mesh is a limit too: {reference} estimates its own error as "
+            f"{percent(own['rel_l2_displacement'], 2)} in displacement, "
+            f"{percent(own['rel_l2_von_mises'], 2)} in von Mises stress (relative L²), "
+            f"{percent(own['energy_norm'], 2)} in the energy norm."
+        )
+    certified = {
+        name: entry["certificate"]["rel_excess"]
+        for name, entry in solvers.items()
+        if entry["certificate"] and entry["certificate"]["rel_excess"] > 0
+    }
+    if certified:
+        each = ", ".join(f"{name} {percent(excess, 2)}" for name, excess in certified.items())
+        sentences.append(
+            f"Energy above the least on the shared mesh, which no solver can argue away: {each}."
+        )
+    without = [name for name, entry in solvers.items() if not entry["certificate"]]
+    if without:
+        sentences.append(f"By the own word alone, without a certificate: {_listed(without)}.")
+    return Answer("What is not converged?", verdict, sentences)
+
+
+def _to_truth(own: Numbers) -> tuple[float, float, float]:
+    """Relative distances from the simulated finger in displacement, von Mises stress and force."""
+    true = own["to_truth"]
+    return true["displacement"]["rel_l2"], true["von_mises"]["rel_l2"], own["force_to_truth_rel"]
+
+
+def _truth_numbers(own: Numbers) -> str:
+    return _listed(
+        [_signed(share, field == "force") for share, field in zip(_to_truth(own), FIELDS, strict=True)]
+    )
+
+
+def _signed(share: float, sign: bool) -> str:
+    return f"{'+' if sign and share > 0 else ''}{percent(share, 2)}"
+
+
+def _plus_minus(share: float, own: float | None) -> str:
+    if own is None:
+        return percent(share, 2)
+    return f"{percent(share, 2, sign=False)} ± {percent(abs(own), 2)}"
+
+
+def _those(some: Sequence[str], of: Mapping[str, object]) -> str:
+    """The names that something holds for: all, none, or the list."""
+    if len(some) == len(of):
+        return f"all {len(of)} that were given some" if len(of) > 1 else _listed(some)
+    return f"only {_listed(some)}" if some else "none"
+
+
+def _listed(names: Sequence[str]) -> str:
+    if not names:
+        return NONE
+    return ", ".join(names[:-1]) + (" and " if names[:-1] else "") + names[-1]

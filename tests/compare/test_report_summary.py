@@ -1,0 +1,139 @@
+"""The answers that a report opens with, from metrics whose answers are known."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compare.evaluation.comparison import Comparison
+from compare.evaluation.evaluation import Evaluation
+from compare.report.metrics_json import metrics
+from compare.report.summary import Answer, answers
+from geometry.observations import Observations
+
+TRUST, MARKERS, CONVERGED = (
+    "May the network be trusted here?",
+    "Did the markers help?",
+    "What is not converged?",
+)
+
+
+def asked(comparison: Comparison, **said: dict[str, str]) -> dict[str, Answer]:
+    return {answer.question: answer for answer in answers(metrics(comparison), **said)}
+
+
+@pytest.fixture
+def given(evaluate: Callable[..., Evaluation], fem: Evaluation, observations: Observations) -> Evaluation:
+    """A solver that meets its markers exactly and is 0.1 mm off in u at each that is held out."""
+    made = replace(evaluate("fem-asm", 1.02), in_sample=True)
+    return replace(
+        made,
+        marker_displacement=observations.displacements,
+        left_out=observations.displacements + np.array([0.1, 0.0]),
+    )
+
+
+@pytest.mark.parametrize(
+    ("scale", "verdict"),
+    [
+        (1.005, "Yes, as a solver: pinn-std and fem differ by less than fem’s own error in displacement."),
+        (1.1, "As a solver to 10 %: that far is pinn-std from fem in displacement."),
+    ],
+)
+def test_a_network_is_judged_by_the_error_of_its_reference(
+    compared: Callable[..., Comparison],
+    estimated: Evaluation,
+    evaluate: Callable[..., Evaluation],
+    scale: float,
+    verdict: str,
+) -> None:
+    answer = asked(compared(estimated, evaluate("pinn-std", scale)))[TRUST]
+    assert answer.verdict.replace("\N{NO-BREAK SPACE}", " ") == verdict
+    assert "±" in answer.sentences[0]
+
+
+def test_a_network_that_did_not_converge_is_not_trusted(
+    compared: Callable[..., Comparison], fem: Evaluation, evaluate: Callable[..., Evaluation]
+) -> None:
+    found = asked(compared(fem, evaluate("pinn-std", converged=False, message="it moves on")))
+    assert found[TRUST].verdict == "No, not with pinn-std (not converged)."
+    assert found[CONVERGED].verdict == "1 of 2 solvers: pinn-std (not converged)."
+    assert "pinn-std (not converged): it moves on." in found[CONVERGED].sentences
+
+
+def test_without_a_network_nobody_asks_for_it(
+    compared: Callable[..., Comparison], fem: Evaluation, failed: Evaluation
+) -> None:
+    assert TRUST not in asked(compared(fem, failed))
+
+
+def test_the_error_of_the_model_is_not_laid_on_the_network(
+    compared: Callable[..., Comparison], fem: Evaluation, evaluate: Callable[..., Evaluation]
+) -> None:
+    network, blame = evaluate("pinn-std", 1.001), "That is the error of the model and its load"
+    far = asked(compared(fem, network, truth=evaluate("fem-nonlinear", 1.5)))[TRUST]
+    assert blame in " ".join(far.sentences)
+    near = asked(compared(fem, evaluate("pinn-std", 1.4), truth=evaluate("fem-nonlinear", 1.5)))[TRUST]
+    assert blame not in " ".join(near.sentences)
+
+
+def test_markers_help_by_what_was_held_out_never_by_what_was_given(
+    compared: Callable[..., Comparison], fem: Evaluation, given: Evaluation
+) -> None:
+    """The reference is 0.7 mm off; the other one meets its markers, and counts with its 0.1 mm."""
+    answer = asked(compared(fem, given))[MARKERS]
+    assert answer.verdict == "Nearer than fem: at held-out simulated markers fem-asm."
+    assert [row[:2] for row in answer.rows] == [["fem", "0.700"], ["fem-asm", "0.100"]]
+    worse = replace(given, left_out=given.left_out + np.array([5.0, 0.0]))
+    assert (
+        asked(compared(fem, worse))[MARKERS].verdict == "Nearer than fem: at held-out simulated markers none."
+    )
+    assert "no camera tells them" in " ".join(answer.sentences)
+
+
+def test_stress_and_force_are_answered_where_they_are_known(
+    compared: Callable[..., Comparison],
+    fem: Evaluation,
+    given: Evaluation,
+    evaluate: Callable[..., Evaluation],
+) -> None:
+    """The truth is half as much again: 1.02 of the reference is nearer in everything but its force."""
+    stronger = replace(given, reaction=10 * fem.reaction)
+    answer = asked(compared(fem, stronger, truth=evaluate("fem-nonlinear", 1.5)))[MARKERS]
+    assert answer.verdict.endswith("in displacement fem-asm, in von Mises stress fem-asm, in force none.")
+    assert "simulated body" in answer.verdict
+
+
+def test_measured_markers_are_never_called_simulated(
+    compared: Callable[..., Comparison],
+    fem: Evaluation,
+    given: Evaluation,
+    observe: Callable[..., Observations],
+) -> None:
+    seen = observe(fem.marker_displacement + np.array([0.3, -0.4]), simulated=False, hidden=(1,))
+    found = asked(compared(fem, given, observations=seen))
+    assert "measured" in found[MARKERS].verdict
+    assert "simulated" not in str(found)
+
+
+@pytest.mark.parametrize(("low", "word"), [(0.4, "inside"), (0.6, "outside")])
+def test_a_found_force_has_its_interval(
+    compared: Callable[..., Comparison],
+    fem: Evaluation,
+    given: Evaluation,
+    evaluate: Callable[..., Evaluation],
+    low: float,
+    word: str,
+) -> None:
+    found = replace(given, stats={**given.stats, "force_low": low, "force_high": 0.8})
+    sentences = asked(compared(fem, found, truth=evaluate("fem-nonlinear", 1.0)))[MARKERS].sentences
+    assert f"that of the simulated finger is 0.500, {word} it." in sentences[-1]
+
+
+def test_what_raised_an_exception_or_was_left_out_is_named(
+    compared: Callable[..., Comparison], fem: Evaluation
+) -> None:
+    answer = asked(compared(fem), failed={"mine": "it broke"}, left_out={"gp": "no markers"})[CONVERGED]
+    assert answer.verdict == "1 of 2 solvers: mine."
+    assert {"mine failed: it broke.", "gp was left out: no markers."} <= set(answer.sentences)
