@@ -2,7 +2,7 @@
 # Arguments go through ARGS, as in: make compare ARGS="--design slender"
 BIN := .venv/bin
 
-.PHONY: help setup compare test test-all verification lint bench clean
+.PHONY: help setup compare test test-all docs verification lint bench clean
 .DEFAULT_GOAL := help
 
 help: ## list these targets
@@ -22,6 +22,11 @@ test: setup ## run the quick tests, some six minutes on two cores
 
 test-all: setup ## run all tests, as CI does
 	$(PYTEST) $(ARGS)
+
+# ARGS=linkcheck asks the network whether the links to other sites are alive.
+docs: setup ## build the documentation site, build/docs/html
+	$(BIN)/python -m pip -qq install --no-deps -r requirements/docs.txt
+	OMP_NUM_THREADS=1 $(BIN)/python -m sphinx -M $(or $(ARGS),html) docs build/docs -W --keep-going -q
 
 verification: setup ## measure fem against known answers, write docs/verification.md
 	$(BIN)/python -m benchmarks.verification

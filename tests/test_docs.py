@@ -2,10 +2,13 @@
 
 import csv
 import json
+import os
 import pkgutil
 import re
 import runpy
 import shlex
+import subprocess
+import sys
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
@@ -24,8 +27,16 @@ from solvers.solver import Solver
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
-GUIDE, OWN_SOLVER = DOCS / "guide.md", DOCS / "own-solver.md"
-PAGES = sorted([*DOCS.glob("*.md"), *ROOT.glob("*.md")])
+HOW_TO, REFERENCE = DOCS / "how-to", DOCS / "reference"
+OWN_FINGER, OWN_TRUTH, MEASUREMENTS = (
+    HOW_TO / "own-finger.md",
+    HOW_TO / "own-truth.md",
+    HOW_TO / "measurements.md",
+)
+FORCE, MESH, RIG, TRAIN = (HOW_TO / f"{name}.md" for name in ("force", "mesh", "rig", "train"))
+PARAMETERS, SOLVERS, FILES = (REFERENCE / f"{name}.md" for name in ("parameters", "solvers", "files"))
+OWN_SOLVER, TRUST = DOCS / "own-solver.md", DOCS / "explanation" / "trust.md"
+PAGES = sorted([*DOCS.rglob("*.md"), *ROOT.glob("*.md")])
 PLUGIN = ROOT / "tests" / "solvers" / "plugin"
 
 PLACEHOLDERS = ("COMPONENT", "DIFFERENCE", "FIELD", "NAME", "PARAMETER", "REGION", "STAT", "UNIT")
@@ -45,7 +56,7 @@ def blocks(page: Path) -> list[Block]:
     text = page.read_text(encoding="utf-8")
     return [
         Block(page, text[: match.start()].count("\n") + 1, match[1], match[2])
-        for match in re.finditer(r"^```(\w*)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+        for match in re.finditer(r"^```(.*?)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
     ]
 
 
@@ -55,8 +66,8 @@ def without_blocks(text: str) -> str:
 
 def id_of(value: object) -> str:
     if isinstance(value, Block):
-        return f"{value.page.name}:{value.line}"
-    return value.name if isinstance(value, Path) else str(value)
+        return f"{id_of(value.page)}:{value.line}"
+    return value.relative_to(ROOT).as_posix() if isinstance(value, Path) else str(value)
 
 
 def is_plugin(block: Block) -> bool:
@@ -70,6 +81,9 @@ TO_RUN = [
     if block.language == "python" and not is_plugin(block) and block.page.name != "notebook.md"
 ]
 """Those of the notebook page run, with their output, in `tests/pinnray/test_notebook.py`."""
+
+CELL = "{code-cell} python"
+NOTEBOOKS = sorted({block.page for block in ALL_BLOCKS if block.language == CELL})
 
 
 def table(page: Path, first_column: str, after: str = "") -> list[list[str]]:
@@ -143,10 +157,39 @@ def test_python_in_the_docs_runs(block, tmp_path, monkeypatch):
     exec(compile(padded, str(block.page), "exec"), {"__name__": "__docs__"})
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("page", NOTEBOOKS, ids=id_of)
+def test_notebooks_run(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {"__name__": "__docs__"}
+    for block in blocks(page):
+        if block.language == CELL:
+            exec(compile("\n" * block.line + block.text, str(page), "exec"), names)
+
+
+def test_there_are_three_notebooks():
+    assert len(NOTEBOOKS) == 3
+
+
 @pytest.mark.parametrize("name", ["pinnray_skfem.py", "pyproject.toml"])
 def test_the_plug_in_in_the_docs_is_the_one_that_is_tested(name):
     source = (PLUGIN / name).read_text(encoding="utf-8")
     assert source in [block.text for block in blocks(OWN_SOLVER)]
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning(tmp_path):
+    """With every page, every command and every public name, but without running the notebooks."""
+    built = subprocess.run(
+        [sys.executable, "-m", "sphinx", "-M", "html", str(DOCS), str(tmp_path), "-W", "--keep-going", "-q"],
+        env={**os.environ, "NOTEBOOKS": "off"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (built.returncode, built.stderr) == (0, "")
+    pages = {path.relative_to(DOCS).with_suffix(".html") for path in DOCS.rglob("*.md")}
+    assert {page for page in pages if not (tmp_path / "html" / page).is_file()} == set()
 
 
 def test_every_block_says_its_language():
@@ -170,7 +213,7 @@ def command_lines() -> list[tuple[str, str]]:
             if line.startswith(("docker run", ".ci/container")) and " compare " in line:
                 line = "compare " + line.split(" compare ", 1)[1]
             if re.match(r"(compare|pinnray) \S", line):
-                found.append((page.name, line))
+                found.append((id_of(page), line))
     return sorted(set(found))
 
 
@@ -197,7 +240,8 @@ def test_command_lines_parse(page, line):
 def test_command_lines_are_found():
     found = command_lines()
     assert len(found) > 12
-    assert ("guide.md", "compare --design slender --solvers fem") in found  # in make's ARGS and docker's line
+    assert ("docs/how-to/container.md", "compare --design slender --solvers fem") in found  # in docker's line
+    assert ("docs/tutorial.md", "compare --design slender --solvers fem") in found  # in make's ARGS
 
 
 @pytest.mark.parametrize("page", PAGES, ids=id_of)
@@ -232,7 +276,7 @@ def anchors(page: Path) -> set[str]:
 
 
 def described(model: type[BaseModel], *, symbols: bool) -> list[str]:
-    """The rows that the guide must have for a model's fields."""
+    """The rows that the docs must have for a model's fields."""
     rows = []
     for name, field in model.model_fields.items():
         symbol, unit, low, high = (
@@ -251,32 +295,32 @@ def described(model: type[BaseModel], *, symbols: bool) -> list[str]:
     return rows
 
 
-def test_the_guide_has_every_parameter_as_it_is():
-    lines = GUIDE.read_text(encoding="utf-8").splitlines()
+def test_the_docs_have_every_parameter_as_it_is():
+    lines = PARAMETERS.read_text(encoding="utf-8").splitlines()
     expected = described(Parameters, symbols=True)
     assert [row for row in expected if row not in lines] == []
-    assert names(table(GUIDE, "parameter")) == list(Parameters.model_fields)
+    assert names(table(PARAMETERS, "parameter")) == list(Parameters.model_fields)
 
 
-def test_the_guide_has_every_mesh_setting_as_it_is():
-    lines = GUIDE.read_text(encoding="utf-8").splitlines()
+def test_the_docs_have_every_mesh_setting_as_it_is():
+    lines = MESH.read_text(encoding="utf-8").splitlines()
     expected = described(MeshSettings, symbols=False)
     assert [row for row in expected if row not in lines] == []
-    assert names(table(GUIDE, "setting")) == list(MeshSettings.model_fields)
+    assert names(table(MESH, "setting")) == list(MeshSettings.model_fields)
 
 
-def test_the_guide_has_every_setting_of_the_virtual_rig_as_it_is():
+def test_the_docs_have_every_setting_of_the_virtual_rig_as_it_is():
     from vision.rig.exposure import Exposure
     from vision.rig.motion import Motion
 
-    lines = GUIDE.read_text(encoding="utf-8").splitlines()
+    lines = RIG.read_text(encoding="utf-8").splitlines()
     for model in (Exposure, Motion):
-        assert names(table(GUIDE, model.__name__.lower())) == list(model.model_fields)
+        assert names(table(RIG, model.__name__.lower())) == list(model.model_fields)
         expected = [row for row in described(model, symbols=False) if "`monochrome`" not in row]
         assert [row for row in expected if row not in lines] == []
 
 
-def test_the_guide_has_every_file_of_a_film(tmp_path):
+def test_the_docs_have_every_file_of_a_film(tmp_path):
     from compare.cli import main
 
     film = "--mesh-size 1 --size 320x180 --rest 1 --moving 0 --held 1 --boards 1 --square 20"
@@ -284,11 +328,11 @@ def test_the_guide_has_every_file_of_a_film(tmp_path):
     actual = [
         path.relative_to(tmp_path / "film").as_posix() for path in tmp_path.rglob("*") if path.is_file()
     ]
-    assert_same([name.replace("NUMBER", "NAME") for name in names(table(GUIDE, "file of a film"))], actual)
+    assert_same([name.replace("NUMBER", "NAME") for name in names(table(RIG, "file of a film"))], actual)
 
 
-def test_the_guide_has_every_preset_as_it_is():
-    rows = table(GUIDE, "preset")
+def test_the_docs_have_every_preset_as_it_is():
+    rows = table(PARAMETERS, "preset")
     assert sorted(names(rows)) == sorted(preset_names())
     for name, text in zip(names(rows), (row[1] for row in rows), strict=True):
         values = tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
@@ -310,10 +354,10 @@ GIVEN_MARKERS = {"pinn-asm": "pinn-std", "pinn-local-asm": "pinn-local"}
 """Solvers that have all settings of another one, and those of assimilation."""
 
 
-def test_the_guide_has_every_solver_setting_as_it_is():
+def test_the_docs_have_every_solver_setting_as_it_is():
     from solvers.registry import BUILT_IN, make_solver
 
-    rows = table(GUIDE, "setting", after="## Solvers")
+    rows = table(SOLVERS, "setting")
     assert {name: row[1] for name, row in zip(names(rows), rows, strict=True)} == settings_of(
         make_solver(name) for name in BUILT_IN if name not in GIVEN_MARKERS
     )
@@ -328,10 +372,10 @@ def test_the_guide_has_every_solver_setting_as_it_is():
         ("pinn-asm", {"preset": "trained"}),
     ],
 )
-def test_the_guide_has_the_settings_of_assimilation_as_they_are(name, settings):
+def test_the_docs_have_the_settings_of_assimilation_as_they_are(name, settings):
     from solvers.registry import make_solver
 
-    rows = table(GUIDE, "setting of `pinn-asm`, `pinn-local-asm`")
+    rows = table(SOLVERS, "setting of `pinn-asm`, `pinn-local-asm`")
     documented = {key: row[1] for key, row in zip(names(rows), rows, strict=True)}
     own, shared = (make_solver(which, **settings).settings() for which in (name, GIVEN_MARKERS[name]))
     assert own.items() >= shared.items()
@@ -341,27 +385,27 @@ def test_the_guide_has_the_settings_of_assimilation_as_they_are(name, settings):
     assert {key: str(own[key]) for key in own if key not in shared} == documented
 
 
-def test_the_guide_has_every_parameter_that_can_be_found():
+def test_the_docs_have_every_parameter_that_can_be_found():
     from solvers.fem.identification import linear_parameters
     from solvers.identification import hypothesis
 
-    assert names(table(GUIDE, "parameter that can be found")) == list(hypothesis.MEANINGS)
-    assert names(table(GUIDE, "parameter of the linear model")) == list(linear_parameters.MEANINGS)
+    assert names(table(FORCE, "parameter that can be found")) == list(hypothesis.MEANINGS)
+    assert names(table(FORCE, "parameter of the linear model")) == list(linear_parameters.MEANINGS)
 
 
-def test_the_guide_has_every_setting_of_the_other_presets_as_it_is():
+def test_the_docs_have_every_setting_of_the_other_presets_as_it_is():
     from solvers.registry import PRESETS, make_solver
 
     for name, (_, *others) in PRESETS.items():
         if name in GIVEN_MARKERS:
             continue
         for preset in others:
-            rows = table(GUIDE, f"setting of `{preset}`")
+            rows = table(TRAIN, f"setting of `{preset}`")
             documented = {name: row[1] for name, row in zip(names(rows), rows, strict=True)}
             assert documented == settings_of([make_solver(name, preset=preset)])
 
 
-def test_the_guide_has_the_limits_of_the_certificate():
+def test_the_docs_have_the_limits_of_the_certificate():
     from compare.evaluation.certificate import (
         CONDITION_LIMIT,
         ENERGY_LIMIT,
@@ -369,33 +413,33 @@ def test_the_guide_has_the_limits_of_the_certificate():
         WORK_LIMIT,
     )
 
-    said = [float(row[1].split(" %")[0]) / 100 for row in table(GUIDE, "fault")]
+    said = [float(row[1].split(" %")[0]) / 100 for row in table(TRUST, "fault")]
     assert said == [ENERGY_LIMIT, CONDITION_LIMIT, INTERPOLANT_LIMIT, WORK_LIMIT]
 
 
-def test_the_guide_has_every_solver_with_its_loads():
+def test_the_docs_have_every_solver_with_its_loads():
     from solvers.registry import BUILT_IN, make_solver
 
-    rows = table(GUIDE, "solver")
+    rows = table(SOLVERS, "solver")
     assert names(rows) == list(BUILT_IN)
     for name, row in zip(names(rows), rows, strict=True):
         assert re.findall(r"`(\w+)`", row[2]) == list(make_solver(name).loads), name
 
 
-def test_the_guide_has_every_column_of_measurements():
+def test_the_docs_have_every_column_of_measurements():
     from vision.measurements import OPTIONAL, REQUIRED
 
-    rows = table(GUIDE, "column")
+    rows = table(MEASUREMENTS, "column")
     assert [(name, row[1]) for name, row in zip(names(rows), rows, strict=True)] == [
         *((name, "yes") for name in REQUIRED),
         *((name, "no") for name in OPTIONAL),
     ]
 
 
-def test_the_measurements_in_the_guide_can_be_read(tmp_path):
+def test_the_measurements_in_the_docs_can_be_read(tmp_path):
     from vision.measurements import read_measurements
 
-    (block,) = [block for block in blocks(GUIDE) if block.language == "csv"]
+    (block,) = [block for block in blocks(MEASUREMENTS) if block.language == "csv"]
     path = tmp_path / "markers.csv"
     path.write_text(block.text, encoding="utf-8")
     observations = read_measurements(path, marker_radius=0.8)
@@ -404,30 +448,35 @@ def test_the_measurements_in_the_guide_can_be_read(tmp_path):
     np.testing.assert_allclose(observations.points, marker_positions(load_design())[:3], atol=0.005)
 
 
-def test_the_guide_has_every_exit_code():
+def test_the_docs_have_every_exit_code():
     from compare.runtime import exits
 
-    codes = {int(name) for name in names(table(GUIDE, "code"))}
+    codes = {int(name) for name in names(table(REFERENCE / "exit-codes.md", "code"))}
     assert codes == {0, 1, exits.BAD_INPUT, exits.NOT_CONVERGED, exits.INTERRUPTED, exits.UNREAD}
 
 
-def test_the_guide_has_every_command():
+def test_the_docs_have_every_command():
     from compare.commands.app import pinnray
 
     commands = {name for name in pinnray if not name.startswith("-")}
-    said = {name.split()[-1] if "SOLVER" not in name else "solve" for name in names(table(GUIDE, "command"))}
+    said = {
+        name.split()[-1] if "SOLVER" not in name else "solve"
+        for name in names(table(REFERENCE / "commands.md", "command"))
+    }
     assert said == commands
 
 
-def test_the_guide_has_every_cad_file(tmp_path):
+def test_the_docs_have_every_cad_file(tmp_path):
     from compare.cli import main
 
     assert main(["design", "--out", str(tmp_path), "--formats", ",".join(CAD_FORMATS)]) == 0
-    assert_same(names(table(GUIDE, "file", after="### CAD")), [path.name for path in tmp_path.iterdir()])
+    assert_same(
+        names(table(OWN_FINGER, "file", after="## CAD files")), [path.name for path in tmp_path.iterdir()]
+    )
 
 
 @pytest.mark.slow
-def test_the_guide_has_every_file_of_a_grid_search(tmp_path):
+def test_the_docs_have_every_file_of_a_grid_search(tmp_path):
     from compare.cli import main
 
     grid = "--learning-rates 1e-3 --bc-weights 10 --epochs 2 --mesh-size 1 --solver-set pinn-std.width=4"
@@ -436,19 +485,19 @@ def test_the_guide_has_every_file_of_a_grid_search(tmp_path):
         path.relative_to(tmp_path / "search").as_posix() for path in tmp_path.rglob("*") if path.is_file()
     ]
     documented = [
-        name.replace("NAME", "lr-0.001_bc-10.0") for name in names(table(GUIDE, "file of a search"))
+        name.replace("NAME", "lr-0.001_bc-10.0") for name in names(table(TRAIN, "file of a search"))
     ]
     assert sorted(documented) == sorted(actual)
 
 
 @pytest.mark.slow
-def test_the_guide_has_every_file_of_a_cross_validation(tmp_path):
+def test_the_docs_have_every_file_of_a_cross_validation(tmp_path):
     from compare.cli import main
 
     study = "--solvers fem,fem-asm --schemes one-out --seeds 1 --mesh-size 1"
     assert main(["crossval", *study.split(), "--out", str(tmp_path / "out")]) == 0
     actual = [path.relative_to(tmp_path / "out").as_posix() for path in tmp_path.rglob("*") if path.is_file()]
-    rows = names(table(GUIDE, "file of a cross-validation"))
+    rows = names(table(OWN_TRUTH, "file of a cross-validation"))
     assert_same(
         [
             name.replace("SEED", "seed-NAME").replace("LAYOUT", "joints").replace("TRUTH", "sliding")
@@ -458,24 +507,24 @@ def test_the_guide_has_every_file_of_a_cross_validation(tmp_path):
     )
 
 
-def test_the_guide_has_every_scheme():
+def test_the_docs_have_every_scheme():
     from compare.crossval.folds import ALL, SCHEMES
 
-    assert names(table(GUIDE, "scheme")) == [scheme for scheme in SCHEMES if scheme != ALL]
+    assert names(table(OWN_TRUTH, "scheme")) == [scheme for scheme in SCHEMES if scheme != ALL]
 
 
-def test_the_guide_has_every_truth():
+def test_the_docs_have_every_truth():
     from compare.evaluation.truths import TRUTHS
 
-    assert names(table(GUIDE, "truth")) == list(TRUTHS)
+    assert names(table(OWN_TRUTH, "truth")) == list(TRUTHS)
 
 
-def test_the_guide_has_every_output_file(run_folder):
+def test_the_docs_have_every_output_file(run_folder):
     actual = [path.relative_to(run_folder).as_posix() for path in run_folder.rglob("*") if path.is_file()]
-    assert_same(names(table(GUIDE, "file", after="## Output")), actual)
+    assert_same(names(table(FILES, "file")), actual)
 
 
-def test_the_guide_has_every_key_of_metrics(run_folder):
+def test_the_docs_have_every_key_of_metrics(run_folder):
     def paths(value: object, prefix: str = "") -> list[str]:
         if not isinstance(value, dict):
             return [prefix]
@@ -483,21 +532,21 @@ def test_the_guide_has_every_key_of_metrics(run_folder):
 
     actual = paths(json.loads((run_folder / "metrics.json").read_text(encoding="utf-8")))
     actual.remove("solvers.fem-nonlinear.certificate")  # null
-    assert_same(names(table(GUIDE, "key")), actual)
+    assert_same(names(table(REFERENCE / "metrics.md", "key")), actual)
 
 
-def test_the_guide_has_every_field(run_folder):
+def test_the_docs_have_every_field(run_folder):
     import pyvista
 
     grid = pyvista.read(run_folder / "fields" / "fem.vtu")
-    text = GUIDE.read_text(encoding="utf-8").partition("In the VTU files")[2].partition("\n\n")[0]
+    text = FILES.read_text(encoding="utf-8").partition("In the VTU files")[2].partition("\n\n")[0]
     assert set(re.findall(r"`(\w+)`", text)) == {*grid.point_data.keys(), *grid.cell_data.keys()}
 
 
 def test_observations_of_a_run_are_measurements(run_folder):
     with (run_folder / "observations.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-    assert set(rows[0]) == {"marker", *names(table(GUIDE, "column"))}
+    assert set(rows[0]) == {"marker", *names(table(MEASUREMENTS, "column"))}
 
 
 def test_the_contract_in_the_docs_is_the_one_that_is_tested():

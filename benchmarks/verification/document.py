@@ -12,7 +12,7 @@ HEAD = """\
 
 All other results of this project are compared with `fem`. This page verifies `fem`, and for finite strain
 `fem-nonlinear` and in space `fem-3d`, on problems with known solutions, solved by their own code.
-[Theory](theory.md) has the equations. Whether they describe a real body is a question of
+[Theory](theory/index.md) has the equations. Whether they describe a real body is a question of
 [validation](validation.md).
 
 `make verification` repeats all of it in less than a minute and rewrites this page; `make test-all

@@ -30,7 +30,7 @@ class ReferenceDifferences(NamedTuple):
         von_mises: Of the von Mises stress, MPa.
         stress: Of the in-plane Cauchy stress components, by name, MPa.
         strain: Of the in-plane strain components, by name.
-        mae_markers: Mean over the markers of |du| + |dv|, mm.
+        mae_markers: Mean over the markers of `|du| + |dv|`, mm.
         energy: Relative difference of the energy (signed).
     """
 

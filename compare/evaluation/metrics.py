@@ -25,7 +25,7 @@ class MarkerErrors(NamedTuple):
         ae_v: The same for v.
         mae_u: Its mean over the visible markers, mm.
         mae_v: The same for v.
-        mae_sum: Mean of |du| + |dv|: the absolute error as the paper's text defines it, mm.
+        mae_sum: Mean of `|du| + |dv|`: the absolute error as the paper's text defines it, mm.
         mae_rss: sqrt(mae_u^2 + mae_v^2): what the `disp` row of the paper's Table I holds, mm.
     """
 

@@ -1,0 +1,103 @@
+"""The documentation site: `make docs` builds it into build/docs. Warnings are errors."""
+
+import os
+import re
+from importlib.util import find_spec
+
+from pydantic import BaseModel
+from pygments.lexers.special import TextLexer
+from sphinx.application import Sphinx
+from sphinx.directives.code import CodeBlock
+from sphinx.ext.napoleon.docstring import GoogleDocstring
+
+project = "pinn-ray"
+copyright = "pinn-ray contributors, MIT licence"
+language = "en"
+smartquotes = False  # two hyphens begin an option
+
+NOTEBOOKS_RUN = find_spec("myst_nb") is not None and os.environ.get("NOTEBOOKS") != "off"
+"""Whether notebooks run, by the packages of requirements/docs.txt; else the site shows their code."""
+
+extensions = [
+    "myst_nb" if NOTEBOOKS_RUN else "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "cyclopts.sphinx_ext",
+]
+exclude_patterns = ["examples"]
+suppress_warnings = ["config.cache"]
+
+myst_enable_extensions = ["colon_fence"]
+myst_heading_anchors = 4
+nb_execution_mode = "force"
+nb_execution_timeout = 600
+nb_execution_raise_on_error = True
+
+autodoc_member_order = "bysource"
+autodoc_default_options = {"members": True}
+autodoc_typehints_format = "short"
+maximum_signature_line_length = 90
+napoleon_google_docstring, napoleon_numpy_docstring = True, False
+napoleon_use_ivar, napoleon_attr_annotations = True, False
+add_module_names = False
+
+# A name of the public interface must be on a page. Those of other libraries would need a network.
+nitpicky = True
+nitpick_ignore_regex = [
+    ("py:.*", r"(numpy|pathlib|annotated_types|collections\.abc|types|pandas|pd|matplotlib|pydantic)\..*"),
+    ("py:.*", r"(Figure|Path|ArrayLike|Array|Value|shapely\..*|T|.*Options)"),
+    ("py:.*", r"compare\.(runtime|figures|camera|crossval|evaluation\.truths)\..*"),
+    ("py:.*", r"(geometry\.(finger\.(rules|parameters)|drawing\.placement)|solvers\.adaptation)\..*"),
+]
+
+html_theme = "pydata_sphinx_theme"
+html_title = "pinn-ray"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+html_copy_source = html_show_sourcelink = False
+html_theme_options = {
+    "navbar_align": "left",
+    "header_links_before_dropdown": 7,
+    "show_prev_next": True,
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+}
+
+linkcheck_timeout = 20
+linkcheck_retries = 2
+
+
+_NESTED = r"~?numpy\._typing\._nested_sequence\._NestedSequence"
+_SCALARS = r"bool \| int \| float \| complex \| str \| bytes"
+_SUPPORTS = r"~?numpy\._typing\._array_like\._SupportsArray\[~?numpy\.dtype\[~?typing\.Any\]\]"
+LONG_TYPES = {
+    rf"{_SUPPORTS} \| {_NESTED}\[{_SUPPORTS}\] \| {_SCALARS} \| {_NESTED}\[{_SCALARS}\]": "ArrayLike",
+    r"~?numpy\.ndarray\[[^][]*, ~?numpy\.dtype\[[^][]*\]\]": "Array",
+}
+"""Short names of arrays in signatures."""
+
+
+def shorten(_app: Sphinx, _what: str, _name: str, value: object, _options: object, *texts: str) -> object:
+    """The signature and the returned type with short names of arrays; none for a table of parameters."""
+    if isinstance(value, type) and issubclass(value, BaseModel):
+        return "", ""
+    for long, short in LONG_TYPES.items():
+        texts = tuple(text and re.sub(long, short, text) for text in texts)
+    return texts
+
+
+def is_hidden(_app: Sphinx, _what: str, name: str, _value: object, skipped: bool, _options: object) -> bool:
+    """Whether a name is left out: constants are for readers of the code."""
+    return skipped or name.isupper()
+
+
+def setup(app: Sphinx) -> None:
+    """Show the code of notebooks where the packages that run them are missing."""
+    if not NOTEBOOKS_RUN:
+        app.add_directive("code-cell", CodeBlock)
+    app.add_lexer("csv", TextLexer)
+    app.connect("autodoc-process-signature", shorten)
+    app.connect("autodoc-skip-member", is_hidden)
+    # The sentence below a constant may have a colon; what stands before it is no type.
+    GoogleDocstring._parse_attribute_docstring = GoogleDocstring._consume_to_end
