@@ -27,6 +27,7 @@ BENCHMARKS = {
     "localisation": "localisation",
     "dots": "printed_dots",
     "validation": "validation.document",
+    "results": "default_run",
     "readings": "readings",
     "plane_strain": "plane_strain",
     "paper": "paper_run",

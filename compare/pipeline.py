@@ -2,7 +2,7 @@
 
 import traceback
 from collections import deque
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -84,6 +84,7 @@ class Job:
         out: Output folder.
         resume: Whether to take over solutions that an earlier run of the same job finished.
         picture_formats: Formats of the pictures besides PNG, of `FORMATS`.
+        options: Options of the command line that made the job, for `run.json`; empty from Python.
     """
 
     design: Finger
@@ -99,6 +100,7 @@ class Job:
     out: Path = Path("out/default")
     resume: bool = False
     picture_formats: Sequence[str] = ()
+    options: Mapping[str, object] = field(default_factory=dict)
 
     @property
     def names(self) -> list[str]:
@@ -301,6 +303,7 @@ def _provenance(folder: Path, job: Job, comparison: Comparison, stages: Stages) 
     adaptation, settings = comparison.adaptation, comparison.settings
     return {
         **stages.record(),
+        "options": dict(job.options),
         "design_sha256": job.design.digest,
         "mesh_sha256": comparison.mesh.digest,
         "problem_sha256": Problem(comparison.mesh, job.material, job.load).digest,

@@ -11,6 +11,7 @@ from compare.commands.gridsearch import gridsearch
 from compare.commands.launch import EXIT_CODES
 from compare.commands.mesh import mesh
 from compare.commands.optimise import optimise
+from compare.commands.options_file import take_options
 from compare.commands.pick import pick
 from compare.commands.predict import predict
 from compare.commands.quiet import quietable
@@ -35,5 +36,6 @@ COMMANDS = (
     *(fiducials, calibrate, pick, rig, track),
 )
 for command in COMMANDS:
-    pinnray.command(quietable(command), help_epilogue=EXIT_CODES, version=program_version)
+    config = take_options if command is compare else None
+    pinnray.command(quietable(command), help_epilogue=EXIT_CODES, version=program_version, config=config)
 pinnray.register_install_completion_command(help="Install the completion of commands and options in a shell.")

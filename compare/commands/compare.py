@@ -20,8 +20,10 @@ from compare.commands.options import (
     comma_list,
     existing,
 )
+from compare.commands.options_file import OPTION, given_options, note_inputs, note_versions, read_options_file
 from compare.evaluation.truths import SLIDING
 from compare.runtime.exits import NOT_CONVERGED, say
+from compare.runtime.output_folder import RUN_FILE
 from geometry.errors import UserError
 from solvers.solver import Solver
 
@@ -37,6 +39,7 @@ def compare(
     truth: str | None = None,
     film: FilmOptions = FilmOptions(),
     reference: str | None = None,
+    from_: Annotated[Path | None, Parameter(name=OPTION)] = None,
     out: OptionalOutputPath = None,
     pictures: Annotated[str, Parameter(group=OUTPUT)] = "",
     resume: OutputFlag = False,
@@ -54,6 +57,7 @@ def compare(
     - compare --design default --measurements video.mkv --camera camera.json
     - compare --truth cylinder
     - compare --preset paper --device cuda
+    - compare --from out/default/run.json --out out/again
 
     Args:
         adapt: Refine the mesh until the estimated error of fem at the markers is below this, mm.
@@ -64,6 +68,8 @@ def compare(
         truth: What is simulated where nothing is measured: sliding (the default), stvk, gent, cylinder,
             oblique, friction, 3d or sticking; docs/how-to/own-truth.md explains them.
         reference: Solver that the others are compared with; default fem, else the first.
+        from_: File with options that the command line leaves out: TOML or JSON with a table `options`, or the
+            run.json of an earlier run, which is repeated so.
         out: Output folder; default out/DESIGN.
         pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
         resume: Reuse solutions that an earlier run finished.
@@ -77,6 +83,9 @@ def compare(
     from compare.report.terminal import body_table, marker_table
     from compare.runtime.stages import Stages
 
+    earlier = read_options_file(from_) if from_ else None
+    if from_ and earlier:
+        note_versions(from_, earlier)
     design, mesh = finger.read(options.preset)
     material, load = physics.read(options.preset)
     made = options.read(job_defaults(options.preset).solvers if solvers is None else solvers)
@@ -96,6 +105,11 @@ def compare(
         out=out or Path("out") / design.name,
         resume=resume,
         picture_formats=comma_list(pictures),
+        options=given_options(
+            *(finger, physics, options, film),
+            **{"adapt": adapt, "solvers": solvers, "measurements": measurements, "truth": truth},
+            **{"reference": reference, "pictures": pictures},
+        ),
     )
     try:
         with Stages(Console(stderr=True), quiet=quiet or json_) as stages:
@@ -104,6 +118,8 @@ def compare(
         kept = job.out.with_name(f"{job.out.name}.partial").exists()
         note = "what was finished is kept; --resume goes on from it" if kept else "nothing was finished yet"
         raise KeyboardInterrupt(note) from None
+    if from_ and earlier:
+        note_inputs(from_, earlier, job.out / RUN_FILE)
     for remark in comparison.remarks:
         say(f"warning: {remark}")
     if json_:

@@ -19,6 +19,8 @@ from geometry.content_hash import file_digest
 from geometry.errors import UserError
 
 RUN_FILE = "run.json"
+SCHEMA = 1
+"""Version of the form of `run.json`."""
 MARK = ".pinnray-unfinished"
 """File in a folder that a run works in or removes; another folder is never replaced."""
 SOLUTIONS = "solutions"
@@ -99,7 +101,7 @@ def write_run(folder: Path, provenance: Mapping[str, Any]) -> None:
         for path in sorted(folder.rglob("*"))
         if path.is_file() and path.name not in (RUN_FILE, MARK)
     }
-    write_json(folder / RUN_FILE, {"schema": 1, **provenance, "files_sha256": files})
+    write_json(folder / RUN_FILE, {"schema": SCHEMA, **provenance, "files_sha256": files})
 
 
 def take_training(name: str, source: Path, target: Path) -> None:

@@ -1,0 +1,94 @@
+"""The option --from: options of `compare` out of a file, which may be the `run.json` of an earlier run."""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from cyclopts import App, ArgumentCollection
+from cyclopts.config import Dict
+
+from compare.runtime.exits import say
+from compare.runtime.output_folder import SCHEMA
+from compare.runtime.provenance import package_versions
+from geometry.errors import UserError
+from geometry.text_files import read_json, read_toml
+
+OPTION = "--from"
+INPUTS = ("design", "mesh", "measurements")
+"""What a run computes from; `run.json` has the SHA-256 of each."""
+
+
+def take_options(app: App, commands: tuple[str, ...], arguments: ArgumentCollection) -> None:
+    """Give every option that the command line leaves out its value in the file of --from, if it has one."""
+    files = [token.value for argument in arguments if OPTION in argument.names for token in argument.tokens]
+    if files:
+        content = read_options_file(Path(files[-1]))
+        nested = content["options"]
+        for command in reversed(commands):
+            nested = {command: nested}
+        Dict(nested, source=files[-1])(app, commands, arguments)
+
+
+def read_options_file(file: Path) -> dict[str, Any]:
+    """The content of a TOML or JSON file with a table `options`: of a `run.json`, with its provenance.
+
+    Raises:
+        UserError: If it cannot be read, has no options, or has a key beside them and is not of a run.
+    """
+    is_json = file.suffix.lower() == ".json"
+    content = read_json(file, "options file") if is_json else read_toml(file, "options file")
+    options = content.get("options") if isinstance(content, dict) else None
+    if not isinstance(options, dict):
+        raise UserError(f'{file} has no table "options"; one line of it is, for example, mesh-size = 0.5')
+    if (schema := content.get("schema", SCHEMA)) != SCHEMA:
+        raise UserError(f"{file} has schema {schema}; this version of pinn-ray reads schema {SCHEMA}")
+    if "files_sha256" not in content and (unknown := sorted({*content} - {"options", "schema"})):
+        raise UserError(f'{file}: unknown key {unknown[0]!r}; options belong into its table "options"')
+    return content
+
+
+def given_options(*groups: Any, **others: object) -> dict[str, object]:
+    """The options that are not as by default, by their names on the command line, for `run.json`.
+
+    Args:
+        groups: Data classes of options.
+        others: Options by name; their default is nothing.
+    """
+    values = {name: value for name, value in others.items() if value}
+    for group in groups:
+        own = {field.name: (getattr(group, field.name), field.default) for field in fields(group)}
+        values |= {name: value for name, (value, default) in own.items() if value != default}
+    return {name.replace("_", "-"): _plain(value) for name, value in values.items()}
+
+
+def note_versions(file: Path, earlier: Mapping[str, Any]) -> None:
+    """Say which packages have another version than in the provenance of an earlier run."""
+    then, now = earlier.get("versions", {}), package_versions()
+    changed = [
+        f"{name} {then[name]} (now {now[name]})" for name in now if then.get(name, now[name]) != now[name]
+    ]
+    if changed:
+        say(f"note: {file} was made with {', '.join(changed)}; the numbers may differ")
+
+
+def note_inputs(file: Path, earlier: Mapping[str, Any], run: Path) -> None:
+    """Say which inputs of a repeated run differ from those of the earlier one.
+
+    Args:
+        file: The `run.json` that was repeated.
+        earlier: Its content, from before the run.
+        run: The `run.json` of the new run.
+    """
+    new = read_json(run, "provenance")
+    if earlier["options"] != new["options"]:
+        return
+    keys = {name: f"{name}_sha256" for name in INPUTS}
+    if changed := [name for name, key in keys.items() if earlier.get(key, new[key]) != new[key]]:
+        say(f"note: not the same as in {file}: {', '.join(changed)}")
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, tuple):
+        return list(value)
+    return str(value) if isinstance(value, Path) else value

@@ -1,0 +1,76 @@
+"""Files for people who install, cite or package: they agree with the project's metadata and figures."""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+import yaml
+
+from benchmarks.default_run import PAGES, TABLES, Figures, kept_figures, marks
+
+ROOT = Path(__file__).parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+
+@pytest.mark.parametrize(
+    ("page", "name"),
+    [(page, name) for page, tables in PAGES.items() for name in tables],
+    ids=lambda value: getattr(value, "name", value),
+)
+def test_the_page_has_the_table_of_the_default_run(page, name):
+    begin, end = marks(name)
+    text = page.read_text(encoding="utf-8")
+    assert text.partition(begin)[2].partition(end)[0] == TABLES[name](kept_figures())
+
+
+@pytest.mark.slow
+def test_the_figures_of_the_default_run_are_those_of_the_program():
+    from compare.evaluation.metrics import force_error, truth_differences
+    from pinnray import compare
+
+    comparison = compare("default", ["fem", "fem-asm", "gp"])
+    kept = {each.solver: each for each in kept_figures()}
+    for evaluation in comparison.evaluations:
+        truth = comparison.truth
+        found = truth_differences(evaluation, truth)
+        figures = found.displacement.rel_l2, found.von_mises.rel_l2, force_error(evaluation, truth)
+        expected = kept[evaluation.solver]
+        assert figures == pytest.approx((expected.displacement, expected.von_mises, expected.force), rel=1e-3)
+
+
+def test_the_readme_says_what_its_table_says():
+    kept = {each.solver: each for each in kept_figures()}
+    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    (said,) = re.findall(r"displacements differ by ([\d.]+) %", text)
+    assert float(said) == float(f"{100 * kept['pinn-std'].from_fem:.1g}")
+    assert kept["pinn-asm"].displacement < kept["pinn-std"].displacement / 4  # "gets better"
+    assert kept["pinn-asm"].von_mises > 4 * kept["pinn-std"].von_mises  # "much worse"
+    assert all(abs(value) < 0.05 for value in kept["fem-id"][8:11])  # "finding the load helps"
+    assert Figures._fields[8:11] == ("displacement", "von_mises", "force")
+
+
+def test_the_version_is_the_same_everywhere():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["version"] == PROJECT["version"]
+    assert citation["license"] == PROJECT["license"]
+    dockerfile = (ROOT / "Dockerfile").read_text(encoding="utf-8")
+    assert re.findall(r"^ARG VERSION=(.+)$", dockerfile, re.MULTILINE) == [PROJECT["version"]]
+
+
+def test_the_public_checks_run_those_of_this_repository():
+    workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))
+    (job,) = workflow["jobs"].values()
+    assert job["container"] == "debian:12"
+    assert [step["run"] for step in job["steps"] if "run" in step][-1] == ".ci/run"
+    devcontainer = json.loads((ROOT / ".devcontainer" / "devcontainer.json").read_text(encoding="utf-8"))
+    assert (devcontainer["image"], devcontainer["postCreateCommand"]) == ("debian:12", "make setup")
+
+
+def test_conda_brings_the_project_itself():
+    environment = yaml.safe_load((ROOT / "environment.yml").read_text(encoding="utf-8"))
+    assert environment["channels"] == ["conda-forge"]
+    *packages, own = environment["dependencies"]
+    assert own == {"pip": ["-e ."]}
+    assert {"fenics-dolfinx", "petsc4py", "mpi4py"} <= {re.split("[<>=]", name)[0] for name in packages}
