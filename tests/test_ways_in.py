@@ -74,3 +74,11 @@ def test_conda_brings_the_project_itself():
     *packages, own = environment["dependencies"]
     assert own == {"pip": ["-e ."]}
     assert {"fenics-dolfinx", "petsc4py", "mpi4py"} <= {re.split("[<>=]", name)[0] for name in packages}
+
+
+def test_every_citation_of_the_paper_has_an_entry():
+    text, entries = (
+        (ROOT / "paper" / name).read_text(encoding="utf-8") for name in ("paper.md", "paper.bib")
+    )
+    cited = set(re.findall(r"(?<!\w)@(\w+)", text))
+    assert cited == set(re.findall(r"^@\w+\{(\w+),$", entries, re.MULTILINE))

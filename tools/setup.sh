@@ -12,8 +12,8 @@ stop() { printf 'setup: cannot go on: %s\n' "$*" >&2; exit 1; }
 elsewhere='Ways on that need neither root nor Debian:
   container  docker build -t pinn-ray . && mkdir -p out &&
              docker run --rm --user "$(id -u)" -v "$PWD/out:/out" pinn-ray
-  conda      conda create -n pinn-ray -c conda-forge python=3.12 fenics-dolfinx && conda activate pinn-ray &&
-             pip install -e ".[dev]", then call compare and pytest instead of make'
+  conda      conda env create -f environment.yml && conda activate pinn-ray,
+             then call compare instead of make'
 
 os_release=${OS_RELEASE:-/etc/os-release}
 system=$(. "$os_release" 2>/dev/null && echo "${ID:-}${VERSION_ID:-}") || true
