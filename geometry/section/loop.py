@@ -41,7 +41,7 @@ class Loop:
             raise ShapeError(f"a loop of {len(points)} corners needs as many names, got {len(self.names)}")
         if not (np.isfinite(points).all() and np.isfinite(bulges).all()):
             raise UserError("a closed curve has a coordinate that is not a finite number")
-        if len(points) < 2 or (np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1) == 0).any():
+        if len(points) < 2 or (_following(points) == points).all(axis=1).any():
             raise UserError("a closed curve has a piece without length")
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "bulges", bulges)
@@ -55,7 +55,7 @@ class Loop:
     @cached_property
     def ends(self) -> FloatArray:
         """Both ends of every piece, shape (n, 2, 2), mm."""
-        return np.stack([self.points, np.roll(self.points, -1, axis=0)], axis=1)
+        return np.stack([self.points, _following(self.points)], axis=1)
 
     @property
     def straight(self) -> IntArray:
@@ -73,11 +73,12 @@ class Loop:
     def area(self) -> float:
         """Enclosed area, mm^2; negative for a clockwise curve."""
         start, end = self.ends[:, 0], self.ends[:, 1]
-        chord = np.linalg.norm(end - start, axis=1)
         origin = self.points[0]
         a, b = start - origin, end - origin
-        polygon = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()
-        return float(polygon + (chord**2 / 8 * _segment(self.bulges)).sum())
+        polygon = float(0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
+        if not self.bulges.any():
+            return polygon
+        return float(polygon + (((end - start) ** 2).sum(axis=1) / 8 * _segment(self.bulges)).sum())
 
     @property
     def bounds(self) -> FloatArray:
@@ -134,7 +135,7 @@ class Loop:
     def reversed(self) -> Self:
         """The same curve in the other direction."""
         names = (*self.names[-2::-1], self.names[-1])
-        return type(self)(self.points[::-1], -np.roll(self.bulges[::-1], -1), names)
+        return type(self)(self.points[::-1], -_following(self.bulges[::-1]), names)
 
     def transformed(self, matrix: ArrayLike, shift: ArrayLike = (0.0, 0.0)) -> Self:
         """The curve under x -> matrix x + shift, with a matrix of a rotation or reflection times a scale.
@@ -170,6 +171,11 @@ class Loop:
         along, away = end - start, points - start
         right = along[1] * away[:, 0] - along[0] * away[:, 1]
         return np.asarray(np.sign(self.bulges[which]) * right >= -1e-9 * float(along @ along))
+
+
+def _following(values: FloatArray) -> FloatArray:
+    """The value of the next corner for every corner, shape (n, ...)."""
+    return np.concatenate([values[1:], values[:1]])
 
 
 def _segment(bulges: FloatArray) -> FloatArray:

@@ -95,21 +95,22 @@ def _reversed(loop: Loop) -> Loop:
 
 def _widths(loops: _Curves, spacing: float, *, corners: bool = False) -> tuple[FloatArray, FloatArray]:
     """Lengths of the rays to the left of curves up to the next one of them."""
-    samples = _samples(loops, spacing)
-    crossing = _through(loops, samples.points, samples.normals)
+    pieces = _Pieces.of(loops)
+    samples = _samples(loops, pieces, spacing)
+    crossing = _through(pieces, samples.points, samples.normals)
     kept = np.isfinite(crossing.lengths)
     if not corners:
-        kept &= ~_beyond_corner(loops, samples, crossing.pieces)
+        counts = np.array([len(loop.bulges) for loop in loops])
+        kept &= ~_beyond_corner(pieces, counts, samples, crossing.pieces)
     return samples.points[kept], crossing.lengths[kept]
 
 
 def boundary_samples(section: Section, spacing: float) -> Samples:
     """Points on every piece of the section, at most `spacing` mm apart and half of that from its ends."""
-    return _samples(section.loops, spacing)
+    return _samples(section.loops, _Pieces.of(section.loops), spacing)
 
 
-def _samples(loops: _Curves, spacing: float) -> Samples:
-    pieces = _Pieces.of(loops)
+def _samples(loops: _Curves, pieces: "_Pieces", spacing: float) -> Samples:
     if (np.abs(pieces.bulges) <= STRAIGHT).all():
         return _samples_of_lines(pieces.start, pieces.end, spacing)
     return _samples_of_curves([loop for loop in loops if isinstance(loop, Loop)], spacing)
@@ -152,11 +153,10 @@ def inner_normals(loop: Loop, which: int, fractions: ArrayLike) -> FloatArray:
 def through(section: Section, points: ArrayLike, directions: ArrayLike) -> Crossing:
     """Rays from points (n, 2), mm, along unit vectors (n, 2), to the first boundary ahead."""
     start, ahead = (np.asarray(each, dtype=np.float64).reshape(-1, 2) for each in (points, directions))
-    return _through(section.loops, start, ahead)
+    return _through(_Pieces.of(section.loops), start, ahead)
 
 
-def _through(loops: _Curves, start: FloatArray, ahead: FloatArray) -> Crossing:
-    pieces = _Pieces.of(loops)
+def _through(pieces: "_Pieces", start: FloatArray, ahead: FloatArray) -> Crossing:
     step = max(AT_ONCE // len(pieces.bulges), 1)
     found = [
         _first(pieces, start[first : first + step], ahead[first : first + step])
@@ -188,27 +188,28 @@ class _Pieces(NamedTuple):
 
 
 def _first(pieces: _Pieces, start: FloatArray, ahead: FloatArray) -> Crossing:
-    lengths = np.full((len(start), len(pieces.bulges)), np.inf)
     curved = np.flatnonzero(np.abs(pieces.bulges) > STRAIGHT)
-    straight = np.setdiff1d(np.arange(len(pieces.bulges)), curved)
-    lengths[:, straight] = _to_lines(pieces.start[straight], pieces.end[straight], start, ahead)
-    lengths[:, curved] = _to_arcs(_Pieces(*(each[curved] for each in pieces)), start, ahead)
+    if len(curved):
+        lengths = np.full((len(start), len(pieces.bulges)), np.inf)
+        straight = np.setdiff1d(np.arange(len(pieces.bulges)), curved)
+        lengths[:, straight] = _to_lines(pieces.start[straight], pieces.end[straight], start, ahead)
+        lengths[:, curved] = _to_arcs(_Pieces(*(each[curved] for each in pieces)), start, ahead)
+    else:
+        lengths = _to_lines(pieces.start, pieces.end, start, ahead)
     nearest = lengths.argmin(axis=1)
     return Crossing(lengths[np.arange(len(start)), nearest], nearest)
 
 
 def _to_lines(first: FloatArray, last: FloatArray, start: FloatArray, ahead: FloatArray) -> FloatArray:
     """Lengths of rays (n, 2) to straight pieces (p, 2), shape (n, p), mm; infinite where they miss."""
-    side = last - first
-    side_x, side_y = side.T
-    ahead_x, ahead_y = ahead.T[..., None]
-    apart_x, apart_y = first[:, 0] - start[:, :1], first[:, 1] - start[:, 1:]
-    across = ahead_x * side_y - ahead_y * side_x
+    side, right = last - first, np.stack([ahead[:, 1], -ahead[:, 0]], axis=1)
+    right_of_side = np.stack([side[:, 1], -side[:, 0]])
+    across = ahead @ right_of_side
     with np.errstate(divide="ignore", invalid="ignore"):
-        length = (apart_x * side_y - apart_y * side_x) / across
-        share = (apart_x * ahead_y - apart_y * ahead_x) / across
+        length = ((first * right_of_side.T).sum(axis=1) - start @ right_of_side) / across
+        share = (right @ first.T - (start * right).sum(axis=1)[:, None]) / across
     slack = 1e-9 / np.linalg.norm(side, axis=1)
-    hit = (length > TOUCH) & (share >= -slack) & (share <= 1 + slack)
+    hit = (length > TOUCH) & (np.abs(share - 0.5) <= 0.5 + slack)
     return np.asarray(np.where(hit, length, np.inf))
 
 
@@ -227,10 +228,11 @@ def _to_arcs(arcs: _Pieces, start: FloatArray, ahead: FloatArray) -> FloatArray:
     return best
 
 
-def _beyond_corner(loops: _Curves, samples: Samples, met: IntArray) -> BoolArray:
-    """Mask of the samples whose ray ends on the next or previous piece, beyond a corner of 90 degrees."""
-    pieces = _Pieces.of(loops)
-    counts = np.array([len(loop.bulges) for loop in loops])
+def _beyond_corner(pieces: _Pieces, counts: IntArray, samples: Samples, met: IntArray) -> BoolArray:
+    """Mask of the samples whose ray ends on the next or previous piece, beyond a corner of 90 degrees.
+
+    `counts` are the numbers of pieces of the closed curves, shape (k,).
+    """
     following = np.arange(counts.sum()) + 1
     following[np.cumsum(counts) - 1] = np.cumsum(counts) - counts
     sides, turn = pieces.end - pieces.start, 2 * np.arctan(pieces.bulges)
