@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from geometry.mesh.triangle_mesh import TriangleMesh as TriangleMesh
     from geometry.observations import Observations as Observations
     from pinnray.comparison import Comparison as Comparison
+    from pinnray.designers import optimise as optimise
+    from pinnray.designers import predict as predict
+    from pinnray.designers import sweep as sweep
     from pinnray.functions import compare as compare
     from pinnray.functions import crossval as crossval
     from pinnray.functions import load_drawing as load_drawing

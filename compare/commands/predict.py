@@ -36,7 +36,9 @@ def predict(
         out: CSV file of the predictions for --csv; default: beside it, NAME-predicted.csv.
     """
     from compare.emulator.emulator import emulator_of
+    from compare.emulator.tables import table
     from compare.runtime.stages import Stages
+    from geometry.atomic import write_text
 
     if bool(set) == (csv is not None):
         raise UserError(
@@ -54,7 +56,7 @@ def predict(
         print_table(emulator, found)
         return 0
     path = out or csv.with_name(f"{csv.stem}-predicted.csv")
-    write_table(path, emulator, fingers, found)
+    write_text(path, table(emulator, fingers, found).to_csv(index=False, lineterminator="\n"))
     print(path)
     return 0
 
@@ -121,30 +123,7 @@ def print_table(emulator: "Emulator", found: "Predictions") -> None:
         ends = "exact" if low == high else f"{low:.4g} to {high:.4g}"
         rows.append([name, QUANTITIES[name].unit, f"{value:.4g}", ends, QUANTITIES[name].meaning])
     title = f"{emulator.study.name}: predicted from {emulator.count:,} samples"
-    table = terminal_table(title, headings, rows, left=["quantity", "unit", "meaning"])
-    for column in table.columns:
+    shown = terminal_table(title, headings, rows, left=["quantity", "unit", "meaning"])
+    for column in shown.columns:
         column.no_wrap, column.overflow = column.header != "meaning", "fold"
-    Console().print(table)
-
-
-def write_table(
-    file: Path, emulator: "Emulator", fingers: "list[dict[str, Value]]", found: "Predictions"
-) -> None:
-    """Write fingers and their quantities with both ends of the intervals as CSV."""
-    import pandas as pd
-
-    from compare.sweep.quantities import heading
-    from compare.sweep.study import title
-    from geometry.atomic import write_text
-
-    frame = pd.DataFrame(
-        {title(name): [finger[name] for finger in fingers] for name in emulator.study.varied}
-    )
-    columns = {}
-    for place, name in enumerate(found.names):
-        columns[heading(name)] = found.values[:, place]
-        if (found.low[:, place] != found.high[:, place]).any():
-            columns |= {f"{heading(name)}_low": found.low[:, place]}
-            columns |= {f"{heading(name)}_high": found.high[:, place]}
-    table = pd.concat([frame, pd.DataFrame(columns)], axis=1)
-    write_text(file, table.to_csv(index=False, lineterminator="\n"))
+    Console().print(shown)

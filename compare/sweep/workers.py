@@ -178,7 +178,10 @@ def _local_cluster(count: int) -> "LocalCluster":
             )
         except RuntimeError as error:
             if attempt == STARTS - 1:
-                raise UserError(f"the worker processes do not start: {_first_line(error)}") from None
+                raise UserError(
+                    f"the worker processes do not start ({_first_line(error)}); they run the calling script "
+                    'once more: what it does must stand under `if __name__ == "__main__":`'
+                ) from None
     raise AssertionError
 
 

@@ -156,3 +156,28 @@ def test_what_is_of_another_type_is_named(call: Callable[[], object], said: str)
 def test_a_load_that_does_not_move_has_no_displacement():
     solution = pr.solve("default", "fem", load=pr.Load(displacement=(0.0, 0.0)), **COARSE)
     assert not solution.reaction.any()
+
+
+def test_a_sweep_is_a_data_frame_and_predicts(tmp_path: Path):
+    from tests.compare.emulator.sweeps import solved_sweep
+
+    folder = solved_sweep(tmp_path / "ref", count=100)
+    finger = {"height": 95, "base_width": 30, "rib_angle": 5, "tip_length": 20, "rib_count": 4}
+    walls = {"rib_thickness": 1.5, "front_thickness": 1.5, "back_thickness": 1.5}
+    found = pr.predict(folder, [{**finger, **walls}, {**finger, **walls, "front_thickness": 2.0}])
+    assert list(found["front_thickness_mm"]) == [1.5, 2.0]
+    assert (found["force_N_low"] < found["force_N"]).all()
+    assert found["force_N"].is_monotonic_increasing
+    with pytest.raises(pr.UserError, match=r"finger 1: .*rib_thickness"):
+        pr.predict(folder, [{**finger, **walls}, {**finger, **walls, "rib_thickness": 9.0}])
+
+
+def test_a_study_is_swept_into_a_data_frame(tmp_path: Path):
+    study = tmp_path / "walls.toml"
+    study.write_text(
+        'mesh_size = 2.0\nsampling = "grid"\n[fixed]\nmarker_diameter = 0.4\n'
+        "[varied]\nfront_thickness = {values = [1.2, 1.8]}\n"
+    )
+    found = pr.sweep(study, out=tmp_path / "out", processes=1)
+    assert list(found["state"]) == ["done", "done"]
+    assert found["force_N"].is_monotonic_increasing

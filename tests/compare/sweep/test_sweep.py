@@ -166,6 +166,18 @@ def test_a_sample_that_always_kills_its_worker_is_listed_as_failed(
     assert {each.state for each in again.measurements} == {"done"}
 
 
+def test_a_script_without_its_guard_is_told_what_it_lacks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_cluster(**settings: object) -> None:  # what LocalCluster does where the script has no guard
+        raise RuntimeError("Nanny failed to start.")
+
+    monkeypatch.setattr("distributed.LocalCluster", no_cluster)
+    study = load_study(study_file(tmp_path, 2))
+    with pytest.raises(UserError, match=r'what it does must stand under `if __name__ == "__main__":`'):
+        run_sweep(SweepJob(study, tmp_path, tmp_path / "out", 1))
+
+
 def die_at_one(task: object) -> Measurement:
     if getattr(task, "number", None) == 1:
         os.kill(os.getpid(), signal.SIGKILL)
