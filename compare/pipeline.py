@@ -292,9 +292,10 @@ def write(
             write_force_displacement(
                 folder / "force_displacement.csv", curves, job.load, depth=job.design.depth
             )
-        write_json(folder / "metrics.json", metrics(comparison))
+        numbers = metrics(comparison)
+        write_json(folder / "metrics.json", numbers)
         provenance = _provenance(folder, job, comparison, stages)
-        write_report(folder / "report.html", comparison, [*pictures, *photographs], provenance)
+        write_report(folder / "report.html", comparison, [*pictures, *photographs], provenance, numbers)
         write_run(folder, provenance)
 
 

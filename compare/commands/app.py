@@ -15,6 +15,7 @@ from compare.commands.options_file import take_options
 from compare.commands.pick import pick
 from compare.commands.predict import predict
 from compare.commands.quiet import quietable
+from compare.commands.report import report
 from compare.commands.rig import rig
 from compare.commands.solve import solve
 from compare.commands.solvers import solvers
@@ -31,7 +32,7 @@ pinnray = App(
     suppress_keyboard_interrupt=False,
 )
 COMMANDS = (
-    *(compare, design, mesh, solve, sweep, predict, optimise),
+    *(compare, report, design, mesh, solve, sweep, predict, optimise),
     *(gridsearch, crossval, solvers),
     *(fiducials, calibrate, pick, rig, track),
 )

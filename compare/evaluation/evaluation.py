@@ -60,6 +60,8 @@ class Evaluation:
         left_out: What the solver says of each marker if it is not given that one, shape (m, 2), mm; None
             where it does not tell.
         solid: Whether the field is a plane of a body in three dimensions.
+        path: Displacement of the nodes at every row of the history, shape (k, n, 2), mm, from a solver that
+            follows the load; None from any other.
         certificate: What the result is worth by the energy of finite elements; not part of the archive.
     """
 
@@ -86,6 +88,7 @@ class Evaluation:
     in_sample: bool = False
     left_out: FloatArray | None = None
     solid: bool = False
+    path: FloatArray | None = None
     certificate: Certificate | None = None
 
     @classmethod
@@ -127,6 +130,9 @@ class Evaluation:
             in_sample=solution.problem.observations is not None,
             left_out=solution.left_out,
             solid=isinstance(solution.field, SolidField),
+            path=np.stack([state.displacement(nodes)[: len(mesh.points)] for state in solution.states])
+            if solution.states
+            else None,
         )
 
     @property

@@ -141,7 +141,7 @@ def evaluated(solution: Solution, mesh: TriangleMesh, markers: ArrayLike | None 
     if error is None:
         return own
     energy = solution.energy * (1 - error.energy_norm**2)
-    better = Evaluation.of(replace(solution, field=error.field, energy=energy), mesh, markers)
+    better = Evaluation.of(replace(solution, field=error.field, energy=energy, states=()), mesh, markers)
     return replace(
         own,
         uncertainty=reference_differences(better, own),

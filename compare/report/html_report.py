@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Template
 
@@ -12,32 +13,48 @@ from compare.evaluation.metrics import force_error, indistinct, reference_differ
 from compare.evaluation.number_format import distance, number, percent
 from compare.evaluation.regions import NEAR
 from compare.figures import Picture
+from compare.figures.fields import QUANTITIES
 from compare.report import text
+from compare.report.field_viewer import viewer
 from compare.report.metrics_json import metrics
 from compare.report.sentences import certificate_sentences, truth_sentences
 from compare.report.summary import answers
 from compare.report.tables import millimetres, printed_rows, seconds, table_one
-from compare.runtime.html import template_environment
+from compare.runtime.html import template_environment, webp_urls
 from geometry.atomic import write_text
+
+FIELDS = {quantity.name for quantity in QUANTITIES}
+"""File names, without their suffix, of the pictures of fields."""
 
 
 def write_report(
-    path: Path, comparison: Comparison, pictures: Sequence[Picture], provenance: Mapping[str, object]
+    path: Path,
+    comparison: Comparison,
+    pictures: Sequence[Picture],
+    provenance: Mapping[str, object],
+    numbers: Mapping[str, Any] | None = None,
 ) -> None:
     """Write the report as one HTML file, atomically.
 
     `provenance` are facts of the run (seed, versions, hashes, times); a mapping in it becomes a group.
+    `numbers` are the comparison's `metrics`, where they are known already.
     """
-    write_text(path, render(comparison, pictures, provenance))
+    write_text(path, render(comparison, pictures, provenance, numbers))
 
 
-def render(comparison: Comparison, pictures: Sequence[Picture], provenance: Mapping[str, object]) -> str:
+def render(
+    comparison: Comparison,
+    pictures: Sequence[Picture],
+    provenance: Mapping[str, object],
+    numbers: Mapping[str, Any] | None = None,
+) -> str:
     """The report as HTML text."""
+    numbers = metrics(comparison) if numbers is None else numbers
     reference, design = comparison.reference, comparison.design
     return _template().render(
         comparison=comparison,
         observations=comparison.observations,
-        answers=answers(metrics(comparison), left_out=comparison.left_out, failed=comparison.failed),
+        answers=answers(numbers, left_out=comparison.left_out, failed=comparison.failed),
         reference=reference,
         reference_label=reference.label,
         own=reference.uncertainty,
@@ -66,7 +83,10 @@ def render(comparison: Comparison, pictures: Sequence[Picture], provenance: Mapp
         near=NEAR,
         load_sentence=text.load_sentence(comparison.load, design),
         source=text.source_sentence(comparison.observations),
-        pictures=pictures,
+        viewer=viewer(comparison),
+        urls=webp_urls([picture.path for picture in pictures]),
+        pictures=[picture for picture in pictures if picture.path.stem not in FIELDS],
+        stills=[picture for picture in pictures if picture.path.stem in FIELDS],
         provenance=text.grouped(provenance),
     )
 

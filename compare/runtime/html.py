@@ -1,6 +1,8 @@
 """The Jinja environment of the HTML pages."""
 
 import base64
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from io import BytesIO
 from pathlib import Path
 
@@ -11,7 +13,7 @@ from PIL import Image
 def template_environment() -> Environment:
     """The environment of `compare/templates`: HTML is escaped, and a missing name is an error.
 
-    The filters `png` and `webp` turn the path of a PNG file into a data URL, the latter of a smaller copy.
+    The filter `png` turns the path of a PNG file into a data URL.
     """
     environment = Environment(
         loader=PackageLoader("compare"),
@@ -20,7 +22,7 @@ def template_environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"png": png_url, "webp": webp_url}
+    environment.filters["png"] = png_url
     return environment
 
 
@@ -29,8 +31,13 @@ def png_url(path: Path) -> str:
     return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
 
 
-def webp_url(path: Path) -> str:
-    """A PNG file as the data URL of a WebP copy, a quarter of its size; the file itself keeps every pixel."""
+def webp_urls(paths: Sequence[Path]) -> dict[Path, str]:
+    """PNG files as data URLs of WebP copies, a quarter of their size; the files keep every pixel."""
+    with ThreadPoolExecutor(max_workers=4) as pool:
+        return dict(zip(paths, pool.map(_webp_url, paths), strict=True))
+
+
+def _webp_url(path: Path) -> str:
     buffer = BytesIO()
     with Image.open(path) as picture:
         picture.convert("RGB").save(buffer, "WEBP", quality=88, method=0)

@@ -11,6 +11,9 @@ from playwright.sync_api import Browser, Page, sync_playwright
 SOFTWARE_WEBGL = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 """Options under which Chromium has WebGL on a machine without a graphics card."""
 
+TIMEOUT = 120_000
+"""Milliseconds after which an action counts as failed, on a machine that is busy with other tests."""
+
 
 @dataclass
 class Opened:
@@ -18,7 +21,7 @@ class Opened:
 
     Attributes:
         page: The page.
-        complaints: Errors and warnings of its console, and exceptions.
+        complaints: Errors of its console, and exceptions.
         asked: Addresses outside the page that it asked for.
     """
 
@@ -41,13 +44,12 @@ def chromium(*options: str) -> Iterator[Browser]:
 def opened(browser: Browser, path: Path, *, width: int = 1400, **context: object) -> Opened:
     """The file at `path` in a window of so many pixels; other arguments are those of `Browser.new_page`."""
     page = browser.new_page(viewport={"width": width, "height": 900}, **context)
+    page.set_default_timeout(TIMEOUT)
     found = Opened(page)
     page.on("pageerror", lambda error: found.complaints.append(str(error)))
     page.on(
         "console",
-        lambda message: (
-            found.complaints.append(message.text) if message.type in ("error", "warning") else None
-        ),
+        lambda message: found.complaints.append(message.text) if message.type == "error" else None,
     )
     page.on(
         "request",

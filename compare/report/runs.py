@@ -1,0 +1,252 @@
+"""Several finished runs side by side: what differs between them, and their numbers in one page and table."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import hypot, isfinite, nan
+from pathlib import Path
+from typing import Any
+
+from compare.evaluation.metrics import MEANS
+from compare.evaluation.number_format import NONE, number, percent
+from compare.report.metrics_json import SCHEMA
+from compare.report.summary import Answer, answers
+from compare.runtime.html import template_environment, webp_urls
+from compare.runtime.output_folder import RUN_FILE
+from compare.runtime.tables import Cell, write_csv
+from geometry.atomic import write_text
+from geometry.errors import UserError
+
+PAGE, TABLE = "runs.html", "runs.csv"
+PICTURES = {"overlay.png": "Deformed finger", "von_mises.png": "Von Mises stress"}
+"""Pictures of a run that stand side by side."""
+MOST_PICTURES = 12
+"""Runs beyond which the page has no pictures, so that it stays small."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A finished run.
+
+    Attributes:
+        name: Its name on the page.
+        folder: Its output folder.
+        metrics: Content of `metrics.json`.
+        record: Content of `run.json`.
+    """
+
+    name: str
+    folder: Path
+    metrics: Mapping[str, Any]
+    record: Mapping[str, Any]
+
+    @property
+    def answers(self) -> list[Answer]:
+        """The answers that its report opens with."""
+        left_out, failed = (self.record.get(key) or {} for key in ("left_out", "failed"))
+        return answers(self.metrics, left_out=left_out, failed=failed)
+
+    @property
+    def settings(self) -> dict[str, str]:
+        """All that the numbers depend on, by name."""
+        metrics, record = self.metrics, self.record
+        groups = {key: metrics.get(key) for key in ("design", "material", "load")}
+        groups |= {key: record.get(key) for key in ("mesh", "seed")}
+        found = dict(_flat(groups))
+        return found | {
+            "markers": str(metrics["measurements"]["description"]),
+            "solvers": ", ".join(metrics["solvers"]),
+            "program": str((record.get("versions") or {}).get("pinn-ray")),
+        }
+
+
+def read_runs(folders: Sequence[Path]) -> list[Run]:
+    """The runs in folders, each under the name of its folder, or its path where two have one name.
+
+    Raises:
+        UserError: If a folder is given twice or holds no finished run.
+    """
+    if len({folder.resolve() for folder in folders}) < len(folders):
+        raise UserError(f"a run is given twice: {', '.join(map(str, folders))}")
+    names = [folder.resolve().name for folder in folders]
+    names = [
+        str(folder) if names.count(name) > 1 else name for name, folder in zip(names, folders, strict=True)
+    ]
+    return [_read(name, folder) for name, folder in zip(names, folders, strict=True)]
+
+
+def _read(name: str, folder: Path) -> Run:
+    if not folder.is_dir():
+        raise UserError(f"there is no folder {folder}; give output folders of `compare`")
+    found = []
+    for file in ("metrics.json", RUN_FILE):
+        try:
+            found.append(json.loads((folder / file).read_text(encoding="utf-8")))
+        except FileNotFoundError:
+            raise UserError(f"{folder} has no {file}, so it is no finished run of `compare`") from None
+        except ValueError:
+            raise UserError(f"{folder / file} is damaged: it is no JSON; make the run again") from None
+    metrics, record = found
+    if not isinstance(metrics, dict) or metrics.get("schema") != SCHEMA or "solvers" not in metrics:
+        raise UserError(
+            f"{folder / 'metrics.json'} is not of `compare`, or of another version; make the run again"
+        )
+    return Run(name, folder, metrics, record)
+
+
+def _flat(value: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    for key, inner in value.items():
+        if isinstance(inner, Mapping):
+            yield from _flat(inner, f"{prefix}{key} ")
+        else:
+            yield f"{prefix}{key}", NONE if inner is None else str(inner)
+
+
+def differences(runs: Sequence[Run]) -> list[list[str]]:
+    """The settings in which runs differ: a name, and its value in every run."""
+    settings = [run.settings for run in runs]
+    names = dict.fromkeys(name for own in settings for name in own)
+    rows = [[name, *(own.get(name, NONE) for own in settings)] for name in names]
+    return [row for row in rows if len(set(row[1:])) > 1]
+
+
+def spread(runs: Sequence[Run]) -> list[list[str]]:
+    """A row for each solver of several runs: how many, and the least and largest of its numbers."""
+    rows = []
+    for solver in dict.fromkeys(name for run in runs for name in run.metrics["solvers"]):
+        own = [row for row in table(runs) if row["solver"] == solver]
+        if len(own) < 2:
+            continue
+        columns = ("held_out_mae_sum_mm", "to_truth_displacement_rel_l2", "to_truth_von_mises_rel_l2")
+        cells = [[float(row[column]) for row in own if row[column] != ""] for column in columns]
+        held_out, *shares = cells
+        rows.append(
+            [
+                solver,
+                str(len(own)),
+                f"{min(held_out):.3f} to {max(held_out):.3f}" if held_out else NONE,
+                *(f"{percent(min(each), 2)} to {percent(max(each), 2)}" if each else NONE for each in shares),
+            ]
+        )
+    return rows
+
+
+def table(runs: Sequence[Run]) -> list[dict[str, Cell]]:
+    """A row for each solver of each run; an empty cell is a number that does not exist.
+
+    `given` are errors at markers that the solver was given, `held_out` at markers that it was not.
+    """
+    return [_row(run, solver, own) for run in runs for solver, own in run.metrics["solvers"].items()]
+
+
+def _row(run: Run, solver: str, own: Mapping[str, Any]) -> dict[str, Cell]:
+    row: dict[str, Cell] = {"run": run.name, "design": run.metrics["design"]["name"], "solver": solver}
+    row |= {"law": own["law"], "converged": int(own["status"] == "converged")}
+    row |= {"observations": run.metrics["measurements"]["source"]}
+    given = own["markers"] if own["markers"]["in_sample"] else {}
+    for kind, errors in (("given", given), ("held_out", own["held_out"] or {})):
+        row |= {f"{kind}_{name}_mm": _cell(errors.get(name)) for name in MEANS}
+    true, to = own["to_truth"] or {}, own["to_reference"]
+    row |= {
+        f"to_truth_{name}_rel_l2": _cell((true.get(name) or {}).get("rel_l2"))
+        for name in ("displacement", "von_mises")
+    }
+    row["to_truth_force_rel"] = _cell(own["force_to_truth_rel"])
+    row["reference"] = run.metrics["reference"]
+    row |= {
+        f"to_reference_{name}_rel_l2": _cell(to[f"rel_l2_{name}"]) for name in ("displacement", "von_mises")
+    }
+    row["energy_N_mm_per_mm"] = _cell(own["energy"])
+    row["force_N_per_mm"] = _cell(hypot(*(nan if part is None else part for part in own["reaction"])))
+    return row | {"seconds_s": _cell(own["seconds"])}
+
+
+def _cell(value: float | None) -> Cell:
+    return "" if value is None or not isfinite(value) else value
+
+
+def _text(value: Cell, share: bool) -> str:
+    if value == "":
+        return NONE
+    return percent(float(value), 3, sign=False) if share else number(float(value), 4)
+
+
+GROUPS = {
+    "Errors at markers that the solver was not given (held out), mm": {
+        "u": "held_out_mae_u_mm",
+        "v": "held_out_mae_v_mm",
+        "sum": "held_out_mae_sum_mm",
+        "rss": "held_out_mae_rss_mm",
+    },
+    "Errors at markers that the solver was given (training errors), mm": {
+        "u": "given_mae_u_mm",
+        "v": "given_mae_v_mm",
+        "sum": "given_mae_sum_mm",
+        "rss": "given_mae_rss_mm",
+    },
+    "Distance from the simulated finger over the whole body, relative L², and error of the force, %": {
+        "displacement": "to_truth_displacement_rel_l2",
+        "von Mises": "to_truth_von_mises_rel_l2",
+        "force": "to_truth_force_rel",
+    },
+    "Distance from the run’s reference over the whole body, relative L², %": {
+        "displacement": "to_reference_displacement_rel_l2",
+        "von Mises": "to_reference_von_mises_rel_l2",
+    },
+    "Energy, force of the indenter, time": {
+        "energy, N mm/mm": "energy_N_mm_per_mm",
+        "force, N/mm": "force_N_per_mm",
+        "time, s": "seconds_s",
+    },
+}
+"""Tables of the page: title, and the columns of `table` under their headings."""
+
+
+def grids(runs: Sequence[Run]) -> list[dict[str, Any]]:
+    """The tables of the page as text; rows without a number are left out."""
+    found = []
+    rows = table(runs)
+    for title, columns in GROUPS.items():
+        cells = [
+            [
+                str(row["run"]),
+                f"{row['solver']}{'' if row['converged'] else ' (not converged)'}",
+                str(row["observations"]),
+                *(_text(row[column], column.startswith("to_")) for column in columns.values()),
+            ]
+            for row in rows
+        ]
+        cells = [row for row in cells if set(row[3:]) != {NONE}]
+        if cells:
+            found.append({"title": title, "heads": ["Run", "solver", "markers", *columns], "rows": cells})
+    return found
+
+
+def write_runs(folder: Path, runs: Sequence[Run]) -> tuple[Path, Path]:
+    """Write the page and the table of runs into a folder, atomically, and return their paths."""
+    pictures = {
+        title: {
+            run.name: run.folder / "figures" / file
+            for run in runs
+            if (run.folder / "figures" / file).is_file()
+        }
+        for file, title in PICTURES.items()
+        if len(runs) <= MOST_PICTURES
+    }
+    page = (
+        template_environment()
+        .get_template("runs.html.j2")
+        .render(
+            runs=runs,
+            differences=differences(runs),
+            spread=spread(runs),
+            grids=grids(runs),
+            pictures=pictures,
+            urls=webp_urls([path for paths in pictures.values() for path in paths.values()]),
+            sources={run.metrics["measurements"]["source"] for run in runs},
+            table=TABLE,
+        )
+    )
+    write_text(folder / PAGE, page)
+    write_csv(folder / TABLE, table(runs))
+    return folder / PAGE, folder / TABLE
