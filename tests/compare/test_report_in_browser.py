@@ -127,7 +127,7 @@ def test_the_load_is_played_until_it_is_stopped(viewer: Page) -> None:
 def test_nothing_moves_for_a_reader_who_wants_no_motion(viewer: Page) -> None:
     viewer.evaluate("document.getElementById('viewer-play').click()")
     viewer.emulate_media(reduced_motion="reduce")
-    assert viewer.locator("#viewer-play").is_hidden()
+    viewer.locator("#viewer-play").wait_for(state="hidden")
     assert viewer.get_attribute("#viewer-play", "aria-pressed") == "false"
     viewer.emulate_media(reduced_motion="no-preference")
 
