@@ -7,9 +7,10 @@ from geometry.errors import UserError
 
 
 def report(*runs: Path, out: OptionalOutputPath = None) -> int:
-    """Answers of a finished run, or several runs (designs, seeds, settings) side by side in one page.
+    """Read one finished run, or several side by side.
 
-    Examples:
+    One gives its answers; several (designs, seeds, settings) make one page and one table. Examples:
+
     - pinnray report out/default
     - pinnray report out/default out/slender
     - pinnray report out/seed-* --out out/seeds
