@@ -282,7 +282,7 @@ def write(
     write_measurements(folder / "observations.csv", comparison.observations)
     with stages.stage("pictures") as progress:
         pictures = draw_all(folder / "figures", comparison, progress, job.picture_formats)
-    with stages.stage("report"):
+    with stages.stage("report"), SharedWork().used():
         for evaluation in comparison.shown_fields:
             write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", comparison.mesh, evaluation)
         write_markers(folder / "markers.csv", comparison)

@@ -12,6 +12,7 @@ from compare.evaluation.evaluation import Evaluation
 from geometry.arrays import FloatArray
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
+from solvers.shared_work import shared
 from solvers.solution import Solution
 
 COMPONENTS: dict[str, tuple[int, int]] = {"xx": (0, 0), "yy": (1, 1), "xy": (0, 1)}
@@ -74,8 +75,11 @@ def _errors(displacement: FloatArray, observations: Observations) -> MarkerError
 
 
 def reference_differences(evaluation: Evaluation, reference: Evaluation) -> ReferenceDifferences:
-    """Differences of displacement, strain and stress from the reference."""
+    """Differences of displacement, strain and stress from the reference; shared work."""
+    return shared(("differences", evaluation, reference), lambda: _differences(evaluation, reference))
 
+
+def _differences(evaluation: Evaluation, reference: Evaluation) -> ReferenceDifferences:
     def differ(name: str, index: tuple[int, ...] = ()) -> FieldDifference:
         chosen = (slice(None), *index)
         return field_difference(
@@ -108,8 +112,11 @@ class TruthDifferences(NamedTuple):
 
 
 def truth_differences(evaluation: Evaluation, truth: Evaluation) -> TruthDifferences:
-    """Differences from what is true where the markers are simulated."""
+    """Differences from what is true where the markers are simulated; shared work."""
+    return shared(("truth", evaluation, truth), lambda: _truth_differences(evaluation, truth))
 
+
+def _truth_differences(evaluation: Evaluation, truth: Evaluation) -> TruthDifferences:
     def differ(name: str) -> FieldDifference:
         values, true = (
             np.reshape(getattr(each, name), (len(truth.weights), -1)) for each in (evaluation, truth)
@@ -144,7 +151,7 @@ def evaluated(solution: Solution, mesh: TriangleMesh, markers: ArrayLike | None 
     better = Evaluation.of(replace(solution, field=error.field, energy=energy, states=()), mesh, markers)
     return replace(
         own,
-        uncertainty=reference_differences(better, own),
+        uncertainty=_differences(better, own),
         marker_uncertainty=np.abs(better.marker_displacement - own.marker_displacement),
     )
 

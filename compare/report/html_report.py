@@ -20,7 +20,7 @@ from compare.report.metrics_json import metrics
 from compare.report.sentences import certificate_sentences, truth_sentences
 from compare.report.summary import answers
 from compare.report.tables import millimetres, printed_rows, seconds, table_one
-from compare.runtime.html import template_environment, webp_urls
+from compare.runtime.html import picture_urls, template_environment
 from geometry.atomic import write_text
 
 FIELDS = {quantity.name for quantity in QUANTITIES}
@@ -84,7 +84,7 @@ def render(
         load_sentence=text.load_sentence(comparison.load, design),
         source=text.source_sentence(comparison.observations),
         viewer=viewer(comparison),
-        urls=webp_urls([picture.path for picture in pictures]),
+        urls=picture_urls([picture.path for picture in pictures]),
         pictures=[picture for picture in pictures if picture.path.stem not in FIELDS],
         stills=[picture for picture in pictures if picture.path.stem in FIELDS],
         provenance=text.grouped(provenance),

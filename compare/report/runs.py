@@ -11,7 +11,7 @@ from compare.evaluation.metrics import MEANS
 from compare.evaluation.number_format import NONE, number, percent
 from compare.report.metrics_json import SCHEMA
 from compare.report.summary import Answer, answers
-from compare.runtime.html import template_environment, webp_urls
+from compare.runtime.html import picture_urls, template_environment
 from compare.runtime.output_folder import RUN_FILE
 from compare.runtime.tables import Cell, write_csv
 from geometry.atomic import write_text
@@ -242,7 +242,7 @@ def write_runs(folder: Path, runs: Sequence[Run]) -> tuple[Path, Path]:
             spread=spread(runs),
             grids=grids(runs),
             pictures=pictures,
-            urls=webp_urls([path for paths in pictures.values() for path in paths.values()]),
+            urls=picture_urls([path for paths in pictures.values() for path in paths.values()]),
             sources={run.metrics["measurements"]["source"] for run in runs},
             table=TABLE,
         )

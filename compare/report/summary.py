@@ -160,7 +160,10 @@ def _markers(metrics: Numbers) -> Answer | None:
     if not plain["to_truth"]:
         sentences.append("Whether stress and force are nearer is unknown: no camera tells them.")
     sentences += filter(None, (_force_interval(name, own, metrics) for name, own in given.items()))
-    verdict = f"Nearer than {reference}: {'; '.join(nearer)}." if nearer else "This run does not tell."
+    verdict = f"nearer than {reference}: {'; '.join(nearer)}." if nearer else "this run does not tell."
+    if len(given) > 1:
+        verdict = f"of {len(given)} solvers that were given markers, {verdict}"
+    verdict = verdict[0].upper() + verdict[1:]
     caption = f"Errors at {source} markers that were not given"
     if plain["to_truth"]:
         caption += ", and distance from the simulated finger over the whole body"
@@ -261,7 +264,7 @@ def _plus_minus(share: float, own: float | None) -> str:
 def _those(some: Sequence[str], of: Mapping[str, object]) -> str:
     """The names that something holds for: all, none, or the list."""
     if len(some) == len(of):
-        return f"all {len(of)} that were given some" if len(of) > 1 else _listed(some)
+        return f"all {len(of)}" if len(of) > 1 else _listed(some)
     return f"only {_listed(some)}" if some else "none"
 
 

@@ -9,6 +9,9 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from PIL import Image
 
+SMALL = 300_000
+"""Bytes up to which a picture, as a rule one of lines, is embedded as it is."""
+
 
 def template_environment() -> Environment:
     """The environment of `compare/templates`: HTML is escaped, and a missing name is an error.
@@ -31,14 +34,16 @@ def png_url(path: Path) -> str:
     return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
 
 
-def webp_urls(paths: Sequence[Path]) -> dict[Path, str]:
-    """PNG files as data URLs of WebP copies, a quarter of their size; the files keep every pixel."""
+def picture_urls(paths: Sequence[Path]) -> dict[Path, str]:
+    """PNG files as data URLs: small ones as they are, large ones as WebP copies, a quarter of their size."""
     with ThreadPoolExecutor(max_workers=4) as pool:
-        return dict(zip(paths, pool.map(_webp_url, paths), strict=True))
+        return dict(zip(paths, pool.map(_picture_url, paths), strict=True))
 
 
-def _webp_url(path: Path) -> str:
+def _picture_url(path: Path) -> str:
+    if path.stat().st_size <= SMALL:
+        return png_url(path)
     buffer = BytesIO()
     with Image.open(path) as picture:
-        picture.convert("RGB").save(buffer, "WEBP", quality=88, method=0)
+        picture.convert("RGB").save(buffer, "WEBP", quality=80, method=0)
     return "data:image/webp;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -252,6 +252,12 @@
       if (change["scene.camera"]) centre = { ...change["scene.camera"].center };
     });
     window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+    let width = canvas.clientWidth;
+    new ResizeObserver(() => {
+      if (canvas.clientWidth === width || canvas.clientWidth === 0) return;
+      width = canvas.clientWidth;
+      keys[0]();
+    }).observe(canvas);
     animation();
     box.dataset.ready = "yes";
   }

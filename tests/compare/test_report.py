@@ -87,7 +87,7 @@ def test_it_asks_for_nothing_from_outside(content: Comparison, pictures: list[Pi
     assert "<link" not in html
     packed = r'(?<=id="viewer-data">)[^<]*|(?<=id="viewer-library">)[^<]*'
     assert re.findall(r"url\(|@import|https?://", re.sub(packed, "", html)) == []
-    assert [source[:23] for source in Page(html).values("src")] == ["data:image/webp;base64,"]
+    assert [source[:22] for source in Page(html).values("src")] == ["data:image/png;base64,"]
     assert {link[0] for link in Page(html).values("href")} == {"#"}
 
 

@@ -63,7 +63,7 @@ def test_several_runs_are_one_page_and_one_table(save: Save, tmp_path: Path) -> 
     assert [row["given_mae_u_mm"] == "" for row in rows] == 2 * [True, True, False]
     assert float(rows[4]["to_reference_displacement_rel_l2"]) == pytest.approx(0.1)
     html = (tmp_path / "both" / "runs.html").read_text(encoding="utf-8")
-    assert html.count("data:image/webp") == 2
+    assert html.count("data:image/png") == 2
     assert re.findall(r"<script src|<link|https?://", html) == []
     assert "simulated" in html
 
