@@ -11,8 +11,9 @@ from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from tests.vision import films, printed_dots
 from tests.vision.printed_dots import INK, PAPER, PrintedDots, darkness_centroids
-from vision.discs import least_squares
+from vision.discs import fit_stages, least_squares
 from vision.discs.correlated_noise import correlated_noise
+from vision.discs.disc_detector import luma_of
 from vision.discs.disc_fit import FittedDiscs, fit_discs
 from vision.discs.disc_image_model import (
     BLUR,
@@ -139,6 +140,18 @@ def test_white_noise_has_no_layers():
     start[:, [0, 1]] = dots.centres - window.origins
     start[:, [RADIUS, BLUR, LIGHT, CONTRAST]] = 4.0, 0.85, 235 * PAPER, 235 * (PAPER - INK)
     assert len(without_waves(window, start)[1]) == 0
+
+
+@pytest.mark.parametrize("frame", [0, 5])
+def test_walls_that_join_beside_a_marker_are_no_layers(frame, monkeypatch):
+    """What a blurred joint leaves of the ground was taken for a wave that moves a marker by 0.1 to 0.4 px."""
+    image, truth = replace(films.recording(), exposure=Exposure(noise=2.0, blur=2.5)).frame(frame)
+    guesses = np.column_stack([truth.pixels, np.full(len(truth.pixels), 7.38)])
+    found = fit_discs(luma_of(image), guesses, radii=7.38)
+    monkeypatch.setattr(fit_stages, "WAVES", 0)
+    without = fit_discs(luma_of(image), guesses, radii=7.38)
+    assert found.found.all()
+    assert (found.centres == without.centres).all()
 
 
 @pytest.mark.parametrize("radius", [4.0, 7.3, 12.0])

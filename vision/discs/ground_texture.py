@@ -42,6 +42,9 @@ BORDER = 0.25
 """Relative contrast from which on a straight edge ends the ground."""
 PERIODS = 2.0
 """Fewest periods of a wave within the window; with fewer it could be a glare."""
+UNLIKE = 0.4
+"""Largest deviation from 1 of the product of a wave's heights in opposite halves of the ground, over its
+squared height: what a joint of walls leaves is in one half alone."""
 REFINEMENTS = 3
 """Steps of Gauss-Newton for the wave vector."""
 LONGEST_STEP = 0.5
@@ -77,6 +80,7 @@ def without_waves(window: PixelWindows, parameters: FloatArray) -> tuple[PixelWi
     window, now, ground, power = window.at(likely), parameters[likely], ground[likely], power[likely]
     heights, vectors, left = _fitted(window, ground, residuals[likely], vectors[likely])
     explained = power - (left**2).sum(axis=1) / count[likely]
+    explained *= _throughout(window, ground, residuals[likely], heights, vectors)
     (found,) = np.nonzero(explained > np.maximum(SHARE * power, QUANTISATION))
     some, now, heights, vectors = window.at(found), now[found], heights[found], vectors[found]
     if not len(found):
@@ -150,21 +154,44 @@ def _fitted(
     """Heights of cosine and sine, wave vectors, each of shape (n, 2), and what is left of the residuals."""
     longest = LONGEST_STEP / (len(window.ring) / 2)
     vectors = vectors.copy()
-    smooth = np.broadcast_to(_smooth_light(window), (len(vectors), 6, len(window.x)))
     for number in range(REFINEMENTS + 1):
-        phase = vectors[:, [0]] * window.x + vectors[:, [1]] * window.y
-        parts = np.stack([np.cos(phase), np.sin(phase)], axis=1)
-        columns = np.concatenate([parts, smooth], axis=1) * ground[:, None]
+        columns = _wave_and_light(window, vectors) * ground[:, None]
         heights = _least_squares(columns, residuals)
         left = residuals - (heights[:, None] @ columns)[:, 0]
         if number == REFINEMENTS:
             break
-        turned = (heights[:, [1]] * parts[:, 0] - heights[:, [0]] * parts[:, 1])[:, None]
+        turned = (heights[:, [1]] * columns[:, 0] - heights[:, [0]] * columns[:, 1])[:, None]
         by_vector = np.concatenate([turned * window.x, turned * window.y], axis=1)
-        columns = np.concatenate([columns, by_vector * ground[:, None]], axis=1)
+        columns = np.concatenate([columns, by_vector], axis=1)
         steps = _least_squares(columns, left)[:, -2:]
         vectors += np.clip(steps, -longest, longest)
     return heights[:, :2], vectors, left.astype(np.float32)
+
+
+def _throughout(
+    window: PixelWindows, ground: BoolArray, residuals: Array, heights: FloatArray, vectors: FloatArray
+) -> BoolArray:
+    """Whether waves are alike in opposite halves of the ground, along the wave and across it, shape (n,)."""
+    columns = _wave_and_light(window, vectors)
+    along = vectors[:, [0]] * window.x + vectors[:, [1]] * window.y
+    across = vectors[:, [0]] * window.y - vectors[:, [1]] * window.x
+    alike = np.ones(len(vectors), dtype=bool)
+    for place in (along, across):
+        first = place < median_where(place, ground)[:, None]
+        one, other = (
+            _least_squares(columns * half[:, None], residuals * half)[:, :2]
+            for half in (ground & first, ground & ~first)
+        )
+        product, square = (one * other).sum(axis=1), (heights[:, :2] ** 2).sum(axis=1)
+        alike &= np.abs(product - square) < UNLIKE * square
+    return alike
+
+
+def _wave_and_light(window: PixelWindows, vectors: FloatArray) -> FloatArray:
+    """Cosine and sine of waves, and terms of light that varies slowly, at the pixels, shape (n, 8, p)."""
+    phase = vectors[:, [0]] * window.x + vectors[:, [1]] * window.y
+    smooth = np.broadcast_to(_smooth_light(window), (len(vectors), 6, len(window.x)))
+    return np.concatenate([np.stack([np.cos(phase), np.sin(phase)], axis=1), smooth], axis=1)
 
 
 def _smooth_light(window: PixelWindows) -> FloatArray:
