@@ -1,6 +1,7 @@
 """Planes against the cameras that saw them, and their covariances against repeated measurements."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from tests.vision.test_fiducials import pose_of
 from vision.calibration.camera import Camera
 from vision.discs.disc_detector import DiscDetections
 from vision.rig.shapes import centroid, circle, closed
-from vision.tracking.plane_fit import camera_plane, homography_plane, similarity_plane
+from vision.rig.virtual_camera import default_camera, viewing_pose
+from vision.tracking.plane_fit import camera_plane, homography_plane, plane_of_markers, similarity_plane
 from vision.tracking.scene import FilmedScene
 from vision.tracking.workspace import default_workspace
 
@@ -176,3 +178,22 @@ def test_the_plane_of_fiducials_is_that_of_their_discs():
     np.testing.assert_allclose(
         plane.points(seen(AFTER)) - plane.points(seen(BEFORE)), AFTER - BEFORE, atol=1e-4
     )
+
+
+def test_a_plane_from_markers_alone_states_what_lens_and_tilt_do_to_their_displacements():
+    """The shares within 1.96 standard deviations; 0.8 by the errors of scale and turn alone."""
+    ratios = []
+    for lens, tilt, direction in product((-0.2, -0.1, 0.1, 0.2), (0, 2, 5), (0, 120, 240)):
+        camera = replace(default_camera(), distortion=(lens, -0.2 * lens, 5e-4, -3e-4, 0.0))
+        pose = viewing_pose(camera, default_workspace(Design()), tilt=tilt, direction=direction)
+        before, after = (
+            projected(camera, np.column_stack([points, np.zeros(len(points))]), pose)
+            for points in (BEFORE, AFTER)
+        )
+        covariances = noise(len(BEFORE)) / 25
+        plane = plane_of_markers(BEFORE, before, covariances)
+        places = plane.points(before), plane.points(after)
+        stated = plane.displacement_covariance(*places, covariances, covariances)
+        missed = (places[1] - places[0]) - (AFTER - BEFORE)
+        ratios.append(missed.ravel() / np.sqrt(np.diag(stated)))
+    assert 0.9 < (np.abs(ratios) < 1.96).mean() < 0.99

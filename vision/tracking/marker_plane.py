@@ -49,12 +49,15 @@ class MarkerPlane:
         parameters: Shape (k,).
         covariance: Of the parameters, shape (k, k).
         residual: Root mean square residual of the fiducials, mm.
+        bending: Standard deviation of a displacement's error over the displacement, by a lens that the
+            projection leaves out.
     """
 
     projection: PlaneProjection
     parameters: FloatArray
     covariance: FloatArray
     residual: float
+    bending: float = 0.0
 
     def points(self, pixels: FloatArray) -> FloatArray:
         """Points of the plane at pixels; shapes (n, 2), mm."""
@@ -112,6 +115,8 @@ class MarkerPlane:
             inverse = np.linalg.inv(jacobians.point)
             shared -= sign * (inverse @ jacobians.parameters).reshape(shared.shape)
             own += inverse @ noise @ inverse.transpose(0, 2, 1)
+        moved = self.bending * np.linalg.norm(final - initial, axis=1)
+        own += moved[:, None, None] ** 2 * np.eye(2)
         covariance = shared @ self.covariance @ shared.T
         blocks = covariance.reshape(count, 2, count, 2)
         blocks[np.arange(count), :, np.arange(count)] += own

@@ -1,6 +1,7 @@
 """Weighted least-squares fits of the markers' plane to fiducials."""
 
 from contextlib import suppress
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -19,6 +20,8 @@ from vision.tracking.marker_plane import (
 STEPS = 50
 CONVERGED = 1e-9
 """Relative length of the last step."""
+BENDING = 5.0
+"""Mean square derivative of the second Legendre polynomial over its mean square, times that of x."""
 UNDETERMINED = "the fiducials do not determine where the camera is"
 
 
@@ -70,6 +73,20 @@ def similarity_plane(points: FloatArray, pixels: FloatArray, covariances: FloatA
     """Fit a scale, rotation and shift; arguments as of `camera_plane`."""
     start = np.array([1.0, 0.0, 0.0, 0.0])
     return _plane_without_lens(SIMILARITY, start, points, pixels, covariances)
+
+
+def plane_of_markers(points: FloatArray, pixels: FloatArray, covariances: FloatArray) -> MarkerPlane:
+    """Fit a similarity to the markers themselves; arguments as of `camera_plane`.
+
+    What lens and tilt leave of the fit is at least quadratic along the markers, a second Legendre polynomial,
+    whose derivative is √5 times its root mean square over that of the places: a marker that moves goes astray
+    by as much of its way, as the fit at rest alone does not show.
+    """
+    plane = similarity_plane(points, pixels, covariances)
+    noise = np.trace(covariances, axis1=1, axis2=2) / plane.scales(points) ** 2
+    misfit = max(plane.residual**2 - float(noise.mean()), 0.0) / 2  # of a coordinate
+    places = float(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean())
+    return replace(plane, bending=(BENDING * misfit / places) ** 0.5)
 
 
 def _plane_without_lens(

@@ -14,7 +14,7 @@ from vision.frames.frame import Image
 from vision.tracking.fiducial_matching import UnseenError, identify_fiducials
 from vision.tracking.layout_matching import match_layout
 from vision.tracking.marker_plane import MarkerPlane
-from vision.tracking.plane_fit import camera_plane, homography_plane, similarity_plane
+from vision.tracking.plane_fit import camera_plane, homography_plane, plane_of_markers, similarity_plane
 from vision.tracking.workspace import Workspace
 
 SMALLEST_VIEW = 0.25
@@ -63,7 +63,7 @@ class FilmedScene:
     def plane_from_markers(self, markers: DiscDetections) -> MarkerPlane:
         """The plane without fiducials, from the markers at rest, shape (m, ...), nan for hidden ones."""
         seen = np.isfinite(markers.radii)
-        return similarity_plane(self.design.markers[seen], *markers.where(seen)[:2])
+        return plane_of_markers(self.design.markers[seen], *markers.where(seen)[:2])
 
     def first_plane(self, image: Image) -> tuple[MarkerPlane, DiscDetections]:
         """The markers' plane in the first frame, and the fiducials, all nan if the markers gave it.
