@@ -26,7 +26,7 @@ test-all: setup ## run all tests, as CI does
 # ARGS=linkcheck asks the network whether the links to other sites are alive.
 docs: setup ## build the documentation site, build/docs/html
 	$(BIN)/python -m pip -qq install --no-deps -r requirements/docs.txt
-	OMP_NUM_THREADS=1 $(BIN)/python -m sphinx -M $(or $(ARGS),html) docs build/docs -W --keep-going -q
+	OMP_NUM_THREADS=1 $(if $(ARGS),NOTEBOOKS=off) $(BIN)/python -m sphinx -M $(or $(ARGS),html) docs build/docs -W --keep-going -q
 
 verification: setup ## measure fem against known answers, write docs/verification.md
 	$(BIN)/python -m benchmarks.verification

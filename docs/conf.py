@@ -82,7 +82,7 @@ def shorten(_app: Sphinx, _what: str, _name: str, value: object, _options: objec
     """The signature and the returned type with short names of arrays; none for a table of parameters."""
     if isinstance(value, type) and issubclass(value, BaseModel):
         return "", ""
-    for long, short in LONG_TYPES.items():
+    for long, short in {**LONG_TYPES, "<factory>": "..."}.items():
         texts = tuple(text and re.sub(long, short, text) for text in texts)
     return texts
 
