@@ -2,13 +2,10 @@
 
 import csv
 import json
-import os
 import pkgutil
 import re
 import runpy
 import shlex
-import subprocess
-import sys
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
@@ -82,9 +79,6 @@ TO_RUN = [
 ]
 """Those of the notebook page run, with their output, in `tests/pinnray/test_notebook.py`."""
 
-CELL = "{code-cell} python"
-NOTEBOOKS = sorted({block.page for block in ALL_BLOCKS if block.language == CELL})
-
 
 def table(page: Path, first_column: str, after: str = "") -> list[list[str]]:
     """Cells of the first table whose header starts with `first_column`, after some text."""
@@ -157,39 +151,10 @@ def test_python_in_the_docs_runs(block, tmp_path, monkeypatch):
     exec(compile(padded, str(block.page), "exec"), {"__name__": "__docs__"})
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("page", NOTEBOOKS, ids=id_of)
-def test_notebooks_run(page, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {"__name__": "__docs__"}
-    for block in blocks(page):
-        if block.language == CELL:
-            exec(compile("\n" * block.line + block.text, str(page), "exec"), names)
-
-
-def test_there_are_three_notebooks():
-    assert len(NOTEBOOKS) == 3
-
-
 @pytest.mark.parametrize("name", ["pinnray_skfem.py", "pyproject.toml"])
 def test_the_plug_in_in_the_docs_is_the_one_that_is_tested(name):
     source = (PLUGIN / name).read_text(encoding="utf-8")
     assert source in [block.text for block in blocks(OWN_SOLVER)]
-
-
-@pytest.mark.slow
-def test_the_site_builds_without_a_warning(tmp_path):
-    """With every page, every command and every public name, but without running the notebooks."""
-    built = subprocess.run(
-        [sys.executable, "-m", "sphinx", "-M", "html", str(DOCS), str(tmp_path), "-W", "--keep-going", "-q"],
-        env={**os.environ, "NOTEBOOKS": "off"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (built.returncode, built.stderr) == (0, "")
-    pages = {path.relative_to(DOCS).with_suffix(".html") for path in DOCS.rglob("*.md")}
-    assert {page for page in pages if not (tmp_path / "html" / page).is_file()} == set()
 
 
 def test_every_block_says_its_language():

@@ -1,0 +1,41 @@
+"""The documentation site: it builds without a warning, and its notebooks run."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.test_docs import ALL_BLOCKS, DOCS, blocks, id_of
+
+CELL = "{code-cell} python"
+NOTEBOOKS = sorted({block.page for block in ALL_BLOCKS if block.language == CELL})
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning(tmp_path):
+    """With every page, every command and every public name, but without running the notebooks."""
+    built = subprocess.run(
+        [sys.executable, "-m", "sphinx", "-M", "html", str(DOCS), str(tmp_path), "-W", "--keep-going", "-q"],
+        env={**os.environ, "NOTEBOOKS": "off"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (built.returncode, built.stderr) == (0, "")
+    pages = {path.relative_to(DOCS).with_suffix(".html") for path in DOCS.rglob("*.md")}
+    assert {page for page in pages if not (tmp_path / "html" / page).is_file()} == set()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", NOTEBOOKS, ids=id_of)
+def test_notebooks_run(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {"__name__": "__docs__"}
+    for block in blocks(page):
+        if block.language == CELL:
+            exec(compile("\n" * block.line + block.text, str(page), "exec"), names)
+
+
+def test_there_are_three_notebooks():
+    assert len(NOTEBOOKS) == 3
