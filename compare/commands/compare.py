@@ -69,7 +69,7 @@ def compare(
             oblique, friction, 3d or sticking; docs/how-to/own-truth.md explains them.
         reference: Solver that the others are compared with; default fem, else the first.
         from_: File with options that the command line leaves out: TOML or JSON with a table `options`, or the
-            run.json of an earlier run, which is repeated so.
+            run.json of an earlier run, which is repeated so; default: none.
         out: Output folder; default out/DESIGN.
         pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
         resume: Reuse solutions that an earlier run finished.
