@@ -3,7 +3,7 @@
 The rate is that of linear elements of degree 2 at 0.5 mm, meshing and every quantity included, from the times
 of a short and a longer sweep, so that starting the workers does not count. Then 10,000 designs at 2 mm are
 run while a worker is killed every few seconds and the program itself three times: none may be lost or done
-twice. Allow an hour on two cores.
+twice. Allow an hour on two idle cores, 100 minutes on busy ones.
 """
 
 import os
