@@ -2,7 +2,7 @@
 # Arguments go through ARGS, as in: make compare ARGS="--design slender"
 BIN := .venv/bin
 
-.PHONY: help setup compare test test-all docs verification lint bench clean
+.PHONY: help setup setup-tests compare test test-all docs verification lint bench clean
 .DEFAULT_GOAL := help
 
 help: ## list these targets
@@ -11,16 +11,19 @@ help: ## list these targets
 setup: ## set up this machine: Debian's packages, .venv, this project
 	@tools/setup.sh
 
+setup-tests: setup # the browser that opens the report, too
+	@tools/setup.sh tests
+
 compare: setup ## the main job: compare all solvers on the default finger
 	$(BIN)/compare $(or $(ARGS),--design default)
 
 # Each worker computes on one thread: two that share two cores would wait for each other.
 PYTEST = OMP_NUM_THREADS=1 $(BIN)/pytest -n $(or $(WORKERS),$(shell nproc)) --dist loadfile
 
-test: setup ## run the quick tests, some six minutes on two cores
+test: setup-tests ## run the quick tests, some six minutes on two cores
 	$(PYTEST) -m "not slow" $(ARGS)
 
-test-all: setup ## run all tests, as CI does
+test-all: setup-tests ## run all tests, as CI does
 	$(PYTEST) $(ARGS)
 
 # ARGS=linkcheck asks the network whether the links to other sites are alive.

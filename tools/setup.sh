@@ -2,6 +2,8 @@
 # Brings .venv up to date: the distribution's packages, the locked PyPI packages, this project. Does only what is
 # missing and says what it does; ends at once when nothing changed. `make` calls it before everything else.
 #
+#   tools/setup.sh        what `make compare` needs
+#   tools/setup.sh tests  the tests' browser as well
 #   TORCH_INDEX  package index to take torch from, for machines whose default index serves the CUDA build
 #   OS_RELEASE   file that names the distribution (default /etc/os-release)
 set -euo pipefail
@@ -25,11 +27,11 @@ $elsewhere"
 fi
 
 # Everything that decides what is installed, and where.
-state=$(sha256sum tools/setup.sh pyproject.toml "$apt" "$dev" "$lock" requirements/dev.txt; pwd; echo "${TORCH_INDEX:-}")
-[[ $state == "$(cat .venv/setup-state 2>/dev/null)" ]] && exit 0
+state=$(sha256sum tools/setup.sh pyproject.toml "$apt" "$lock" requirements/dev.txt; pwd; echo "${TORCH_INDEX:-}")
+up_to_date() { [[ $state == "$(cat .venv/setup-state 2>/dev/null)" ]]; }
 SECONDS=0
 
-mapfile -t wanted < <(cat "$apt" "$dev")
+mapfile -t wanted < <(cat "$apt" ${1:+"$dev"})
 missing=()
 for package in "${wanted[@]}"; do
     [[ $(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null) == installed ]] || missing+=("$package")
@@ -51,6 +53,7 @@ $elsewhere"
 $output"
     fi
 fi
+up_to_date && exit 0
 
 pip() { .venv/bin/python -m pip -qq --disable-pip-version-check --no-input "$@"; }
 index=(${TORCH_INDEX:+--extra-index-url "$TORCH_INDEX"})
