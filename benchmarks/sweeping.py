@@ -51,18 +51,28 @@ def main() -> Table:
     table = Table(title="pinnray sweep")
     table.add_column("what", no_wrap=True)
     table.add_column("figure", justify="right", no_wrap=True)
-    one, two = (rate(processes) for processes in (1, 2))
-    table.add_row("designs a second, one worker", f"{one:.2f}")
+    core, one, two = rate(1, cores=1), rate(1), rate(2)
+    table.add_row("designs a second, one worker on one core", f"{core:.2f}")
+    table.add_row("designs a second, one worker on all cores", f"{one:.2f}")
     table.add_row("designs a second, two workers", f"{two:.2f}")
-    table.add_row("ratio", f"{two / one:.2f}")
+    table.add_row("ratio of two workers to one on one core", f"{two / core:.2f}")
+    table.add_row("ratio to one on all cores", f"{two / one:.2f}")
     for name, figure in under_kills(KILLED).items():
         table.add_row(name, figure)
     return table
 
 
-def rate(processes: int) -> float:
-    """Designs a second at 0.5 mm, without the start of the workers."""
-    return (MANY - FEW) / (_seconds(MANY, processes) - _seconds(FEW, processes))
+def rate(processes: int, cores: int | None = None) -> float:
+    """Designs a second at 0.5 mm, without the start of the workers, on some of the cores or all of them.
+
+    The mesher of a worker is a process of its own, so that one worker can keep more than one core busy.
+    """
+    allowed = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, sorted(allowed)[:cores])
+    try:
+        return (MANY - FEW) / (_seconds(MANY, processes) - _seconds(FEW, processes))
+    finally:
+        os.sched_setaffinity(0, allowed)
 
 
 def _seconds(count: int, processes: int) -> float:

@@ -32,7 +32,7 @@ class Opened:
 
 @contextmanager
 def chromium(*options: str) -> Iterator[Browser]:
-    """The browser that the system has; `make setup` installs it."""
+    """The browser that the system has; `make test` installs it."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=list(options))
         try:
