@@ -87,7 +87,7 @@ BAD = [
     ("compare --frobnicate", "Unknown option: --frobnicate"),
     (
         "frobnicate",
-        "Unknown command .* commands: compare, design, mesh, solve, sweep, predict, optimise, gridsearch",
+        "Unknown command .* commands: compare, report, design, mesh, solve, sweep, predict, optimise, ",
     ),
     ("compare slender", "'slender' belongs to no option"),  # forgot --design
     ("compare --seed", "--seed requires an argument"),
