@@ -23,7 +23,7 @@ from compare.evaluation.virtual_experiment import (
     no_displacements,
     virtual_experiment,
 )
-from compare.figures import FORMATS, Picture, draw_all
+from compare.figures import Picture, check_formats, draw_all
 from compare.report.html_report import write_report
 from compare.report.metrics_json import metrics
 from compare.report.tables import write_markers, write_summary, write_table_one
@@ -155,8 +155,7 @@ def checked(job: Job) -> Job:
         check_adaptable(job.adapt, job.load)
     if job.reference is not None and job.reference not in job.names:
         raise UserError(f"the reference {job.reference!r} is not among the solvers {', '.join(job.names)}")
-    if unknown := [kind for kind in job.picture_formats if kind not in FORMATS]:
-        raise UserError(f"there are no pictures as {unknown[0]}; besides PNG there are {', '.join(FORMATS)}")
+    check_formats(job.picture_formats)
     check_truths([job.truth], job.design)
     check_walls(TRUTHS[job.truth])
     supported_solvers(job.solvers, job.spare, job.material, job.load)

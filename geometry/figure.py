@@ -1,6 +1,6 @@
 """A matplotlib figure with the project's look, which saves itself as PNG and shows itself in a notebook."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -84,12 +84,18 @@ class Figure(MplFigure):
         with mpl.rc_context(_RC):
             super().draw(renderer)
 
-    def save(self, path: Path) -> Path:
-        """Write the figure atomically, in the format of the path's suffix, and return the path."""
-        buffer = BytesIO()
+    def save(self, path: Path, formats: Collection[str] = ()) -> Path:
+        """Write the figure atomically, and return the path.
+
+        Args:
+            path: Where to write, in the format of its suffix.
+            formats: Others in which it is written beside it: `svg` or `pdf`.
+        """
         with mpl.rc_context(_RC):
-            self.savefig(buffer, format=path.suffix.removeprefix("."), **OPTIONS.get(path.suffix, {}))
-        write_bytes(path, buffer.getvalue())
+            for file in (path, *(path.with_suffix(f".{name}") for name in formats)):
+                buffer = BytesIO()
+                self.savefig(buffer, format=file.suffix.removeprefix("."), **OPTIONS.get(file.suffix, {}))
+                write_bytes(file, buffer.getvalue())
         return path
 
     def _repr_png_(self) -> bytes:

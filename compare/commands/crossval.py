@@ -12,6 +12,7 @@ from compare.commands.options import (
     SolverOptions,
     comma_list,
     existing_table,
+    read_formats,
     read_processes,
 )
 from compare.runtime.exits import NOT_CONVERGED, say
@@ -34,6 +35,7 @@ def crossval(
     noise: float = 0.005,
     measurements: Path | None = None,
     processes: int | None = None,
+    pictures: str = "",
     out: OptionalOutputPath = None,
 ) -> int:
     """Score solvers on markers, loads and fields that they were not given.
@@ -54,6 +56,7 @@ def crossval(
         noise: Standard deviation of a simulated marker's displacement, mm.
         measurements: CSV file of marker displacements; default: simulated.
         processes: Solvers run at a time; default: one per core.
+        pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
         out: Output folder; default out/crossval-DESIGN.
     """
     from compare.commands.cost import EXPERIMENT
@@ -83,6 +86,7 @@ def crossval(
         measurements=read_measurements(file, marker_radius=design.marker_radius) if file else None,
         out=out or Path("out") / f"crossval-{design.name}",
         processes=read_processes(processes),
+        picture_formats=read_formats(pictures),
     )
     made = [variant.make(0) for variant in study.variants]
     physics.check_law(made)

@@ -11,6 +11,7 @@ from compare.commands.options import (
     OptionalOutputPath,
     PhysicsOptions,
     SolverOptions,
+    read_formats,
     read_processes,
 )
 from compare.runtime.exits import NOT_CONVERGED, say
@@ -32,6 +33,7 @@ def gridsearch(
     bc_weights: str = "0.1,1,10,100,1000",
     epochs: int | None = None,
     processes: int | None = None,
+    pictures: str = "",
     out: OptionalOutputPath = None,
 ) -> int:
     """Repeat the paper's grid search for the learning rate and the weight of the boundary conditions.
@@ -44,6 +46,7 @@ def gridsearch(
         bc_weights: Weights of the boundary conditions in the loss, MPa/mm².
         epochs: Epochs of every run; default 2,000 (short), or 60,000 with --preset paper.
         processes: Runs trained at a time; default: one per core.
+        pictures: Formats of the picture besides PNG (default: none), separated by commas: svg, pdf.
         out: Output folder; default out/gridsearch-DESIGN.
     """
     from compare.gridsearch.search import GridSearch, search_grid
@@ -64,6 +67,7 @@ def gridsearch(
         settings=read_settings(options, epochs),
         out=out or Path("out") / f"gridsearch-{design.name}",
         processes=read_processes(processes),
+        picture_formats=read_formats(pictures),
     )
     physics.check_law([job.solver(point) for point in job.points])
     try:

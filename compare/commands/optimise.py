@@ -4,7 +4,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from compare.commands.options import OptionalOutputPath, read_processes
+from compare.commands.options import OptionalOutputPath, read_formats, read_processes
 
 
 def optimise(
@@ -12,6 +12,7 @@ def optimise(
     *,
     processes: int | None = None,
     scheduler: str | None = None,
+    pictures: str = "",
     out: OptionalOutputPath = None,
 ) -> int:
     """Find the fingers that no other finger beats: the Pareto front of two or three quantities.
@@ -24,6 +25,7 @@ def optimise(
         question: TOML file with objectives, constraints, the ranges of the parameters and the solver.
         processes: Worker processes on this machine; default: one per core.
         scheduler: Address of a Dask scheduler whose workers are used, such as tcp://host:8786; default: none.
+        pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
         out: Output folder; default out/optimum-NAME.
     """
     from compare.optimum.page import front_grid, write_front
@@ -33,6 +35,7 @@ def optimise(
     from compare.runtime.tables import terminal_table
     from compare.sweep.study import TaskMaker
 
+    formats = read_formats(pictures)
     read = load_question(question)
     folder = out or Path("out") / f"optimum-{read.study.name}"
     job = OptimumJob(read, question.parent, folder, read_processes(processes), scheduler)
@@ -40,7 +43,8 @@ def optimise(
         with Stages() as stages:
             found = search_front(job, stages)
             with stages.stage("pictures"):
-                files = write_front(found, TaskMaker(read.study, question.parent), folder, stages.record())
+                maker = TaskMaker(read.study, question.parent)
+                files = write_front(found, maker, folder, stages.record(), formats)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"the same command goes on from what {folder} keeps") from None
     grid = front_grid(found)

@@ -272,6 +272,14 @@ def comma_list(text: str) -> list[str]:
     return [word for part in text.split(",") if (word := part.strip())]
 
 
+def read_formats(text: str) -> list[str]:
+    """Formats of pictures besides PNG, from their names with commas between them."""
+    from compare.figures import check_formats
+
+    check_formats(formats := comma_list(text))
+    return formats
+
+
 def read_processes(processes: int | None) -> int:
     """Processes at a time: as many as there are cores if None."""
     count = cores() if processes is None else processes

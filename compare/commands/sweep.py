@@ -4,7 +4,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from compare.commands.options import OptionalOutputPath, read_processes
+from compare.commands.options import OptionalOutputPath, read_formats, read_processes
 from compare.runtime.exits import NOT_CONVERGED, say
 
 
@@ -13,6 +13,7 @@ def sweep(
     *,
     processes: int | None = None,
     scheduler: str | None = None,
+    pictures: str = "",
     out: OptionalOutputPath = None,
 ) -> int:
     """Solve many fingers: the samples of a study over parameters of design, material and load.
@@ -24,6 +25,7 @@ def sweep(
         study: TOML file with the ranges of the parameters, the sampling and the solver.
         processes: Worker processes on this machine; default: one per core.
         scheduler: Address of a Dask scheduler whose workers are used, such as tcp://host:8786; default: none.
+        pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
         out: Output folder; default out/sweep-NAME.
     """
     from compare.runtime.stages import Stages
@@ -33,6 +35,7 @@ def sweep(
     from compare.sweep.sweep import SweepJob, run_sweep
     from compare.sweep.tables import failure_grid, quantity_grid, write_tables
 
+    formats = read_formats(pictures)
     read = load_study(study)
     folder = out or Path("out") / f"sweep-{read.name}"
     job = SweepJob(read, study.parent, folder, read_processes(processes), scheduler)
@@ -41,7 +44,7 @@ def sweep(
             done = run_sweep(job, stages)
             written = write_tables(done, folder)
             with stages.stage("pictures"):
-                written += write_page(done, TaskMaker(read, study.parent), folder, stages.record())
+                written += write_page(done, TaskMaker(read, study.parent), folder, stages.record(), formats)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"the same command goes on from what {folder} keeps") from None
     quantities, failures = quantity_grid(done), failure_grid(done)

@@ -1,6 +1,7 @@
 """The output files of a cross-validation: numbers, tables, pictures and the report."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ from compare.crossval.charts import draw_fields, draw_held_out, draw_weight_swee
 from compare.crossval.folds import ONE, SeedResults
 from compare.crossval.result import Case, CrossvalResult
 from compare.crossval.tables import grids, write_tables
+from compare.figures import FORMATS
 from compare.runtime.html import template_environment
 from compare.runtime.tables import Cell, write_csv
 from geometry.atomic import write_json, write_text
@@ -30,7 +32,10 @@ def write_results(
     write_tables(out, result, results)
     pictures = {
         truth: [
-            drawn.save(out / f"{name}{'' if len(result.truths) == 1 else '-' + truth}.png")
+            drawn.save(
+                out / f"{name}{'' if len(result.truths) == 1 else '-' + truth}.png",
+                result.study.picture_formats,
+            )
             for name, drawn in each
         ]
         for truth in result.truths
@@ -43,9 +48,13 @@ def write_results(
             for values in zip(*sweep.values(), strict=True)
         ]
         write_csv(out / "l_curve.csv", rows)
-    saved = {path for each in pictures.values() for path in each}
-    for name in (HELD_OUT, FIELDS, SWEEP):
-        for path in {*out.glob(f"{name}.png"), *out.glob(f"{name}-*.png")} - saved:  # of an earlier study
+    kinds = ("png", *result.study.picture_formats)
+    saved = {path.with_suffix(f".{kind}") for each in pictures.values() for path in each for kind in kinds}
+    for name, kind in product((HELD_OUT, FIELDS, SWEEP), ("png", *FORMATS)):
+        for path in {
+            *out.glob(f"{name}.{kind}"),
+            *out.glob(f"{name}-*.{kind}"),
+        } - saved:  # of an earlier study
             path.unlink()
     template = template_environment().get_template("crossval.html.j2")
     html = template.render(result=result, answers=answers(result), grids=grids(result), pictures=pictures)

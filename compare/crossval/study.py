@@ -107,6 +107,7 @@ class Study:
         noise: Standard deviation of a simulated marker's displacement, mm.
         measurements: Marker displacements from elsewhere; None for the virtual experiment.
         processes: Solvers run at a time.
+        picture_formats: Formats of the pictures besides PNG.
     """
 
     design: Finger
@@ -122,6 +123,7 @@ class Study:
     noise: float = 0.005
     measurements: Observations | None = None
     processes: int = field(default_factory=cores)
+    picture_formats: Sequence[str] = ()
 
     @property
     def mesh_file(self) -> Path:

@@ -11,10 +11,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from compare.evaluation.comparison import Comparison
+from geometry.errors import UserError
 from solvers.shared_work import SharedWork
 
 FORMATS = ("svg", "pdf")
 """Formats of pictures for print."""
+
+
+def check_formats(formats: Collection[str]) -> None:
+    """Raise a `UserError` for a format of pictures that there is not."""
+    if unknown := [kind for kind in formats if kind not in FORMATS]:
+        raise UserError(f"there are no pictures as {unknown[0]}; besides PNG there are {', '.join(FORMATS)}")
 
 
 @dataclass(frozen=True)
@@ -56,9 +63,7 @@ def draw_all(
             progress(number / len(DRAWINGS), what)
             if (drawing := draw(comparison)) is None:
                 continue
-            path = drawing.figure.save(folder / f"{name}.png")
-            for kind in formats:
-                drawing.figure.save(folder / f"{name}.{kind}")
+            path = drawing.figure.save(folder / f"{name}.png", formats)
             pictures.append(Picture(path, drawing.title, drawing.caption, drawing.alt))
     progress(1.0, "pictures drawn")
     return pictures

@@ -46,6 +46,7 @@ class GridSearch:
         settings: The other settings of `pinn-std`, its preset `paper` among them.
         out: Output folder; runs that an earlier search with the same settings finished there are reused.
         processes: Runs trained at a time.
+        picture_formats: Formats of the picture besides PNG.
     """
 
     design: Finger
@@ -57,6 +58,7 @@ class GridSearch:
     settings: Mapping[str, object]
     out: Path
     processes: int
+    picture_formats: Sequence[str] = ()
 
     @property
     def points(self) -> list[GridPoint]:
@@ -104,7 +106,7 @@ def search_grid(search: GridSearch, stages: Stages | None = None) -> list[Traini
         with stages.stage("picture"):
             from compare.gridsearch.chart import draw_grid
 
-            draw_grid(runs=runs).save(search.out / "gridsearch.png")
+            draw_grid(runs=runs).save(search.out / "gridsearch.png", search.picture_formats)
         best = best_of(runs)
         write_json(
             search.out / "gridsearch.json",

@@ -1,5 +1,6 @@
 """The page of a search: the front, its fingers, and a design file for each."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -47,7 +48,9 @@ class FrontFiles:
     designs: list[Path]
 
 
-def write_front(optimum: Optimum, maker: TaskMaker, folder: Path, record: dict[str, Any]) -> FrontFiles:
+def write_front(
+    optimum: Optimum, maker: TaskMaker, folder: Path, record: dict[str, Any], formats: Collection[str] = ()
+) -> FrontFiles:
     """Write the table, design files, pictures and page of a front, and return the paths.
 
     Args:
@@ -55,6 +58,7 @@ def write_front(optimum: Optimum, maker: TaskMaker, folder: Path, record: dict[s
         maker: Makes the tasks of its fingers.
         folder: Where to write.
         record: Start, durations and machine, from `Stages.record`.
+        formats: Of the pictures besides PNG.
     """
     tasks = {run: maker.task(run, optimum.fingers[run]) for run in optimum.front}
     designs = [
@@ -74,7 +78,7 @@ def write_front(optimum: Optimum, maker: TaskMaker, folder: Path, record: dict[s
         ),
         "growth": (draw_growth(optimum), "Hypervolume of the front over the number of runs."),
     }
-    pictures = {each.save(folder / f"{name}.png"): text for name, (each, text) in drawn.items()}
+    pictures = {each.save(folder / f"{name}.png", formats): text for name, (each, text) in drawn.items()}
     page = (
         template_environment()
         .get_template("designs.html.j2")

@@ -1,5 +1,6 @@
 """The page of a sweep: summary, tables and pictures in one HTML file."""
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,9 @@ FILES = (
 SAMPLED = {"grid": "on a grid", "latin": "of a Latin hypercube", "sobol": "of a Sobol sequence"}
 
 
-def write_page(sweep: Sweep, maker: TaskMaker, folder: Path, record: dict[str, Any]) -> list[Path]:
+def write_page(
+    sweep: Sweep, maker: TaskMaker, folder: Path, record: dict[str, Any], formats: Collection[str] = ()
+) -> list[Path]:
     """Write the pictures and the page, and return the paths.
 
     Args:
@@ -29,6 +32,7 @@ def write_page(sweep: Sweep, maker: TaskMaker, folder: Path, record: dict[str, A
         maker: Makes the fingers of its samples.
         folder: Where to write.
         record: Start, durations and machine, from `Stages.record`.
+        formats: Of the pictures besides PNG.
     """
     pictures: dict[Path, str] = {}
     found = sensitivities(sweep, SHOWN)
@@ -42,7 +46,7 @@ def write_page(sweep: Sweep, maker: TaskMaker, folder: Path, record: dict[str, A
         }
         if found:
             drawn["sensitivity"] = (draw_sensitivity(found), sensitivity_caption(found))
-        pictures = {each.save(folder / f"{name}.png"): text for name, (each, text) in drawn.items()}
+        pictures = {each.save(folder / f"{name}.png", formats): text for name, (each, text) in drawn.items()}
     failures = failure_grid(sweep)
     page = (
         template_environment()

@@ -94,6 +94,7 @@ BAD = [
     ("compare --solvers fen", r"no solver is called 'fen'; did you mean 'fem'\?"),  # near match
     ("compare --solvers comsol", r"no solver is called 'comsol' \(there are: fem, "),  # nothing near
     ("compare --solvers ,", "no solver was asked for"),
+    ("sweep ribs.toml --pictures eps", "there are no pictures as eps; besides PNG there are svg, pdf"),
     ("compare --design slendr", "there is no design 'slendr'; the presets are default, "),
     ("compare --design absent.toml", "there is no design file absent.toml"),
     # designs

@@ -389,7 +389,8 @@ def run(line: str, out: Path) -> int:
 @pytest.mark.slow
 def test_the_command_writes_what_the_guide_says_and_goes_on(tmp_path, capsys, in_line, monkeypatch):
     line = "--solvers fem,gp,fem-asm --schemes tip-out --solver-set fem-asm.choose=given"
-    assert run(f"{line} --seeds 1", tmp_path / "out") == 0
+    assert run(f"{line} --seeds 1 --pictures pdf", tmp_path / "out") == 0
+    assert {path.name for path in (tmp_path / "out").glob("*.pdf")} == {"fields.pdf", "l_curve.pdf"}
     said = " ".join(capsys.readouterr().out.split())
     assert (
         "tip-out: the third of the markers nearest the tip held out together; simulated markers, mm" in said
@@ -405,6 +406,7 @@ def test_the_command_writes_what_the_guide_says_and_goes_on(tmp_path, capsys, in
     assert any("von Mises stress" in sentence for sentence in stresses)
 
     assert run(f"{line} --seeds 2", tmp_path / "out") == 0
+    assert not [*(tmp_path / "out").glob("*.pdf")]  # of the earlier study
     content = json.loads((tmp_path / "out" / "crossval.json").read_text())
     solvers = content["truths"]["sliding"]["layouts"]["joints"]["solvers"]
     against = solvers["fem-asm"]["against"]["fem"]["tip-out"]

@@ -143,9 +143,11 @@ def test_the_command_finds_a_front_of_real_fingers(
         encoding="utf-8",
     )
     out = tmp_path / "out"
-    assert main(["optimise", str(path), "--out", str(out), "--processes", "1"]) == 0
+    line = ["optimise", str(path), "--out", str(out), "--processes", "1", "--pictures", "svg"]
+    assert main(line) == 0
     assert "Fingers on the front" in capsys.readouterr().out
     assert (out / "front.html").read_text(encoding="utf-8").count("<img alt=") == 3
+    assert {path.name for path in out.glob("*.svg")} == {"front.svg", "fingers.svg", "growth.svg"}
     designs = sorted((out / "front").glob("*.toml"))
     assert all(load_design(design).rib_thickness >= 1.0 for design in designs)
     rows = (out / "front.csv").read_text(encoding="utf-8").splitlines()
