@@ -36,6 +36,7 @@ BENCHMARKS = {
     "sweep": "sweeping",
     "predict": "emulators",
     "optimise": "fronts",
+    "reliability": "reliability.document",
 }
 """Names and modules; the modules' docstrings have descriptions and times."""
 
@@ -43,7 +44,7 @@ WIDEST = 400
 """Columns of the widest table."""
 SHORT = ("fem", "pinn")
 TIMED = ("deepxde", "recipes", "paper", "trained")
-ROWED = ("stress",)
+ROWED = ("stress", "reliability")
 
 
 def show(table: RenderableType, console: Console | None = None) -> None:

@@ -6,17 +6,20 @@ the process, and NumPy prints a traceback. Their bytes are made in memory and wr
 
 import json
 import os
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from errno import EDQUOT, EFBIG, EIO, ENOSPC
 from io import BytesIO
 from math import isfinite
 from pathlib import Path
-from threading import get_native_id
+from secrets import token_hex
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+_PARTIAL = re.compile(r"\..+\.[0-9a-f]{8}\.partial(\.[^.]*)?")
 
 
 @contextmanager
@@ -27,7 +30,8 @@ def atomic_path(path: Path) -> Iterator[Path]:
         OSError: With `path` as its file name: if the disk is full, or the block has written nothing.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.stem}.{get_native_id()}.partial{path.suffix}")  # unique to a thread
+    # Unique: process numbers are not among containers that share a folder.
+    partial = path.with_name(f".{path.stem}.{token_hex(4)}.partial{path.suffix}")
     try:
         yield partial
         if not partial.exists() or not partial.stat().st_size:
@@ -39,6 +43,18 @@ def atomic_path(path: Path) -> Iterator[Path]:
         raise
     finally:
         partial.unlink(missing_ok=True)
+
+
+def is_partial(path: Path) -> bool:
+    """Whether a file was made by `atomic_path` and has not taken its place."""
+    return _PARTIAL.fullmatch(path.name) is not None
+
+
+def remove_partials(folder: Path) -> None:
+    """Remove the files that killed processes have left in a folder; no other process may write to it."""
+    for path in folder.rglob(".*.partial*"):
+        if is_partial(path):
+            path.unlink(missing_ok=True)
 
 
 def write_bytes(path: Path, content: bytes) -> None:

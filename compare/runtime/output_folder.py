@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from geometry.atomic import write_json
+from geometry.atomic import remove_partials, write_json
 from geometry.content_hash import file_digest
 from geometry.errors import UserError
 
@@ -80,17 +80,18 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
                 "folder with --out"
             )
         (partial / MARK).touch()
+        _restore(out)
         _clear(partial, keep)
         try:
             yield partial
         except BaseException:
             if not any([*partial.glob(f"{SOLUTIONS}/*.npz"), *partial.glob(f"{TRAINING}/*/*")]):
-                shutil.rmtree(partial, ignore_errors=True)
+                with suppress(OSError):
+                    _discard(partial)
                 for folder in missing:
                     with suppress(OSError):  # in use by another program
                         folder.rmdir()
             raise
-        (partial / MARK).unlink()
         _take_place(partial, out)
 
 
@@ -110,25 +111,59 @@ def take_training(name: str, source: Path, target: Path) -> None:
     if left != place:
         shutil.rmtree(place, ignore_errors=True)
         if left.is_dir():
-            shutil.copytree(left, place)
+            copy = place.with_name(f".{name}.copy")  # whole or not there, whenever the process is killed
+            shutil.rmtree(copy, ignore_errors=True)
+            shutil.copytree(left, copy)
+            copy.replace(place)
 
 
 def _take_place(partial: Path, out: Path) -> None:
-    previous = out.with_name(f".{out.name}.previous")
+    """Replace the output folder; the mark goes last, so that what a kill leaves is known as a run's."""
+    previous = _previous(out)
     if previous.exists():
         if not (previous / MARK).exists():
             raise UserError(f"{previous} would be replaced, but no run has left it; move it")
-        shutil.rmtree(previous)  # of a run that was killed right here
+        _discard(previous)  # of a run that was killed right here
     try:
         if out.exists():
             (out / MARK).touch()
             out.replace(previous)
         partial.replace(out)
     except OSError as error:
+        with suppress(OSError):
+            _restore(out)
+        with suppress(OSError):
+            (partial / MARK).unlink()  # no later run may clear it
         raise UserError(
             f"cannot replace {out} ({error.strerror}); the complete result is in {partial}"
         ) from None
-    shutil.rmtree(previous, ignore_errors=True)
+    (out / MARK).unlink(missing_ok=True)
+    if previous.exists():
+        with suppress(OSError):
+            _discard(previous)
+
+
+def _previous(out: Path) -> Path:
+    """Place of the last result for the moment in which the new one takes its name."""
+    return out.with_name(f".{out.name}.previous")
+
+
+def _restore(out: Path) -> None:
+    """Give the last result its name back, if a run ended between the two renames."""
+    previous = _previous(out)
+    if out.exists() or not (previous / MARK).exists():
+        return
+    if all((previous / name).is_file() for name in _written(previous) or {RUN_FILE}):
+        previous.replace(out)
+        (out / MARK).unlink()
+
+
+def _discard(folder: Path) -> None:
+    """Remove a folder that carries the mark; the mark goes last."""
+    for path in folder.iterdir():
+        if path.name != MARK:
+            _remove(path)
+    shutil.rmtree(folder)
 
 
 def _written(out: Path) -> set[str] | None:
@@ -153,7 +188,7 @@ def _clear(partial: Path, keep: Collection[str]) -> None:
 
 
 def _remove(path: Path) -> None:
-    if path.is_dir():
+    if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:
         path.unlink()
@@ -161,16 +196,21 @@ def _remove(path: Path) -> None:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Lock the folder against a second run; the lock ends with the process."""
+    """Lock the folder against a second run; the lock ends with the process.
+
+    Files that a killed run has half written are removed.
+    """
+    busy = UserError(f"another run is writing to {folder}; wait for it, or name another folder with --out")
     handle = os.open(folder, os.O_RDONLY)
     try:
         with suppress(OSError):  # some network file systems have no locks
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                raise UserError(
-                    f"another run is writing to {folder}; wait for it, or name another folder with --out"
-                ) from None
+                raise busy from None
+        if not folder.exists() or not os.path.samestat(os.fstat(handle), folder.stat()):
+            raise busy  # it has just given the folder its final name
+        remove_partials(folder)
         yield
     finally:
         os.close(handle)

@@ -8,6 +8,7 @@ from typing import Any
 from pydantic_core import to_jsonable_python
 
 from compare.runtime.provenance import package_versions, sources_digest
+from geometry.atomic import is_partial
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
@@ -51,7 +52,7 @@ def check_resumable_folder(
     out = file.parent
     if out.exists() and not out.is_dir():
         raise UserError(f"{out} is a file; name a folder with --out")
-    if not out.exists() or not any(out.iterdir()):
+    if not out.exists() or all(is_partial(path) for path in out.iterdir()):
         return
     try:
         before = _flat(json.loads(file.read_text(encoding="utf-8")))

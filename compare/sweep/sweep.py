@@ -1,6 +1,7 @@
 """Run a study: every sample once, whatever happens to the workers or to the program."""
 
 from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -81,8 +82,9 @@ def run_sweep(job: SweepJob, stages: Stages | None = None) -> Sweep:
     free = {"study.samples"} if job.study.sampling == "sobol" else set()  # which may be continued
     check_resumable_folder(job.out / STUDY_FILE, definition, job="sweep", free=free)
     job.out.mkdir(parents=True, exist_ok=True)
-    with locked(job.out), opened(job.out / JOURNAL) as journal:
-        write_json(job.out / STUDY_FILE, definition)
+    with locked(job.out), ExitStack() as stack:
+        write_json(job.out / STUDY_FILE, definition)  # first: a folder without it is taken for someone's
+        journal = stack.enter_context(opened(job.out / JOURNAL))
         journal.forget("failed")
         with stages.stage("samples") as progress, Workers(job.processes, job.scheduler) as workers:
             finish(tasks, journal, workers, progress)

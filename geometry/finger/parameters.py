@@ -199,7 +199,10 @@ def _sentence(problem: ErrorDetails, model: type[BaseModel]) -> str:
         return unknown_parameter(name, model)
     titled = title(name, model)
     if kind in ("greater_than_equal", "less_than_equal"):
-        given = with_unit(float(value), name, model)
+        try:
+            given = with_unit(float(value), name, model)
+        except OverflowError:
+            given = reprlib.repr(value)
         return f"{titled} = {given} is outside its range, {_bounds(name, model)}"
     titled = f"{titled} = {' '.join(reprlib.repr(value).split())}"  # an array's text has several lines
     if kind in ("int_from_float", "int_parsing", "int_type"):

@@ -1,12 +1,15 @@
 """The output folder: replaced as a whole or not at all, and only where nothing else would be lost."""
 
 import json
+import os
+import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
-from compare.runtime.output_folder import MARK, check_output, replaced_folder, take_training
+from compare.runtime.output_folder import MARK, check_output, locked, replaced_folder, take_training
 from geometry.errors import UserError
 
 
@@ -213,3 +216,116 @@ def test_the_folder_that_one_stands_in_is_not_pulled_away(out, monkeypatch, insi
     monkeypatch.chdir(out / inside)
     with pytest.raises(UserError, match="cannot run inside it"):
         check_output(out)
+
+
+class Killed(BaseException):
+    """Stands for the end of the process: nothing after it has an effect on files."""
+
+
+def killed_before(
+    change: str, number: int, block: Callable[[], object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Run a block whose process ends before a change of files of some kind, counted from 1."""
+    changes = {name: getattr(os, name) for name in ("unlink", "rename", "replace", "rmdir", "mkdir")}
+    done = dict.fromkeys(changes, 0)
+    ended = False
+
+    def counted(name: str) -> Callable[..., object]:
+        def call(*arguments: object, **named: object) -> object:
+            nonlocal ended
+            done[name] += 1
+            ended = ended or (name == change and done[name] == number)
+            if ended:
+                raise Killed
+            return changes[name](*arguments, **named)
+
+        return call
+
+    with monkeypatch.context() as patched, suppress(Killed):
+        for name in changes:
+            patched.setattr(os, name, counted(name))
+        block()
+    assert ended, "the change was not reached"
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_a_run_that_is_killed_while_it_replaces_the_last_result_does_not_bar_the_next(
+    out, monkeypatch, number
+):
+    """The last result is removed file by file, and its mark must not be among the first."""
+    (out / MARK).touch()
+    killed_before("unlink", number, lambda: attempt(out), monkeypatch)
+    attempt(out)
+    assert tree(out.parent) == {"run/report.html": "new report"}
+
+
+@pytest.mark.parametrize("number", [1, 2], ids=["first", "second"])
+def test_a_run_that_is_killed_at_one_of_the_two_renames_leaves_a_result_under_its_name(
+    out, monkeypatch, number
+):
+    """Of the runs that go on, one that fails must not lose the last result either."""
+    before = tree(out)
+    killed_before("replace", number, lambda: attempt(out), monkeypatch)
+    with pytest.raises(RuntimeError):
+        attempt(out, error=RuntimeError())
+    assert tree(out) == before
+    attempt(out)
+    assert tree(out.parent) == {"run/report.html": "new report"}
+
+
+def test_a_rename_that_fails_leaves_the_last_result_under_its_name(out, monkeypatch):
+    before, rename, calls = tree(out), os.rename, []
+
+    def second_fails(source: Path, target: Path) -> None:
+        calls.append(target)
+        if len(calls) == 2:
+            raise OSError(5, "Input/output error")
+        rename(source, target)
+
+    monkeypatch.setattr(os, "rename", second_fails)
+    monkeypatch.setattr(os, "replace", second_fails)
+    with pytest.raises(UserError, match="cannot replace"):
+        attempt(out)
+    assert tree(out) == before
+
+
+def test_a_copy_of_a_training_that_is_cut_off_does_not_pass_for_one(out, tmp_path, monkeypatch):
+    """Its solver would go on from half a checkpoint."""
+    (out / "training" / "pinn-std").mkdir(parents=True)
+    (out / "training" / "pinn-std" / "checkpoint").write_text("finished")
+
+    def cut_off(source: Path, target: Path) -> None:
+        target.mkdir(parents=True)
+        (target / "checkpoint").write_text("fin")
+        raise Killed
+
+    with monkeypatch.context() as patched, suppress(Killed):
+        patched.setattr(shutil, "copytree", cut_off)
+        take_training("pinn-std", out, tmp_path)
+    assert not (tmp_path / "training" / "pinn-std").exists()
+    take_training("pinn-std", out, tmp_path)
+    assert (tmp_path / "training" / "pinn-std" / "checkpoint").read_text() == "finished"
+
+
+def test_a_folder_that_has_just_got_its_final_name_is_not_locked_as_the_unfinished_one(tmp_path, monkeypatch):
+    """The second run opened it under the old name; a third one would make that anew and lock it too."""
+    partial, opened = tmp_path / "run.partial", os.open
+    partial.mkdir()
+
+    def slow(path: Path, flags: int) -> int:
+        handle = opened(path, flags)
+        partial.rename(tmp_path / "run")
+        partial.mkdir()
+        return handle
+
+    monkeypatch.setattr(os, "open", slow)
+    with pytest.raises(UserError, match="another run is writing"), locked(partial):
+        pass
+
+
+def test_files_that_a_killed_run_has_half_written_are_removed(tmp_path):
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / ".result.0123abcd.partial.json").write_text("{")
+    (tmp_path / "notes.partial.txt").write_text("mine")
+    with locked(tmp_path):
+        assert tree(tmp_path) == {"notes.partial.txt": "mine"}

@@ -68,3 +68,13 @@ def test_a_full_disk_names_the_file_and_leaves_the_old_one(
         write(path)
     assert (error.value.errno, error.value.filename) == (errno.EFBIG, str(path))
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_two_processes_of_one_number_do_not_write_the_same_file(tmp_path: Path) -> None:
+    """As those of two containers, each with numbers of its own, on one volume."""
+    path = tmp_path / "mesh.npz"
+    with atomic_path(path) as ours, atomic_path(path) as theirs:
+        assert ours != theirs
+        ours.write_text("ours")
+        theirs.write_text("theirs")
+    assert path.read_text() == "ours"

@@ -185,3 +185,9 @@ def test_advice_never_promises_a_range_that_breaks_another_rule() -> None:
         for value in (start, stop):
             if value is not None:
                 assert obeys(bad.model_copy(update={name: value}))
+
+
+@pytest.mark.parametrize("name", ["marker_count", "rib_thickness"])
+def test_a_whole_number_with_more_digits_than_a_float_can_have_is_refused(name: str) -> None:
+    """Its size cannot be printed with the usual format."""
+    assert "\n" not in message_of({name: 10**400})

@@ -179,6 +179,11 @@ def test_derivatives_are_those_of_differences(camera):
         ("%YAML:1.0\n- 1\n", "it is not JSON or YAML as OpenCV writes it"),  # a list has no keys
         ('{"a": ' + "[" * 100_000 + "]" * 100_000 + "}", "it is nested too deeply"),  # ends OpenCV's reader
         ("%YAML:1.0\n---\na: " + "[" * 100_000 + "]" * 100_000, "it is nested too deeply"),
+        # its table of keys is broken, which OpenCV finds when it looks for the second one
+        (
+            f"%YAML:1.0\n---\nimage_width: 6{53 * '5'}40\nimag2_height: 480\nfisheye_model:%YA 0",
+            "it is not JSON or YAML as OpenCV writes it",
+        ),
     ],
 )
 def test_a_file_that_opencv_cannot_take_is_one_line(tmp_path, content, said):

@@ -66,13 +66,22 @@ def load_camera(path: Path) -> Camera:
         if _depth(text) > DEEPEST:  # OpenCV's reader ends the process
             raise UserError(f"cannot read the camera {path}: it is nested too deeply")
         storage = cv2.FileStorage(text, cv2.FileStorage_READ | cv2.FileStorage_MEMORY)
-        storage.getNode("image_width")  # fails unless the file has keys
+        return _camera(storage, path)  # OpenCV finds some faults only where it looks for a key
     except OSError as error:
         raise UserError(f"cannot read the camera {path}: {error.strerror}") from None
     except (UnicodeDecodeError, cv2.error, SystemError):
         raise UserError(
             f"cannot read the camera {path}: it is not JSON or YAML as OpenCV writes it"
         ) from None
+
+
+def check_format(path: Path) -> None:
+    """Raise `UserError` unless the suffix is one of `FORMATS`."""
+    if path.suffix.lower() not in FORMATS:
+        raise UserError(f"{path}: a camera is written as {', '.join(FORMATS)}; give a name that ends so")
+
+
+def _camera(storage: cv2.FileStorage, path: Path) -> Camera:
     width, height = (_number(storage, name, path) for name in ("image_width", "image_height"))
     matrix = _matrix(storage, "camera_matrix", path, sizes=(9,)).reshape(3, 3)
     model = "fisheye" if storage.getNode("fisheye_model").real() else "brown"
@@ -85,12 +94,6 @@ def load_camera(path: Path) -> Camera:
         return replace(camera, covariance=_covariance(storage, len(camera.intrinsic_names), path))
     except UserError as error:
         raise UserError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
-
-
-def check_format(path: Path) -> None:
-    """Raise `UserError` unless the suffix is one of `FORMATS`."""
-    if path.suffix.lower() not in FORMATS:
-        raise UserError(f"{path}: a camera is written as {', '.join(FORMATS)}; give a name that ends so")
 
 
 def _content(camera: Camera) -> dict[str, Entry]:

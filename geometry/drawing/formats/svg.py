@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator
 from math import inf
 from pathlib import Path
 from typing import Any
-from xml.etree.ElementTree import ParseError
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import svgelements
@@ -19,6 +19,10 @@ from geometry.errors import UserError
 LENGTHS = {**UNITS, "": 25.4 / 96, "px": 25.4 / 96, "pt": 25.4 / 72, "pc": 25.4 / 6}
 """Units of `width` and `height`, mm; a number without one is in pixels."""
 
+MOST_ELEMENTS = 100_000
+"""Elements of a drawing, those that are copied by `use` counted as often as they are."""
+
+LINK = "{http://www.w3.org/1999/xlink}href"
 INKSCAPE_LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 
 
@@ -38,9 +42,12 @@ def read_svg(path: Path, units: str | None = None) -> Drawing:
     """
     digest = sha256_of(path)
     try:
+        _check_copies(ET.parse(path).getroot(), path.name)
         parsed = svgelements.SVG.parse(str(path), reify=False)
-    except (OSError, ParseError, ValueError, UnicodeDecodeError) as error:
+    except (OSError, ET.ParseError, ValueError, UnicodeDecodeError) as error:
         raise UserError(f"cannot read {path.name} as SVG: {error}") from None
+    except RecursionError:
+        raise UserError(f"cannot read {path.name} as SVG: it is nested too deeply") from None
     _check_view_box(parsed, path.name)
     back = ~svgelements.Matrix(parsed.viewbox_transform or "")
     unit = UNITS[units] if units else _unit(parsed, path.name)
@@ -56,6 +63,27 @@ def read_svg(path: Path, units: str | None = None) -> Drawing:
     return marks.drawing(
         pieces, digest, note=f"SVG, {unit:.6g} mm in a user unit{' (given)' if units else ''}"
     )
+
+
+def _check_copies(root: ET.Element, file: str) -> None:
+    """Refuse elements that contain themselves, and copies of copies whose number grows without limit."""
+    by_id = {f"#{element.get('id')}": element for element in root.iter()}
+    sizes: dict[ET.Element, float] = {}
+
+    def size(element: ET.Element) -> float:
+        if element not in sizes:
+            sizes[element] = inf  # while it is open, that is, if it contains itself
+            copied = by_id.get(element.get("href", element.get(LINK, ""))) if _is_copy(element) else None
+            sizes[element] = 1 + sum(map(size, element)) + (0 if copied is None else size(copied))
+        return sizes[element]
+
+    if (count := size(root)) > MOST_ELEMENTS:
+        what = "an element contains itself" if count == inf else f"its copies make {count:.0f} elements"
+        raise UserError(f"cannot read {file} as SVG: {what}; draw each curve once")
+
+
+def _is_copy(element: ET.Element) -> bool:
+    return isinstance(element.tag, str) and element.tag.rpartition("}")[2] == "use"
 
 
 def _check_view_box(parsed: Any, file: str) -> None:

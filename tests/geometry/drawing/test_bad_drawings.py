@@ -115,6 +115,20 @@ def test_a_coordinate_must_be_a_number(tmp_path):
         load_drawing(path)
 
 
+def test_an_element_that_contains_itself_is_one_line(tmp_path):
+    path = write_svg(tmp_path / "a.svg", '<g id="a"><use href="#a"/></g>')
+    with pytest.raises(UserError, match=r"a\.svg as SVG: an element contains itself"):
+        load_drawing(path)
+
+
+def test_copies_of_copies_are_counted_before_they_are_made(tmp_path):
+    """Thirty lines would make a thousand million rectangles."""
+    levels = "".join(f'<g id="g{n + 1}">{2 * f"""<use href="#g{n}"/>"""}</g>' for n in range(30))
+    path = write_svg(tmp_path / "a.svg", f'<g id="g0"><rect width="9" height="3"/></g>{levels}')
+    with pytest.raises(UserError, match=r"a\.svg as SVG: its copies make \d+ elements"):
+        load_drawing(path)
+
+
 def test_a_step_file_that_was_cut_off_is_one_line(tmp_path):
     """OpenCASCADE prints about it to the standard output, on which the child process answers."""
     path = tmp_path / "cut.stp"

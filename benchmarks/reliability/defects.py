@@ -1,0 +1,72 @@
+"""The defects that faults, random input and mutants have shown, each with the test that guards its mend."""
+
+DEFECTS = (
+    (
+        "kill",
+        "Between the removal of its mark and its rename a finished folder barred every later run.",
+        "`test_output_folder.py`, two renames",
+    ),
+    (
+        "reading",
+        "While the last result was removed, its mark went first: every later run was refused.",
+        "`test_output_folder.py`, replaces the last result",
+    ),
+    (
+        "kill",
+        "Between the two renames the last result was left under a hidden name, and a later run that failed "
+        "did not give it back.",
+        "`test_output_folder.py`, two renames",
+    ),
+    (
+        "reading",
+        "Where the second rename failed, so did the last result: it stayed under a hidden name.",
+        "`test_output_folder.py`, a rename that fails",
+    ),
+    (
+        "reading",
+        "A training that was being taken over from an earlier run, cut off, passed for the whole one.",
+        "`test_output_folder.py`, a copy of a training",
+    ),
+    (
+        "reading",
+        "A sweep killed before it had written its definition left a journal, and its folder was refused.",
+        "`test_resumable_folder.py`",
+    ),
+    (
+        "reading",
+        "A search, sweep or cross-validation killed while it wrote its definition was refused, too.",
+        "`test_resumable_folder.py`",
+    ),
+    (
+        "reading",
+        "Two runs in containers, whose processes have equal numbers, wrote the same temporary file of a "
+        "cache that they shared.",
+        "`test_atomic.py`, two processes",
+    ),
+    (
+        "reading",
+        "A run that opened an unfinished folder in the moment it got its final name held no lock.",
+        "`test_output_folder.py`, its final name",
+    ),
+    (
+        "random input",
+        "A whole number of hundreds of digits, given from Python, ended with an `OverflowError`.",
+        "`test_design.py`, more digits",
+    ),
+    (
+        "fuzzing",
+        "A camera file whose table of keys was broken ended with an error of OpenCV.",
+        "`test_camera.py`, one line",
+    ),
+    (
+        "fuzzing",
+        "An SVG element that contained itself ended with a `RecursionError`.",
+        "`test_bad_drawings.py`, contains itself",
+    ),
+    (
+        "fuzzing",
+        "An SVG file of thirty lines with copies of copies took all time and memory.",
+        "`test_bad_drawings.py`, copies of copies",
+    ),
+)
+"""Found by, what happened, test."""

@@ -1,0 +1,111 @@
+"""Faults at every change of a file, random and mutated input; writes `benchmarks/reliability.md`.
+
+Each command runs in a forked process whose changes of files are counted. Then it runs again for each,
+with a fault there: killed before it, killed in the middle of a write, a disk that is full from there on, one
+failed call. The same command goes on and must give the numbers of the undisturbed run to the bit. x86-64
+Linux only. `--rows compare` makes the rows of the jobs with this word in their names; all take two hours.
+"""
+
+import os
+import platform
+from collections import Counter
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # one thread: numbers are to agree to the bit
+
+from rich.table import Table
+
+from benchmarks.reliability.defects import DEFECTS
+from benchmarks.reliability.faults import Row, run_faults
+from benchmarks.reliability.jobs import JOBS
+from geometry.atomic import write_text
+
+PAGE = Path(__file__).parents[1] / "reliability.md"
+HEADER = ("job", "points", "killed", "torn write", "full disk", "failed call", "as promised", "left over")
+
+
+def main(rows: str = "") -> Table:
+    """Run the trials of the jobs with one of the words, write the page and return its table."""
+    found = run_faults(rows.split(",") if rows else ())
+    write_text(PAGE, page(found))
+    table = Table(*HEADER, title="faults")
+    for cells in fault_rows(found):
+        table.add_row(*cells)
+    return table
+
+
+def page(rows: Sequence[Row]) -> str:
+    """The page of all results that are kept."""
+    return "\n".join([*_faults(rows), *_defects()])
+
+
+def fault_rows(rows: Sequence[Row]) -> list[tuple[str, ...]]:
+    """A row of the table for each job, and the sum."""
+    jobs = [job.name for job in JOBS if any(row.job == job.name for row in rows)]
+    groups = {name: [row for row in rows if row.job == name] for name in jobs}
+    return [_counted(name, group) for name, group in {**groups, "all": list(rows)}.items()]
+
+
+def _counted(name: str, rows: Sequence[Row]) -> tuple[str, ...]:
+    kinds = Counter(row.kind for row in rows)
+    return (
+        name,
+        str(len({(row.job, row.at) for row in rows})),
+        *(str(kinds[kind]) for kind in ("kill", "torn", "ENOSPC", "EIO")),
+        str(sum(not row.faults for row in rows)),
+        str(sum(bool(row.leftovers) for row in rows)),
+    )
+
+
+def _faults(rows: Sequence[Row]) -> list[str]:
+    wrong = [row for row in rows if row.faults]
+    return [
+        "# Reliability",
+        "",
+        "## Faults at every change of a file",
+        "",
+        f"`make bench ARGS=reliability`: {platform.machine()}, Python {platform.python_version()}, numpy "
+        f"{version('numpy')}, one thread.",
+        "",
+        "A *point* is a system call that changes a file in the output folder, in what stands in for it while "
+        "it is made, or in the cache: `write`, `rename`, `unlink`, `mkdir`, `ftruncate`, `fsync` and their "
+        "relatives, of the command, its libraries and its child processes; of a series of equal calls on one "
+        "file the first, the middle and the last. The kernel stops the command there (seccomp), and it is "
+        "*killed*; or killed after half of a *torn write*; or the *disk is full* from there on; or this one "
+        "*call fails* with EIO. *As promised*:",
+        "",
+        "- after a kill no process is left, and no file is in part under its final name, nor in the cache;",
+        "- an output folder that is replaced as a whole is the last result or the new one;",
+        "- after an error the command ends with code 2 and one line, or, if it is in the cache, goes on;",
+        "- the same command, `compare` with `--resume`, then ends well, with the numbers of an undisturbed "
+        "run to the bit: every JSON, CSV, array and VTU file without its times, every row of the journal.",
+        "",
+        "*Left over*: trials after which temporary files remain, all of them in the cache. Pictures of "
+        "`compare` are blank here, which changes no file but the PNGs. Meshes are coarse (4 mm).",
+        "",
+        *_table(HEADER, fault_rows(rows), left=1),
+        "",
+        *([f"{len(wrong)} of {len(rows)} trials are not as promised:", ""] if wrong else []),
+        *(f"- {row.job}, {row.kind} at {row.call} {row.path}: {row.faults}" for row in wrong),
+        *([""] if wrong else []),
+        "Every trial is a row of `benchmarks/reliability/faults.csv`.",
+        "",
+    ]
+
+
+def _defects() -> list[str]:
+    return [
+        "## Defects found and mended",
+        "",
+        "Each has a test that failed before.",
+        "",
+        *_table(("found by", "what happened", "test"), DEFECTS, left=3),
+        "",
+    ]
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]], left: int) -> list[str]:
+    rule = ["---"] * left + ["---:"] * (len(header) - left)
+    return [f"| {' | '.join(cells)} |" for cells in (header, rule, *rows)]

@@ -1,0 +1,109 @@
+"""The trials of all jobs: run, kept as a table, and counted."""
+
+import csv
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+from unittest.mock import patch
+
+from benchmarks.reliability.jobs import CACHE, FEM, JOBS, started
+from benchmarks.reliability.supervision import KINDS
+from benchmarks.reliability.trials import Trial, faults, trials, undisturbed
+from geometry.atomic import write_text
+
+ROWS = Path(__file__).with_name("faults.csv")
+SEPARATOR = " | "
+
+
+class Row(NamedTuple):
+    """A trial as it is kept; what went wrong and what was left over with `SEPARATOR` between."""
+
+    job: str
+    kind: str
+    at: int
+    call: str
+    path: str
+    code: int
+    faults: str
+    leftovers: str
+
+
+def run_faults(words: Collection[str] = ()) -> list[Row]:
+    """Run the trials of the jobs with one of the words in their names, or of all, and keep their rows."""
+    asked = [job for job in JOBS if not words or any(word in job.name for word in words)]
+    kept = [row for row in kept_rows() if row.job not in {job.name for job in asked}]
+    with tempfile.TemporaryDirectory(prefix="reliability-") as name, _cheap_pictures():
+        folder = Path(name)
+        _fill(folder)
+        for job in asked:
+            place = folder / "job"
+            expected = undisturbed(job, place, folder / CACHE)
+            which = faults(expected)
+            step = -(-len(which) // (job.most or len(which)))
+            for done in trials(job, expected, which[::step], place):
+                kept.append(_row(done))
+                print(*kept[-1], sep="  ", file=sys.stderr, flush=True)
+                write_rows(kept)
+            shutil.rmtree(place)
+    return kept
+
+
+def kept_rows() -> list[Row]:
+    """The trials as they were kept."""
+    if not ROWS.exists():
+        return []
+    with ROWS.open(encoding="utf-8", newline="") as file:
+        return [
+            Row(job, kind, int(at), call, path, int(code), *rest)
+            for job, kind, at, call, path, code, *rest in list(csv.reader(file))[1:]
+        ]
+
+
+def write_rows(rows: Sequence[Row]) -> None:
+    """Keep the trials, by job."""
+    order = {job.name: number for number, job in enumerate(JOBS)}
+    lines = [Row._fields, *sorted(rows, key=lambda row: (order[row.job], KINDS.index(row.kind), row.at))]
+    text = [",".join(f'"{cell}"' if "," in str(cell) else str(cell) for cell in line) for line in lines]
+    write_text(ROWS, "\n".join(text) + "\n")
+
+
+def _row(trial: Trial) -> Row:
+    said = [
+        SEPARATOR.join(texts).replace('"', "'").replace("\n", " ")
+        for texts in (trial.faults, trial.leftovers)
+    ]
+    return Row(
+        *(trial.job, trial.fault.kind, trial.fault.at, trial.point.call, trial.point.path, trial.code),
+        *said,
+    )
+
+
+def _fill(folder: Path) -> None:
+    """Fill a cache, in a process of its own, and import in this one what its forks need."""
+    if (ending := started(FEM, folder)).code:
+        raise RuntimeError(ending.text)
+    from compare.cli import main
+
+    with patch.dict(os.environ, PINNRAY_CACHE=str(folder / CACHE)):
+        main([each.replace("FOLDER", str(folder)) for each in FEM])
+    shutil.rmtree(folder / "out")
+
+
+@contextmanager
+def _cheap_pictures() -> Iterator[None]:
+    """Let the pictures of a comparison be blank: the same files, a tenth of the time."""
+    from compare.figures import gallery
+    from geometry.figure import Figure
+
+    def blank(_: object) -> gallery.Drawing:
+        return gallery.Drawing(Figure(1.0), "Blank", "Blank.", "Blank.")
+
+    drawings: dict[str, tuple[str, Callable[[object], gallery.Drawing]]]
+    drawings = {name: (what, blank) for name, (what, _) in gallery.DRAWINGS.items()}
+    with patch.object(gallery, "DRAWINGS", drawings), patch("geometry.figure.DPI", 20):
+        yield

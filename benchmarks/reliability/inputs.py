@@ -1,0 +1,73 @@
+"""Random fingers, materials and loads: each gives a valid result, or one line, in bounded time."""
+
+import math
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+
+from hypothesis import HealthCheck, Phase, given, settings
+
+from benchmarks.reliability.strategies import tasks
+from compare.sweep.measurement import Measurement, measured
+from compare.sweep.study import Task
+
+LONGEST_S = 60.0
+"""Time that a coarse finger may take, s."""
+
+
+@dataclass
+class Outcomes:
+    """What came of the inputs that were tried.
+
+    Attributes:
+        states: Number of inputs by the state of their measurement.
+        slowest: Longest time of one, s.
+        wrong: What was not as promised, by the sentence, with an input that shows it.
+    """
+
+    states: Counter[str] = field(default_factory=Counter)
+    slowest: float = 0.0
+    wrong: dict[str, Task] = field(default_factory=dict)
+
+
+def fault_of(task: Task) -> tuple[Measurement, str]:
+    """Run a task; the sentence says what is wrong with its end, and is empty if nothing is."""
+    started = time.perf_counter()
+    answer = measured(task)
+    seconds = time.perf_counter() - started
+    if answer.state == "failed":
+        return answer, f"an error of the program: {answer.message}"
+    if not answer.message.strip():
+        return answer, "no word of explanation"
+    if answer.state == "refused" and "Error:" in answer.message:
+        return answer, f"a message for programmers: {answer.message}"
+    if bad := [name for name, value in answer.values.items() if not math.isfinite(value)]:
+        return answer, f"no finite {bad[0]}, though it is {answer.state}"
+    if seconds > LONGEST_S:
+        return answer, f"it took {seconds:.0f} s"
+    return answer, ""
+
+
+def tried(count: int, solvers: tuple[str, ...] = ("fem",)) -> Outcomes:
+    """Try random inputs, without stopping at what is wrong."""
+    found = Outcomes()
+
+    @settings(
+        max_examples=count,
+        database=None,
+        deadline=None,
+        derandomize=True,
+        phases=[Phase.generate],
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(tasks(solvers))
+    def one(task: Task) -> None:
+        started = time.perf_counter()
+        answer, fault = fault_of(task)
+        found.states[answer.state] += 1
+        found.slowest = max(found.slowest, time.perf_counter() - started)
+        if fault:
+            found.wrong.setdefault(fault, task)
+
+    one()
+    return found

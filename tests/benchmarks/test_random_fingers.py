@@ -1,0 +1,13 @@
+"""Random fingers, materials and loads: a valid result or one line; the benchmark `reliability` has more."""
+
+import pytest
+
+pytest.importorskip("hypothesis", reason="`make setup` installs it")
+
+from benchmarks.reliability.inputs import tried
+
+
+def test_random_input_gives_a_result_or_one_line() -> None:
+    found = tried(40)
+    assert not found.wrong
+    assert found.states["done"] >= 5

@@ -1,0 +1,115 @@
+"""Faults at changes of files: where they strike, and what a command makes of some of them."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from benchmarks.reliability.document import PAGE, page
+from benchmarks.reliability.faults import kept_rows
+from benchmarks.reliability.supervision import Fault, Kind, Point, supervised
+from benchmarks.reliability.trials import chosen, plain
+from geometry.atomic import write_text
+from geometry.errors import UserError
+
+ROOT = Path(__file__).parents[2]
+
+
+def run(work: Callable[[], int], folder: Path, kind: Kind | None = None, at: int = 0):
+    watched = folder / "watched"
+    watched.mkdir(exist_ok=True)
+    try:
+        return supervised(work, [watched], folder / "log", fault=kind and Fault(kind, at), limit_s=60)
+    except UserError as error:
+        pytest.skip(str(error))
+
+
+def calls(ending) -> list[tuple[str, str]]:
+    return [(point.call, plain(Path(point.path).name)) for point in ending.points]
+
+
+def test_every_change_of_a_file_is_a_point_also_those_of_children(tmp_path: Path) -> None:
+    def work() -> int:
+        write_text(tmp_path / "watched" / "a.txt", "a")
+        write_text(tmp_path / "elsewhere.txt", "a")
+        subprocess.run(["sh", "-c", "echo b > watched/b"], cwd=tmp_path, check=True)
+        return 3
+
+    ending = run(work, tmp_path)
+    assert (ending.code, ending.orphans) == (3, 0)
+    assert calls(ending) == [
+        ("openat", ".a.partial.txt"),
+        ("write", ".a.partial.txt"),
+        ("rename", "a.txt"),
+        ("openat", "b"),
+        ("write", "b"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("kind", "at", "code", "left"),
+    [
+        ("kill", 1, -9, {".a.partial.txt": ""}),  # before the write
+        ("torn", 1, -9, {".a.partial.txt": "hal"}),  # half of it
+        ("kill", 2, -9, {".a.partial.txt": "hallo!"}),  # before the rename
+        ("EIO", 1, 1, {}),  # the temporary file is removed
+        ("ENOSPC", 0, 1, {}),
+    ],
+)
+def test_faults_leave_what_they_say(
+    tmp_path: Path, kind: Kind, at: int, code: int, left: dict[str, str]
+) -> None:
+    def work() -> int:
+        write_text(tmp_path / "watched" / "a.txt", "hallo!")
+        return 0
+
+    ending = run(work, tmp_path, kind, at)
+    assert (ending.code, ending.struck) == (code, True)
+    found = {plain(path.name): path.read_text() for path in (tmp_path / "watched").iterdir()}
+    assert found == left
+
+
+def test_a_process_that_stays_behind_is_an_orphan(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("benchmarks.reliability.supervision.PATIENCE_S", 0.3)
+
+    def work() -> int:
+        subprocess.Popen(["sleep", "30"])
+        return 0
+
+    assert run(work, tmp_path).orphans == 1
+
+
+def test_of_equal_calls_on_a_file_the_first_the_middle_and_the_last_are_chosen() -> None:
+    points = [Point("open", "a"), *[Point("write", "a")] * 7, Point("write", "b"), Point("rename", "b")]
+    assert chosen(points) == [0, 1, 4, 7, 8, 9]
+
+
+def test_the_page_is_that_of_the_kept_trials() -> None:
+    assert PAGE.read_text(encoding="utf-8").splitlines()[8:] == page(kept_rows()).splitlines()[8:]
+
+
+@pytest.mark.slow
+def test_a_command_that_is_killed_goes_on_to_the_same_numbers(tmp_path: Path) -> None:
+    """Four of the points; a program of its own, because this one has threads."""
+    code = (
+        "from benchmarks.reliability import faults, jobs\n"
+        "import dataclasses\n"
+        "from pathlib import Path\n"
+        "import sys\n"
+        "faults.ROWS = Path(sys.argv[1])\n"
+        "faults.JOBS = (dataclasses.replace(jobs.JOBS[1], most=4),)\n"
+        "assert not [row for row in faults.run_faults() if row.faults], faults.ROWS.read_text()\n"
+    )
+    environment = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / "faults.csv")],
+        env=environment,
+        capture_output=True,
+        text=True,
+    )
+    if "seccomp" in done.stderr:
+        pytest.skip("the system refuses seccomp filters")
+    assert done.returncode == 0, done.stderr
