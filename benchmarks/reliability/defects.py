@@ -68,5 +68,25 @@ DEFECTS = (
         "An SVG file of thirty lines with copies of copies took all time and memory.",
         "`test_bad_drawings.py`, copies of copies",
     ),
+    (
+        "fuzzing",
+        "A PNG of a hundred bytes with a chunk, or pixels, of gigabytes in a header took 17 s and 3.3 GB.",
+        "`test_pictures.py`, gigabytes",
+    ),
+    (
+        "fuzzing",
+        "A DXF file whose header lacks a value ended with an `IndexError` or `ValueError`.",
+        "`test_bad_drawings.py`, damaged header",
+    ),
+    (
+        "kill",
+        "An empty folder that was left of the last result barred every later run.",
+        "`test_output_folder.py`, replaces the last result",
+    ),
+    (
+        "failed call",
+        "After the last rename had failed, `--resume` was refused beside the complete result.",
+        "`test_output_folder.py`, a rename that fails",
+    ),
 )
 """Found by, what happened, test."""

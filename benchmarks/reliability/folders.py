@@ -18,6 +18,9 @@ TIMES = ("second", "started", "time", "rate_hz", "pace", "live")
 """Words in the names of entries that differ from run to run."""
 PAGES = (".html", ".png", ".mp4", ".mkv", ".pt", ".safetensors")
 """Files of which only the presence is compared: pages tell times, and videos have marks of their own."""
+TRANSACTED = (".sqlite",)
+"""Files whose half-done changes are undone by the one who opens them next."""
+
 UNSURE = ("run.json",)
 """Files that list digests of the pages."""
 
@@ -32,7 +35,7 @@ def broken(folder: Path) -> list[str]:
     """Files under their final names that cannot be read to their end."""
     found = []
     for path in sorted(folder.rglob("*")):
-        if path.is_file() and not path.name.startswith("."):
+        if path.is_file() and not path.name.startswith(".") and path.suffix not in TRANSACTED:
             reader = READERS.get(path.suffix, Path.read_bytes)
             try:
                 reader(path)

@@ -74,7 +74,7 @@ def main(name: str, seconds: float, folder: Path) -> None:
         if time.monotonic() - started > seconds:
             keep()
             os._exit(0)
-        if counts["runs"] % 1000 == 0:
+        if counts["runs"] % 200 == 0:
             keep()
 
     words = folder / "words"

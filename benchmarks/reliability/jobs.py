@@ -63,16 +63,16 @@ rib_angle = {from = -10, to = 20}
 
 JOBS = (
     Job("compare", FEM, again=("--resume",)),
-    Job("compare over an older result", FEM, again=("--resume",), earlier=(FEM,)),
-    Job("cache", FEM, again=("--resume",), warm=False, watched=(CACHE, TEMPORARY), most=60),
+    Job("compare over an older result", FEM, again=("--resume",), earlier=(FEM,), most=120),
+    Job("cache", FEM, again=("--resume",), warm=False, watched=(CACHE, TEMPORARY), most=40),
     Job(
         "sweep",
         ("sweep", "FOLDER/study.toml", "--processes", "1", "--out", "FOLDER/out", "--quiet"),
         whole=False,
         files=(("study.toml", STUDY),),
-        most=40,
+        most=24,
     ),
-    Job("rig", (*RIG, "--out", "FOLDER/out"), most=40),
+    Job("rig", (*RIG, "--out", "FOLDER/out"), most=24),
     Job(
         "track",
         (
@@ -85,7 +85,7 @@ JOBS = (
             "--quiet",
         ),
         earlier=((*RIG, "--out", "FOLDER/film"),),
-        most=40,
+        most=24,
     ),
     Job(
         "crossval",
@@ -94,7 +94,7 @@ JOBS = (
             *("--processes", "1", "--out", "FOLDER/out", "--quiet"),
         ),
         whole=False,
-        most=40,
+        most=24,
     ),
     Job(
         "gridsearch",
@@ -113,7 +113,7 @@ JOBS = (
             *("--out", "FOLDER/out", "--quiet"),
         ),
         whole=False,
-        most=40,
+        most=16,
     ),
 )
 

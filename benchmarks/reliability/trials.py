@@ -12,6 +12,9 @@ from benchmarks.reliability.jobs import CACHE, OUT, Job, prepared, started
 from benchmarks.reliability.supervision import GROWING, KINDS, Ending, Fault, Kind, Point
 
 REFUSED, NOT_CONVERGED = 2, 3
+WHOLE = "the complete result is in"
+"""What a command says that cannot replace its output folder; one that cannot resume has it moved first."""
+
 TRACE = "Traceback (most recent call last)"
 
 
@@ -111,6 +114,9 @@ def trial(job: Job, expected: Expected, fault: Fault, folder: Path) -> Trial:
     wrong += [f"half written: {each}" for place in folder.glob("*out*") for each in broken(place)]
     wrong += [f"poisoned: {each}" for each in broken(folder / CACHE)]
     wrong += _after(job, expected, fault, hit, before, folder)
+    if not job.again and WHOLE in hit.text:
+        wrong += differences(expected.numbers, numbers(folder / f"{OUT}.partial"))
+        (folder / f"{OUT}.partial").rename(folder / "moved")
     again = started((*job.arguments, *job.again), folder, job.watched)
     if again.code not in (0, NOT_CONVERGED) or TRACE in again.text:
         wrong.append(f"the next run ends with {again.code}: {_last(again.text)}")

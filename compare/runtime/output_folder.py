@@ -74,7 +74,8 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
     except OSError as error:
         raise UserError(f"cannot write to {partial}: {error.strerror}") from None
     with locked(partial):
-        if not (partial / MARK).exists() and any(partial.iterdir()):
+        ours = (partial / MARK).exists() or (keep and _is_whole(partial))
+        if not ours and any(partial.iterdir()):
             raise UserError(
                 f"{partial} would be replaced, but it is not of an unfinished run; move it, or name another "
                 "folder with --out"
@@ -121,7 +122,7 @@ def _take_place(partial: Path, out: Path) -> None:
     """Replace the output folder; the mark goes last, so that what a kill leaves is known as a run's."""
     previous = _previous(out)
     if previous.exists():
-        if not (previous / MARK).exists():
+        if not (previous / MARK).exists() and any(previous.iterdir()):
             raise UserError(f"{previous} would be replaced, but no run has left it; move it")
         _discard(previous)  # of a run that was killed right here
     try:
@@ -137,7 +138,8 @@ def _take_place(partial: Path, out: Path) -> None:
         raise UserError(
             f"cannot replace {out} ({error.strerror}); the complete result is in {partial}"
         ) from None
-    (out / MARK).unlink(missing_ok=True)
+    with suppress(OSError):  # what is left does no harm
+        (out / MARK).unlink()
     if previous.exists():
         with suppress(OSError):
             _discard(previous)
@@ -153,7 +155,7 @@ def _restore(out: Path) -> None:
     previous = _previous(out)
     if out.exists() or not (previous / MARK).exists():
         return
-    if all((previous / name).is_file() for name in _written(previous) or {RUN_FILE}):
+    if _is_whole(previous):
         previous.replace(out)
         (out / MARK).unlink()
 
@@ -172,6 +174,11 @@ def _written(out: Path) -> set[str] | None:
         return {RUN_FILE, *json.loads((out / RUN_FILE).read_text(encoding="utf-8"))["files_sha256"]}
     except (OSError, ValueError, LookupError, TypeError):
         return None
+
+
+def _is_whole(folder: Path) -> bool:
+    """Whether a folder has a `run.json` and every file that it lists."""
+    return all((folder / name).is_file() for name in _written(folder) or {RUN_FILE})
 
 
 def _clear(partial: Path, keep: Collection[str]) -> None:

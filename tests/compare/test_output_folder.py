@@ -248,13 +248,16 @@ def killed_before(
     assert ended, "the change was not reached"
 
 
-@pytest.mark.parametrize("number", [1, 2, 3])
+@pytest.mark.parametrize(
+    ("change", "number"),
+    [("unlink", 1), ("unlink", 2), ("unlink", 3), ("rmdir", 2)],  # the last leaves an empty folder
+)
 def test_a_run_that_is_killed_while_it_replaces_the_last_result_does_not_bar_the_next(
-    out, monkeypatch, number
+    out, monkeypatch, change, number
 ):
     """The last result is removed file by file, and its mark must not be among the first."""
     (out / MARK).touch()
-    killed_before("unlink", number, lambda: attempt(out), monkeypatch)
+    killed_before(change, number, lambda: attempt(out), monkeypatch)
     attempt(out)
     assert tree(out.parent) == {"run/report.html": "new report"}
 
@@ -273,7 +276,7 @@ def test_a_run_that_is_killed_at_one_of_the_two_renames_leaves_a_result_under_it
     assert tree(out.parent) == {"run/report.html": "new report"}
 
 
-def test_a_rename_that_fails_leaves_the_last_result_under_its_name(out, monkeypatch):
+def test_a_rename_that_fails_leaves_both_results(out, monkeypatch):
     before, rename, calls = tree(out), os.rename, []
 
     def second_fails(source: Path, target: Path) -> None:
@@ -282,11 +285,20 @@ def test_a_rename_that_fails_leaves_the_last_result_under_its_name(out, monkeypa
             raise OSError(5, "Input/output error")
         rename(source, target)
 
-    monkeypatch.setattr(os, "rename", second_fails)
-    monkeypatch.setattr(os, "replace", second_fails)
-    with pytest.raises(UserError, match="cannot replace"):
-        attempt(out)
+    def complete() -> None:
+        with replaced_folder(out) as folder:
+            write(folder)
+            (folder / "run.json").write_text(json.dumps({"files_sha256": {"report.html": "0"}}))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "replace", second_fails)
+        with pytest.raises(UserError, match="cannot replace"):
+            complete()
     assert tree(out) == before
+    with pytest.raises(UserError, match="not of an unfinished run"):  # the complete result is not lost
+        complete()
+    attempt(out, keep=("fem",))  # a resumed run goes on from it
+    assert tree(out.parent) == {"run/report.html": "new report"}
 
 
 def test_a_copy_of_a_training_that_is_cut_off_does_not_pass_for_one(out, tmp_path, monkeypatch):

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from vision.frames.pictures import PNG, Decoder, split
+from vision.frames.pictures import PNG, PNG_HEADER, Decoder, split
 from vision.frames.sources import open_frames
 
 
@@ -87,6 +87,10 @@ def test_another_size_names_both_pictures(tmp_path):
         (b"no picture", "it is damaged, too large, or not one that OpenCV knows"),
         (encoded(1, ".bmp")[:-9], "it is damaged"),
         (encoded(1)[:-12], "its end is missing"),
+        (
+            encoded(1)[:PNG_HEADER] + b"\xbc" * 12 + encoded(1)[-12:],
+            "it is damaged: one of its chunks",
+        ),  # of 3 GB
         (encoded(1, ".jpg")[:-2], "its end is missing"),
         (encoded(1, ".tif", dtype=np.float32), "float32"),
     ],
@@ -156,15 +160,27 @@ def test_a_note_to_turn_a_photograph_is_not_followed():
     assert Decoder()(turned, "a").shape == (6, 8)
 
 
-def test_a_header_alone_does_not_take_gigabytes(tmp_path):
-    """A PNG of a kilobyte that says 25,000 x 25,000 pixels; OpenCV looks for its limit when it is loaded."""
+@pytest.mark.parametrize(
+    ("side", "depth", "colour", "padding", "said"),
+    [
+        (25_000, 8, 2, 2_000_000, "it is damaged, too large, or not one"),  # OpenCV's limit of pixels
+        (14_000, 16, 6, 0, "its header asks for more pixels than the file can hold"),  # below that limit
+    ],
+)
+def test_a_header_alone_does_not_take_gigabytes(tmp_path, side, depth, colour, padding, said):
+    """A PNG that says that it has many pixels; OpenCV looks for its limit when it is loaded."""
 
     def chunk(kind, body):
         checksum = zlib.crc32(kind + body).to_bytes(4, "big")
         return len(body).to_bytes(4, "big") + kind + body + checksum
 
-    header = struct.pack(">IIBBBBB", 25_000, 25_000, 8, 2, 0, 0, 0)
-    parts = [(b"IHDR", header), (b"IDAT", zlib.compress(bytes(1000))), (b"IEND", b"")]
+    header = struct.pack(">IIBBBBB", side, side, depth, colour, 0, 0, 0)
+    parts = [
+        (b"IHDR", header),
+        (b"paDd", bytes(padding)),
+        (b"IDAT", zlib.compress(bytes(1000))),
+        (b"IEND", b""),
+    ]
     path = tmp_path / "large.png"
     path.write_bytes(PNG + b"".join(chunk(*part) for part in parts))
     program = (
@@ -181,5 +197,5 @@ def test_a_header_alone_does_not_take_gigabytes(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", program, str(path)], capture_output=True, text=True, check=True, timeout=60
     )
-    assert "large.png: it is damaged, too large, or not one" in done.stdout
+    assert f"large.png: {said}" in done.stdout
     assert int(done.stdout.split()[-1]) < 600_000  # kilobytes; the picture has 1.9 million

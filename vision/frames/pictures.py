@@ -20,6 +20,9 @@ SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp",
 JPEG, PNG, PNG_END = b"\xff\xd8", b"\x89PNG\r\n\x1a\n", b"\0\0\0\0IEND\xaeB`\x82"
 PNG_HEADER = 33
 """Length of a PNG's signature and first chunk, bytes."""
+DEFLATE = 1032
+"""Largest ratio by which a PNG's compression makes data smaller. Source: zlib, technical details."""
+
 DEPTHS = (10, 12, 14, 16)
 """Possible numbers of significant bits in 16-bit pictures."""
 
@@ -110,6 +113,8 @@ class Decoder:
             raise UserError(f"cannot read {label}: it is empty")
         if content.startswith((JPEG, PNG)) and picture_end(content) is None:
             raise UserError(f"cannot read {label}: its end is missing")
+        if content.startswith(PNG) and (fault := _png_fault(content)):
+            raise UserError(f"cannot read {label}: {fault}")
         image = None
         with silenced(), suppress(cv2.error):  # raised for more pixels than `vision.MOST_PIXELS`
             image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), _AS_STORED)
@@ -134,6 +139,24 @@ class Decoder:
             UserError: If the file cannot be read, is no whole picture, or has neither 8 nor 16 bits.
         """
         return self(_content(path), f"the picture {path}")
+
+
+def _png_fault(content: bytes) -> str:
+    """A clause if chunks or pixels of a PNG are too long for the file: OpenCV would take the memory.
+
+    Source: PNG specification, third edition, sections 5.3 and 11.2.1.
+    """
+    position, kind = len(PNG), b""
+    while kind != b"IEND" and position < len(content):
+        kind = content[position + 4 : position + 8]
+        position += 12 + int.from_bytes(content[position : position + 4], "big")
+    if position > len(content):
+        return "it is damaged: one of its chunks is longer than the file"
+    width, height = (int.from_bytes(content[at : at + 4], "big") for at in (16, 20))
+    samples = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}.get(content[25], 1)
+    if width * height * samples * content[24] // 8 > DEFLATE * len(content):
+        return "its header asks for more pixels than the file can hold"
+    return ""
 
 
 def _content(path: Path) -> bytes:

@@ -51,6 +51,8 @@ def read_dxf(path: Path, units: str | None = None) -> Drawing:
         document = ezdxf.filemanagement.readfile(path)
     except (OSError, DXFError, UnicodeDecodeError) as error:
         raise UserError(f"cannot read {path.name} as DXF: {str(error).splitlines()[0]}") from None
+    except Exception:  # a damaged file can make ezdxf raise anything
+        raise UserError(f"cannot read {path.name} as DXF: it is damaged") from None
     declared = HEADER_UNITS.get(document.units)
     unit = UNITS[units or declared or "mm"]
     marks = Marks(path.name)

@@ -115,6 +115,20 @@ def test_a_coordinate_must_be_a_number(tmp_path):
         load_drawing(path)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "  0\nSECTION\n  2\nHEADER\n  9\n$ACADVER\n  0\nENDSEC\n  0\nEOF\n",  # a variable without a value
+        "  0\nSECTION\n  2\nHEADER\n  9\n$EXTMIN\n 10\n1\n 20\n1\n 30\n-1e\n  0\nENDSEC\n  0\nEOF\n",
+    ],
+    ids=["no value", "no number"],
+)
+def test_a_damaged_header_of_a_dxf_file_is_one_line(tmp_path, text):
+    (tmp_path / "a.dxf").write_text(text)
+    with pytest.raises(UserError, match=r"cannot read a\.dxf as DXF"):
+        load_drawing(tmp_path / "a.dxf")
+
+
 def test_an_element_that_contains_itself_is_one_line(tmp_path):
     path = write_svg(tmp_path / "a.svg", '<g id="a"><use href="#a"/></g>')
     with pytest.raises(UserError, match=r"a\.svg as SVG: an element contains itself"):
