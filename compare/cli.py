@@ -3,9 +3,16 @@
 The commands, which take most of a second to import, are imported when Ctrl-C no longer gives a traceback.
 """
 
+import os
 import sys
 
 from compare.runtime.interruption import ending_at_once, interruptible
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+"""The matrices are small: more threads of the linear algebra only cost a core, waiting for one another.
+
+And so the sums have one order, whatever the number of cores. Read when NumPy and PETSc are loaded.
+"""
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -55,6 +55,7 @@ html_title = "pinn-ray"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_copy_source = html_show_sourcelink = False
+html_sidebars = {page: [] for page in ("tutorial", "gallery", "faq", "changelog")}  # no pages below them
 html_theme_options = {
     "navbar_align": "left",
     "header_links_before_dropdown": 7,

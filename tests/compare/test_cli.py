@@ -763,3 +763,17 @@ def test_solve_gives_the_markers_to_a_solver_that_assimilates(tmp_path, capsys):
     assert main(["solve", "fem-asm", *options]) == 0
     assert "mm when they are left out" in capsys.readouterr().out
     assert out.exists()
+
+
+@pytest.mark.parametrize(("given", "threads"), [({}, {1}), ({"OPENBLAS_NUM_THREADS": "2"}, {2})])
+def test_the_linear_algebra_computes_on_one_thread_unless_told_otherwise(given, threads):
+    """So that numbers do not depend on the cores of a machine."""
+    program = (
+        "import compare.cli, numpy, petsc4py.PETSc; from threadpoolctl import threadpool_info; "
+        "print({each['num_threads'] for each in threadpool_info() if each['internal_api'] == 'openblas'})"
+    )
+    kept = {key: value for key, value in os.environ.items() if not key.endswith("_NUM_THREADS")}
+    answer = subprocess.run(
+        [sys.executable, "-c", program], env=kept | given, capture_output=True, text=True, check=True
+    )
+    assert answer.stdout == f"{threads}\n"

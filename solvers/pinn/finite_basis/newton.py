@@ -23,6 +23,8 @@ SETTLED, SLOW = 1e-6, 0.1
 The regularisation damps steps along nearly dependent basis functions, as in a slender bar, so that what is
 left there of the energy falls slowly. It is far below the error of the network.
 """
+LEAP = 2.0
+"""Growth of the energy over its least value at which Newton's method has leapt away."""
 
 
 class LoadStep(NamedTuple):
@@ -46,24 +48,48 @@ def find_equilibrium(
 ) -> tuple[NewtonIterate | None, int]:
     """Equilibrium under a fraction of the load, None if the iteration fails, and the iterations taken.
 
-    An unstable one is left for a stable one beside it; where none is found, it is the result.
+    An unstable one is left for a stable one beside it; where none is found, it is the result. Where Newton's
+    method leaps away, as near the load at which a part buckles, its lowest iterate is followed down instead.
     """
-    before = np.inf
+    before = least = np.inf
+    lowest = None
     for iteration in range(1, MAX_ITERATIONS + 1):
         state = network.step(guess, fraction)
         if state is None:
-            return None, iteration
+            break
         slow = SLOW * before < state.change < SETTLED
         if state.change < TOLERANCE or slow:
             return (_stable(network, state, fraction) if state.unstable else state), iteration
-        guess, before = state.output, state.change
-    return None, MAX_ITERATIONS
+        guess, before = state.output, state.change  # from now on the guess has the prescribed displacement
+        energy = network.energy_with_springs(guess, fraction)
+        if energy < least:
+            lowest, least = guess, energy
+        elif not energy < LEAP * least:
+            break
+    return None if lowest is None else least_energy(network, lowest.numpy(), fraction), iteration
 
 
 def _stable(network: ConstrainedNetwork, state: NewtonIterate, fraction: float) -> NewtonIterate:
     """A stable equilibrium beside an unstable one, of two to either side the lower; itself if none is found.
 
     The step aside is the response to random forces of a tangent that is nearly singular in soft directions.
+    """
+
+    def energy(output: FloatArray) -> float:
+        return network.energy_with_springs(torch.from_numpy(output), fraction)
+
+    starts = aside(state.output.numpy(), network.softest(state.output), energy)
+    found = [settled for start in starts if (settled := least_energy(network, start, fraction))]
+    return min(found, key=lambda each: energy(each.output.numpy()), default=state)
+
+
+def least_energy(network: ConstrainedNetwork, start: FloatArray, fraction: float) -> NewtonIterate | None:
+    """The stable equilibrium to which the energy falls from an output layer; None if none is reached.
+
+    Args:
+        network: The network.
+        start: Shape (c, 2, m + 1), mm, under the same prescribed displacement.
+        fraction: Of the load.
     """
 
     def step(output: FloatArray, shift: float) -> Step | None:
@@ -73,13 +99,9 @@ def _stable(network: ConstrainedNetwork, state: NewtonIterate, fraction: float) 
     def energy(output: FloatArray) -> float:
         return network.energy_with_springs(torch.from_numpy(output), fraction)
 
-    found = []
-    for start in aside(state.output.numpy(), network.softest(state.output), energy):
-        lower = descended(start, energy, step)
-        settled = None if lower is None else network.step(torch.from_numpy(lower), fraction)
-        if settled is not None and not settled.unstable:
-            found.append(settled)
-    return min(found, key=lambda each: energy(each.output.numpy()), default=state)
+    lower = descended(start, energy, step)
+    settled = None if lower is None else network.step(torch.from_numpy(lower), fraction)
+    return None if settled is None or settled.unstable else settled
 
 
 def follow_load(network: ConstrainedNetwork, progress: Progress) -> LoadStep:
