@@ -2,7 +2,7 @@
 
 Exactly drawn discs at random places within a pixel, with noise. The bound follows from the derivatives of the
 drawn picture with respect to all unknowns: place, size and shape of the disc, levels, blur, gradient of the
-light, straight edges. One minute; writes `localisation.md`.
+light, straight edges. One minute; writes `docs/evidence/localisation.md`.
 """
 
 import platform
@@ -23,7 +23,7 @@ from vision.discs.circle_proposals import propose_circles
 from vision.discs.disc_fit import KNOWN_RADIUS, FittedDiscs, fit_discs
 from vision.frames.frame import GreyImage
 
-REPORT = Path("benchmarks/localisation.md")
+REPORT = Path("docs/evidence/localisation.md")
 SEED = 1
 PLACES = 500
 ROW = 25

@@ -2,7 +2,7 @@
 
 Dots with irregular outlines, light specks and disturbances of lens and camera, by the virtual rig, at random
 places within a pixel; the truth is the centroid of the outline's area. Three minutes;
-writes `printed_dots.md`.
+writes `docs/evidence/printed_dots.md`.
 """
 
 import platform
@@ -22,7 +22,7 @@ from vision.discs import irregular_outlines
 from vision.discs.disc_fit import FittedDiscs, fit_discs
 from vision.rig.exposure import Exposure
 
-REPORT = Path("benchmarks/printed_dots.md")
+REPORT = Path("docs/evidence/printed_dots.md")
 SEED = 5
 COUNT = 192
 RADII = (4.0, 7.3, 12.0)

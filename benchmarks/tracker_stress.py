@@ -2,8 +2,8 @@
 
 The default finger is filmed by the virtual rig at rest, while it is pressed, and held; two films for every
 case, whose noise and tilt differ. The camera is known exactly. Both methods see the same films. Half an hour
-on two cores; writes every finished row to `benchmarks/tracker_stress.md`, with its date. `--rows blur,codec`
-runs only the rows whose names hold one of these words: the others stay.
+on two cores; writes every finished row to `docs/evidence/tracker_stress.md`, with its date. `--rows
+blur,codec` runs only the rows whose names hold one of these words: the others stay.
 """
 
 import platform
@@ -45,7 +45,7 @@ from vision.tracking.scene import FilmedScene
 from vision.tracking.tracker import track
 from vision.tracking.workspace import default_workspace
 
-REPORT = Path("benchmarks/tracker_stress.md")
+REPORT = Path("docs/evidence/tracker_stress.md")
 FILMS = 2
 MOTION = Motion(rest=5, moving=3, held=5)
 JUMP = Motion(rest=5, moving=0, held=5)
