@@ -8,12 +8,13 @@ import json
 import os
 import re
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from errno import EDQUOT, EFBIG, EIO, ENOSPC
 from io import BytesIO
 from math import isfinite
 from pathlib import Path
 from secrets import token_hex
+from time import time
 from typing import Any
 
 import numpy as np
@@ -50,11 +51,17 @@ def is_partial(path: Path) -> bool:
     return _PARTIAL.fullmatch(path.name) is not None
 
 
-def remove_partials(folder: Path) -> None:
-    """Remove the files that killed processes have left in a folder; no other process may write to it."""
+def remove_partials(folder: Path, *, older_than_s: float = 0.0) -> None:
+    """Remove the files that killed processes have left in a folder.
+
+    Args:
+        folder: The folder, with those in it.
+        older_than_s: Age from which a file cannot be one that another process is writing, s.
+    """
     for path in folder.rglob(".*.partial*"):
-        if is_partial(path):
-            path.unlink(missing_ok=True)
+        with suppress(FileNotFoundError):  # another process has removed it
+            if is_partial(path) and time() - path.stat().st_mtime >= older_than_s:
+                path.unlink()
 
 
 def write_bytes(path: Path, content: bytes) -> None:

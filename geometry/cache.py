@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
-from geometry.atomic import write_bytes
+from geometry.atomic import remove_partials, write_bytes
 from geometry.content_hash import content_hash, file_digest
 from geometry.drawing.description import Description
 from geometry.drawing.drawn_finger import DrawnFinger
@@ -24,6 +24,9 @@ FORMAT = 1
 """Increase it when the content of the cached files changes its meaning."""
 
 TIMEOUT_S = 300.0
+ABANDONED_S = 86_400.0
+"""Age of a half-written file of the cache after which its process has ended, s."""
+
 CAD_FORMATS = ("step", "stl", "dxf", "svg")
 
 MAKERS = ("cadquery", "cadquery-ocp", "ezdxf", "gmsh", "numpy", "svgelements")
@@ -201,6 +204,7 @@ def _cached(
         made.unlink(missing_ok=True)
     if keep:
         with kept_if_possible(folder, str(task["what"])):
+            remove_partials(folder, older_than_s=ABANDONED_S)
             write_bytes(entry, content)
     return result
 

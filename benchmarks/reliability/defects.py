@@ -4,7 +4,7 @@ DEFECTS = (
     (
         "kill",
         "Between the removal of its mark and its rename a finished folder barred every later run.",
-        "`test_output_folder.py`, two renames",
+        "`test_output_folder.py`, two renames, in one step",
     ),
     (
         "reading",
@@ -13,9 +13,9 @@ DEFECTS = (
     ),
     (
         "kill",
-        "Between the two renames the last result was left under a hidden name, and a later run that failed "
-        "did not give it back.",
-        "`test_output_folder.py`, two renames",
+        "Between two renames the last result was left under a hidden name, and a later run that failed did "
+        "not give it back. Both names are now exchanged in one step, where the file system can.",
+        "`test_output_folder.py`, two renames, in one step",
     ),
     (
         "reading",
@@ -70,13 +70,18 @@ DEFECTS = (
     ),
     (
         "fuzzing",
-        "A PNG of a hundred bytes with a chunk, or pixels, of gigabytes in a header took 17 s and 3.3 GB.",
+        "A PNG of a hundred bytes that speaks of gigabytes of pixels, or in one chunk, took 17 s and 3.3 GB.",
         "`test_pictures.py`, gigabytes",
     ),
     (
         "fuzzing",
         "A DXF file whose header lacks a value ended with an `IndexError` or `ValueError`.",
         "`test_bad_drawings.py`, damaged header",
+    ),
+    (
+        "kill",
+        "Half-written files that kills left in the cache stayed there for ever; they go after a day.",
+        "`test_cache.py`, nothing but the result",
     ),
     (
         "kill",

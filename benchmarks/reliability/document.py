@@ -17,6 +17,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # one thread: numbers are to agre
 
 from rich.table import Table
 
+from benchmarks.reliability import fuzz_all, inputs, mutants
 from benchmarks.reliability.defects import DEFECTS
 from benchmarks.reliability.faults import Row, run_faults
 from benchmarks.reliability.jobs import JOBS
@@ -38,7 +39,7 @@ def main(rows: str = "") -> Table:
 
 def page(rows: Sequence[Row]) -> str:
     """The page of all results that are kept."""
-    return "\n".join([*_faults(rows), *_defects()])
+    return "\n".join([*_faults(rows), *_inputs(), *_fuzzing(), *_mutants(), *_defects()])
 
 
 def fault_rows(rows: Sequence[Row]) -> list[tuple[str, ...]]:
@@ -91,6 +92,92 @@ def _faults(rows: Sequence[Row]) -> list[str]:
         *(f"- {row.job}, {row.kind} at {row.call} {row.path}: {row.faults}" for row in wrong),
         *([""] if wrong else []),
         "Every trial is a row of `benchmarks/reliability/faults.csv`.",
+        "",
+    ]
+
+
+def _inputs() -> list[str]:
+    header = ("solver", "inputs", "solved", "not converged", "refused", "wrong", "slowest, s", "memory, MB")
+    rows = [
+        (f"`{each.solver}`", *map(str, each[1:6]), f"{each.slowest:.1f}", f"{each.peak / 1e6:.0f}")
+        for each in inputs.kept_rows()
+    ]
+    return [
+        "## Random fingers, materials and loads",
+        "",
+        "`python -m benchmarks.reliability.inputs COUNT` (Hypothesis): presets with up to four parameters of "
+        "the design and three of material and load changed, half of them gently, the others to any value in "
+        "their range or at its ends, and in one of four inputs a value that is none: NaN, infinity, a number "
+        "of 400 digits, text, a list. Coarse elements, 2 to 20 mm. *Wrong* would be an error of the program, "
+        "a refusal without a reason or with one for programmers, a quantity that is not finite, or more than "
+        f"{inputs.LONGEST_S:.0f} s. The slowest is on a busy machine; memory is that of the whole process.",
+        "",
+        *_table(header, rows, left=1),
+        "",
+    ]
+
+
+def _fuzzing() -> list[str]:
+    header = ("reader", "runs", "good files", "unhandled", "ended by a library", "slowest, s", "memory, MB")
+    rows = [
+        (
+            each.reader,
+            *(f"{count:,}" for count in (each.runs, each.read, each.unhandled, each.ended)),
+            f"{each.slowest:.2f}",
+            f"{each.peak / 1e6:.0f}",
+        )
+        for each in fuzz_all.kept_rows()
+    ]
+    return [
+        "## Mutated files",
+        "",
+        "`python -m benchmarks.reliability.fuzz_all SECONDS` (Atheris, guided by the readers' branches): "
+        "files that start from good ones. *Unhandled*: places of exceptions that are no refusal in one line; "
+        "those that were found before are mended, see below. *Ended by a library*: C code crashed or took "
+        "longer than 10 s; drawings and meshes are therefore read in a process of their own by the commands, "
+        "which say in one line that it ended.",
+        "",
+        *_table(header, rows, left=1),
+        "",
+    ]
+
+
+def _mutants() -> list[str]:
+    rows = mutants.kept_rows()
+    groups = {
+        name: [row for row in rows if row.module == name]
+        for name in dict.fromkeys(row.module for row in rows)
+    }
+    cells = [
+        (
+            f"`{name}`",
+            str(len(group)),
+            str(killed := sum(row.end == "killed" for row in group)),
+            f"{100 * killed / len(group):.0f} %",
+            str(sum(row.judgement.startswith("equal") for row in group)),
+        )
+        for name, group in groups.items()
+    ]
+    survivors = [row for row in rows if row.end == "survived"]
+    return [
+        "## Mutants",
+        "",
+        "`python -m benchmarks.reliability.mutants MODULE`: one operator, comparison, number, sign, "
+        "condition or returned value of the module changed at a time; killed if a quick test of its own "
+        "fails. A survivor is *equal* if no input can tell it from the original.",
+        "",
+        *_table(("module", "mutants", "killed", "share", "equal"), cells, left=1),
+        "",
+        "Survivors:",
+        "",
+        *_table(
+            ("module", "line", "change", "judgement"),
+            [
+                (f"`{row.module}`", str(row.line), row.change, row.judgement or "not judged")
+                for row in survivors
+            ],
+            left=4,
+        ),
         "",
     ]
 

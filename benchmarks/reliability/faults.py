@@ -37,12 +37,11 @@ def run_faults(words: Collection[str] = ()) -> list[Row]:
     """Run the trials of the jobs with one of the words in their names, or of all, and keep their rows."""
     asked = [job for job in JOBS if not words or any(word in job.name for word in words)]
     kept = [row for row in kept_rows() if row.job not in {job.name for job in asked}]
-    with tempfile.TemporaryDirectory(prefix="reliability-") as name, _cheap_pictures():
+    with tempfile.TemporaryDirectory(prefix="reliability-") as name, filled(Path(name)) as cache:
         folder = Path(name)
-        _fill(folder)
         for job in asked:
             place = folder / "job"
-            expected = undisturbed(job, place, folder / CACHE)
+            expected = undisturbed(job, place, cache)
             which = faults(expected)
             step = -(-len(which) // (job.most or len(which)))
             for done in trials(job, expected, which[::step], place):
@@ -83,15 +82,18 @@ def _row(trial: Trial) -> Row:
     )
 
 
-def _fill(folder: Path) -> None:
-    """Fill a cache, in a process of its own, and import in this one what its forks need."""
+@contextmanager
+def filled(folder: Path) -> Iterator[Path]:
+    """A filled cache in a folder; in the block this process has imported what its forks need."""
     if (ending := started(FEM, folder)).code:
         raise RuntimeError(ending.text)
     from compare.cli import main
 
-    with patch.dict(os.environ, PINNRAY_CACHE=str(folder / CACHE)):
-        main([each.replace("FOLDER", str(folder)) for each in FEM])
-    shutil.rmtree(folder / "out")
+    with _cheap_pictures():
+        with patch.dict(os.environ, PINNRAY_CACHE=str(folder / CACHE)):
+            main([each.replace("FOLDER", str(folder)) for each in FEM])
+        shutil.rmtree(folder / "out")
+        yield folder / CACHE
 
 
 @contextmanager

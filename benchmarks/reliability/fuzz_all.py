@@ -5,18 +5,21 @@
 
 import csv
 import json
-import os
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import BinaryIO, NamedTuple
 
 from geometry.atomic import write_text
 
 ROWS = Path(__file__).with_name("fuzzing.csv")
+GRACE_S = 60.0
+"""Time that a process may take to start and to end."""
+
 KEPT = Path("out/reliability/fuzzing")
 """Folder of the inputs that were not handled."""
 
@@ -76,7 +79,7 @@ def fuzzed(name: str, seconds: float) -> Row:
             folder = Path(place)
             command = [sys.executable, "-m", "benchmarks.reliability.fuzzing", name, str(left), place]
             with (folder / "log").open("wb") as log:
-                code = subprocess.run(command, stdout=log, stderr=log, cwd=os.getcwd()).returncode
+                code = _ended(command, log, left + GRACE_S)
             found = folder / "found.json"
             if found.exists():
                 counts = json.loads(found.read_text())
@@ -100,6 +103,14 @@ def fuzzed(name: str, seconds: float) -> Row:
     for key, text in wrong.items():
         print(name, key, text, flush=True)
     return row._replace(unhandled=len(wrong))
+
+
+def _ended(command: Sequence[str], log: BinaryIO, limit_s: float) -> int:
+    """The exit code of a command; that of SIGKILL if it hangs where no alarm reaches it."""
+    try:
+        return subprocess.run(command, stdout=log, stderr=log, timeout=limit_s).returncode
+    except subprocess.TimeoutExpired:
+        return -signal.SIGKILL
 
 
 if __name__ == "__main__":

@@ -85,7 +85,7 @@ JOBS = (
             "--quiet",
         ),
         earlier=((*RIG, "--out", "FOLDER/film"),),
-        most=24,
+        most=12,
     ),
     Job(
         "crossval",
@@ -94,7 +94,7 @@ JOBS = (
             *("--processes", "1", "--out", "FOLDER/out", "--quiet"),
         ),
         whole=False,
-        most=24,
+        most=12,
     ),
     Job(
         "gridsearch",
@@ -113,7 +113,7 @@ JOBS = (
             *("--out", "FOLDER/out", "--quiet"),
         ),
         whole=False,
-        most=16,
+        most=8,
     ),
 )
 

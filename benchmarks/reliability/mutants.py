@@ -2,7 +2,7 @@
 
 `python -m benchmarks.reliability.mutants [MODULE ...]`: a process with the libraries loaded forks for each
 mutant, loads the changed module and runs the tests until one fails. A mutant is killed if one does, or if
-they take too long. Docstrings, annotations and messages of errors are left alone.
+they take too long. Docstrings, annotations, decorators and messages of errors are left alone.
 """
 
 import ast
@@ -30,7 +30,7 @@ LONGEST = 6.0
 TESTS: Mapping[str, tuple[str, ...]] = {
     "solvers.elasticity": ("tests/solvers/test_elasticity.py", "tests/solvers/test_stability.py"),
     "geometry.mesh.quadrature": ("tests/geometry/test_quadrature.py",),
-    "compare.evaluation.metrics": ("tests/compare/test_metrics.py",),
+    "compare.evaluation.metrics": ("tests/compare/test_metrics.py", "tests/compare/test_uncertainty.py"),
     "compare.evaluation.differences": ("tests/compare/test_metrics.py",),
     "solvers.assimilation.misfit": ("tests/solvers/test_assimilation.py",),
     "solvers.assimilation.marker_weighting": (
@@ -111,8 +111,9 @@ def mutants(source: str) -> Iterator[Mutant]:
 
 def _places(tree: ast.AST) -> Iterator[tuple[Any, None]]:
     """Nodes that can be changed; not those of messages of errors and of docstrings."""
+    settings = getattr(tree, "decorator_list", [])
     for child in ast.iter_child_nodes(tree):
-        if isinstance(child, ast.Raise | ast.JoinedStr | ast.Import | ast.ImportFrom):
+        if child in settings or isinstance(child, ast.Raise | ast.JoinedStr | ast.Import | ast.ImportFrom):
             continue
         yield from ((child, None) for _ in [0] if hasattr(child, "lineno"))
         yield from _places(child)

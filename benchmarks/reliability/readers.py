@@ -283,7 +283,7 @@ READERS = {
         _written(".json", _write_workspace),
         ("vision.tracking.workspace", "geometry.text_files"),
     ),
-    "svg": Reader(".svg", _svg, lambda: [SVG, SVG_USE], ("geometry.drawing", "svgelements")),
+    "svg": Reader(".svg", _svg, lambda: [SVG, SVG_USE], ("geometry.drawing",)),
     "dxf": Reader(
         ".dxf", _dxf, _written(".dxf", _write_dxf), ("geometry.drawing", "ezdxf.lldxf"), longest=32768
     ),

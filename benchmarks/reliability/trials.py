@@ -15,6 +15,7 @@ REFUSED, NOT_CONVERGED = 2, 3
 WHOLE = "the complete result is in"
 """What a command says that cannot replace its output folder; one that cannot resume has it moved first."""
 
+TRIAL = "trial"
 TRACE = "Traceback (most recent call last)"
 
 
@@ -57,7 +58,7 @@ class Expected:
 def undisturbed(job: Job, folder: Path, cache: Path) -> Expected:
     """Prepare a job, run it without a fault and keep what it gives."""
     prepared(job, folder / "before", cache)
-    run = folder / "run"
+    run = folder / TRIAL  # as later: files name the folder that they come from
     shutil.copytree(folder / "before", run)
     ending = started(job.arguments, run, job.watched)
     if ending.code not in (0, NOT_CONVERGED):
@@ -96,7 +97,7 @@ def faults(expected: Expected, kinds: Sequence[Kind] = KINDS) -> list[Fault]:
 def trials(job: Job, expected: Expected, which: Sequence[Fault], folder: Path) -> Iterator[Trial]:
     """Try faults one after another, each from the state before the run."""
     for fault in which:
-        place = folder / "trial"
+        place = folder / TRIAL
         shutil.rmtree(place, ignore_errors=True)
         shutil.copytree(expected.folder, place)
         yield trial(job, expected, fault, place)

@@ -93,19 +93,25 @@ def test_the_page_is_that_of_the_kept_trials() -> None:
 
 @pytest.mark.slow
 def test_a_command_that_is_killed_goes_on_to_the_same_numbers(tmp_path: Path) -> None:
-    """Four of the points; a program of its own, because this one has threads."""
+    """Where the new result takes its name; in a program of its own, because this one has threads."""
     code = (
-        "from benchmarks.reliability import faults, jobs\n"
-        "import dataclasses\n"
         "from pathlib import Path\n"
         "import sys\n"
-        "faults.ROWS = Path(sys.argv[1])\n"
-        "faults.JOBS = (dataclasses.replace(jobs.JOBS[1], most=4),)\n"
-        "assert not [row for row in faults.run_faults() if row.faults], faults.ROWS.read_text()\n"
+        "from benchmarks.reliability.faults import filled\n"
+        "from benchmarks.reliability.jobs import JOBS\n"
+        "from benchmarks.reliability.supervision import Fault\n"
+        "from benchmarks.reliability.trials import trials, undisturbed\n"
+        "job, folder = JOBS[1], Path(sys.argv[1])\n"
+        "with filled(folder) as cache:\n"
+        "    expected = undisturbed(job, folder / 'job', cache)\n"
+        "    renames = [at for at, each in enumerate(expected.points) if each.call.startswith('rename')]\n"
+        "    which = [Fault('kill', renames[-2])]\n"
+        "    found = list(trials(job, expected, which, folder / 'job'))\n"
+        "assert not any(each.faults for each in found), found\n"
     )
     environment = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path / "faults.csv")],
+        [sys.executable, "-c", code, str(tmp_path)],
         env=environment,
         capture_output=True,
         text=True,

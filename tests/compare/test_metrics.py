@@ -6,7 +6,15 @@ import pytest
 
 from compare.evaluation.differences import field_difference, weighted_percentile
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import marker_errors, pick_reference, reference_differences
+from compare.evaluation.metrics import (
+    MEANS,
+    force_error,
+    held_out_errors,
+    marker_errors,
+    pick_reference,
+    reference_differences,
+    truth_differences,
+)
 from geometry.observations import Observations
 
 
@@ -31,6 +39,29 @@ def test_errors_at_the_markers_by_hand(fem: Evaluation, observe: Callable[..., O
     np.testing.assert_array_equal(errors.ae_u, [1, np.nan, 5])
     np.testing.assert_array_equal(errors.ae_v, [2, np.nan, 6])
     assert errors[2:] == (3.0, 4.0, 7.0, 5.0)
+
+
+def test_without_a_visible_marker_there_is_no_mean_error(
+    fem: Evaluation, observe: Callable[..., Observations]
+) -> None:
+    errors = marker_errors(fem, observe(np.zeros((3, 2)), hidden=(0, 1, 2)))
+    assert np.isnan([*errors.ae_u, *errors.ae_v, *errors[2:]]).all()
+    assert errors._fields[2:] == MEANS == ("mae_u", "mae_v", "mae_sum", "mae_rss")
+
+
+def test_held_out_errors_are_of_what_the_solver_was_not_given(
+    fem: Evaluation, observe: Callable[..., Observations]
+) -> None:
+    seen = observe(fem.marker_displacement + 1.0)
+    assert held_out_errors(fem, observe(np.zeros((3, 2)), hidden=(0, 1, 2))) is None
+    free = held_out_errors(fem, seen)
+    assert free is not None
+    assert (free.mae_u, free.mae_v) == pytest.approx((1, 1))  # it was given no marker
+    given = replace(fem, in_sample=True)
+    assert held_out_errors(given, seen) is None
+    told = held_out_errors(replace(given, left_out=fem.marker_displacement + 3.0), seen)
+    assert told is not None
+    assert (told.mae_u, told.mae_v) == pytest.approx((2, 2))
 
 
 def test_both_displacement_errors_of_the_paper(fem: Evaluation, observe: Callable[..., Observations]) -> None:
@@ -82,3 +113,18 @@ def test_the_reference_is_the_wanted_solver_then_fem_then_the_first(
     assert pick_reference([failed, pinn, fem], "pinn-std") is pinn
     assert pick_reference([failed, pinn, fem]) is fem
     assert pick_reference([failed, pinn]) is failed
+
+
+def test_differences_from_the_truth_are_those_of_whole_tensors(fem: Evaluation) -> None:
+    strain = fem.strain.copy()
+    strain[:, 0, 0] += 0.3
+    strain[:, 1, 1] += 0.4
+    differences = truth_differences(replace(fem, strain=strain, displacement=2 * fem.displacement), fem)
+    assert differences.strain.mean == pytest.approx(0.5)
+    assert differences.displacement.rel_l2 == pytest.approx(1)
+    assert differences.von_mises.rel_l2 == 0
+
+
+@pytest.mark.parametrize(("factor", "expected"), [(1.5, 0.5), (-0.75, -0.25)], ids=["too large", "too small"])
+def test_the_error_of_the_force_is_that_of_its_size(fem: Evaluation, factor: float, expected: float) -> None:
+    assert force_error(replace(fem, reaction=factor * fem.reaction), fem) == pytest.approx(expected)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.atomic import atomic_path, write_arrays, write_text
+from geometry.atomic import atomic_path, remove_partials, write_arrays, write_text
 
 
 def test_the_new_file_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
@@ -78,3 +78,13 @@ def test_two_processes_of_one_number_do_not_write_the_same_file(tmp_path: Path) 
         ours.write_text("ours")
         theirs.write_text("theirs")
     assert path.read_text() == "ours"
+
+
+def test_a_file_that_another_process_may_still_be_writing_is_left(tmp_path: Path) -> None:
+    with atomic_path(tmp_path / "mesh.npz") as partial:
+        partial.write_text("half")
+        remove_partials(tmp_path, older_than_s=60)
+        assert partial.exists()
+        remove_partials(tmp_path)
+        assert not partial.exists()
+        partial.write_text("whole")

@@ -19,6 +19,9 @@ COARSE = MeshSettings(size=1.5, coarsening=2)
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("cache")
+    abandoned = folder / ".mesh-0.0123abcd.partial.npz"
+    abandoned.write_bytes(b"half of a mesh")
+    os.utime(abandoned, (0, 0))
     finger_mesh(Design(), settings=COARSE, cache_dir=folder)
     return folder
 

@@ -142,16 +142,18 @@ class Decoder:
 
 
 def _png_fault(content: bytes) -> str:
-    """A clause if chunks or pixels of a PNG are too long for the file: OpenCV would take the memory.
+    """A clause if a chunk of a PNG is damaged, or its pixels are too many: OpenCV would take gigabytes.
 
-    Source: PNG specification, third edition, sections 5.3 and 11.2.1.
+    Source: PNG specification, third edition, sections 5.3, 5.5 and 11.2.1.
     """
     position, kind = len(PNG), b""
-    while kind != b"IEND" and position < len(content):
-        kind = content[position + 4 : position + 8]
-        position += 12 + int.from_bytes(content[position : position + 4], "big")
-    if position > len(content):
-        return "it is damaged: one of its chunks is longer than the file"
+    while kind != b"IEND":
+        length = int.from_bytes(content[position : position + 4], "big")
+        body, end = content[position + 4 : position + 8 + length], position + 12 + length
+        kind = body[:4]
+        if end > len(content) or zlib.crc32(body) != int.from_bytes(content[end - 4 : end], "big"):
+            return "one of its parts is damaged"
+        position = end
     width, height = (int.from_bytes(content[at : at + 4], "big") for at in (16, 20))
     samples = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}.get(content[25], 1)
     if width * height * samples * content[24] // 8 > DEFLATE * len(content):
