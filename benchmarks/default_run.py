@@ -26,7 +26,7 @@ MEANINGS = {
     "pinn-std": "neural network",
     "pinn-asm": "neural network, given the markers",
     "fem-asm": "finite elements, given the markers",
-    "fem-id": "finite elements; load and material found from the markers",
+    "fem-id": "finite elements; contact, force, walls and law found from the markers",
     "gp": "interpolation of the markers, no mechanics",
     "statfem": "finite elements, corrected by interpolated markers",
 }
@@ -83,7 +83,7 @@ def kept_figures() -> list[Figures]:
 
 def short_table(rows: Sequence[Figures]) -> str:
     """The table of the README and the paper."""
-    header = ("solver", "what it is", "markers, mm", "displacement", "stress", "force")
+    header = ("solver", "what it is", "markers (rss), mm", "displacement", "stress", "force")
     cells = [
         (
             f"`{each.solver}`",

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import matplotlib as mpl
 import numpy as np
 
-from compare.evaluation.comparison import Comparison
+from compare.evaluation.comparison import TRUTH, Comparison
 from compare.evaluation.differences import field_difference, weighted_percentile
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import COMPONENTS
@@ -117,8 +117,9 @@ def draw_field(comparison: Comparison, quantity: Quantity) -> Figure:
             axes = axes_at(drawn, (MARGIN, top, width, height))
             values = quantity.values(evaluation)
             means = evaluation.per_triangle(values)
+            name = f"{evaluation.label}, simulated" if evaluation.solver == TRUTH else evaluation.label
             note = f"{largest} {significant(np.abs(means).max(), 3)} {quantity.unit}"
-            body.panel(axes, canvas, mesh, scale.paint(means), evaluation.label, note)
+            body.panel(axes, canvas, mesh, scale.paint(means), name, note)
             beside = (2 * MARGIN + width, top, width, height)
             if evaluation is not reference:
                 axes = axes_at(drawn, beside)

@@ -210,11 +210,8 @@ def _convergence(metrics: Numbers, left_out: Mapping[str, str], failed: Mapping[
     sentences += [f"{name} was left out: {message.rstrip('. ')}." for name, message in left_out.items()]
     bad = [*faulty, *failed]
     count = len(solvers) + len(failed)
-    verdict = (
-        f"{len(bad)} of {count} solvers: {_listed(bad)}."
-        if bad
-        else f"Nothing: {'the solver' if count == 1 else f'all {count} solvers'} met the own criterion."
-    )
+    met = "the solver met its" if count == 1 else f"all {count} solvers met their"
+    verdict = f"{len(bad)} of {count} solvers: {_listed(bad)}." if bad else f"Nothing: {met} own criterion."
     own = solvers[reference]["uncertainty"]
     if own:
         sentences.append(
@@ -235,7 +232,7 @@ def _convergence(metrics: Numbers, left_out: Mapping[str, str], failed: Mapping[
         )
     without = [name for name, entry in solvers.items() if not entry["certificate"]]
     if without:
-        sentences.append(f"By the own word alone, without a certificate: {_listed(without)}.")
+        sentences.append(f"By their own criterion alone, without a certificate: {_listed(without)}.")
     return Answer("What is not converged?", verdict, sentences)
 
 
