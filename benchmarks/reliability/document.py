@@ -1,4 +1,4 @@
-"""Faults at every change of a file, random and mutated input; writes `benchmarks/reliability.md`.
+"""Faults at every change of a file, random and mutated input; writes `docs/evidence/reliability.md`.
 
 Each command runs in a forked process whose changes of files are counted. Then it runs again for each,
 with a fault there: killed before it, killed in the middle of a write, a disk that is full from there on, one
@@ -23,7 +23,7 @@ from benchmarks.reliability.faults import Row, run_faults
 from benchmarks.reliability.jobs import JOBS
 from geometry.atomic import write_text
 
-PAGE = Path(__file__).parents[1] / "reliability.md"
+PAGE = Path(__file__).parents[2] / "docs" / "evidence" / "reliability.md"
 HEADER = ("job", "points", "killed", "torn write", "full disk", "failed call", "as promised", "left over")
 
 
