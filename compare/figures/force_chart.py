@@ -6,22 +6,25 @@ import numpy as np
 
 from compare.evaluation.force_displacement import ForceCurve, follows_load
 from compare.figures.style import axes_at, heading, legend_above, legend_height, solver_colour
-from geometry.figure import INK, WIDTH, Figure, figure
+from geometry.figure import INK, MEASURED, WIDTH, Figure, figure
 
 HEAD, HEIGHT, FOOT, LEFT, RIGHT = 0.3, 2.4, 0.45, 0.75, 0.65
 """Heights and the margins, inches."""
 
+SIMULATED = "truth, simulated"
 
-def draw_force_displacement(curves: Sequence[ForceCurve], *, depth: float) -> Figure:
+
+def draw_force_displacement(
+    curves: Sequence[ForceCurve], *, depth: float, truth: ForceCurve | None = None
+) -> Figure:
     """Draw every curve: per mm of depth on the left axis, for the depth, mm, on the right one.
 
-    A solver that follows the load has a mark at each of its equilibria, a linear one a dashed line.
+    A solver that follows the load has a mark at each of its equilibria, a linear one a dashed line. A cross
+    is the end of the simulated finger's curve.
     """
-    labels = [
-        f"{curve.evaluation.label}, {curve.force[-1]:.3g} N/mm at {curve.travel[-1]:.3g} mm"
-        for curve in curves
-    ]
-    height = legend_height(labels)
+    labels = [_label(curve, curve.evaluation.label) for curve in curves]
+    every = [*curves, truth] if truth else curves
+    height = legend_height([*labels, _label(truth, SIMULATED)] if truth else labels)
     with figure(HEAD + height + HEIGHT + FOOT) as drawn:
         heading(drawn, "Force of the indenter along its travel")
         axes = axes_at(drawn, (LEFT, HEAD + height, WIDTH - LEFT - RIGHT, HEIGHT))
@@ -41,8 +44,20 @@ def draw_force_displacement(curves: Sequence[ForceCurve], *, depth: float) -> Fi
                 label=label,
                 zorder=3 if followed else 2,
             )
-        axes.set_xlim(0, 1.02 * max(curve.travel[-1] for curve in curves))
-        forces = np.concatenate([curve.force for curve in curves])
+        if truth:
+            axes.plot(
+                truth.travel[-1:],
+                truth.force[-1:],
+                linestyle="",
+                marker="x",
+                markersize=7,
+                markeredgewidth=1.8,
+                color=MEASURED,
+                label=_label(truth, SIMULATED),
+                zorder=4,
+            )
+        axes.set_xlim(0, 1.02 * max(curve.travel[-1] for curve in every))
+        forces = np.concatenate([curve.force for curve in every])
         axes.set_ylim(min(0.0, 1.05 * float(forces.min())), 1.05 * (float(forces.max()) or 1.0))
         axes.set_xlabel("travel of the indenter, mm")
         axes.set_ylabel("force, N per mm of depth")
@@ -55,3 +70,7 @@ def draw_force_displacement(curves: Sequence[ForceCurve], *, depth: float) -> Fi
         whole.spines["right"].set(visible=True, color=INK)
         legend_above(axes)
     return drawn
+
+
+def _label(curve: ForceCurve, name: str) -> str:
+    return f"{name}, {curve.force[-1]:.3g} N/mm at {curve.travel[-1]:.3g} mm"

@@ -8,7 +8,7 @@ import numpy as np
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import IN_SAMPLE, Evaluation
-from compare.evaluation.force_displacement import force_curves
+from compare.evaluation.force_displacement import ForceCurve, force_curves
 from compare.evaluation.metrics import held_out_errors
 from compare.figures.colours import PERCENT
 from compare.figures.design_drawing import draw_design
@@ -121,13 +121,17 @@ def force_displacement(comparison: Comparison) -> Drawing | None:
     depth = comparison.design.depth
     if not (curves := force_curves(comparison.evaluations, comparison.load)):
         return None
+    truth, cross = None, ""
+    if comparison.truth is not None:
+        truth = ForceCurve.of(comparison.truth, comparison.load)
+        cross = " Cross: the force on the simulated finger, the truth that the solvers should reach."
     return Drawing(
-        draw_force_displacement(curves, depth=depth),
+        draw_force_displacement(curves, depth=depth, truth=truth),
         "Force over displacement",
         f"Force of the indenter along its travel: per mm of depth (left), and for the finger’s "
         f"{depth:g} mm (right). A point is an equilibrium that a solver found as the load "
         f"grew; a linear solver’s line (dashed) is straight by its law. Solvers that were given the "
-        f"markers are left out: the markers pull too.",
+        f"markers are left out: the markers pull too.{cross}",
         each_of(
             f"Force at the end of the travel, N per mm, after {curves[0].travel[-1]:g} mm",
             [curve.evaluation for curve in curves],

@@ -73,5 +73,14 @@ def test_picture_has_both_scales_and_the_end_of_every_curve(followed: Evaluation
     assert "fem, 0.5 N/mm at 10 mm" in page.text
     assert "fem-nonlinear (not converged), 3 N/mm at 10 mm" in page.text
     assert "force for 20 mm of depth, N" in page.text
+    assert "truth" not in page.text
     left, right = page.figure.axes[0], page.figure.axes[0].child_axes[0]
     assert right.get_ylim() == pytest.approx([20 * end for end in left.get_ylim()])
+
+
+def test_the_force_on_the_simulated_finger_is_a_cross(followed: Evaluation, fem: Evaluation) -> None:
+    (curve,) = force_curves([followed], Load())
+    page = page_of(draw_force_displacement([curve], depth=20.0, truth=ForceCurve.of(fem, Load())))
+    assert "truth, simulated, 0.5 N/mm at 10 mm" in page.text
+    (cross,) = [line for line in page.figure.axes[0].lines if line.get_marker() == "x"]
+    assert (cross.get_xdata(), cross.get_ydata()) == (pytest.approx([10.0]), pytest.approx([0.5]))
