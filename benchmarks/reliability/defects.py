@@ -75,6 +75,11 @@ DEFECTS = (
     ),
     (
         "fuzzing",
+        "The end of a study's range that is no number, `from = nan`, ended with a `KeyError`.",
+        "`test_study.py`, an end that is no number",
+    ),
+    (
+        "fuzzing",
         "A DXF file whose header lacks a value ended with an `IndexError` or `ValueError`.",
         "`test_bad_drawings.py`, damaged header",
     ),

@@ -284,9 +284,7 @@ READERS = {
         ("vision.tracking.workspace", "geometry.text_files"),
     ),
     "svg": Reader(".svg", _svg, lambda: [SVG, SVG_USE], ("geometry.drawing",)),
-    "dxf": Reader(
-        ".dxf", _dxf, _written(".dxf", _write_dxf), ("geometry.drawing", "ezdxf.lldxf"), longest=32768
-    ),
+    "dxf": Reader(".dxf", _dxf, _written(".dxf", _write_dxf), ("geometry.drawing",), longest=32768),
     "msh": Reader(".msh", _mesh, _written(".msh", _write_gmsh), ("geometry.drawing",)),
     "picture": Reader(
         ".png", _picture, _encoded(".png", ".jpg", ".tif", ".bmp", ".ppm", ".webp"), ("vision.frames",)

@@ -160,8 +160,12 @@ class Parameters(CheckedModel):
 def parameter_info(
     name: str, key: Literal["unit", "symbol", "low", "high"], model: type[BaseModel] = Parameters
 ) -> Any:
-    """Unit, symbol or bound of a model's parameter; an empty text where it has none."""
-    extra = model.model_fields[name].json_schema_extra
+    """Unit, symbol or bound of a model's parameter; an empty text where it has none.
+
+    A parameter that goes by another name in files has none by that name.
+    """
+    field = model.model_fields.get(name)
+    extra = field.json_schema_extra if field else None
     return extra.get(key, "") if isinstance(extra, dict) else ""
 
 

@@ -27,6 +27,14 @@ REFUSED = {
         "samples = 4\n[varied]\nheight = {from = 90, to = 80}\n",
         "varied.height: from = 90 must be below to = 80",
     ),
+    "an end that is no number": (
+        "samples = 4\n[varied]\nheight = {from = nan, to = 80}\n",
+        "varied.height: from = nan is not a finite number",
+    ),
+    "an end that is a text": (
+        'samples = 4\n[varied]\nheight = {from = 80, to = "90 mm"}\n',
+        "varied.height: to = '90 mm' is not a finite number",
+    ),
     "no table": ("samples = 4\n[varied]\nheight = 90\n", r"varied.height: write \{from = LOW, to = HIGH\}"),
     "beyond the parameter's own limits": (
         "samples = 4\n[varied]\nheight = {from = 5, to = 80}\n",
