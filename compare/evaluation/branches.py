@@ -57,7 +57,9 @@ def with_branches(evaluations: Sequence[Evaluation], problem: Problem) -> tuple[
         if not any(_unlike(*pair) for pair in combinations(some, 2)):
             continue
         own = replace(problem, material=problem.material.model_copy(update={"law": law}))
-        branches = _branches(some, own)
+        branches, lost = _branches(some, own)
+        if lost:
+            remarks.append(_lost(lost))
         if len(branches) < 2:
             continue
         for branch in branches:
@@ -84,17 +86,19 @@ def _unlike(first: Evaluation, second: Evaluation) -> bool:
     return difference.rel_l2 > ALIKE + stated
 
 
-def _branches(evaluations: Sequence[Evaluation], problem: Problem) -> list[_Branch]:
-    """The stable equilibria beside results, the one of least energy first."""
+def _branches(evaluations: Sequence[Evaluation], problem: Problem) -> tuple[list[_Branch], list[str]]:
+    """The stable equilibria beside results, that of least energy first; names of results that have none."""
     try:
         from solvers.fem.finite_strain.nearby import equilibria_near
     except ImportError as error:
         warnings.warn(f"results differ, and nobody looks for branches: {error}", stacklevel=2)
-        return []
+        return [], []
     starts = [np.concatenate([entry.node_displacement, entry.edge_displacement]) for entry in evaluations]
     branches: list[_Branch] = []
+    lost = []
     for evaluation, found in zip(evaluations, equilibria_near(problem, starts), strict=True):
         if found is None or found.unstable:
+            lost.append(evaluation.solver)
             continue
         for branch in branches:
             other = branch.equilibrium.nodal
@@ -103,7 +107,14 @@ def _branches(evaluations: Sequence[Evaluation], problem: Problem) -> list[_Bran
                 break
         else:
             branches.append(_Branch(found, [evaluation.solver]))
-    return sorted(branches, key=lambda branch: branch.equilibrium.energy)
+    return sorted(branches, key=lambda branch: branch.equilibrium.energy), lost
+
+
+def _lost(names: Sequence[str]) -> str:
+    return (
+        "results differ by more than they say, and no stable equilibrium was found on the elements of "
+        f"fem-nonlinear beside {' and '.join(names)}: whether this load has several is open"
+    )
 
 
 def _place(branch: _Branch, branches: Sequence[_Branch]) -> str:

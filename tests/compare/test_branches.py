@@ -86,3 +86,26 @@ def test_results_that_agree_are_not_looked_at(problem, solutions, monkeypatch):
     own, _ = solutions
     monkeypatch.setattr("solvers.fem.finite_strain.nearby.equilibria_near", None)
     assert with_branches(evaluations(problem, own, replace(own, solver="again")), problem)[1] == []
+
+
+def test_a_result_beside_which_there_is_no_equilibrium_is_said(problem, solutions, monkeypatch):
+    found = equilibria_near(problem, [solutions[0].field.values])
+    monkeypatch.setattr("solvers.fem.finite_strain.nearby.equilibria_near", lambda *_: [*found, None])
+    judged, remarks = with_branches(evaluations(problem, *solutions), problem)
+    assert all("several" not in evaluation.message for evaluation in judged)
+    (remark,) = remarks
+    assert "no stable equilibrium was found on the elements of fem-nonlinear beside other:" in remark
+
+
+def test_where_newton_leaps_away_the_energy_is_followed_down(problem, solutions, monkeypatch):
+    """From the bent column with its bend halved between base and head; too far off for three iterations."""
+    own, _ = solutions
+    space = LagrangeSpace(problem.mesh, 2)
+    share = 1 - 0.5 * np.sin(np.pi * space.nodes[:, 1:] / HEIGHT) ** 2
+    monkeypatch.setattr("solvers.fem.finite_strain.nearby.ITERATIONS", 3)
+    start = own.field.values * np.hstack([share, np.ones_like(share)])
+    (found,) = equilibria_near(problem, [start])
+    assert found is not None
+    assert found.energy == pytest.approx(own.energy, rel=1e-6)
+    monkeypatch.setattr("solvers.fem.finite_strain.load_path.descended", lambda *_: None)
+    assert equilibria_near(problem, [start]) == [None]

@@ -114,8 +114,16 @@ class LoadPath:
         return state
 
     def settled_from(self, nodal: FloatArray) -> LoadState | None:
-        """Equilibrium under the full load from displacements, shape (N, d), mm; None if none is found."""
-        return self._settled(self._newton, replace(self.equilibrium.rest, fraction=1.0, nodal=nodal))
+        """Equilibrium under the full load from displacements, shape (N, d), mm; None if none is found.
+
+        Where Newton's method leaps away, the energy is followed down from there.
+        """
+        start = replace(self.equilibrium.rest, fraction=1.0, nodal=nodal)
+        state = self._settled(self._newton, start)
+        if state is not None or self.equilibrium.contact is not None:
+            return state
+        lower = descended(nodal, self.equilibrium.energy_with_springs(start), self.equilibrium.step_at(start))
+        return None if lower is None else self._settled(self._newton, replace(start, nodal=lower))
 
     def _stable(self, point: LoadState) -> LoadState:
         """An equilibrium or, if it is unstable, a stable one beside it: of those to either side, the lower.
