@@ -75,6 +75,12 @@ DEFECTS = (
     ),
     (
         "fuzzing",
+        "An SVG path without data or start, a height of zero, or a DXF entity of an unknown kind ended with "
+        "a `TypeError`, `AttributeError`, `ZeroDivisionError` or `DXFAttributeError`.",
+        "`test_bad_drawings.py`, stumbles over, unknown entity",
+    ),
+    (
+        "fuzzing",
         "The end of a study's range that is no number, `from = nan`, ended with a `KeyError`.",
         "`test_study.py`, an end that is no number",
     ),
@@ -92,6 +98,16 @@ DEFECTS = (
         "kill",
         "An empty folder that was left of the last result barred every later run.",
         "`test_output_folder.py`, replaces the last result",
+    ),
+    (
+        "failed call",
+        "A full disk or failed call in a process of `crossval` or `gridsearch` ended with a traceback.",
+        "`test_processes.py`, cannot be written",
+    ),
+    (
+        "failed call",
+        "A full disk under a checkpoint of a training ended with a `SafetensorError` and a traceback.",
+        "`test_pinn_training.py`, names the checkpoint",
     ),
     (
         "failed call",

@@ -28,7 +28,7 @@ LONGEST = 6.0
 """Longest time of the tests of a mutant, as a multiple of the time without a change."""
 
 TESTS: Mapping[str, tuple[str, ...]] = {
-    "solvers.elasticity": ("tests/solvers/test_elasticity.py", "tests/solvers/test_stability.py"),
+    "solvers.elasticity": ("tests/solvers/test_elasticity.py",),
     "geometry.mesh.quadrature": ("tests/geometry/test_quadrature.py",),
     "compare.evaluation.metrics": ("tests/compare/test_metrics.py", "tests/compare/test_uncertainty.py"),
     "compare.evaluation.differences": ("tests/compare/test_metrics.py",),

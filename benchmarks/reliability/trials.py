@@ -145,7 +145,7 @@ def _after(
             wrong.append(f"it ended with {hit.code}: {_last(hit.text)}")
         elif hit.code == REFUSED and len(_lines(hit.text, "error:")) != 1:
             wrong.append(f"it did not say why in one line: {hit.text.strip()[-300:]}")
-        elif hit.code in (0, NOT_CONVERGED):
+        elif hit.code == 0:
             wrong += differences(expected.numbers, numbers(folder / OUT))
     if job.whole and (folder / OUT).exists():
         wrong += incomplete(folder / OUT)

@@ -34,14 +34,16 @@ class ProcessFailed:
 
     Attributes:
         exit_code: Of the operating system; the negative number of the signal that ended it.
+        reason: A file that could not be read or written, and why; empty for another end.
     """
 
     exit_code: int | None
+    reason: str = ""
 
     @property
     def message(self) -> str:
         """The end of the process, as a clause."""
-        return f"its process ended with exit code {self.exit_code}"
+        return self.reason or f"its process ended with exit code {self.exit_code}"
 
 
 @dataclass(frozen=True)
@@ -180,8 +182,11 @@ def _child(work: Callable[[Input, Progress], Output], task: Input, connection: C
 
     logging.captureWarnings(True)  # FFCx does when it is imported, which would undo the next line
     warnings.showwarning = warn
+    answer: Output | ProcessFailed
     try:
         answer = work(task, report)
     except KeyboardInterrupt:
         return
+    except OSError as error:  # such as a full disk: no fault of the program
+        answer = ProcessFailed(1, f"{error.filename or 'input or output'}: {error.strerror or error}")
     connection.send(_Done(answer))

@@ -128,3 +128,8 @@ def test_differences_from_the_truth_are_those_of_whole_tensors(fem: Evaluation) 
 @pytest.mark.parametrize(("factor", "expected"), [(1.5, 0.5), (-0.75, -0.25)], ids=["too large", "too small"])
 def test_the_error_of_the_force_is_that_of_its_size(fem: Evaluation, factor: float, expected: float) -> None:
     assert force_error(replace(fem, reaction=factor * fem.reaction), fem) == pytest.approx(expected)
+
+
+def test_the_95th_percentile_of_a_difference_is_below_a_twentieth_of_the_area() -> None:
+    values = np.random.default_rng(0).permutation(np.arange(1.0, 1001.0))
+    assert field_difference(values, np.zeros(1000), np.ones(1000)).p95 == 950

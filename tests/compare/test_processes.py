@@ -33,6 +33,10 @@ def ended(number: int, progress: Progress) -> float:
     return 1 / (number - 2)
 
 
+def unwritten(folder: Path, progress: Progress) -> None:
+    (folder / "absent" / "file").write_text("")
+
+
 def threads(_: int, progress: Progress) -> str:
     return os.environ["OMP_NUM_THREADS"]
 
@@ -83,6 +87,12 @@ def test_a_process_that_ends_without_an_answer_does_not_stop_the_others(capfd):
     answers = dict(in_processes(ended, {"a": 1, "b": 2, "c": 3}, processes=3, report=silent))
     assert answers == {"a": ProcessFailed(-signal.SIGKILL), "b": ProcessFailed(1), "c": 1.0}
     assert "ZeroDivisionError" in capfd.readouterr().err  # whose fault it is can be read
+
+
+def test_a_file_that_cannot_be_written_is_told_in_one_line(tmp_path, capfd):
+    answers = dict(in_processes(unwritten, {"a": tmp_path}, processes=1, report=silent))
+    assert answers["a"].message == f"{tmp_path}/absent/file: No such file or directory"
+    assert "Traceback" not in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("work", [endless, endless_with_petsc])

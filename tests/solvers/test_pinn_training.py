@@ -12,6 +12,7 @@ import pytest
 import torch
 
 from geometry.errors import UserError
+from solvers.pinn.paper.checkpoint import save_checkpoint
 from solvers.pinn.paper.solver import PaperPinnSolver
 from solvers.problem import Load, Problem
 from solvers.solution import Solution
@@ -112,6 +113,12 @@ def test_a_broken_checkpoint_is_refused(problem, tmp_path):
     (tmp_path / "checkpoint.safetensors").write_bytes(b"half of it")
     with pytest.raises(UserError, match=r"checkpoint\.safetensors cannot be read .*; remove it, or"):
         SMALL.in_context(TrainingContext(tmp_path, resume=True)).solve(problem)
+
+
+def test_a_full_disk_names_the_checkpoint(tmp_path, full_disk):
+    with pytest.raises(OSError, match="File too large") as error:
+        save_checkpoint(tmp_path, {"weights": torch.zeros(9000)}, "digest")
+    assert error.value.filename == str(tmp_path / "checkpoint.safetensors")
 
 
 def test_the_history_is_a_table_with_units(problem, straight, tmp_path):

@@ -87,6 +87,7 @@ def test_another_size_names_both_pictures(tmp_path):
         (b"no picture", "it is damaged, too large, or not one that OpenCV knows"),
         (encoded(1, ".bmp")[:-9], "it is damaged"),
         (encoded(1)[:-12], "its end is missing"),
+        (PNG + encoded(1)[-12:], "it has no header"),
         # a chunk of 3 GB, and one that OpenCV passes over to find such a length
         (encoded(1)[:PNG_HEADER] + b"\xbc" * 12 + encoded(1)[-12:], "one of its parts is damaged"),
         (encoded(1)[:PNG_HEADER] + bytes(4) + b"IDAT" + bytes(4) + encoded(1)[-12:], "one of its parts is"),

@@ -154,6 +154,8 @@ def _png_fault(content: bytes) -> str:
         if end > len(content) or zlib.crc32(body) != int.from_bytes(content[end - 4 : end], "big"):
             return "one of its parts is damaged"
         position = end
+    if content[12:16] != b"IHDR" or len(content) < PNG_HEADER:
+        return "it has no header"
     width, height = (int.from_bytes(content[at : at + 4], "big") for at in (16, 20))
     samples = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}.get(content[25], 1)
     if width * height * samples * content[24] // 8 > DEFLATE * len(content):

@@ -58,8 +58,8 @@ def read_dxf(path: Path, units: str | None = None) -> Drawing:
     marks = Marks(path.name)
     pieces: list[Piece] = []
     for entity in _plain(list(document.modelspace())):
-        layer = label_of(entity.dxf.layer)
-        if layer == "defpoints" or _hidden(document, entity.dxf.layer):
+        layer = label_of(_layer(entity))
+        if layer == "defpoints" or _hidden(document, _layer(entity)):
             continue
         if not marks.took(*_mark(entity, unit), layer):
             pieces += _pieces(entity, layer, unit, path.name)
@@ -75,6 +75,14 @@ def _plain(entities: list[Any]) -> Iterator[Any]:
             yield from _plain(list(entity.virtual_entities()))
         else:
             yield entity
+
+
+def _layer(entity: Any) -> str:
+    """The layer of an entity; that of the format where it has none."""
+    try:
+        return str(entity.dxf.layer)
+    except DXFError:  # of a kind that ezdxf does not know
+        return "0"
 
 
 def _hidden(document: Any, layer: str) -> bool:
@@ -132,7 +140,7 @@ def _pieces(entity: Any, layer: str, unit: float, file: str) -> Iterator[Piece]:
                 yield piece.scaled(unit)
     elif kind not in (*WITHOUT_GEOMETRY, "POINT"):
         raise UserError(
-            f"{file}: cannot read the {kind} on layer {entity.dxf.layer!r}; draw the boundary by lines, "
+            f"{file}: cannot read the {kind} on layer {_layer(entity)!r}; draw the boundary by lines, "
             "arcs, circles, polylines, ellipses and splines, or freeze that layer"
         )
 

@@ -48,8 +48,13 @@ def read_svg(path: Path, units: str | None = None) -> Drawing:
         raise UserError(f"cannot read {path.name} as SVG: {error}") from None
     except RecursionError:
         raise UserError(f"cannot read {path.name} as SVG: it is nested too deeply") from None
+    except (ArithmeticError, AttributeError, LookupError, TypeError):  # of svgelements, at what is no SVG
+        raise UserError(f"cannot read {path.name} as SVG: an attribute has no sound value") from None
     _check_view_box(parsed, path.name)
-    back = ~svgelements.Matrix(parsed.viewbox_transform or "")
+    try:
+        back = ~svgelements.Matrix(parsed.viewbox_transform or "")
+    except ZeroDivisionError:
+        raise UserError(f"{path.name}: its width or height is zero, or no length") from None
     unit = UNITS[units] if units else _unit(parsed, path.name)
     marks = Marks(path.name)
     pieces: list[Piece] = []

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 
 from geometry.arrays import FloatArray
-from geometry.atomic import atomic_path
+from geometry.atomic import atomic_path, write_bytes
 from geometry.errors import UserError
 
 FILE = "checkpoint.safetensors"
@@ -21,8 +21,8 @@ FILE = "checkpoint.safetensors"
 
 def save_checkpoint(folder: Path, state: Mapping[str, torch.Tensor], digest: str) -> None:
     """Write a state atomically."""
-    with atomic_path(folder / FILE) as partial:
-        save_file({name: tensor.contiguous() for name, tensor in state.items()}, partial, {"digest": digest})
+    content = {name: tensor.contiguous() for name, tensor in state.items()}
+    write_bytes(folder / FILE, save(content, {"digest": digest}))  # safetensors hides that a disk is full
 
 
 def load_checkpoint(folder: Path, digest: str) -> dict[str, torch.Tensor] | None:

@@ -129,6 +129,28 @@ def test_a_damaged_header_of_a_dxf_file_is_one_line(tmp_path, text):
         load_drawing(tmp_path / "a.dxf")
 
 
+@pytest.mark.parametrize(
+    ("head", "body"),
+    [
+        ('width="30mm" height="(0m1" viewBox="0 0 30 10"', '<path d="M0 0H30L0 10Z"/>'),  # a height of zero
+        ("", '<path t="M0 0H30L0 10Z"/>'),  # no data
+        ("", '<path d="V0L0 10Z"/>'),  # nowhere to start from
+    ],
+    ids=["height", "no data", "no start"],
+)
+def test_what_svgelements_stumbles_over_is_one_line(tmp_path, head, body):
+    path = write_svg(tmp_path / "a.svg", body, head)
+    with pytest.raises(UserError, match=r"a\.svg"):
+        load_drawing(path)
+
+
+def test_an_unknown_entity_of_a_dxf_file_is_named(tmp_path):
+    path = write_dxf(tmp_path / "a.dxf", [BEAM])
+    path.write_text(path.read_text().replace("LWPOLYLINE", "LVPOLYLINE"))
+    with pytest.raises(UserError, match="cannot read the LVPOLYLINE on layer"):
+        load_drawing(path)
+
+
 def test_an_element_that_contains_itself_is_one_line(tmp_path):
     path = write_svg(tmp_path / "a.svg", '<g id="a"><use href="#a"/></g>')
     with pytest.raises(UserError, match=r"a\.svg as SVG: an element contains itself"):
