@@ -1,9 +1,5 @@
 """Random fingers, materials and loads: a valid result or one line; the benchmark `reliability` has more."""
 
-import pytest
-
-pytest.importorskip("hypothesis", reason="`make setup` installs it")
-
 from benchmarks.reliability.inputs import tried
 
 
