@@ -50,6 +50,8 @@ def test_the_tutorial_runs_from_the_parameters_to_the_printed_finger(
 ) -> None:
     from compare.cli import compare_main, main
 
+    monkeypatch.setattr("compare.optimum.proposals.POPULATION", 32)  # a quick search for the front
+    monkeypatch.setattr("compare.optimum.proposals.GENERATIONS", 8)
     shutil.copytree(DOCS / "examples", tmp_path / "docs" / "examples")
     monkeypatch.chdir(tmp_path)
     for line in blocks(PAGE)[0].text.splitlines():

@@ -49,6 +49,7 @@ def base_line(parameters: Parameters, distance: float) -> Line:
     return Line(distance * inward, along)
 
 
+@lru_cache(maxsize=64)
 def back_line(parameters: Parameters, distance: float) -> Line:
     """The line `distance` mm inside the back face, toward the tip."""
     base, apex = base_corners(parameters)[1], np.array([parameters.height, 0.0])
@@ -102,6 +103,7 @@ def rib_pitch(parameters: Parameters) -> float:
     return (end - start) / (p.rib_count + 1)
 
 
+@lru_cache(maxsize=64)
 def cavity_ends(parameters: Parameters) -> tuple[float, float]:
     """Abscissae between which cavities and ribs lie along the front wall's inner face, mm."""
     p = parameters
@@ -134,6 +136,7 @@ def rib_axes(parameters: Parameters) -> FloatArray:
     return np.stack([lines.meets(end) for end in ends], axis=1)
 
 
+@lru_cache(maxsize=64)
 def marker_positions(parameters: Parameters) -> FloatArray:
     """Centres of the markers, ordered from base to tip, shape (m, 2), mm.
 
@@ -147,9 +150,12 @@ def marker_positions(parameters: Parameters) -> FloatArray:
     p = parameters
     if p.marker_layout == "front":
         x = (p.height - tip_tangent(p)) * np.arange(1, p.marker_count + 1) / (p.marker_count + 1)
-        return np.stack([x, np.full_like(x, -p.front_thickness / 2)], axis=1)
-    points = np.concatenate([rib_axes(p).reshape(-1, 2), _tip_middle(p)[None]])
-    return np.asarray(points[np.lexsort((-points[:, 1], points[:, 0]))], dtype=np.float64)
+        points = np.stack([x, np.full_like(x, -p.front_thickness / 2)], axis=1)
+    else:
+        points = np.concatenate([rib_axes(p).reshape(-1, 2), _tip_middle(p)[None]])
+        points = points[np.lexsort((-points[:, 1], points[:, 0]))]
+    points.setflags(write=False)  # the same for all who ask
+    return np.asarray(points, dtype=np.float64)
 
 
 def apex_angle(parameters: Parameters) -> float:
@@ -170,13 +176,14 @@ def corner_angles(corners: FloatArray) -> FloatArray:
     return np.asarray(np.arctan2(cross, (ahead * behind).sum(axis=1)), dtype=np.float64)
 
 
+@lru_cache(maxsize=64)
 def _base_frame(p: Parameters) -> tuple[FloatArray, FloatArray]:
     """Unit vectors from the base into the body and along it from front to back, each of shape (2,)."""
     tilt = np.radians(p.base_tilt)
     return np.array([np.cos(tilt), np.sin(tilt)]), np.array([np.sin(tilt), -np.cos(tilt)])
 
 
-@lru_cache(maxsize=8)  # one finger is asked for by many rules
+@lru_cache(maxsize=64)
 def _quadrilaterals(p: Parameters) -> tuple[FloatArray, ...]:
     """Cavities and ribs in turn, from base to tip, each of shape (4, 2), mm."""
     half = p.rib_thickness / (2 * np.cos(np.radians(rib_slope(p))))
