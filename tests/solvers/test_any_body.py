@@ -36,6 +36,7 @@ SETTINGS = QUICK | {
     "pinn-std trained": TINY,
     "pinn-asm trained": TINY,
     "gp": {"clamp": True},
+    "pinn-id": QUICK["pinn-id"] | {"law": "given"},
 }
 
 SOLVERS = [
