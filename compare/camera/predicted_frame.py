@@ -14,6 +14,7 @@ from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import marker_errors
 from compare.figures import Picture
 from compare.figures.gallery import each_of
+from compare.figures.overlay import mean_errors
 from compare.figures.style import axes_at, heading, legend_below_heading
 from geometry.arrays import FloatArray
 from geometry.figure import INK, MEASURED, SMALL, WIDTH, Figure, figure
@@ -112,7 +113,5 @@ def _markers(axes: Axes, tracking: Tracking, computed: FloatArray) -> None:
 
 
 def _name(axes: Axes, comparison: Comparison, evaluation: Evaluation) -> None:
-    errors = marker_errors(evaluation, comparison.observations)
-    given = ", given" * evaluation.in_sample
-    note = f"MAE{given}  u {errors.mae_u:.2f} mm,  v {errors.mae_v:.2f} mm"
+    note = mean_errors(evaluation, comparison.observations)
     axes.set_title(f"{evaluation.label_at_markers}: {note}", size=SMALL)

@@ -4,6 +4,8 @@ from math import isnan
 
 NONE = "–"
 """Stands where there is no number."""
+LEAST_PERCENT, LEAST_DISTANCE = 0.001, 0.0001
+"""Smaller shares, %, and lengths, mm, are printed as less than this: they are as good as zero."""
 
 
 def significant(value: float, digits: int) -> str:
@@ -30,11 +32,21 @@ def percent(share: float, digits: int = 3, *, sign: bool = True) -> str:
     if isnan(share):
         return NONE
     value = 100 * share
-    whole = abs(value) >= 10**digits
-    text = "0" if value == 0 else f"{value:.0f}".replace("-", "−") if whole else number(value, digits)
+    if value == 0:
+        text = "0"
+    elif abs(value) < LEAST_PERCENT:
+        text = f"{'>' if value < 0 else '<'} {'−' * (value < 0)}{LEAST_PERCENT}".replace(
+            " ", "\N{NO-BREAK SPACE}"
+        )
+    else:
+        text = f"{value:.0f}".replace("-", "−") if abs(value) >= 10**digits else number(value, digits)
     return f"{text}\N{NO-BREAK SPACE}%" if sign else text
 
 
 def distance(value: float) -> str:
     """A small length, mm, with two significant digits; a dash for NaN, zero for rounding errors."""
-    return NONE if isnan(value) else f"{value if value > 1e-9 else 0:.2g}".replace("-", "−")
+    if isnan(value):
+        return NONE
+    if value > 1e-9 and value < LEAST_DISTANCE:
+        return f"<\N{NO-BREAK SPACE}{LEAST_DISTANCE}"
+    return f"{value if value > 1e-9 else 0:.2g}"

@@ -15,6 +15,8 @@ LOG_RATIO = 20.0
 """An axis is logarithmic where the largest value exceeds the smallest by this factor."""
 HEAD, HEIGHT, FOOT, LEFT, GAP = 0.3, 1.6, 0.45, 0.75, 0.85
 """Heights, the left margin and the gap between charts, inches."""
+FEW = 3
+"""Records of no more rows are single results, not a curve: a dotted line joins them."""
 ENERGY = "energy"
 
 Group = tuple[str, str]
@@ -96,14 +98,14 @@ def _distances(
 ) -> None:
     distances = [np.abs(evaluation.history[ENERGY] / reference.energy - 1) for evaluation in members]
     for evaluation, distance in zip(members, distances, strict=True):
-        _line(axes, evaluation.history[group[0]], distance, colours[evaluation.solver], None)
+        _line(axes, evaluation.history[group[0]], 100 * distance, colours[evaluation.solver], None)
     _scale(axes, group, distances, members)
-    axes.set_ylabel("|E / E(reference) − 1|")
+    axes.set_ylabel(f"distance from {reference.solver}, %")
 
 
 def _line(axes: Axes, x: FloatArray, y: FloatArray, colour: str, label: str | None) -> None:
-    marker = "o" if len(x) <= 40 else ""
-    axes.plot(x, y, color=colour, linewidth=1.2, marker=marker, markersize=3, label=label, zorder=2)
+    marker, style = "o" if len(x) <= 40 else "", "-" if len(x) > FEW else ":"
+    axes.plot(x, y, style, color=colour, linewidth=1.2, marker=marker, markersize=3, label=label, zorder=2)
 
 
 def _scale(axes: Axes, group: Group, ordinates: Sequence[FloatArray], members: Sequence[Evaluation]) -> None:
@@ -123,5 +125,12 @@ def wants_log(values: FloatArray) -> bool:
 
 def readable(name: str) -> str:
     """A column's name for an axis: with its unit where it has one, without underscores."""
-    names = {"seconds": "time, s", ENERGY: "energy, N mm/mm", "curve_energy": "energy added, N mm/mm"}
+    names = {
+        "seconds": "time, s",
+        ENERGY: "energy, N mm/mm",
+        "curve_energy": "energy added, N mm/mm",
+        "units": "hidden units of the network",
+        "load_fraction": "share of the load",
+        "weight_factor": "factor of the markers’ weight",
+    }
     return names.get(name, name.replace("_", " "))

@@ -125,9 +125,9 @@ def draw_field(comparison: Comparison, quantity: Quantity) -> Figure:
                 axes = axes_at(drawn, beside)
                 own = difference_scale(quantity, mesh, evaluation, reference)
                 distance = percent(field_difference(values, base, reference.weights).rel_l2)
-                note = f"rel. L² {distance}; scale ±{significant(own.high, 2)} {quantity.unit}"
+                title = f"minus {reference.solver}, ±{significant(own.high, 2)} {quantity.unit}"
                 colours = own.paint(evaluation.per_triangle(values - base))
-                body.panel(axes, canvas, mesh, colours, f"minus {reference.label}", note, bold=False)
+                body.panel(axes, canvas, mesh, colours, title, f"rel. L² {distance}", bold=False)
             elif columns == 2:
                 _explain(drawn, beside, reference)
         body.scale_bar(axes, extent)
@@ -152,8 +152,8 @@ def _explain(drawn: Figure, box: tuple[float, float, float, float], reference: E
     text = (
         f"Reference: {reference.label}\n"
         f"Scales end at the {PERCENT:g} % point of the area:\n"
-        "left of the reference, right of each\ndifference. Values beyond have the\n"
-        "end colours. Largest: of triangles’ means."
+        "left of the reference, right of each\ndifference, where ± above a panel is its\n"
+        "end. Values beyond have the end colours.\nLargest: of triangles’ means."
     )
     axes.text(0.02, 0.95, text, va="top", size=SMALL, color=MUTED, linespacing=1.35, transform=axes.transAxes)
 

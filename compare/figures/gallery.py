@@ -74,8 +74,8 @@ def marker_errors(comparison: Comparison) -> Drawing | None:
         "Errors at the markers",
         f"Absolute difference between each solver’s displacement and the {observations.label} one, "
         f"for both components, on one scale, which a solver that did not converge may exceed; markers "
-        f"are numbered as in the drawing of the design. Full bars: at a marker that the solver was "
-        f"not given, predicted from all others if it was given those. Hollow bars: training errors."
+        f"are numbered as in the drawing of the design. Bars: at a marker that the solver was "
+        f"not given, predicted from all others if it was given those. Circles: training errors."
         f"{unseen} {_given(comparison)}{_simulated(comparison)}",
         each_of(
             "Mean of |Δu| + |Δv| at markers that were not given, mm",
@@ -95,7 +95,7 @@ def field(comparison: Comparison, quantity: Quantity) -> Drawing:
     )
     beside = (
         f" Right: the field minus that of {reference}, point by point; each on a scale of its own, which "
-        f"ends at the same share of the area and is stated below the panel: compare numbers, not colours."
+        f"ends at the same share of the area and is stated above the panel: compare numbers, not colours."
         if len(comparison.shown_fields) > 1
         else ""
     )

@@ -1,9 +1,11 @@
 """Errors at the markers, a row a solver."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
@@ -12,19 +14,21 @@ from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import MarkerErrors, held_out_errors, marker_errors
 from compare.figures.style import axes_at, heading, legend_below_heading, solver_colour
 from geometry.arrays import BoolArray
-from geometry.figure import MUTED, SMALL, WIDTH, Figure, figure
+from geometry.figure import INK, MUTED, SMALL, WIDTH, Figure, figure
 from geometry.observations import Observations
 
 HEAD, TITLE, HEIGHT, GAP, FOOT = 0.62, 0.19, 0.42, 0.09, 0.4
 """Heights in inches: heading and legend; a solver's name; its bars; the space below; the lowest axis."""
-LEFT, MEANS = 0.56, 0.82
+LEFT, MEANS = 0.56, 1.08
 """Widths in inches beside the bars: their scale; their means."""
+TRAINING: dict[str, Any] = {"ls": "", "marker": "o", "ms": 3.2, "mfc": "white", "mew": 0.8}
+"""Look of a training error: a circle is seen even where the error vanishes."""
 
 
 def draw_marker_errors(comparison: Comparison) -> Figure:
     """Bars of |du| and |dv| at every marker (Fig. 6 of the paper), all on one scale.
 
-    Full bars: at markers that the solver was not given. Hollow ones: at markers that it was given.
+    Bars: at markers that the solver was not given. Circles: at markers that it was given.
     """
     evaluations, observations = comparison.evaluations, comparison.observations
     width = WIDTH / 2 - LEFT - MEANS
@@ -32,11 +36,12 @@ def draw_marker_errors(comparison: Comparison) -> Figure:
     ceiling = _ceiling(evaluations, observations)
     with figure(HEAD + len(evaluations) * step + FOOT) as drawn:
         heading(drawn, f"Absolute error at the markers, against {observations.label} displacements")
+        fitted = any(evaluation.in_sample for evaluation in evaluations)
         handles = [
-            Patch(facecolor=MUTED, edgecolor=MUTED, label="at a marker that the solver was not given"),
-            Patch(facecolor="white", edgecolor=MUTED, label="at one that it was given"),
+            Patch(facecolor=MUTED, edgecolor=MUTED, label="held out: the solver was not given this marker"),
+            Line2D([], [], **TRAINING, color=MUTED, label="training: it was given this marker (†)"),
         ]
-        legend_below_heading(drawn, handles, length=1.4)
+        legend_below_heading(drawn, handles[: 1 + fitted], length=1.4)
         for row, evaluation in enumerate(evaluations):
             held_out = held_out_errors(evaluation, observations)
             given = marker_errors(evaluation, observations) if evaluation.in_sample else None
@@ -46,6 +51,8 @@ def draw_marker_errors(comparison: Comparison) -> Figure:
                 _bars(axes, symbol, held_out, given, solver_colour(row))
                 _scales(axes, observations.visible, ceiling)
                 axes.set_ylabel(rf"$|\Delta {symbol}|$, mm", size=SMALL)
+                if row == 0:
+                    axes.text(1.03, 1.06, "mean, mm", size=SMALL, color=INK, transform=axes.transAxes)
                 if column == 0:
                     axes.set_title(evaluation.label_at_markers, size=8.5, pad=2, weight="bold")
                 if row == len(evaluations) - 1:
@@ -68,19 +75,19 @@ def _ceiling(evaluations: Sequence[Evaluation], observations: Observations) -> f
 def _bars(
     axes: Axes, symbol: str, held_out: MarkerErrors | None, given: MarkerErrors | None, colour: str
 ) -> None:
-    """The bars of one solver and component, and their means beside."""
-    width = 0.8 if held_out is None or given is None else 0.4
+    """The bars and circles of one solver and component, and their means beside."""
     words = []
-    for errors, shift, hollow in ((held_out, -0.5, False), (given, 0.5, True)):
+    for errors, kind in ((held_out, "held out"), (given, "training")):
         if errors is None:
             continue
         values = getattr(errors, f"ae_{symbol}")
         marker = np.arange(1, len(values) + 1)
-        x = marker + (shift * width if width < 0.5 else 0.0)
         seen = np.isfinite(values)
-        face = "white" if hollow else colour
-        axes.bar(x[seen], values[seen], 0.9 * width, color=face, edgecolor=colour, linewidth=0.6)
-        words.append(f"{'given' if hollow else 'mean'} {getattr(errors, f'mae_{symbol}'):.3f}")
+        if errors is given:
+            axes.plot(marker[seen], values[seen], **TRAINING, color=INK, clip_on=False, zorder=3)
+        else:
+            axes.bar(marker[seen], values[seen], 0.72, color=colour, edgecolor=colour, linewidth=0.6)
+        words.append(f"{getattr(errors, f'mae_{symbol}'):.3f} {kind}")
     axes.text(1.03, 0.5, "\n".join(words), size=SMALL, va="center", color=MUTED, transform=axes.transAxes)
 
 

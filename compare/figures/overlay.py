@@ -8,15 +8,18 @@ from matplotlib.patches import Circle
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.metrics import marker_errors
+from compare.evaluation.metrics import held_out_errors, marker_errors
 from compare.figures import body
 from compare.figures.canvas import Canvas, Extent
 from compare.figures.colours import Scale
-from compare.figures.style import arrow, axes_at, heading, legend_below_heading
+from compare.figures.style import LEGEND_LINE, arrow, axes_at, heading, legend_below_heading
 from geometry.arrays import FloatArray
 from geometry.figure import INK, MEASURED, MUTED, WIDTH, Figure, figure
 from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.observations import Observations
 
+GIVEN = "† was given these markers and meets them; held out: each predicted from the others"
+"""Meaning of the mark of a solver that was given the markers."""
 MARGIN = 0.12
 HEAD, PANEL_TITLE, FOOT = 0.55, 0.27, 0.48
 """Heights in inches: heading and legend; the name above a panel; the colour bar."""
@@ -38,13 +41,15 @@ def draw_overlay(comparison: Comparison) -> Figure:
     height = width * extent.height / extent.width
     high = max(float(_magnitude(mesh, evaluation).max()) for evaluation in evaluations)
     scale = Scale(0.0, high or 1.0, mpl.colormaps["viridis"])
-    total = HEAD + rows * (PANEL_TITLE + height) + FOOT
+    given = GIVEN if any(evaluation.in_sample for evaluation in evaluations) else ""
+    head = HEAD + LEGEND_LINE * bool(given)
+    total = head + rows * (PANEL_TITLE + height) + FOOT
     with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // columns) as canvas:
         heading(drawn, "Deformed finger, true scale")
         for number, evaluation in enumerate(evaluations):
             row, column = divmod(number, columns)
             left = MARGIN + column * (width + MARGIN)
-            top = HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
+            top = head + PANEL_TITLE + row * (PANEL_TITLE + height)
             axes = axes_at(drawn, (left, top, width, height))
             _panel(axes, canvas, scale, comparison, evaluation)
             _motion(axes, comparison, evaluation)
@@ -60,7 +65,7 @@ def draw_overlay(comparison: Comparison) -> Figure:
             Line2D([], [], color="#9a9a9a", lw=0.9, label="undeformed"),
             Line2D([], [], color=INK, lw=1, marker=">", ms=3.5, markevery=[1], label=f"{moved}’s motion"),
         ]
-        legend_below_heading(drawn, handles, length=1.6)
+        legend_below_heading(drawn, handles, length=1.6, note=given)
     return drawn
 
 
@@ -103,9 +108,16 @@ def _panel(axes: Axes, canvas: Canvas, scale: Scale, comparison: Comparison, eva
     axes.plot(*computed.T, "x", ms=4, color=INK, mew=0.9, zorder=5)
     axes.set_title(evaluation.label_at_markers, size=9, pad=3, y=1.0, weight="bold")
     if observations.known:
-        errors = marker_errors(evaluation, observations)
-        note = f"MAE{', given' * evaluation.in_sample}  u {errors.mae_u:.3f},  v {errors.mae_v:.3f} mm"
-        body.write_note(axes, canvas.extent, note)
+        body.write_note(axes, canvas.extent, mean_errors(evaluation, observations))
+
+
+def mean_errors(evaluation: Evaluation, observations: Observations) -> str:
+    """Mean absolute errors at the markers in words: held out where the solver tells, else what they are."""
+    errors, kind = held_out_errors(evaluation, observations), "held out"
+    if errors is None:
+        errors, kind = marker_errors(evaluation, observations), "training"
+    kind = f" {kind}" if evaluation.in_sample else ""
+    return f"MAE{kind}: u {errors.mae_u:.3f}, v {errors.mae_v:.3f} mm"
 
 
 def _motion(axes: Axes, comparison: Comparison, evaluation: Evaluation) -> None:

@@ -12,6 +12,9 @@ from geometry.figure import INK, MUTED, SMALL, Figure
 HALO = [patheffects.withStroke(linewidth=2.5, foreground="white")]
 """Keeps type and lines legible on anything."""
 
+LEGEND_LINE = 0.17
+"""Height of a line of a legend, inches."""
+
 SOLVER_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#56b4e9", "#d55e00", "#000000", "#8c6bb1", "#999933")
 """Okabe and Ito's palette, safe for colour-blind readers, without its pink (see `MEASURED`), and two more."""
 
@@ -47,22 +50,28 @@ def arrow(
     axes.annotate("", xy=tuple(end), xytext=tuple(start), arrowprops=shape, zorder=6)
 
 
-def legend_below_heading(drawn: Figure, handles: Sequence[Artist], *, length: float) -> None:
-    """A legend in one line below the heading; `length` is that of its handles, in heights of the type."""
+def legend_below_heading(drawn: Figure, handles: Sequence[Artist], *, length: float, note: str = "") -> None:
+    """A legend in one line below the heading, and a note in the line below it.
+
+    Args:
+        drawn: The figure.
+        handles: What is in the legend.
+        length: Of its handles, in heights of the type.
+        note: What the reader must know of marks in the figure, if there are any.
+    """
+    height = drawn.get_figheight()
+    if note:
+        drawn.text(0.012, 1 - (0.26 + LEGEND_LINE) / height, note, va="top", size=SMALL, color=INK)
     drawn.legend(
         handles=handles,
         loc="upper left",
-        bbox_to_anchor=(0.0, 1 - 0.24 / drawn.get_figheight()),
+        bbox_to_anchor=(0.0, 1 - 0.24 / height),
         ncols=len(handles),
         columnspacing=1.2,
         handletextpad=0.5,
         borderaxespad=0.1,
         handlelength=length,
     )
-
-
-LEGEND_LINE = 0.17
-"""Height of a line of a legend, inches."""
 
 
 def legend_columns(labels: Sequence[str]) -> int:

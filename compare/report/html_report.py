@@ -60,6 +60,7 @@ def render(
         own=reference.uncertainty,
         own_error=text.own_error_sentence(reference),
         beside=text.beside,
+        stat=text.stat,
         table_one=table_one(comparison),
         printed=printed_rows(design),
         truth_sentences=truth_sentences(comparison),
@@ -100,7 +101,6 @@ def _template() -> Template:
         "distance": distance,
         "percent": percent,
         "sentence": text.sentence,
-        "stat": text.stat,
         "symbol": text.symbol,
     }
     return environment.get_template("report.html.j2")

@@ -119,9 +119,11 @@ def symbol(name: str) -> Markup:
     )
 
 
-def stat(value: object) -> str:
-    """A number of a solver's record: whole numbers in full, others with four digits."""
-    return number(value) if isinstance(value, float) else str(value)
+def stat(name: str, value: object) -> str:
+    """A number of a solver's record: whole numbers in full, others with four digits; a probability in %."""
+    if not isinstance(value, float):
+        return str(value)
+    return percent(value, 4) if name.startswith("probability") else number(value)
 
 
 def sentence(text: str) -> str:

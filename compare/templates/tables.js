@@ -69,8 +69,8 @@
   }
 
   const number = (text) => {
-    const found = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?/i.exec(text);
-    return found ? parseFloat(found[0]) : NaN;
+    const found = /^(?:[<>] )?([+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?)/i.exec(text);
+    return found ? parseFloat(found[1]) : NaN;
   };
 
   function compare(a, b) {

@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -46,3 +47,21 @@ def test_a_growing_load_does_not_approach_the_reference() -> None:
     assert not approaches_reference(("load_fraction", "energy"))
     assert not approaches_reference(("units", "loss"))
     assert readable("newton_iterations") == "newton iterations"
+
+
+def test_axes_name_what_a_record_is_over(
+    fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
+) -> None:
+    drawn = draw_energy(compared(fem, pinn))
+    assert drawn is not None
+    assert drawn.axes[0].get_xlabel() == "hidden units of the network"
+    assert drawn.axes[1].get_ylabel() == "distance from fem, %"
+
+
+def test_two_results_are_joined_by_dots_and_no_curve(
+    fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
+) -> None:
+    short = {name: column[:2] for name, column in pinn.history.items()}
+    drawn = draw_energy(compared(fem, replace(pinn, history=short)))
+    assert drawn is not None
+    assert drawn.axes[0].lines[0].get_linestyle() == ":"

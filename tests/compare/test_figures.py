@@ -14,6 +14,7 @@ from PIL import Image
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.convergence import with_certificates
 from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.metrics import held_out_errors, marker_errors
 from compare.figures import FORMATS, draw_all
 from compare.figures.fields import QUANTITIES, draw_field
 from compare.figures.gallery import DRAWINGS, Drawing, draw
@@ -170,6 +171,38 @@ def test_a_solver_that_was_given_the_markers_is_marked_at_them(
     assert "† was given these markers" in drawing.caption
 
 
+def test_pictures_say_which_errors_are_held_out_and_which_are_of_training(
+    fem: Evaluation, pinn: Evaluation, observations: Observations, compared: Callable[..., Comparison]
+) -> None:
+    told = replace(pinn, in_sample=True, left_out=pinn.marker_displacement + 0.5)
+    untold = replace(told, solver="pinn-x", left_out=None)
+    errors = held_out_errors(told, observations), marker_errors(told, observations)
+    comparison = compared(fem, told, untold)
+    overlay, bars = (page_of(draw(comparison, name).figure) for name in ("overlay", "marker_errors"))
+    for kind, found in zip(("held out", "training"), errors, strict=True):
+        assert found is not None
+        assert f"MAE {kind}: u {found.mae_u:.3f}, v {found.mae_v:.3f} mm" in overlay.text
+        assert f"{found.mae_u:.3f} {kind}" in bars.text
+    assert "† was given these markers" in overlay.text
+    assert "mean, mm" in bars.text
+    assert "training: it was given this marker (†)" in bars.text
+    assert (overlay.cut_off(), overlay.overlaps(), bars.cut_off(), bars.overlaps()) == ([], [], [], [])
+
+
+def test_a_circle_shows_a_training_error_that_vanishes(
+    fem: Evaluation, pinn: Evaluation, observations: Observations, compared: Callable[..., Comparison]
+) -> None:
+    met = replace(pinn, in_sample=True, marker_displacement=observations.displacements.copy())
+    figure = draw(compared(fem, met), "marker_errors").figure
+    (circles,) = figure.axes[2].lines
+    assert circles.get_marker() == "o"
+    np.testing.assert_array_equal(circles.get_ydata(), 0.0)
+
+
+def test_a_difference_has_its_scale_beside_its_name(pages: dict[str, Page]) -> None:
+    assert re.search(r"minus fem, ±[\d.e-]+ MPa", pages["von_mises"].text)
+
+
 @pytest.mark.parametrize("name", ["overlay", "marker_errors"])
 def test_simulated_markers_are_called_simulated(
     name: str, drawings: dict[str, Drawing], pages: dict[str, Page]
@@ -217,7 +250,7 @@ def test_the_overlay_shows_the_whole_of_every_solution_that_converged(
 def test_the_reference_energy_is_a_line(pages: dict[str, Page]) -> None:
     energies, distances, *_ = pages["energy"].figure.axes
     assert [2.0, 2.0] in [list(line.get_ydata()) for line in energies.get_lines()]
-    np.testing.assert_allclose(distances.get_lines()[0].get_ydata(), [44.0, 1.0, 0.21])
+    np.testing.assert_allclose(distances.get_lines()[0].get_ydata(), [4400.0, 100.0, 21.0])
 
 
 def test_no_remark_on_a_field_lies_on_a_slender_finger(

@@ -14,7 +14,7 @@ from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.number_format import distance, number, percent
 from compare.figures import Picture
 from compare.report import html_report
-from compare.report.text import sentence
+from compare.report.text import sentence, stat
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.adaptation import Adaptation, RefinementRound
@@ -289,8 +289,15 @@ def test_numbers_are_set_with_four_digits(value: float, expected: str) -> None:
 
 def test_small_words() -> None:
     assert [percent(value) for value in (-0.0123, 0, 29.4714)] == ["−1.23\xa0%", "0\xa0%", "2947\xa0%"]
+    assert [percent(value) for value in (6.1e-26, -6.1e-26)] == ["<\xa00.001\xa0%", ">\xa0−0.001\xa0%"]
+    assert stat("probability_gent", 5.8e-25) == "<\xa00.001\xa0%"
     assert [percent(value, 2, sign=False) for value in (1.234, 0.05, math.nan)] == ["123", "5.0", "–"]
-    assert [distance(value) for value in (math.nan, 3e-15, 9.44e-7, 0.21)] == ["–", "0", "9.4e−07", "0.21"]
+    assert [distance(value) for value in (math.nan, 3e-15, 9.44e-7, 0.21)] == [
+        "–",
+        "0",
+        "<\xa00.0001",
+        "0.21",
+    ]
     assert sentence("solved directly; no more.") == "Solved directly; no more."
 
 
