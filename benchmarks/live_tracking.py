@@ -39,7 +39,7 @@ def main() -> Table:
     table = Table(title="Tracking at 1280x720 pixels, nine markers and seven fiducials")
     for column in ("method", "frames from", "frames a second", "median, ms", "95 %, ms", "lost markers"):
         table.add_column(column, justify="left" if column in ("method", "frames from") else "right")
-    scene, images = _film()
+    scene, images = film()
     to_and_fro = [*images, *images[-2:0:-1]]
     whole = list(islice(chain.from_iterable(repeat(to_and_fro)), FRAMES))
     grey = [cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in whole]
@@ -60,7 +60,7 @@ def main() -> Table:
     return table
 
 
-def _film() -> tuple[FilmedScene, list[Image]]:
+def film() -> tuple[FilmedScene, list[Image]]:
     """A finger that is bent by 10 mm in 24 frames."""
     design, camera = Design(), default_camera()
     workspace = default_workspace(design)
