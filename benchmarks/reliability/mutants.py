@@ -48,6 +48,7 @@ LIBRARIES = (
     "scipy.optimize",
     "scipy.sparse.linalg",
     "scipy.stats",
+    "torch",
     "pydantic",
     "cv2",
     "ufl",

@@ -8,6 +8,7 @@ from solvers.elasticity import (
     PlaneTensor,
     energy_density_of,
     lame_constants,
+    lame_derivatives,
     linear_energy_density,
     linear_stress,
     small_strain,
@@ -27,6 +28,22 @@ def rotation(angle: float) -> np.ndarray:
 def test_printed_constants_of_the_paper_are_plane_stress():
     assert lame_constants(YOUNG, POISSON, "stress").λ == pytest.approx(6.43, abs=5e-3)
     assert lame_constants(YOUNG, POISSON, "strain").λ == pytest.approx(35.38, abs=5e-3)
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_derivatives_of_the_lame_constants_are_those_by_a_complex_step(plane):
+    step = 1e-30
+    moved = lame_constants(YOUNG, complex(POISSON, step), plane)
+    slopes = [complex(constant).imag / step for constant in moved]
+    assert lame_derivatives(YOUNG, POISSON, plane) == pytest.approx(tuple(slopes), rel=1e-12)
+
+
+def test_gents_stiffness_has_grown_by_a_third_at_a_quarter_of_its_limit():
+    """In simple shear J = 1 and tr C - 3 = γ^2: the shear stress is μ γ / (1 - γ^2 / LIMIT)."""
+    shear = np.array([[[0.0, 0.5], [0.0, 0.0]]])
+    lame = lame_constants(YOUNG, POISSON, "strain")
+    stress = stress_of("gent", shear, lame, np.log)
+    assert stress.xy[0] == pytest.approx(4 / 3 * lame.μ * 0.5, rel=1e-12)
 
 
 @pytest.mark.parametrize(
