@@ -1,5 +1,7 @@
 """Atomic writing: a reader sees the old file or the new one, never a part of it or an empty one.
 
+That holds after a power cut, too: the new one is on the disk before it takes the old one's name.
+
 Libraries that write files themselves do not always say that a disk is full: VTK leaves an empty file or ends
 the process, and NumPy prints a traceback. Their bytes are made in memory and written here.
 """
@@ -37,6 +39,8 @@ def atomic_path(path: Path) -> Iterator[Path]:
         yield partial
         if not partial.exists() or not partial.stat().st_size:
             raise OSError(EIO, "nothing was written; is the disk full?", str(path))
+        with partial.open("rb") as file:
+            os.fsync(file.fileno())  # a rename may reach the disk before what it names
         os.replace(partial, path)
     except OSError as error:
         if error.errno in (ENOSPC, EDQUOT, EFBIG):

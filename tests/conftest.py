@@ -20,6 +20,14 @@ from geometry.worker import child_environment
 PLUGIN = Path(__file__).parent / "solvers" / "plugin"
 
 
+@pytest.fixture(scope="session", autouse=True)
+def without_waiting_for_the_disk() -> Iterator[None]:
+    """Files need not be on the disk: no test cuts the power, and thousands of files take minutes."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda _: None)
+        yield
+
+
 @pytest.fixture
 def full_disk() -> Iterator[None]:
     """No file may become longer than 4096 bytes: writing fails as on a full disk, in libraries, too."""

@@ -17,7 +17,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # one thread: numbers are to agre
 
 from rich.table import Table
 
-from benchmarks.reliability import fuzz_all, inputs, mutants
+from benchmarks.reliability import fuzz_all, inputs, memory, mutants
 from benchmarks.reliability.defects import DEFECTS
 from benchmarks.reliability.faults import Row, run_faults
 from benchmarks.reliability.jobs import JOBS
@@ -39,7 +39,7 @@ def main(rows: str = "") -> Table:
 
 def page(rows: Sequence[Row]) -> str:
     """The page of all results that are kept."""
-    return "\n".join([*_faults(rows), *_inputs(), *_fuzzing(), *_mutants(), *_defects()])
+    return "\n".join([*_faults(rows), *_inputs(), *_fuzzing(), *_memory(), *_mutants(), *_defects()])
 
 
 def fault_rows(rows: Sequence[Row]) -> list[tuple[str, ...]]:
@@ -136,6 +136,30 @@ def _fuzzing() -> list[str]:
         "those that were found before are mended, see below. *Ended by a library*: C code crashed or took "
         "longer than 10 s; drawings and meshes are therefore read in a process of their own by the commands, "
         "which say in one line that it ended.",
+        "",
+        *_table(header, rows, left=1),
+        "",
+    ]
+
+
+def _memory() -> list[str]:
+    header = ("repeated", "times", "after a tenth, MB", "at the end, MB", "growth, kB each time")
+    rows = [
+        (
+            each.job,
+            f"{each.count:,}",
+            f"{each.after_tenth:.1f}",
+            f"{each.after_all:.1f}",
+            f"{each.growth:.1f}",
+        )
+        for each in memory.kept_rows()
+    ]
+    return [
+        "## Memory",
+        "",
+        "`python -m benchmarks.reliability.memory`: resident memory of a process that repeats one thing, "
+        "each time with another load, other markers or another picture. *Growth* is the slope over the "
+        "second half.",
         "",
         *_table(header, rows, left=1),
         "",

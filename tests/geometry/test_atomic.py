@@ -1,4 +1,5 @@
 import errno
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,6 +16,39 @@ def test_the_new_file_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
         partial.write_text("new")
         assert path.read_text() == "old"
     assert path.read_text() == "new"
+
+
+def test_the_new_file_is_on_the_disk_before_it_takes_the_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A power cut after a rename alone may leave an empty file under the final name."""
+    path, synced = tmp_path / "table.csv", []
+    sync, replace = os.fsync, os.replace
+    monkeypatch.setattr(os, "fsync", lambda file: (synced.append(os.fstat(file).st_ino), sync(file)))
+
+    def watched(source: Path, target: Path) -> None:
+        assert synced == [source.stat().st_ino]
+        assert source.read_text() == "new"
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", watched)
+    write_text(path, "new")
+    assert path.read_text() == "new"
+
+
+def test_a_disk_that_fails_late_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A network disk may only then say that it is full."""
+    path = tmp_path / "table.csv"
+    path.write_text("old")
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space") as error:
+        write_text(path, "new")
+    assert error.value.filename == str(path)
+    assert [(entry.name, entry.read_text()) for entry in tmp_path.iterdir()] == [("table.csv", "old")]
 
 
 def test_an_error_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
