@@ -12,6 +12,7 @@ from compare.camera.film import Film
 from compare.evaluation.branches import with_branches
 from compare.evaluation.comparison import Comparison, supported_solvers
 from compare.evaluation.convergence import with_certificates
+from compare.evaluation.deformed_body import with_body_checks
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.force_displacement import force_curves, write_force_displacement
 from compare.evaluation.metrics import evaluated, pick_reference
@@ -226,6 +227,7 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
         raise fault
     with stages.stage("certificate"):
         evaluations = with_certificates(evaluations, problem)
+        evaluations, impossible = with_body_checks(evaluations, mesh, truth)
         evaluations, branches = with_branches(evaluations, problem)
     return Comparison(
         design=job.design,
@@ -240,7 +242,7 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
         settings=settings,
         left_out=left_out,
         failed=failed,
-        warnings=[*remarks, *branches],
+        warnings=[*remarks, *impossible, *branches],
     )
 
 

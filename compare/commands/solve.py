@@ -34,6 +34,7 @@ def solve(
         out: VTU file of the fields.
     """
     from compare.evaluation.convergence import with_certificates
+    from compare.evaluation.deformed_body import with_body_checks
     from compare.evaluation.force_displacement import force_curves, write_force_displacement
     from compare.evaluation.metrics import evaluated
     from compare.evaluation.plausibility import check_positions, displacement_remarks
@@ -80,13 +81,16 @@ def solve(
                 say(f"warning: {remark}")
             solution = solved(made, problem, progress)
         with stages.stage("certificate"):
-            (evaluation,) = with_certificates([evaluated(solution, triangles)], problem)
+            certified = with_certificates([evaluated(solution, triangles)], problem)
+            (evaluation,), remarks = with_body_checks(certified, triangles)
         write_vtu(out, triangles, evaluation)
         written = [out]
         if curves := force_curves([evaluation], load):
             written += [out.with_name(f"{out.stem}_force_displacement.{kind}") for kind in ("csv", "png")]
             write_force_displacement(written[1], curves, load, depth=chosen.depth)
             draw_force_displacement(curves, depth=chosen.depth).save(written[2])
+    for remark in remarks:
+        say(f"warning: {remark}")
     print(f"{evaluation.label}: {evaluation.message}")
     u, v = solution.reaction
     print(f"energy {solution.energy:.6g} N mm/mm, reaction ({u:.6g}, {v:.6g}) N/mm")

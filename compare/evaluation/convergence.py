@@ -12,6 +12,10 @@ CERTIFIED_LAW = "linear"
 """Only there does the least energy settle the question: it is quadratic."""
 
 
+NOT_FINITE = "its displacement or stress is not finite everywhere"
+"""What is said of a result with NaN or infinity in a field."""
+
+
 def with_certificates(evaluations: Sequence[Evaluation], problem: Problem) -> list[Evaluation]:
     """The evaluations, those of the linear law with a certificate and the verdict that follows from it.
 
@@ -49,7 +53,7 @@ def with_certificate(evaluation: Evaluation, certificate: Certificate | None) ->
 
     A result that is not finite has no certificate, which is a fault of its own.
     """
-    faults = ["its displacement is not finite everywhere"] if certificate is None else certificate.faults
+    faults = [NOT_FINITE] if certificate is None else certificate.faults
     return replace(
         evaluation,
         converged=evaluation.converged and not faults,

@@ -40,6 +40,7 @@ def metrics(comparison: Comparison) -> dict[str, Any]:
             "description": observations.source,
             "markers": int(observations.visible.sum()),
         },
+        "warnings": list(comparison.warnings),
         "reference": comparison.reference.solver,
         "solvers": {
             evaluation.solver: _solver(evaluation, comparison) for evaluation in comparison.evaluations

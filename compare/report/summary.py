@@ -62,8 +62,20 @@ def answers(
     }
     solvers = {label[name]: own for name, own in metrics["solvers"].items()}
     metrics = {**metrics, "solvers": solvers, "reference": label[metrics["reference"]]}
-    found = [_trust(metrics), _markers(metrics), _convergence(metrics, left_out or {}, failed or {})]
+    found = [
+        _warnings(metrics),
+        _trust(metrics),
+        _markers(metrics),
+        _convergence(metrics, left_out or {}, failed or {}),
+    ]
     return [answer for answer in found if answer is not None]
+
+
+def _warnings(metrics: Numbers) -> Answer | None:
+    """The warnings of the run, before any number of it; a run of an earlier version has kept none."""
+    said = [f"{text[:1].upper()}{text[1:].rstrip('. ')}." for text in metrics.get("warnings", ())]
+    count = "One warning" if len(said) == 1 else f"{len(said)} warnings"
+    return Answer("What speaks against these numbers?", f"{count}:", said) if said else None
 
 
 def _trust(metrics: Numbers) -> Answer | None:

@@ -339,5 +339,5 @@ def test_a_result_that_is_not_finite_is_not_converged(finger: TriangleMesh) -> N
     nodal = np.full((len(LagrangeSpace(finger, 2).nodes), 2), np.nan)
     (lost,) = with_certificates([sampled(problem, nodal)], problem)
     assert not lost.converged
-    assert lost.message == "a given displacement; its displacement is not finite everywhere"
+    assert lost.message == "a given displacement; its displacement or stress is not finite everywhere"
     assert certificate_sentences(lost) == "given (not converged) has no certificate: it is not finite."

@@ -62,6 +62,7 @@ SCHEMA = {
     "material": {"young": Real, "poisson": Real, "plane": str, "law": str},
     "load": {"kind": str, "displacement": tuple, "position": type(None), "radius": (Real, type(None))},
     "measurements": {"source": str, "description": str, "markers": int},
+    "warnings": list,
     "reference": str,
     "solvers": {"fem": SOLVER, "pinn-std": {**SOLVER, "uncertainty": type(None)}},
 }

@@ -1,0 +1,110 @@
+"""Checks every result's deformed body: finite, not turned inside out, and not through itself."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import shapely
+
+from compare.evaluation.convergence import CERTIFIED_LAW, NOT_FINITE
+from compare.evaluation.evaluation import Evaluation
+from geometry.arrays import BoolArray, FloatArray
+from geometry.mesh.boundary import boundary_edges
+from geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
+from solvers.lagrange import LagrangeSpace
+
+QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
+"""Nodes of the four triangles into which the middles of its edges cut a quadratic one."""
+
+
+INSIDE_OUT = "TURNED INSIDE OUT"
+THROUGH_ITSELF = "THE BODY GOES THROUGH ITSELF"
+ADVICE = {
+    NOT_FINITE: "it counts as not converged",
+    INSIDE_OUT: "no material does that; take a smaller stroke",
+    THROUGH_ITSELF: "self-contact is not modelled, so that a result beyond the stroke at which parts meet "
+    "says nothing of a real finger; take a smaller stroke",
+}
+"""What follows from a fault, and what to do."""
+
+
+class Body:
+    """A body at rest, and what is impossible about its deformations."""
+
+    def __init__(self, mesh: TriangleMesh) -> None:
+        self._mesh, space = mesh, LagrangeSpace(mesh, 2)
+        self._edges, self._nodes = boundary_edges(mesh.triangles), space.nodes
+        self._quarters = space.cell_nodes[:, QUARTERS].reshape(-1, 3)
+
+    def inside_out(self, evaluation: Evaluation) -> BoolArray:
+        """The triangles that are turned inside out, wholly or in one of their quarters, shape (t,)."""
+        moved = self._nodes + np.concatenate([evaluation.node_displacement, evaluation.edge_displacement])
+        return np.asarray((signed_areas(moved, self._quarters) <= 0).reshape(-1, len(QUARTERS)).any(axis=1))
+
+    def crossings(self, displacement: FloatArray) -> FloatArray:
+        """Places where the deformed boundary crosses or touches itself, shape (k, 2), mm, from base to tip.
+
+        Args:
+            displacement: Of the mesh's nodes, shape (n, 2), mm.
+        """
+        edges, points = self._edges, self._mesh.points
+        lines = shapely.linestrings((points + displacement)[edges])
+        one, other = shapely.STRtree(lines).query(lines, predicate="intersects")
+        apart = (edges[one][:, :, None] != edges[other][:, None, :]).all(axis=(1, 2)) & (one < other)
+        one, other = one[apart], other[apart]
+        if len(one):  # a slit is closed at rest
+            rest = shapely.linestrings(points[edges])
+            opened = ~shapely.intersects(rest[one], rest[other])
+            one, other = one[opened], other[opened]
+        places = shapely.get_coordinates(shapely.centroid(shapely.intersection(lines[one], lines[other])))
+        return np.asarray(places[places[:, 0].argsort()])
+
+    def faults(self, evaluation: Evaluation) -> dict[str, str]:
+        """What is impossible about a result, with the place."""
+        if not evaluation.finite:
+            return {NOT_FINITE: ""}
+        faults = {}
+        turned = self.inside_out(evaluation)
+        if turned.any():
+            x, y = self._mesh.points[self._mesh.triangles[turned]].mean(axis=1)[0]
+            where = (
+                f" in {turned.sum()} of {len(turned)} triangles, one of them at rest at ({x:.3g}, {y:.3g}) mm"
+            )
+            faults[INSIDE_OUT] = where
+        crossed = self.crossings(evaluation.node_displacement)
+        if len(crossed):
+            x, y = crossed[0]
+            faults[THROUGH_ITSELF] = f" near ({x:.3g}, {y:.3g}) mm"
+        return faults
+
+
+def with_body_checks(
+    evaluations: Sequence[Evaluation], mesh: TriangleMesh, truth: Evaluation | None = None
+) -> tuple[list[Evaluation], list[str]]:
+    """The evaluations, those with an impossible body with a sentence on it; and a remark on each fault.
+
+    A result that is not finite, or of finite strain and turned inside out, does not count as converged. A
+    linear law knows no such fault: its equations are those of the body at rest. No law here knows
+    self-contact, so that a body that goes through itself is a warning, whatever the law.
+
+    Args:
+        evaluations: Sampled on the mesh.
+        mesh: The body at rest.
+        truth: The simulated finger, if there is one, of which there is a remark only.
+    """
+    body, checked = Body(mesh), []
+    having: dict[str, list[str]] = {}
+    for evaluation in evaluations:
+        faults = body.faults(evaluation)
+        fatal = NOT_FINITE in faults or (INSIDE_OUT in faults and evaluation.law != CERTIFIED_LAW)
+        said = [f"{fault}{place}" for fault, place in faults.items() if fault not in evaluation.message]
+        if said:
+            message = "; ".join([evaluation.message.rstrip(". "), *said])
+            evaluation = replace(evaluation, message=message, converged=evaluation.converged and not fatal)
+        checked.append(evaluation)
+        for fault in faults:
+            having.setdefault(fault, []).append(evaluation.solver)
+    if truth is not None:
+        for fault in body.faults(truth):
+            having.setdefault(fault, []).append("the simulated finger")
+    return checked, [f"{', '.join(names)}: {fault}; {ADVICE[fault]}" for fault, names in having.items()]
