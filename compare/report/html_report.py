@@ -60,7 +60,7 @@ def render(
         own=reference.uncertainty,
         own_error=text.own_error_sentence(reference),
         beside=text.beside,
-        stat=text.stat,
+        record=text.record,
         table_one=table_one(comparison),
         printed=printed_rows(design),
         truth_sentences=truth_sentences(comparison),

@@ -126,6 +126,26 @@ def stat(name: str, value: object) -> str:
     return percent(value, 4) if name.startswith("probability") else number(value)
 
 
+ASPECTS = ("", "_deviation", "_low", "_high", "_resolution")
+"""Endings of the numbers of a quantity that a solver has found with an interval."""
+
+
+def record(stats: Mapping[str, object]) -> tuple[list[tuple[str, list[str]]], list[tuple[str, str]]]:
+    """The numbers that a solver recorded of its solve, but for its time.
+
+    Returns:
+        The quantities that it found with an interval, each with its `ASPECTS`, and the rest by name.
+    """
+    names = [name for name in stats if f"{name}_low" in stats]
+    known = {f"{name}{aspect}" for name in names for aspect in ASPECTS} | {"seconds"}
+
+    def told(name: str) -> str:
+        return stat(name, stats[name]) if name in stats else "–"
+
+    found = [(name.replace("_", " "), [told(f"{name}{aspect}") for aspect in ASPECTS]) for name in names]
+    return found, [(name.replace("_", " "), told(name)) for name in stats if name not in known]
+
+
 def sentence(text: str) -> str:
     """The text with a capital at its start and one full stop at its end."""
     return text[:1].upper() + text[1:].rstrip(". ") + "."

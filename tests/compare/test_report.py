@@ -14,7 +14,7 @@ from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.number_format import distance, number, percent
 from compare.figures import Picture
 from compare.report import html_report
-from compare.report.text import sentence, stat
+from compare.report.text import record, sentence, stat
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.adaptation import Adaptation, RefinementRound
@@ -285,6 +285,20 @@ def test_it_is_written_atomically(content: Comparison, tmp_path: Path) -> None:
 )
 def test_numbers_are_set_with_four_digits(value: float, expected: str) -> None:
     assert number(value) == expected
+
+
+def test_what_a_solver_found_is_told_apart_from_its_other_numbers() -> None:
+    stats = {
+        "seconds": 3.0,
+        "force": 0.25,
+        "force_low": 0.2,
+        "force_high": 0.3,
+        "young_modulus": 2,
+        "law": "gent",
+    }
+    found, rest = record(stats)
+    assert found == [("force", ["0.2500", "–", "0.2000", "0.3000", "–"])]
+    assert rest == [("young modulus", "2"), ("law", "gent")]
 
 
 def test_small_words() -> None:
