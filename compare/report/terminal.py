@@ -39,7 +39,7 @@ def body_table(comparison: Comparison) -> Table:
     """Distances over the body, error of the force, and time."""
     evaluations, reference, truth = comparison.evaluations, comparison.reference, comparison.truth
     label = reference.label
-    lines = [f"from {label}: relative L² difference of the displacement."]
+    lines = [f"from ref.: relative L² difference of the displacement from {label}."]
     if reference.uncertainty is not None and len(evaluations) > 1:
         lines.append(f"±: error of {label} itself, estimated; a smaller difference says nothing.")
     lines.append("above fem: energy of the displacement on fem's elements above the least there.")
@@ -47,7 +47,7 @@ def body_table(comparison: Comparison) -> Table:
         lines.append("truth: relative L² difference from the simulated finger of finite strain;")
         lines.append("force: error of the size of the indenter's force.")
     table = _table("Over the whole body", "\n".join(lines))
-    headings = [f"from {reference.solver}\n%", "above fem\n%"]
+    headings = ["from ref.\n%", "above fem\n%"]
     headings += ["truth\ndispl.", "\nv. Mises", "\nforce, %"] * (truth is not None)
     for heading in [*headings, "time\ns"]:
         table.add_column(heading, justify="right", no_wrap=True)

@@ -72,7 +72,8 @@ def test_both_tables_fit_eighty_columns(
 ):
     slow = replace(failed, stats={"seconds": 12345.2}, in_sample=True, left_out=failed.marker_displacement)
     both = compared(estimated, slow, truth=failed)
-    tables = [marker_table(both), body_table(both)]
+    long = compared(replace(estimated, solver="fem-nonlinear"), slow, truth=failed)
+    tables = [marker_table(both), body_table(both), body_table(long)]
     text = "".join(printed(table, width=width) for table in tables)
     assert "12345 " in text
     assert "fem-nonlinear" in text
