@@ -16,7 +16,7 @@ from compare.evaluation.deformed_body import with_body_checks
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.force_displacement import force_curves, write_force_displacement
 from compare.evaluation.metrics import evaluated, pick_reference
-from compare.evaluation.plausibility import check_positions, displacement_remarks
+from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
 from compare.evaluation.shared_mesh import shared_mesh, write_rounds
 from compare.evaluation.truths import SLIDING, TRUTHS, check_truths, check_walls
 from compare.evaluation.virtual_experiment import (
@@ -242,7 +242,7 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
         settings=settings,
         left_out=left_out,
         failed=failed,
-        warnings=[*remarks, *impossible, *branches],
+        warnings=[*unit_remarks(problem), *remarks, *impossible, *branches],
     )
 
 

@@ -37,7 +37,7 @@ def solve(
     from compare.evaluation.deformed_body import with_body_checks
     from compare.evaluation.force_displacement import force_curves, write_force_displacement
     from compare.evaluation.metrics import evaluated
-    from compare.evaluation.plausibility import check_positions, displacement_remarks
+    from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
     from compare.evaluation.shared_mesh import shared_mesh, tolerance_reached
     from compare.figures.force_chart import draw_force_displacement
     from compare.report.vtu_file import write_vtu
@@ -77,7 +77,8 @@ def solve(
         )
         with stages.stage(made.name) as progress:
             problem = Problem(triangles, with_law(material, made), load, given, chosen)
-            for remark in displacement_remarks(given, problem) if given else ():
+            measured = displacement_remarks(given, problem) if given else []
+            for remark in [*unit_remarks(problem), *measured]:
                 say(f"warning: {remark}")
             solution = solved(made, problem, progress)
         with stages.stage("certificate"):

@@ -21,7 +21,7 @@ INSIDE_OUT = "TURNED INSIDE OUT"
 THROUGH_ITSELF = "THE BODY GOES THROUGH ITSELF"
 ADVICE = {
     NOT_FINITE: "it counts as not converged",
-    INSIDE_OUT: "no material does that; take a smaller stroke",
+    INSIDE_OUT: "no material does that; take a smaller stroke, or look at the markers that were given",
     THROUGH_ITSELF: "self-contact is not modelled, so that a result beyond the stroke at which parts meet "
     "says nothing of a real finger; take a smaller stroke",
 }

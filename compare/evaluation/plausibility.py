@@ -35,6 +35,10 @@ OPPOSED = -0.7
 """Cosine of u alone below which its sign looks reversed; at finite strain it falls to 0."""
 SIZES = 3.0
 """Ratio of measured to linear displacements that is unlikely; at finite strain it is 0.86 to 1."""
+TINY = 1e-3
+"""Share of the finger's length below which a stroke or a radius looks like metres: strokes have some per cent."""
+SOFT, STIFF = 0.02, 2e4
+"""Young's moduli that are printed, MPa: the softest silicones have 0.05, filled plastics up to 15,000."""
 SMALL = 0.1
 """Share of the stroke below which `fem`'s displacements at the markers say little of a direction."""
 
@@ -60,6 +64,27 @@ def check_positions(observations: Observations, mesh: TriangleMesh) -> None:
                 f"the measurements are not of this finger: all markers lie within {extent:.3g} mm of its "
                 f"frame's origin; these look like {unit}; give positions and displacements in mm"
             )
+
+
+def unit_remarks(problem: Problem) -> list[str]:
+    """Remarks on a load or a material that looks like another unit, a line each."""
+    length, load, young = (
+        float(np.ptp(problem.mesh.points, axis=0).max()),
+        problem.load,
+        problem.material.young,
+    )
+    remarks = [
+        f"the {name} of {size:g} mm is {size / length:.1g} of the finger's length; this looks like metres, "
+        "give mm"
+        for name, size in (("stroke", float(np.abs(load.values).max())), ("radius", load.radius))
+        if size is not None and size < TINY * length
+    ]
+    if not SOFT <= young <= STIFF:
+        unit = "gigapascals" if young < SOFT else "pascals"
+        remarks.append(
+            f"Young's modulus of {young:g} MPa is no rubber's or plastic's; this looks like {unit}, give MPa"
+        )
+    return remarks
 
 
 def displacement_remarks(observations: Observations, problem: Problem) -> list[str]:

@@ -1,12 +1,14 @@
 """Measurements that cannot be, or hardly, of the finger under its load; units mm."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from compare.evaluation.plausibility import check_positions, displacement_remarks
+from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
 from compare.evaluation.virtual_experiment import virtual_experiment
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
@@ -24,6 +26,44 @@ def problem(coarse_mesh: TriangleMesh) -> Problem:
 def measured(problem: Problem) -> Observations:
     """Displacements of finite strain, as unlike those of linear `fem` as a real finger's may be."""
     return virtual_experiment(problem, 0.8)[0]
+
+
+@pytest.mark.parametrize(
+    ("load", "young", "said"),
+    [
+        (
+            {"displacement": (0.0, -0.01)},
+            11.4,
+            "the stroke of 0.01 mm is .*; this looks like metres, give mm",
+        ),
+        (
+            {"kind": "cylinder", "displacement": (0.0, -10.0), "radius": 0.005},
+            11.4,
+            "the radius of 0.005 mm is .*; this looks like metres, give mm",
+        ),
+        ({}, 1e6, "modulus of 1e[+]06 MPa .*; this looks like pascals, give MPa"),  # a silicone of 1 MPa
+        ({}, 0.0114, "modulus of 0.0114 MPa .*; this looks like gigapascals, give MPa"),
+    ],
+)
+def test_a_load_or_a_material_in_other_units_is_warned_of(
+    load: dict[str, Any], young: float, said: str, coarse_mesh: TriangleMesh
+) -> None:
+    (remark,) = unit_remarks(Problem(coarse_mesh, Material(young=young), Load(**load)))
+    assert re.search(said, remark)
+
+
+@pytest.mark.parametrize(
+    ("load", "young"),
+    [
+        ({}, 11.4),
+        ({"displacement": (None, -0.5)}, 0.05),  # the softest silicone, pressed a little
+        ({"kind": "cylinder", "displacement": (0.0, -30.0), "radius": 2.0}, 3500.0),  # a hard plastic
+    ],
+)
+def test_a_usual_load_and_material_are_not_warned_of(
+    load: dict[str, Any], young: float, coarse_mesh: TriangleMesh
+) -> None:
+    assert unit_remarks(Problem(coarse_mesh, Material(young=young), Load(**load))) == []
 
 
 def test_a_finger_at_finite_strain_is_plausible(measured: Observations, problem: Problem) -> None:
