@@ -36,7 +36,7 @@ OPPOSED = -0.7
 SIZES = 3.0
 """Ratio of measured to linear displacements that is unlikely; at finite strain it is 0.86 to 1."""
 TINY = 1e-3
-"""Share of the finger's length below which a stroke or a radius looks like metres: strokes have some per cent."""
+"""Share of the finger's length below which a stroke or a radius looks like metres; strokes have per cents."""
 SOFT, STIFF = 0.02, 2e4
 """Young's moduli that are printed, MPa: the softest silicones have 0.05, filled plastics up to 15,000."""
 SMALL = 0.1
