@@ -25,6 +25,8 @@ MAX_ITERATIONS = 8
 """Newton iterations before a guess counts as too far away."""
 MOST_ITERATIONS = 20
 """The same from the state of another body, beyond which there is no other way."""
+FAR = 0.1
+"""Relative size of a Newton step above which the steps must not grow, or the guess is too far away."""
 ROUGH, EXACT = 2e-3, 1e-6
 """Relative size of the last Newton step, in the energy norm, while unknowns are sought and at the end."""
 SHORTEST = 2.0**-6
@@ -189,7 +191,7 @@ class ResponseModel:
             step = linearised.solve(balance[None])[0]
             work = max(abs(float((load * state).sum())), REST)
             size = float(np.sqrt(abs((step * balance).sum()) / work)) if balance.any() else 0.0
-            if not np.isfinite(size) or size > max(2 * before, 1.0):
+            if not np.isfinite(size) or size > max(before, FAR):
                 return None
             if size < tolerance:
                 return self._with_slopes(values, hypothesis, (state + step, state), linearised, traction)
