@@ -68,6 +68,11 @@ def test_plane_stress_thickness_strain_is_that_of_uniaxial_tension():
     assert strain.zz[0] == pytest.approx(-POISSON * 0.01, rel=1e-12)
 
 
+def test_plane_strain_has_no_strain_along_the_thickness():
+    strain = small_strain(np.array([[[0.01, 0.0], [0.0, 0.02]]]), lame_constants(YOUNG, POISSON, "strain"))
+    assert strain.zz[0] == 0.0
+
+
 @pytest.mark.parametrize("plane", ["strain", "stress"])
 def test_linear_energy_is_half_stress_times_strain(plane):
     gradient = np.random.default_rng(0).normal(size=(50, 2, 2))
