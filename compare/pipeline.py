@@ -55,6 +55,7 @@ from solvers.solver import (
     TrainedSolver,
     TrainingContext,
     UnsupportedProblemError,
+    check_name,
     solved,
     with_law,
 )
@@ -150,6 +151,8 @@ def checked(job: Job) -> Job:
     """The job with its measurements read, refused if it cannot be done, before anything is computed."""
     if not job.solvers:
         raise UserError("no solver was asked for; name at least one")
+    for name in job.names:
+        check_name(name)
     if len(set(job.names)) < len(job.names):
         raise UserError(f"a solver is named twice: {', '.join(job.names)}")
     if job.adapt is not None:

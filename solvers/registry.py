@@ -11,7 +11,7 @@ from typing import Any, get_type_hints
 from pydantic import TypeAdapter, ValidationError
 
 from geometry.errors import UserError
-from solvers.solver import Solver
+from solvers.solver import Solver, check_name
 
 GROUP = "pinnray.solvers"
 
@@ -91,6 +91,7 @@ def make_solver(name: str, **settings: Any) -> Solver:
             f"solver {name!r} does not have the interface: "
             "name, laws, loads, solve(problem, progress), settings()"
         )
+    check_name(solver.name)
     return solver
 
 

@@ -1,5 +1,6 @@
 """The interface of a solver: settings live in the solver, the problem is the argument."""
 
+import re
 import sys
 import traceback
 from collections.abc import Callable, Mapping
@@ -14,6 +15,10 @@ from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, Status
+
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
+RESERVED = "truth"
+"""Name of the field of a simulated finger, which no solver can have."""
 
 Progress = Callable[[float, str], None]
 """Called with the fraction done (0 to 1) and a short text; a fast solver may ignore it."""
@@ -82,6 +87,16 @@ class Solver(Protocol):
     def settings(self) -> dict[str, object]:
         """Every setting that changes the result, as JSON-ready values; recorded with the result."""
         ...
+
+
+def check_name(name: str) -> None:
+    """Raise a `UserError` unless a solver's name can be that of a file and of a row beside the truth."""
+    if not (isinstance(name, str) and NAME.fullmatch(name)) or name == RESERVED:
+        taken = f"{RESERVED} is the simulated finger's" if name == RESERVED else "files are called so"
+        raise UserError(
+            f"a solver is called {name!r}: {taken}; take up to 64 letters, digits, '.', '_', '-', and begin "
+            "with a letter or a digit"
+        )
 
 
 def check_problem(solver: Solver, problem: Problem) -> None:

@@ -90,7 +90,7 @@ class Study(CheckedModel):
         varied: Parameters with a range of values.
     """
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,47}$")
     design: str = "default"
     solver: str = "fem"
     settings: dict[str, Value] = Field(default_factory=dict)

@@ -66,6 +66,16 @@ def test_a_broken_package_warns_and_the_rest_goes_on(tmp_path, monkeypatch):
         make_solver("broken")
 
 
+@pytest.mark.parametrize("name", ["../up", "a/b", "", ".hidden", "a b", "<b>", "x" * 65, "truth", "a\n"])
+def test_a_name_that_no_file_can_have_is_refused(name, plugin_folder, monkeypatch):
+    monkeypatch.syspath_prepend(str(plugin_folder))
+    from pinnray_skfem import SkfemSolver
+
+    monkeypatch.setattr(SkfemSolver, "name", name)
+    with pytest.raises(UserError, match="a solver is called"):
+        make_solver("skfem-p2")
+
+
 def test_an_object_without_the_interface_is_refused(tmp_path, monkeypatch):
     info = tmp_path / "odd-0.1.dist-info"
     info.mkdir()
