@@ -7,6 +7,7 @@ stays for the next task, because starting it takes longer than a mesh.
 import atexit
 import json
 import os
+import resource
 import selectors
 import shutil
 import signal
@@ -14,18 +15,26 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from queue import SimpleQueue
 from typing import IO, Any
 
 from geometry.errors import UserError
+from geometry.machine_memory import free_memory_gb, limit_memory
 
 FOREIGN_PREFIXES = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "I_MPI_", "MPI_", "HYDRA_", "MPIEXEC_")
 """Environment variables that would make the child a member of the parent's MPI run."""
 
 EXTRA_SECONDS = 5
+USABLE = 0.9
+"""Share of the free memory that a task may take."""
+TOO_LARGE = "{what} needs more than {memory_gb:.2g} GB, which is what is free; use larger elements"
+OUT_OF_MEMORY = ("bad_alloc", "MemoryError", "Cannot allocate memory", "out of memory")
+"""Last words of a process that got no memory."""
+NEARLY = 0.8
+"""Share of its memory from which on a task that a signal ends has run out of it: Gmsh then crashes."""
 
 
 def run_task(task: Mapping[str, Any], timeout_s: float) -> Path:
@@ -44,7 +53,8 @@ def run_task(task: Mapping[str, Any], timeout_s: float) -> Path:
     worker = _worker(os.getpid())
     output = worker.folder / str(task["output"])
     try:
-        error = worker.answer({**task, "output": str(output), "timeout_s": timeout_s}, timeout_s)
+        limits = {"timeout_s": timeout_s, "memory_gb": USABLE * free_memory_gb()}
+        error = worker.answer({**task, "output": str(output), **limits}, timeout_s)
     except BaseException:  # a time-out, a crash, or Ctrl-C: leave no process behind
         worker.stop()
         _worker.cache_clear()
@@ -108,6 +118,10 @@ class Worker:
         code = self._process.wait()
         self._errors.seek(0)
         last = self._errors.read().strip().splitlines()[-1:] or ["it left no message"]
+        most_gb = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024 / 1e9
+        crowded = code < 0 and most_gb > NEARLY * task.get("memory_gb", float("inf"))
+        if crowded or any(word in last[0] for word in OUT_OF_MEMORY):
+            return UserError(TOO_LARGE.format(**{"memory_gb": most_gb, **task}))
         return UserError(f"{task['what']} failed (exit code {code}): {last[0]}")
 
 
@@ -133,29 +147,37 @@ def perform(task: Mapping[str, Any]) -> None:
     Args:
         task: `kind` and `output` as the path of the result; for a "mesh" also `finger` as its definition and
             `settings` as a dictionary, for "cad" `finger` and `formats`, for a "drawing" its `file` and
-            `description`.
+            `description`. `memory_gb`, if it is there, is the memory that the task may take, GB.
     """
-    output = Path(task["output"])
-    if task["kind"] == "drawing":
+    work = _work(str(task["kind"]))
+    if "memory_gb" in task:
+        limit_memory(task["memory_gb"])
+    work(task, Path(task["output"]))
+
+
+def _work(kind: str) -> Callable[[Mapping[str, Any], Path], None]:
+    """The function for tasks of a kind, its libraries imported: a limit of memory is the task's alone."""
+    if kind == "drawing":
         from geometry.drawing.description import Description
         from geometry.drawing.load import load_drawing
 
-        load_drawing(task["file"], Description(**task["description"])).save(output)
-        return
+        return lambda task, output: load_drawing(task["file"], Description(**task["description"])).save(
+            output
+        )
     from geometry.drawing.definition import finger_from
 
-    finger = finger_from(task["finger"])
-    if task["kind"] == "mesh":
+    if kind == "mesh":
         from geometry.mesh.mesher import build_mesh
         from geometry.mesh.settings import MeshSettings
 
-        build_mesh(finger, MeshSettings(**task["settings"])).save(output)
-    elif task["kind"] == "cad":
+        return lambda task, output: build_mesh(
+            finger_from(task["finger"]), MeshSettings(**task["settings"])
+        ).save(output)
+    if kind == "cad":
         from geometry.cad import write_archive
 
-        write_archive(finger, task["formats"], output)
-    else:
-        raise UserError(f"unknown task {task['kind']!r}; there are 'mesh', 'cad' and 'drawing'")
+        return lambda task, output: write_archive(finger_from(task["finger"]), task["formats"], output)
+    raise UserError(f"unknown task {kind!r}; there are 'mesh', 'cad' and 'drawing'")
 
 
 def main() -> None:
@@ -175,6 +197,8 @@ def main() -> None:
         try:
             perform(task)
             error = ""
+        except MemoryError:
+            error = TOO_LARGE.format(**task)
         except UserError as refusal:
             error = str(refusal)
         except OSError as fault:

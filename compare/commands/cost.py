@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from geometry.drawing.drawn_finger import DrawnFinger
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
+from geometry.machine_memory import free_memory_gb
 from geometry.mesh.element_size import estimated_triangles
 from geometry.mesh.settings import MeshSettings
-from solvers.fem.solid.cost import free_memory_gb
 
 MESH, EXPERIMENT = "mesh", "virtual experiment"
 

@@ -63,10 +63,12 @@ def _triangulation(finger: Finger, settings: MeshSettings, elements: float) -> T
             curves = add_section((outline_with_contact(finger), *section.cavities), finger.markers)
             set_sizes(field, grown, settings, Path(folder))
             return triangulate(curves)
-        except OSError:
+        except (OSError, MemoryError):
             raise
         except Exception as error:
-            # Gmsh raises bare Exception with its last message.
+            # Gmsh raises bare Exception with its last message, which is empty where it got no memory.
+            if not str(error).strip():
+                raise MemoryError from error
             raise UserError(
                 f"Gmsh could not mesh design {finger.name!r}: {error}; try another mesh size"
             ) from error

@@ -1,5 +1,6 @@
 """Cache and worker: quick hits, damaged entries, time limits, one-line failures."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -120,6 +121,32 @@ def test_crash_in_the_worker_gives_one_line() -> None:
     with pytest.raises(UserError, match=r"meshing failed \(exit code 1\)") as refused:
         run_task({**task, "output": "m.npz"}, 60)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is limited on Linux only")
+def test_a_task_that_needs_more_memory_than_is_free_is_one_line(tmp_path: Path) -> None:
+    """A worker whose task takes a gigabyte, then one whose task takes a megabyte, with 0.5 GB free."""
+    code = (
+        "import geometry.worker as worker\n"
+        "worker._work = lambda kind: lambda task, output: bytearray(task['bytes']) and None\n"
+        "worker.main()"
+    )
+    task = {"kind": "mesh", "what": "meshing", "output": "m.npz", "timeout_s": 60, "memory_gb": 0.5}
+    tasks = "".join(json.dumps({**task, "bytes": size}) + "\n" for size in (10**9, 10**6))
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, str(tmp_path / "folder")],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env=child_environment(os.environ),
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+    process.stdin.write(tasks)
+    process.stdin.flush()
+    answers = [json.loads(process.stdout.readline())["error"] for _ in range(2)]
+    process.communicate()
+    assert answers == ["meshing needs more than 0.5 GB, which is what is free; use larger elements", ""]
 
 
 def test_a_cache_that_cannot_be_written_is_a_warning_and_the_mesh_is_there(tmp_path: Path) -> None:

@@ -5,9 +5,7 @@ Fitted to the default finger with elements of 0.5 to 1 mm and 4 to 12 layers, on
 step at 235,000. Other bodies may differ by a factor of two.
 """
 
-import os
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 from geometry.errors import UserError
@@ -79,12 +77,3 @@ def affordable(unknowns: int, levels: int, asked: LinearSolver, free_gb: float) 
         f"fem-3d would need about {costs[-1].memory_gb:.1f} GB for {unknowns:,} unknowns, "
         f"and {free_gb:.1f} GB are free; {advice}"
     )
-
-
-def free_memory_gb() -> float:
-    """Memory that can be had without swapping, GB."""
-    told = Path("/proc/meminfo")  # Linux
-    for line in told.read_text(encoding="ascii").splitlines() if told.exists() else ():
-        if line.startswith("MemAvailable:"):
-            return float(line.split()[1]) * 1024 / 1e9
-    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9

@@ -7,10 +7,11 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 
 from geometry.errors import UserError
+from geometry.machine_memory import free_memory_gb
 from solvers.cylinder_contact import CONTACT_AT_END, ContactRegion
 from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.ranks import communicator, on_all_ranks
-from solvers.fem.solid.cost import Cost, LinearSolver, affordable, free_memory_gb
+from solvers.fem.solid.cost import Cost, LinearSolver, affordable
 from solvers.fem.solid.extrusion import ExtrudedSpace
 from solvers.fem.solid.plane_guide import PlaneGuide
 from solvers.fem.solid.side_face import Face, FaceField
