@@ -73,7 +73,9 @@ def answers(
 
 def _warnings(metrics: Numbers) -> Answer | None:
     """The warnings of the run, before any number of it; a run of an earlier version has kept none."""
-    said = [f"{text[:1].upper()}{text[1:].rstrip('. ')}." for text in metrics.get("warnings", ())]
+    said = [
+        f"{text.rstrip('. ')}." for text in metrics.get("warnings", ())
+    ]  # many begin with a solver's name
     count = "One warning" if len(said) == 1 else f"{len(said)} warnings"
     return Answer("What speaks against these numbers?", f"{count}:", said) if said else None
 

@@ -139,6 +139,7 @@ def test_the_warning_names_all_and_the_simulated_finger(
     comparison = compared(*checked, warnings=remarks)
     assert metrics(comparison)["warnings"] == remarks
     page = render(comparison, [], {})
+    assert f"<li>fem, pinn-std, the simulated finger: {SELF};" in page
     assert (
         page.index("What speaks against these numbers?")
         < page.index(SELF)
