@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 import shapely
 
 from compare.evaluation.convergence import CERTIFIED_LAW, NOT_FINITE
 from compare.evaluation.evaluation import Evaluation
-from geometry.arrays import BoolArray, FloatArray
+from geometry.arrays import BoolArray, FloatArray, IntArray
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
 from solvers.lagrange import LagrangeSpace
@@ -32,13 +33,18 @@ class Body:
     """A body at rest, and what is impossible about its deformations."""
 
     def __init__(self, mesh: TriangleMesh) -> None:
-        self._mesh, space = mesh, LagrangeSpace(mesh, 2)
-        self._edges, self._nodes = boundary_edges(mesh.triangles), space.nodes
-        self._quarters = space.cell_nodes[:, QUARTERS].reshape(-1, 3)
+        self._mesh, self._space = mesh, LagrangeSpace(mesh, 2)
+        self._edges = boundary_edges(mesh.triangles)
+
+    @cached_property
+    def _quarters(self) -> IntArray:
+        return self._space.cell_nodes[:, QUARTERS].reshape(-1, 3)
 
     def inside_out(self, evaluation: Evaluation) -> BoolArray:
         """The triangles that are turned inside out, wholly or in one of their quarters, shape (t,)."""
-        moved = self._nodes + np.concatenate([evaluation.node_displacement, evaluation.edge_displacement])
+        moved = self._space.nodes + np.concatenate(
+            [evaluation.node_displacement, evaluation.edge_displacement]
+        )
         return np.asarray((signed_areas(moved, self._quarters) <= 0).reshape(-1, len(QUARTERS)).any(axis=1))
 
     def crossings(self, displacement: FloatArray) -> FloatArray:

@@ -4,6 +4,7 @@ import time
 from dataclasses import dataclass, field
 from typing import Literal
 
+from compare.evaluation.deformed_body import THROUGH_ITSELF, Body
 from compare.sweep.quantities import quantities
 from compare.sweep.study import Task, load_of, material_of
 from geometry.cache import finger_mesh
@@ -62,4 +63,7 @@ def measured(task: Task) -> Measurement:
         return ended("refused", str(error))
     except Exception as error:
         return ended("failed", f"{type(error).__name__}: {error}")
-    return ended("done" if solution.status.converged else "not converged", solution.status.message, values)
+    said = solution.status.message
+    if len(Body(mesh).crossings(solution.displacement(mesh.points))):
+        said = f"{THROUGH_ITSELF}; {said}"
+    return ended("done" if solution.status.converged else "not converged", said, values)

@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -72,6 +73,8 @@ def test_what_goes_wrong_with_a_sample_is_its_answer(tmp_path: Path) -> None:
     assert "ribs" in refused.message
     task = maker.task(1, {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0})
     assert measured(task).state == "done"
+    pressed = measured(replace(task, load={**task.load, "stroke": 60.0}))
+    assert (pressed.state, pressed.message[:28]) == ("done", "THE BODY GOES THROUGH ITSELF")
     object.__setattr__(task, "mesh_size", "broken")
     assert measured(task).state in ("refused", "failed")
 
