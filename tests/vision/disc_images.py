@@ -21,12 +21,16 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 @dataclass(frozen=True)
 class Edge:
-    """A half-plane `normal` · p > `offset` of reflectance `level`; in front of the disc or behind all."""
+    """A half-plane `normal` · p > `offset` of reflectance `level`; in front of the disc or behind all.
+
+    One behind all may bend along its normal: `curvature`, 1/pixel, about the point nearest to (20, 20).
+    """
 
     angle: float
     offset: float
     level: float
     occludes: bool = False
+    curvature: float = 0.0
 
     @property
     def normal(self) -> tuple[float, float]:
@@ -113,9 +117,11 @@ class DiscImage:
 
     def _half_plane(self, edge: Edge, x: FloatArray, y: FloatArray) -> FloatArray:
         nx, ny = edge.normal
-        distance = (nx * x + ny * y[:, None] - edge.offset) / self.blur
-        slope = _bell(distance) / self.blur
-        return np.stack([ndtr(distance), nx * slope, ny * slope])
+        along = nx * (y[:, None] - 20) - ny * (x - 20)
+        bend = edge.curvature * (along**2 + self.blur**2) / 2  # to the first order, as the lens blurs it
+        distance = (nx * x + ny * y[:, None] - edge.offset - bend) / self.blur
+        slope, turn = _bell(distance) / self.blur, edge.curvature * along
+        return np.stack([ndtr(distance), (nx + ny * turn) * slope, (ny - nx * turn) * slope])
 
 
 def _bell(x: FloatArray) -> FloatArray:

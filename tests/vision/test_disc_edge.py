@@ -134,6 +134,15 @@ def test_the_wall_beside_the_disc_does_not_move_it(image):
     assert np.sqrt((errors**2).mean()) < (0.0105 if image.blur < 1 else 0.017)
 
 
+@pytest.mark.parametrize("blur", [0.8, 1.5])
+def test_a_wall_that_is_bent_does_not_move_the_disc(blur):
+    """It is 0.014 and 0.053 pixels astray if its edges are taken for straight ones."""
+    wall = tuple(replace(edge, curvature=sign * 0.004) for edge, sign in zip(WALL, (1, -1), strict=True))
+    discs, errors = measured(DiscImage(edges=wall, blur=blur))
+    assert_covered(discs, errors)
+    assert np.abs(errors.mean(axis=0)).max() < 0.01
+
+
 @pytest.mark.parametrize(
     "image",
     [

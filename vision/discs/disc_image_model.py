@@ -1,14 +1,14 @@
 """Model of the grey levels near the edge of a disc, with its derivatives by the parameters.
 
-    I(p) = (1 + g·(p - p₀)) (L - A Φ((R(φ) - √(ρ² + s²)) / s) + Σ B Φ((n·(p - p₀) - h) / s))
+    I(p) = (1 + g·q) (L - A Φ((R(φ) - √(ρ² + s²)) / s) + Σ B Φ((n·q - h - c (t·q)²/2) / s)),  q = p - p₀
 
 Here ρ and φ are the distance and the direction of the pixel p from the centre; R(φ) is an ellipse, which
 waves cos kφ and sin kφ, relative to its radius, may turn into an irregular outline; Φ is the
 normal distribution, s the width of the edge, L the level around the disc, L - A the level within and g the
 gradient of the light about the fixed point p₀. The square root is the mean distance to the centre of a point
 that is blurred by s: it accounts for the curvature of the edge, which shrinks a blurred disc by s²/2R. The
-sum is over straight edges beside the disc, such as those of the wall that it is printed on, with normals n,
-offsets h and levels L + B beyond.
+sum is over edges beside the disc, such as those of the wall that it is printed on, with normals n, tangents
+t, offsets h, curvatures c and levels L + B beyond.
 
 Many discs at once, in single precision. Units: pixels, grey levels.
 """
@@ -39,11 +39,11 @@ GLARE = range(HALO + 1, COUNT + OUTLINE)
 """Columns of the glare."""
 WIDER = 1.6
 """Width of the halo over that of the edge; 1.5 for an edge of 0.85 pixels and a mask of 1 pixel."""
-EDGE = 3
-"""Parameters of a straight edge: angle of its normal, offset of the edge along that from p₀, and how much
-lighter it is beyond."""
+EDGE = 4
+"""Parameters of an edge beside the disc: angle of its normal, offset of the edge along that from p₀, how much
+lighter it is beyond, and curvature, positive if the edge bends along its normal."""
 EDGES = 2
-"""Straight edges of every disc; those that are absent have zero contrast."""
+"""Edges beside every disc; those that are absent have zero contrast."""
 DIRECTIONS = np.arange(128) * 2 * np.pi / 128
 """Directions in which an outline is evaluated, rad."""
 WIDTH = COUNT + EDGES * EDGE
@@ -55,7 +55,7 @@ def disc_image(parameters: Array, x: Array, y: Array) -> tuple[Array, Array]:
 
     Args:
         parameters: Those of the disc, the centre relative to p₀, those of an irregular outline or none, then
-            those of its straight edges; shape (n, m) with m = 10 (+ 15) + 3 for each straight edge.
+            those of the edges beside it; shape (n, m) with m = 10 (+ 15) + 4 for each of these.
         x: Pixels relative to p₀, to the right, shape (p,).
         y: Likewise, down.
 
@@ -113,15 +113,17 @@ def disc_image(parameters: Array, x: Array, y: Array) -> tuple[Array, Array]:
     if len(waves):
         derivatives[:, HALO] = -shade * contrast * wide
     for first in range(first_edge, len(columns), EDGE):
-        angle, offset, lighter = columns[first : first + EDGE]
+        angle, offset, lighter, curvature = columns[first : first + EDGE]
         cosine, sine = np.cos(angle), np.sin(angle)
-        z = (cosine * x + sine * y - offset) / s
+        across, along = cosine * x + sine * y, cosine * y - sine * x
+        z = (across - offset - curvature * along**2 / 2) / s
         beyond, density = _blurred_step(z)
         reflectance += lighter * beyond
         by_edge = density * shade * (lighter / s)
-        derivatives[:, first] = by_edge * (cosine * y - sine * x)
+        derivatives[:, first] = by_edge * along * (1 + curvature * across)
         derivatives[:, first + 1] = -by_edge
         derivatives[:, first + 2] = shade * beyond
+        derivatives[:, first + 3] = -by_edge * along**2 / 2
         derivatives[:, BLUR] -= z * by_edge
     derivatives[:, SHADE_X] = reflectance * x
     derivatives[:, SHADE_Y] = reflectance * y
@@ -134,7 +136,7 @@ def disc_image(parameters: Array, x: Array, y: Array) -> tuple[Array, Array]:
 
 
 def irregular_columns(width: int) -> tuple[range, int]:
-    """Columns of an irregular outline among those of `width` parameters, and the first of straight edges.
+    """Columns of an irregular outline among those of `width` parameters, and the first of edges beside discs.
 
     Those of the glare may be left out.
     """

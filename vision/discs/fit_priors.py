@@ -30,8 +30,9 @@ DEVIATIONS = {STRETCH: 0.05, SLANT: 0.05, BLUR: 5.0, SHADE_X: 0.05, SHADE_Y: 0.0
 """Prior standard deviations, about zero but for the blur. They matter where little of the edge is seen."""
 STEPS = {X: 1.0, Y: 1.0, STRETCH: 0.3, SLANT: 0.3, BLUR: 0.7, SHADE_X: 0.02, SHADE_Y: 0.02}
 """Longest steps of an iteration."""
-EDGE_DEVIATIONS, EDGE_STEPS, MISSING = (0.5, 1.5, 100.0), (0.3, 1.0, 1e3), 1e-3
-"""The same for straight edges: rad, pixels, grey levels; and the deviation of all of an absent edge."""
+EDGE_DEVIATIONS, EDGE_STEPS, MISSING = (0.5, 1.5, 100.0, 0.005), (0.3, 1.0, 1e3, 0.01), 1e-3
+"""The same for edges beside the disc: rad, pixels, grey levels, 1/pixel; and the deviation of an absent
+edge."""
 OUTLINE_DEVIATION, OUTLINE_STEP = 0.05, 0.05
 """The same for the waves of an irregular outline, over the radius."""
 HALO_DEVIATION, HALO_STEP = 1.0, 0.3
@@ -104,7 +105,7 @@ def prior_and_limits(
 
     Args:
         start: Parameters at the start of the fit, shape (n, m).
-        present: Straight edges that are there, shape (n, 2).
+        present: Edges that are there, shape (n, 2).
         radii: Known or guessed, shape (n,), pixels.
         known: Of the discs.
     """

@@ -63,7 +63,8 @@ def fit_discs_of_one_size(grey: GreyImage, guesses: FloatArray, radii: FloatArra
             break
         waved = waved[found]
         before, now = fit.at(waved), _fit_windows(smooth, votes.at(waved), known.at(waved))
-        (better,) = np.nonzero(now.settled & (now.variance < before.variance) | ~before.settled)
+        less = now.variance * before.seen < before.variance * now.seen  # what is left out has no variance
+        (better,) = np.nonzero(now.settled & less | ~before.settled)
         smooth, waved, now = smooth.at(better), waved[better], now.at(better)
         astray = UNSURE * (now.parameters - before.at(better).parameters)[:, [X, Y]]
         doubt[waved] += astray[:, :, None] * astray[:, None]

@@ -127,8 +127,10 @@ def _beyond(window: PixelWindows, parameters: FloatArray) -> Array:
     """Share of the pixels beyond straight edges where the ground ends, shape (n, p)."""
     within = np.ones((len(parameters), len(window.x)), dtype=np.float32)
     for first in range(COUNT, COUNT + EDGES * EDGE, EDGE):
-        angle, offset, lighter = parameters[:, first : first + EDGE].T[:, :, None]
-        away = np.cos(angle) * window.x + np.sin(angle) * window.y - offset
+        angle, offset, lighter, curvature = parameters[:, first : first + EDGE].T[:, :, None]
+        cosine, sine = np.cos(angle), np.sin(angle)
+        along = cosine * window.y - sine * window.x
+        away = cosine * window.x + sine * window.y - offset - curvature * along**2 / 2
         ends = np.abs(lighter) > BORDER * np.abs(parameters[:, [CONTRAST]])
         within *= np.where(ends, np.clip(0.5 - away / (2 * parameters[:, [BLUR]]), 0, 1), 1)
     return np.asarray(1 - within, dtype=np.float32)

@@ -56,6 +56,8 @@ NEAR = 2.0
 """Pixels from the edge within which the noise matters most."""
 SHARPEST = 0.3
 """Width of an edge without any blur, pixels: that of the pixels themselves."""
+MOST_BENT = 0.08
+"""Largest curvature of an edge beside a disc, over that of the disc: walls bend less."""
 ABSENT = 1e5
 """Precision of a parameter from which on it is held at its mean, zero."""
 FAINT = 1e-5
@@ -149,6 +151,7 @@ def fit_disc_model(
     information = np.tile(np.eye(width), (count, 1, 1))
     all_residuals = np.empty_like(window.values)
     active, diagonal = np.arange(count), range(width)
+    bends = list(range(irregular_columns(width)[1] + EDGE - 1, width, EDGE))
     for number in range(STEPS):
         now, allowed, values = result.parameters[active], chosen[active], window.values[active]
         levels, derivatives = disc_image(now.astype(np.float32), window.x, window.y)
@@ -177,6 +180,8 @@ def fit_disc_model(
         now = now + shortened[:, None] * step
         now[:, RADIUS] = np.maximum(now[:, RADIUS], 1.0)
         now[:, BLUR] = np.clip(now[:, BLUR], SHARPEST, now[:, RADIUS])
+        most_bent = MOST_BENT / now[:, [RADIUS]]
+        now[:, bends] = np.clip(now[:, bends], -most_bent, most_bent)
         steady = (variance > STEADY * result.variance[active]) | (known.min(axis=1) == 1)
         result.parameters[active], information[active], result.variance[active] = now, normal, variance
         all_residuals[active] = residuals
@@ -225,7 +230,7 @@ def behind_clipping(values: Array, levels: Array, variance: FloatArray) -> tuple
 
 
 def _columns(start: FloatArray, prior: DiscPrior) -> list[int]:
-    """Columns of the parameters without a glare and straight edges that no disc has."""
+    """Columns of the parameters without a glare and edges that no disc has."""
     waves, first = irregular_columns(start.shape[1])
     edges = [range(edge, edge + EDGE) for edge in range(first, start.shape[1], EDGE)]
     present = [column for edge in edges if start[:, edge].any() for column in edge]

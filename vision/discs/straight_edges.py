@@ -66,7 +66,7 @@ def with_edges(
         lighter = overlap[each, best] / length[each, best]
         gain = lighter * overlap[each, best]
         present[:, number] = gain > GAIN * np.maximum(window.noise**2, QUANTISATION)
-        edges[:, number] = np.stack([angles[best], offsets[best], lighter], axis=1)
+        edges[:, number] = np.stack([angles[best], offsets[best], lighter, np.zeros_like(lighter)], axis=1)
         chosen = orthogonal(tried[best] * used)
         residuals = residuals - lighter[:, None] * chosen
         squares = squares - (chosen @ tried.T) ** 2 / np.maximum((chosen**2).sum(axis=1, keepdims=True), 1.0)
