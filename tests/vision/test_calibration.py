@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from compare.cli import main
 from geometry.errors import UserError
 from tests.vision.chessboards import BOARD, CAMERA, drawn, views
+from vision.calibration import lens_fit
 from vision.calibration.camera import Camera, Pose
 from vision.calibration.camera_calibration import better_lens, calibrate, calibrate_views
 from vision.calibration.camera_file import load_camera
@@ -95,6 +96,32 @@ def test_a_fisheye_is_recovered_and_proposed():
     assert other == fisheye
     assert error == pytest.approx(found.held_out_rms)
     assert brown.held_out_rms > 2 * error
+
+
+def test_a_board_that_is_first_taken_to_be_tilted_the_other_way_does_not_spoil_the_fit(monkeypatch):
+    """The fit ended in another minimum, with residuals of 0.34 px instead of 0.29."""
+    rng, count, first_guess = np.random.default_rng(2), 12, lens_fit.initial_poses
+    board, camera = Board(7, 5, 25.0), Camera(640, 480, 480.0, 480.0, 330.0, 235.0, (0.03, -0.1, 0, 0, 0))
+    way = rng.uniform(0, 2 * np.pi, count)
+    axes = np.column_stack([np.cos(way), np.sin(way), np.zeros(count)])
+    turns = Rotation.from_rotvec(np.radians(rng.uniform(15, 35, count))[:, None] * axes)
+    centres = rng.uniform((-120, -90, 800), (120, 90, 1000), (count, 3))
+    shifts = centres - turns.apply(board.corners.mean(axis=0))
+    seen = [
+        camera.project(turn.apply(board.corners) + shift) + rng.normal(0, 0.3, (35, 2))
+        for turn, shift in zip(turns, shifts, strict=True)
+    ]
+
+    def mirrored(*given):
+        poses = first_guess(*given)
+        rotations = poses.rotations.as_rotvec()
+        rotations[9, :2] *= -1
+        return poses._replace(rotations=Rotation.from_rotvec(rotations))
+
+    right = lens_fit.fit_lens(seen, board, (640, 480), LensChoice())
+    monkeypatch.setattr(lens_fit, "initial_poses", mirrored)
+    again = lens_fit.fit_lens(seen, board, (640, 480), LensChoice())
+    np.testing.assert_allclose(again.camera.intrinsics, right.camera.intrinsics, rtol=1e-4, atol=1e-4)
 
 
 def test_a_bad_view_is_named():

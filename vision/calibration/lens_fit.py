@@ -3,7 +3,8 @@
 Units: mm, pixels.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import fields
 from typing import NamedTuple
 
@@ -28,6 +29,10 @@ UNDETERMINED = (
     "the photographs do not determine the camera; take some with the board tilted by 20 to 45 degrees in "
     "different directions"
 )
+ALIKE = 3.0
+"""Largest ratio of the reprojection errors of the two poses that a plane may have for both to be tried."""
+GAIN = 1e-6
+"""Relative change of the sum of squares from which on another pose is better."""
 
 
 class LensChoice(NamedTuple):
@@ -57,7 +62,16 @@ def fit_lens(
         first = initial_camera(observations, size, lens.model)
     except UserError:
         raise UserError(UNDETERMINED) from None
-    return _adjusted(first, observations, lens)
+    adjusted = _adjusted(first, observations, lens)
+    for view, pose in _other_poses(adjusted, observations):
+        rotations, translations = adjusted.poses.rotations.as_rotvec(), adjusted.poses.translations.copy()
+        rotations[view], translations[view] = np.split(pose, 2)
+        poses = Poses(Rotation.from_rotvec(rotations), translations)
+        with suppress(UserError):
+            other = _adjusted(adjusted.camera, observations, lens, poses)
+            if (other.residuals**2).sum() < (1 - GAIN) * (adjusted.residuals**2).sum():
+                adjusted = other
+    return _determined(adjusted)
 
 
 def held_out_rms(views: Sequence[FloatArray], board: Board, camera: Camera, lens: LensChoice) -> float:
@@ -72,7 +86,7 @@ def held_out_rms(views: Sequence[FloatArray], board: Board, camera: Camera, lens
         left_out = np.asarray(views[fold::folds])
         others = [view for number, view in enumerate(views) if number % folds != fold]
         kept = corner_observations(others, board)
-        trained = _adjusted(camera, kept, lens).camera
+        trained = _determined(_adjusted(camera, kept, lens)).camera
         for half in board.halves:
             known = corner_observations(np.where(half[:, None], left_out, np.nan), board)
             asked = corner_observations(np.where(half[:, None], np.nan, left_out), board)
@@ -81,13 +95,23 @@ def held_out_rms(views: Sequence[FloatArray], board: Board, camera: Camera, lens
     return rms(distances)
 
 
-def _adjusted(camera: Camera, observations: CornerObservations, lens: LensChoice) -> Adjustment:
-    """Fit camera and poses from a first guess of the camera."""
+def _adjusted(
+    camera: Camera, observations: CornerObservations, lens: LensChoice, poses: Poses | None = None
+) -> Adjustment:
+    """Fit camera and poses from a first guess of the camera, and of the poses if there is one."""
     free = np.array([lens.fit_k3 or lens.model != "brown" or name != "k3" for name in camera.intrinsic_names])
     try:
-        adjusted = adjust(camera, initial_poses(camera, observations), observations, free=free)
+        return adjust(camera, poses or initial_poses(camera, observations), observations, free=free)
     except (UserError, np.linalg.LinAlgError):
         raise UserError(UNDETERMINED) from None
+
+
+def _determined(adjusted: Adjustment) -> Adjustment:
+    """The same.
+
+    Raises:
+        UserError: If the views do not determine the focal lengths.
+    """
     deviation = adjusted.independent[:2] / adjusted.camera.intrinsics[:2]
     error = max(rms([adjusted.residuals]), 1e-9)
     if not (deviation * max(1, CORNER_ERROR / error) < LARGEST_DEVIATION).all():
@@ -131,19 +155,45 @@ def initial_poses(camera: Camera, observations: CornerObservations) -> Poses:
     Raises:
         UserError: If the corners of a view are no image of a plane, or the distortion cannot be undone there.
     """
+    found = [poses for poses, _ in _planar_poses(camera, observations)]
+    if not all(len(poses) and np.isfinite(poses[0]).all() for poses in found):
+        raise UserError("the corners of a view are no image of a plane")
+    rotations, translations = np.split(np.array([poses[0] for poses in found]), 2, axis=1)
+    return Poses(Rotation.from_rotvec(rotations), translations)
+
+
+def _planar_poses(
+    camera: Camera, observations: CornerObservations
+) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Poses that the plane of every view may have, shape (k, 6), and their errors, pixels; the best first."""
     straight = camera.undistort(observations.pixels)
     points, pixels = (np.split(each, observations.starts[1:]) for each in (observations.points, straight))
-    poses = []
     for corners, seen in zip(points, pixels, strict=True):
         try:
-            found, *pose = cv2.solvePnP(corners, seen, camera.matrix, np.zeros(4), flags=cv2.SOLVEPNP_IPPE)
+            _, rotations, translations, errors = cv2.solvePnPGeneric(
+                corners, seen, camera.matrix, np.zeros(4), flags=cv2.SOLVEPNP_IPPE
+            )
         except cv2.error:
-            found = False
-        if not found or not np.isfinite(pose).all():
-            raise UserError("the corners of a view are no image of a plane")
-        poses.append(np.ravel(pose))
-    rotations, translations = np.split(np.array(poses, dtype=np.float64), 2, axis=1)
-    return Poses(Rotation.from_rotvec(rotations), translations)
+            yield np.empty((0, 6)), np.empty(0)
+            continue
+        poses = np.column_stack([np.reshape(part, (-1, 3)) for part in (rotations, translations)])
+        yield poses.astype(np.float64), np.ravel(errors)
+
+
+def _other_poses(adjusted: Adjustment, observations: CornerObservations) -> Iterator[tuple[int, FloatArray]]:
+    """Views whose board could also have another pose than the fitted one, and that pose, shape (6,).
+
+    A distant plane looks almost the same when it is tilted the other way: while the lens is not known, the
+    first guess may be the wrong one, and the fit ends in another minimum.
+
+    Source: G. Schweighofer, A. Pinz, "Robust pose estimation from a planar target", IEEE TPAMI 28, 2006.
+    """
+    for view, (poses, errors) in enumerate(_planar_poses(adjusted.camera, observations)):
+        if len(poses) > 1 and np.isfinite(poses).all():
+            fitted = adjusted.poses.rotations[view].inv()
+            other = int((Rotation.from_rotvec(poses[:, :3]) * fitted).magnitude().argmax())
+            if errors[other] < ALIKE * errors[0]:
+                yield view, poses[other]
 
 
 def rms(distances: Sequence[FloatArray]) -> float:
