@@ -121,8 +121,8 @@ def _report(rows: list[tuple[str, ...]]) -> str:
         "and the share of the errors of a coordinate within 1.96 of them, 95 % if they are right, with the "
         f"standard deviation of a share of {2 * COUNT} coordinates. "
         "Ellipses: the same fit without irregular outlines; where it finds fewer, its error is that of the "
-        "easier dots alone, to which the errors of the others are not to be compared. Centroid: of the darkness within 1.2 radii "
-        "and 2 px, from the true place on.",
+        "easier dots alone, to which the errors of the others are not to be compared. Centroid: of the "
+        "darkness within 1.2 radii and 2 px, from the true place on.",
         "",
         "| " + " | ".join(HEADER) + " |",
         "|---|" + "---:|" * (len(HEADER) - 1),
