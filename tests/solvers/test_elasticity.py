@@ -75,6 +75,16 @@ def test_plane_strain_has_no_strain_along_the_thickness(law):
     assert strain_of(law, np.array([[[0.01, 0.0], [0.0, 0.02]]]), lame).zz[0] == 0.0
 
 
+def test_the_linear_law_has_small_strain_and_hookes_stress():
+    gradient = np.random.default_rng(1).normal(size=(5, 2, 2))
+    lame = lame_constants(YOUNG, POISSON, "strain")
+    for found, expected in (
+        (strain_of("linear", gradient, lame), small_strain(gradient, lame)),
+        (stress_of("linear", gradient, lame, np.log), linear_stress(gradient, lame)),
+    ):
+        np.testing.assert_array_equal(found, expected)
+
+
 @pytest.mark.parametrize("plane", ["strain", "stress"])
 def test_linear_energy_is_half_stress_times_strain(plane):
     gradient = np.random.default_rng(0).normal(size=(50, 2, 2))
