@@ -147,7 +147,8 @@ def compare(
         UserError: If the comparison cannot be made.
     """
     from compare.commands.preset_jobs import job_defaults
-    from compare.pipeline import Job, checked, compute, run
+    from compare.pipeline.job import Job, checked
+    from compare.pipeline.pipeline import compute, run
     from compare.runtime.stages import Stages
 
     finger = _design(design)

@@ -24,6 +24,7 @@ from compare.commands.options_file import OPTION, given_options, note_inputs, no
 from compare.evaluation.truths import SLIDING
 from compare.runtime.exits import NOT_CONVERGED, say
 from compare.runtime.output_folder import RUN_FILE
+from compare.runtime.provenance import cores
 from geometry.errors import UserError
 from solvers.solver import Solver
 
@@ -77,9 +78,11 @@ def compare(
         json_: Print metrics.json and nothing else.
     """
     from compare.commands.cost import EXPERIMENT
+    from compare.commands.launch import on_ranks
     from compare.commands.preset_jobs import job_defaults
     from compare.evaluation.shared_mesh import tolerance_reached
-    from compare.pipeline import Job, run
+    from compare.pipeline.job import Job
+    from compare.pipeline.pipeline import run
     from compare.report.terminal import body_table, marker_table
     from compare.runtime.stages import Stages
 
@@ -105,6 +108,7 @@ def compare(
         out=out or Path("out") / design.name,
         resume=resume,
         picture_formats=comma_list(pictures),
+        processes=1 if on_ranks() else min(cores(), 2),
         options=given_options(
             *(finger, physics, options, film),
             **{"adapt": adapt, "solvers": solvers, "measurements": measurements, "truth": truth},

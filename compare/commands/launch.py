@@ -45,8 +45,12 @@ def launched(command: Callable[[], Any]) -> int:
     _write_any_letter()
     _give_libraries_a_cache()
     command = partial(_with_enough_files, command)
-    alone = all(os.environ.get(name, "1") == "1" for name in SIZES)
-    return guarded(command if alone else lambda: _on_ranks(command))
+    return guarded(lambda: _on_ranks(command) if on_ranks() else command())
+
+
+def on_ranks() -> bool:
+    """Whether `mpirun` started the program on more than one rank."""
+    return any(os.environ.get(name, "1") != "1" for name in SIZES)
 
 
 def guarded(command: Callable[[], Any]) -> int:

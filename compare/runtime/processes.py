@@ -7,9 +7,11 @@ interrupted they are killed before they can save their state, and they cannot re
 import logging
 import os
 import signal
+import sys
 import warnings
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
+from ctypes import CDLL
 from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
@@ -20,6 +22,9 @@ from compare.runtime.interruption import leave_signals_alone
 from compare.runtime.provenance import cores
 from compare.runtime.stages import Stages
 from solvers.solver import Progress
+
+PR_SET_PDEATHSIG = 1
+"""Of `prctl(2)`: the signal that a process gets when its parent ends."""
 
 THREADS = "OMP_NUM_THREADS"
 """Variable that torch and OpenBLAS read when they are loaded."""
@@ -61,11 +66,11 @@ class _Warned:
 
 
 def in_processes(
-    work: Callable[[Input, Progress], Output],
+    work: Callable[[Input, Callable[..., None]], Output],
     tasks: Mapping[str, Input],
     *,
     processes: int,
-    report: Callable[[str, float, str], None],
+    report: Callable[..., None],
 ) -> Generator[tuple[str, Output | ProcessFailed], None, None]:
     """Run tasks in fresh processes and yield their answers as they come.
 
@@ -78,10 +83,10 @@ def in_processes(
     Warnings in a process are warnings here, where Python shows a text only once.
 
     Args:
-        work: A function of a module, called with a task and a progress report.
+        work: A function of a module, called with a task and a function that reports progress.
         tasks: Tasks by name; they must be picklable.
         processes: Largest number of processes at a time.
-        report: Called with the task's name and the arguments of its progress report.
+        report: Called with the task's name and what it reports.
     """
     context = get_context("spawn")
     waiting = dict(tasks)
@@ -90,12 +95,14 @@ def in_processes(
         while waiting or running:
             while waiting and len(running) < processes:
                 name = next(iter(waiting))
-                ours, theirs = context.Pipe(duplex=False)
-                process = context.Process(target=_child, args=(work, waiting.pop(name), theirs), name=name)
+                ours, theirs = context.Pipe()
+                process = context.Process(target=_child, args=(work, theirs), name=name)
                 with _threads(max(1, cores() // min(processes, len(tasks)))):
                     process.start()
                 theirs.close()
                 running[ours] = name, process
+                with suppress(OSError):  # it has ended already, which is found below
+                    ours.send(waiting.pop(name))
             ready = wait(list(running))
             for connection in [connection for connection in running if connection in ready]:
                 name, process = running[connection]
@@ -164,15 +171,24 @@ def _threads(count: int) -> Iterator[None]:
         del os.environ[THREADS]
 
 
-def _child(work: Callable[[Input, Progress], Output], task: Input, connection: Connection) -> None:
-    """Run a task and send its answer; signals of the terminal reach this process through its parent."""
+def end_with_parent() -> None:
+    """Let the system kill this process when its parent ends, which it would notice at its next report.
+
+    For a task that writes where the next run of its parent will. Elsewhere than on Linux this does nothing.
+    """
+    if sys.platform == "linux":
+        CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def _child(work: Callable[[Input, Callable[..., None]], Output], connection: Connection) -> None:
+    """Receive a task, run it and send its answer; signals of the terminal reach this process through its parent."""
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     leave_signals_alone()  # PETSc would end the process when nobody listens
 
-    def report(fraction: float, text: str) -> None:
+    def report(*message: object) -> None:
         try:
-            connection.send((fraction, text))
+            connection.send(message)
         except OSError:  # nobody listens any more
             raise KeyboardInterrupt from None
 
@@ -184,7 +200,9 @@ def _child(work: Callable[[Input, Progress], Output], task: Input, connection: C
     warnings.showwarning = warn
     answer: Output | ProcessFailed
     try:
-        answer = work(task, report)
+        answer = work(connection.recv(), report)
+    except EOFError:  # nobody asks any more
+        return
     except KeyboardInterrupt:
         return
     except OSError as error:  # such as a full disk: no fault of the program

@@ -13,7 +13,7 @@ from compare.cli import main
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.figures import Picture
-from compare.pipeline import Job, checked
+from compare.pipeline.job import Job, checked
 from compare.report.html_report import render
 from compare.report.metrics_json import metrics
 from compare.runtime.html import template_environment

@@ -17,7 +17,8 @@ import pytest
 from rich.console import Console
 
 from compare.gridsearch.training_run import GridPoint, ReferenceSolution, TrainingRun, TrainingTask, train
-from compare.pipeline import Job, run
+from compare.pipeline.job import Job
+from compare.pipeline.pipeline import run
 from compare.runtime.exits import NOT_CONVERGED
 from compare.runtime.stages import Stages
 from geometry.errors import UserError

@@ -17,7 +17,8 @@ import pyvista
 from rich.console import Console
 
 from compare.evaluation.comparison import Comparison
-from compare.pipeline import Job, run
+from compare.pipeline.job import Job
+from compare.pipeline.pipeline import run
 from compare.report.metrics_json import metrics
 from compare.runtime.provenance import package_versions
 from compare.runtime.stages import Stages

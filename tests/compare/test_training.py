@@ -10,7 +10,8 @@ import pytest
 from rich.console import Console
 
 from compare.evaluation.evaluation import Evaluation
-from compare.pipeline import Job, run
+from compare.pipeline.job import Job
+from compare.pipeline.pipeline import run
 from compare.runtime.stages import Stages
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings

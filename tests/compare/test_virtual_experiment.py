@@ -13,7 +13,8 @@ from rich.console import Console
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.truths import TRUTHS
 from compare.evaluation.virtual_experiment import UnfinishedExperimentError, virtual_experiment
-from compare.pipeline import Job, run
+from compare.pipeline.job import Job
+from compare.pipeline.pipeline import run
 from compare.runtime.stages import Stages
 from geometry.cache import finger_mesh
 from geometry.errors import UserError

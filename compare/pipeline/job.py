@@ -1,0 +1,84 @@
+"""What a comparison compares."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from compare.camera.film import Film
+from compare.evaluation.comparison import supported_solvers
+from compare.evaluation.truths import SLIDING, TRUTHS, check_truths, check_walls
+from compare.figures import check_formats
+from geometry.errors import UserError
+from geometry.finger.finger import Finger
+from geometry.mesh.settings import MeshSettings
+from geometry.observations import Observations
+from solvers.adaptation import check_adaptable
+from solvers.problem import Load, Material
+from solvers.solver import Solver, check_name
+from vision.measurements import read_measurements
+
+
+@dataclass(frozen=True)
+class Job:
+    """A comparison to make.
+
+    Attributes:
+        design: The finger.
+        solvers: The solvers, in the order of tables and pictures.
+        spare: Names of those that are left out, with a remark, if they do not support the problem.
+        mesh: Element sizes.
+        adapt: Tolerance to which `fem` shall know the markers, mm, for which the mesh is refined; None: not.
+        material: The elastic constants; each solver takes the law that it has.
+        load: What moves the finger.
+        measurements: Marker displacements, their CSV file, or a film to track; None for a virtual experiment.
+        truth: What the virtual experiment simulates; a key of `TRUTHS`.
+        reference: Name of the solver that the others are compared with; `fem`, else the first, if None.
+        out: Output folder.
+        resume: Whether to take over solutions that an earlier run of the same job finished.
+        picture_formats: Formats of the pictures besides PNG, of `FORMATS`.
+        processes: Processes that may solve at a time; a second one takes the solvers of finite strain.
+        options: Options of the command line that made the job, for `run.json`; empty from Python.
+    """
+
+    design: Finger
+    solvers: Sequence[Solver]
+    spare: Collection[str] = ()
+    mesh: MeshSettings = field(default_factory=MeshSettings)
+    adapt: float | None = None
+    material: Material = field(default_factory=Material)
+    load: Load = field(default_factory=Load)
+    measurements: Observations | Path | Film | None = None
+    truth: str = SLIDING.name
+    reference: str | None = None
+    out: Path = Path("out/default")
+    resume: bool = False
+    picture_formats: Sequence[str] = ()
+    processes: int = 1
+    options: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the solvers."""
+        return [solver.name for solver in self.solvers]
+
+
+def checked(job: Job) -> Job:
+    """The job with its measurements read, refused if it cannot be done, before anything is computed."""
+    if not job.solvers:
+        raise UserError("no solver was asked for; name at least one")
+    for name in job.names:
+        check_name(name)
+    if len(set(job.names)) < len(job.names):
+        raise UserError(f"a solver is named twice: {', '.join(job.names)}")
+    if job.adapt is not None:
+        check_adaptable(job.adapt, job.load)
+    if job.reference is not None and job.reference not in job.names:
+        raise UserError(f"the reference {job.reference!r} is not among the solvers {', '.join(job.names)}")
+    check_formats(job.picture_formats)
+    check_truths([job.truth], job.design)
+    check_walls(TRUTHS[job.truth])
+    supported_solvers(job.solvers, job.spare, job.material, job.load)
+    if isinstance(job.measurements, Path):
+        radius = job.design.marker_radius
+        return replace(job, measurements=read_measurements(job.measurements, marker_radius=radius))
+    return job

@@ -1,0 +1,195 @@
+"""The main job: mesh, measure, solve, evaluate; then draw and write."""
+
+from collections import deque
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from compare.camera.film import Film
+from compare.evaluation.branches import with_branches
+from compare.evaluation.comparison import Comparison, supported_solvers
+from compare.evaluation.convergence import with_certificates
+from compare.evaluation.deformed_body import with_body_checks
+from compare.evaluation.force_displacement import force_curves, write_force_displacement
+from compare.evaluation.metrics import pick_reference
+from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
+from compare.evaluation.shared_mesh import shared_mesh, write_rounds
+from compare.evaluation.truths import TRUTHS
+from compare.evaluation.virtual_experiment import (
+    UnfinishedExperimentError,
+    no_displacements,
+    virtual_experiment,
+)
+from compare.figures import Picture, draw_all
+from compare.pipeline.job import Job, checked
+from compare.pipeline.provenance import provenance
+from compare.pipeline.solving import ERRORS, solve_all
+from compare.report.html_report import write_report
+from compare.report.metrics_json import metrics
+from compare.report.tables import write_markers, write_summary, write_table_one
+from compare.report.vtu_file import write_vtu
+from compare.runtime.output_folder import check_output, replaced_folder, write_run
+from compare.runtime.stages import Stages
+from geometry.atomic import write_json
+from geometry.errors import UserError
+from geometry.observations import Observations
+from solvers.assimilation.misfit import assimilates
+from solvers.problem import Problem
+from solvers.shared_work import SharedWork
+from solvers.solver import Solver
+from vision.frames.frame import Frame
+from vision.measurements import write_measurements
+
+TRACK = "track"
+"""Folder of the files of the marker tracking."""
+
+
+def run(job: Job, stages: Stages) -> Comparison:
+    """Make the comparison and write its output folder.
+
+    Raises:
+        UserError: If the job cannot be done; the output folder is as it was.
+    """
+    job = checked(job)
+    check_output(job.out)
+    with replaced_folder(job.out, keep=job.names if job.resume else ()) as folder:
+        photographs: list[Picture] = []
+        tracked: Sequence[str] = ()
+        measurements = job.measurements
+        if isinstance(measurements, Film):
+            # They need OpenCV.
+            from compare.camera.predicted_frame import predicted_frame
+            from compare.camera.track_film import track_figures, track_film
+
+            last: deque[Frame] = deque(maxlen=1)
+            with stages.stage("track") as progress:
+                (folder / TRACK).mkdir()
+                tracking, measurements = track_film(
+                    measurements,
+                    job.design,
+                    folder / TRACK,
+                    progress,
+                    video=False,
+                    watch=lambda frame, _: last.append(frame),
+                )
+            photographs, tracked = track_figures(folder / TRACK, tracking), tracking.warnings
+        comparison = compute(replace(job, measurements=measurements), stages, folder)
+        comparison = replace(comparison, warnings=[*tracked, *comparison.warnings])
+        if photographs:
+            photographs.append(predicted_frame(folder / TRACK, comparison, tracking, last[0].image))
+        write(folder, job, comparison, stages, photographs=photographs)
+    return comparison
+
+
+def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
+    """Mesh, solve and evaluate, without pictures and report.
+
+    Args:
+        job: Checked, with its film tracked.
+        stages: Told of the progress.
+        folder: For solutions and checkpoints as they are finished, from which a resumed run goes on.
+
+    Raises:
+        UserError: If the mesh, the virtual experiment or a solver refuses.
+    """
+    given = job.measurements if isinstance(job.measurements, Observations) else None
+    solvers, left_out = supported_solvers(job.solvers, job.spare, job.material, job.load)
+    mesh, adaptation = shared_mesh(
+        job.design,
+        job.mesh,
+        stages,
+        tolerance=job.adapt,
+        material=job.material,
+        load=job.load,
+        solvers=solvers,
+        check=partial(check_positions, given) if given else None,
+    )
+    problem = Problem(mesh, job.material, job.load, finger=job.design)
+    with stages.stage("measurements") as progress:
+        observations, truth, remarks = given, None, displacement_remarks(given, problem) if given else []
+        if observations is None:
+            radius = job.design.marker_radius
+            try:
+                observations, truth = virtual_experiment(problem, radius, progress, TRUTHS[job.truth])
+            except UnfinishedExperimentError as error:
+                solvers, without = _without_markers(solvers, job.spare, error)
+                left_out |= without
+                observations, remarks = no_displacements(problem, radius, str(error)), [f"no truth: {error}"]
+    outcome = solve_all(job, solvers, problem, observations, folder, stages)
+    with stages.stage("certificate"):
+        evaluations = with_certificates(list(outcome.evaluations.values()), problem)
+        evaluations, impossible = with_body_checks(evaluations, mesh, truth)
+        evaluations, branches = with_branches(evaluations, problem)
+    return Comparison(
+        design=job.design,
+        mesh=mesh,
+        observations=observations,
+        evaluations=evaluations,
+        reference=pick_reference(evaluations, job.reference),
+        material=job.material,
+        load=job.load,
+        truth=truth,
+        adaptation=adaptation,
+        settings={each.name: each.settings() for each in solvers if each.name in outcome.evaluations},
+        left_out=left_out | outcome.left_out,
+        failed={
+            name: f"{fault}; its traceback is in {ERRORS}/{name}.txt"
+            for name, fault in outcome.failed.items()
+        },
+        warnings=[*unit_remarks(problem), *remarks, *impossible, *branches],
+    )
+
+
+def _without_markers(
+    solvers: Sequence[Solver], spare: Collection[str], error: UserError
+) -> tuple[list[Solver], dict[str, str]]:
+    """The solvers that need no markers, and by name why others are left out.
+
+    Raises:
+        UserError: The given one, if a solver that needs markers is not spare, or all need them.
+    """
+    chosen = [solver for solver in solvers if not assimilates(solver)]
+    needing = [solver.name for solver in solvers if assimilates(solver)]
+    if not chosen or not set(needing) <= set(spare):
+        raise error
+    return chosen, dict.fromkeys(needing, "no markers to assimilate")
+
+
+def write(
+    folder: Path,
+    job: Job,
+    comparison: Comparison,
+    stages: Stages,
+    *,
+    photographs: Sequence[Picture] = (),
+) -> None:
+    """Write every file of a comparison but its solutions, which `compute` has written.
+
+    Args:
+        folder: Where to write.
+        job: What was asked for.
+        comparison: What was found.
+        stages: Told of the progress.
+        photographs: Pictures of the marker tracking, for the report.
+    """
+    if comparison.adaptation is not None:
+        write_rounds(folder / "adapt.csv", comparison.adaptation)
+    write_measurements(folder / "observations.csv", comparison.observations)
+    with stages.stage("pictures") as progress:
+        pictures = draw_all(folder / "figures", comparison, progress, job.picture_formats)
+    with stages.stage("report"), SharedWork().used():
+        for evaluation in comparison.shown_fields:
+            write_vtu(folder / "fields" / f"{evaluation.solver}.vtu", comparison.mesh, evaluation)
+        write_markers(folder / "markers.csv", comparison)
+        write_table_one(folder / "table1.csv", comparison)
+        write_summary(folder / "summary.csv", comparison)
+        if curves := force_curves(comparison.evaluations, job.load):
+            write_force_displacement(
+                folder / "force_displacement.csv", curves, job.load, depth=job.design.depth
+            )
+        numbers = metrics(comparison)
+        write_json(folder / "metrics.json", numbers)
+        record = provenance(folder, job, comparison, stages)
+        write_report(folder / "report.html", comparison, [*pictures, *photographs], record, numbers)
+        write_run(folder, record)
