@@ -88,6 +88,8 @@ def in_processes(
         processes: Largest number of processes at a time.
         report: Called with the task's name and what it reports.
     """
+    with suppress(ValueError):  # outside of the main thread, where it cannot be set
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # as Python does; PETSc ends the program at one
     context = get_context("spawn")
     waiting = dict(tasks)
     running: dict[Connection, tuple[str, SpawnProcess]] = {}
@@ -181,7 +183,10 @@ def end_with_parent() -> None:
 
 
 def _child(work: Callable[[Input, Callable[..., None]], Output], connection: Connection) -> None:
-    """Receive a task, run it and send its answer; signals of the terminal reach this process through its parent."""
+    """Receive a task, run it and send its answer.
+
+    Signals of the terminal reach this process through its parent.
+    """
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     leave_signals_alone()  # PETSc would end the process when nobody listens

@@ -182,4 +182,4 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures take most of the time of a small run, and have tests of their own."""
-    monkeypatch.setattr("compare.pipeline.draw_all", lambda *_: [])
+    monkeypatch.setattr("compare.pipeline.pipeline.draw_all", lambda *_: [])

@@ -2,5 +2,5 @@
 
 COMMAND = "import sys; from compare.cli import main; sys.exit(main(sys.argv[1:]))"
 
-WITHOUT_PICTURES = f"import compare.pipeline; compare.pipeline.draw_all = lambda *_, **__: []; {COMMAND}"
+WITHOUT_PICTURES = f"import compare.pipeline.pipeline as p; p.draw_all = lambda *_, **__: []; {COMMAND}"
 """Pictures take most of the time of a small comparison, and have tests of their own."""

@@ -443,7 +443,7 @@ def test_a_design_with_many_changes_still_has_a_name():
 
 def test_without_names_a_solver_that_cannot_do_the_job_is_left_out(folder, capsys, monkeypatch):
     """Two are known before anything is solved, for their law, and one once the markers are."""
-    monkeypatch.setattr("compare.pipeline.draw_all", lambda *_: [])
+    monkeypatch.setattr("compare.pipeline.pipeline.draw_all", lambda *_: [])
     monkeypatch.setitem(JOBS, "", JobDefaults(solvers="gp,fem-id,fem,fem-nonlinear"))
     options = ["--load", "patch", "--plane", "stress", "--mesh-size", "1", "--measurements", "good.csv"]
     assert main(["compare", *options]) == 0
@@ -484,7 +484,7 @@ def ends(monkeypatch: pytest.MonkeyPatch, end: BaseException | Callable[[Solutio
 
     monkeypatch.setattr(FemSolver, "solve", scripted)
     # The check of the measurements solves with `fem`, too.
-    monkeypatch.setattr("compare.pipeline.displacement_remarks", lambda *_: [])
+    monkeypatch.setattr("compare.pipeline.pipeline.displacement_remarks", lambda *_: [])
 
 
 def test_an_interrupted_run_says_how_to_go_on(folder, capsys, monkeypatch, without_pictures):
@@ -541,7 +541,7 @@ def test_a_full_disk_is_one_line_with_its_folders(folder, capsys, monkeypatch, w
 
     cache = folder / "absent" / "cache"
     monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
-    monkeypatch.setattr("compare.pipeline.write_report", full)
+    monkeypatch.setattr("compare.pipeline.pipeline.write_report", full)
     monkeypatch.setattr(
         "compare.commands.launch._space", lambda path: 10**3 if path.is_relative_to(cache) else 10**9
     )

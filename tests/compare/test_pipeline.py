@@ -342,7 +342,9 @@ def test_a_run_without_the_solver_that_it_needs_ends_in_one_line(job, reference)
 
 def test_several_equilibria_are_told(job, monkeypatch):
     said = "2 stable equilibria"
-    monkeypatch.setattr("compare.pipeline.with_branches", lambda evaluations, problem: (evaluations, [said]))
+    monkeypatch.setattr(
+        "compare.pipeline.pipeline.with_branches", lambda evaluations, problem: (evaluations, [said])
+    )
     assert said in compare(job(Scripted("first"))).remarks
 
 
@@ -440,7 +442,7 @@ def test_other_markers_are_not_resumed_from(job, measured):
 def test_another_version_of_the_code_is_not_resumed_from(job, monkeypatch, what):
     first = Scripted("first")
     compare(job(first))
-    monkeypatch.setattr(f"compare.pipeline.{what}", lambda *_: {"other": "1"})
+    monkeypatch.setattr(f"compare.pipeline.solving.{what}", lambda *_: {"other": "1"})
     compare(job(first, resume=True))
     assert first.calls == 2
 
@@ -496,7 +498,8 @@ def test_a_result_that_its_solver_believes_in_but_finite_elements_do_not_is_mark
     """Linear elements on a coarse mesh: in JSON, both CSV files, report, fields and what pictures get."""
     drawn = []
     monkeypatch.setattr(
-        "compare.pipeline.draw_all", lambda _, comparison, *rest: drawn.extend(comparison.evaluations) or []
+        "compare.pipeline.pipeline.draw_all",
+        lambda _, comparison, *rest: drawn.extend(comparison.evaluations) or [],
     )
     asked = job(FemSolver(), Scripted("linear", degree=1))
     compare(asked)

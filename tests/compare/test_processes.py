@@ -89,6 +89,14 @@ def test_a_process_that_ends_without_an_answer_does_not_stop_the_others(capfd):
     assert "ZeroDivisionError" in capfd.readouterr().err  # whose fault it is can be read
 
 
+def test_a_process_that_ends_before_it_has_read_a_large_task_is_noticed(monkeypatch):
+    """Its parent must not wait for a reader: the task is larger than a pipe holds."""
+    monkeypatch.setattr(sys.modules["__main__"], "__file__", str(Path(__file__).with_name("ends_at_once.py")))
+    monkeypatch.setattr(sys.modules["__main__"], "__spec__", None)
+    answers = dict(in_processes(half, {"a": bytes(2**22)}, processes=1, report=silent))
+    assert answers == {"a": ProcessFailed(5)}
+
+
 def test_a_file_that_cannot_be_written_is_told_in_one_line(tmp_path, capfd):
     answers = dict(in_processes(unwritten, {"a": tmp_path}, processes=1, report=silent))
     assert answers["a"].message == f"{tmp_path}/absent/file: No such file or directory"

@@ -237,7 +237,7 @@ def unfinished(monkeypatch: pytest.MonkeyPatch) -> None:
     def stops(*_: object) -> None:
         raise UnfinishedExperimentError("the virtual experiment stopped at 67.5% of the load")
 
-    monkeypatch.setattr("compare.pipeline.virtual_experiment", stops)
+    monkeypatch.setattr("compare.pipeline.pipeline.virtual_experiment", stops)
 
 
 def _compared(out: Path, *names: str, spare: tuple[str, ...] = ()) -> Comparison:
