@@ -28,6 +28,7 @@ BENCHMARKS = {
     "dots": "printed_dots",
     "validation": "validation.document",
     "results": "default_run",
+    "default": "default_time",
     "readings": "readings",
     "plane_strain": "plane_strain",
     "paper": "paper_run",
