@@ -17,7 +17,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # one thread: numbers are to agre
 
 from rich.table import Table
 
-from benchmarks.reliability import fuzz_all, inputs, memory, mutants
+from benchmarks.reliability import fuzz_all, inputs, memory, mutants, same_answer
 from benchmarks.reliability.defects import DEFECTS
 from benchmarks.reliability.faults import Row, run_faults
 from benchmarks.reliability.jobs import JOBS
@@ -39,7 +39,9 @@ def main(rows: str = "") -> Table:
 
 def page(rows: Sequence[Row]) -> str:
     """The page of all results that are kept."""
-    return "\n".join([*_faults(rows), *_inputs(), *_fuzzing(), *_memory(), *_mutants(), *_defects()])
+    return "\n".join(
+        [*_faults(rows), *_inputs(), *_fuzzing(), *_same(), *_memory(), *_mutants(), *_defects()]
+    )
 
 
 def fault_rows(rows: Sequence[Row]) -> list[tuple[str, ...]]:
@@ -164,6 +166,33 @@ def _memory() -> list[str]:
         *_table(header, rows, left=1),
         "",
     ]
+
+
+def _same() -> list[str]:
+    stored, others = same_answer.stored_on(), same_answer.systems()
+    header = ("job", *(_system(other.versions, stored) for other in others))
+    rows = [
+        (f"`{name}`", *(f"{other.differences[name]:.1e}" for other in others))
+        for name in others[0].differences
+    ]
+    here = ", ".join(f"{package} {version}" for package, version in stored.items())
+    return [
+        "## The same answer",
+        "",
+        "`python -m tests.solvers.golden`: energy, force, displacements of two markers and mean von Mises "
+        "stress of every solver on one stored mesh of the default finger (1.5 mm, nine rounded marker "
+        "displacements), and their largest relative difference from those that are kept, which "
+        f"`tests/solvers/test_golden.py` asks for on every machine: {here}. Zero is equality to the bit. "
+        "Small reactions and displacements are a thousandth of the largest, and differ the most.",
+        "",
+        *_table(header, rows, left=1),
+        "",
+    ]
+
+
+def _system(versions: dict[str, str], stored: dict[str, str]) -> str:
+    """What differs on a system."""
+    return ", ".join(f"{name} {version}" for name, version in versions.items() if version != stored[name])
 
 
 def _mutants() -> list[str]:
