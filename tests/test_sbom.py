@@ -1,0 +1,45 @@
+"""The list of every installed package that `make sbom` writes."""
+
+import json
+import re
+import subprocess
+import sys
+from importlib.metadata import distributions, version
+from pathlib import Path
+
+import pytest
+
+MAKEFILE = Path(__file__).parents[1] / "Makefile"
+
+CLOSED = re.compile(r"AGPL|Affero|SSPL|Commons Clause|Proprietary|NonCommercial|CC-BY-NC", re.IGNORECASE)
+"""Licences under which the container could not be passed on."""
+
+UNSTATED = {"fenics-dolfinx", "graphemeu", "partd", "perf", "ply", "python-apt"}
+"""Packages whose metadata have no licence; their licence files have: LGPL, MIT, BSD, GPL, BSD, GPL."""
+
+
+@pytest.mark.slow
+def test_the_list_has_every_installed_package_and_no_licence_that_forbids_its_use(tmp_path):
+    recipe = re.search(r"cyclonedx-bom==\S+", MAKEFILE.read_text(encoding="utf-8"))
+    assert recipe
+    subprocess.run([sys.executable, "-m", "venv", tmp_path / "venv"], check=True)
+    pip = [tmp_path / "venv" / "bin" / "python", "-m", "pip", "-qq", "install", recipe.group()]
+    subprocess.run(pip, check=True)
+    listed = tmp_path / "sbom.json"
+    maker = tmp_path / "venv" / "bin" / "cyclonedx-py"
+    subprocess.run([maker, "environment", sys.executable, "--output-reproducible", "-o", listed], check=True)
+    components = json.loads(listed.read_text(encoding="utf-8"))["components"]
+    found = {canonical(each["name"]): each for each in components}
+    names = {each.metadata["Name"] for each in distributions()}
+    installed = {canonical(name): version(name) for name in names}  # of two versions the one that is imported
+    assert {name: found[name]["version"] for name in installed if name != "pinn-ray"} == {
+        name: version for name, version in installed.items() if name != "pinn-ray"
+    }
+    licences = {name: json.dumps(each.get("licenses", [])) for name, each in found.items()}
+    assert not {name: text for name, text in licences.items() if CLOSED.search(text)}
+    assert {name for name, text in licences.items() if text == "[]"} <= UNSTATED
+
+
+def canonical(name: str) -> str:
+    """A package's name as PEP 503 writes it."""
+    return re.sub(r"[-_.]+", "-", name).lower()
