@@ -2,8 +2,9 @@
 
 `pinn-std` with the preset `paper`, for two loads and three seeds. At each of `LOOKS` the displacement is
 compared with `fem` on the same mesh and with the simulated markers, as in the paper's Table I. Writes
-`docs/paper-run.csv`, and the picture and table of `docs/paper-run.md`. A training takes about 35 minutes on
-two quiet cores; `--seconds` ends it earlier, and the next start goes on from the last checkpoint.
+`docs/paper-run.csv`, `docs/paper-losses.csv`, and the pictures and table of `docs/paper-run.md`. A training
+takes about 35 minutes on two quiet cores; `--seconds` ends it earlier, and the next start goes on from the
+last checkpoint.
 """
 
 import csv
@@ -34,6 +35,7 @@ from solvers.solver import TrainingContext
 
 DOCS = Path(__file__).parents[1] / "docs"
 FIGURES, PAGE, PICTURE = DOCS / "paper-run.csv", DOCS / "paper-run.md", DOCS / "pictures" / "paper-run.png"
+LOSSES, LOSS_PICTURE = DOCS / "paper-losses.csv", DOCS / "pictures" / "paper-losses.png"
 CHECKPOINTS = Path("out") / "paper-run"
 BEGIN, END = "<!-- table of the paper's run -->\n", "<!-- end of the table -->\n"
 
@@ -43,6 +45,15 @@ RUNS: tuple[tuple[Kind, int], ...] = (("mean", 0), ("point", 0), ("mean", 1), ("
 
 LOOKS = (250, 500, 1000, 2000, 4000, 6000, 9000, 13_000, 18_000, 24_000, 30_000, 40_000, 50_000, 60_000)
 """Epochs after which the network is compared."""
+
+
+EACH = 100
+"""Epochs from one kept value of the losses to the next."""
+
+
+LOSS_COLUMNS = ("load", "seed", "epoch", "PDE", "BC")
+RECORDED = ("epoch", "PDE [MPa]", "BC [mm2]")
+"""Columns of a training's history that are kept."""
 
 
 class Look(NamedTuple):
@@ -84,6 +95,7 @@ def main(seconds: float = inf) -> Table:
         for look in train(kind, seed, {epoch for _, _, epoch in looks}, end):
             looks[look[:3]] = look
             write(list(looks.values()))
+            write_losses(kind, seed)
     return table(list(looks.values()))
 
 
@@ -138,6 +150,49 @@ def write(looks: list[Look]) -> None:
     rows += [(f"{look.load}, {look.seed}", *cells(look)) for look in looks]
     lines = "".join(f"| {' | '.join(row)} |\n" for row in rows)
     write_text(PAGE, before + BEGIN + lines + END + rest.partition(END)[2])
+
+
+def write_losses(kind: Kind, seed: int) -> None:
+    """Keep the losses of a training, and draw those of all."""
+    folder = CHECKPOINTS / f"{kind}-{seed}"
+    with (folder / "history.csv").open(encoding="utf-8") as file:
+        ours = [
+            dict(zip(LOSS_COLUMNS, (kind, str(seed), *(row[name] for name in RECORDED)), strict=True))
+            for row in csv.DictReader(file)
+            if int(row["epoch"]) % EACH == 0
+        ]
+    kept = [row for row in read_losses() if (row["load"], row["seed"]) != (kind, str(seed))]
+    write_csv(LOSSES, [*kept, *ours])
+    draw_losses([*kept, *ours])
+
+
+def read_losses() -> list[dict[str, str]]:
+    """The rows of `LOSSES`."""
+    if not LOSSES.exists():
+        return []
+    with LOSSES.open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def draw_losses(rows: list[dict[str, str]]) -> None:
+    """Both terms of the loss over the epochs, as the paper's Fig. 7 has the first."""
+    mesh = finger_mesh(Design())
+    least = FemSolver(estimate=False).solve(Problem(mesh)).energy / mesh.areas.sum()
+    with figure(4.4) as drawn:
+        drawn.subplots_adjust(left=0.16, right=0.94, top=0.97, bottom=0.1, hspace=0.1)
+        axes = drawn.subplots(2, sharex=True)
+        runs = groupby(rows, key=lambda row: (row["load"], row["seed"]))
+        for number, ((kind, seed), group) in enumerate(runs):
+            run = list(group)
+            epochs = [int(row["epoch"]) for row in run]
+            for panel, term in zip(axes, ("PDE", "BC"), strict=True):
+                values = [float(row[term]) for row in run]
+                panel.plot(epochs, values, lw=0.6, c=f"C{number}", label=f"{kind} load, seed {seed}")
+        axes[0].axhline(least, color=MUTED, lw=0.8, label="mean energy density of fem")
+        axes[0].set(yscale="log", ylabel="L_PDE, MPa")
+        axes[1].set(yscale="log", ylabel="L_BC, mm²", xlabel="epochs", xlim=(0, LOOKS[-1]))
+        axes[0].legend(loc="upper right")
+    drawn.save(LOSS_PICTURE)
 
 
 HEADER = (
