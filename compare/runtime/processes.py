@@ -26,6 +26,9 @@ from solvers.solver import Progress
 PR_SET_PDEATHSIG = 1
 """Of `prctl(2)`: the signal that a process gets when its parent ends."""
 
+PATIENCE_S = 1.0
+"""Time that an interrupted process has for its next report, s; then it is interrupted wherever it is."""
+
 THREADS = "OMP_NUM_THREADS"
 """Variable that torch and OpenBLAS read when they are loaded."""
 
@@ -78,7 +81,8 @@ def in_processes(
     for one another on cores of others take more than they give.
 
     When the iterator is closed or interrupted, or this process is killed, the next progress report of every
-    running process raises KeyboardInterrupt there, so that it can save its state.
+    running process raises KeyboardInterrupt there, so that it can save its state. One that reports nothing is
+    interrupted as by SIGINT; one whose parent was killed then goes on to its end.
 
     Warnings in a process are warnings here, where Python shows a text only once.
 
@@ -95,6 +99,7 @@ def in_processes(
     running: dict[Connection, tuple[str, SpawnProcess]] = {}
     try:
         while waiting or running:
+            fresh: list[tuple[Connection, Input]] = []
             while waiting and len(running) < processes:
                 name = next(iter(waiting))
                 ours, theirs = context.Pipe()
@@ -103,8 +108,10 @@ def in_processes(
                     process.start()
                 theirs.close()
                 running[ours] = name, process
+                fresh.append((ours, waiting.pop(name)))
+            for connection, task in fresh:  # now that all have started: each reads when it has imported
                 with suppress(OSError):  # it has ended already, which is found below
-                    ours.send(waiting.pop(name))
+                    connection.send(task)
             ready = wait(list(running))
             for connection in [connection for connection in running if connection in ready]:
                 name, process = running[connection]
@@ -125,7 +132,10 @@ def in_processes(
         for connection in running:
             connection.close()
         for _, process in running.values():
-            process.join()
+            process.join(PATIENCE_S)
+            if process.is_alive():
+                process.terminate()
+                process.join()
 
 
 def in_stages(
@@ -189,6 +199,7 @@ def _child(work: Callable[[Input, Callable[..., None]], Output], connection: Con
     """
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     leave_signals_alone()  # PETSc would end the process when nobody listens
 
     def report(*message: object) -> None:

@@ -153,7 +153,10 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize(("name", "ending"), [("silent", signal.SIGKILL), ("reporting", signal.SIGTERM)])
+@pytest.mark.parametrize(
+    ("name", "ending"),
+    [("silent", signal.SIGKILL), ("silent", signal.SIGTERM), ("reporting", signal.SIGTERM)],
+)
 def test_no_process_outlives_the_run(tmp_path, name, ending):
     program = subprocess.Popen(
         [sys.executable, "-c", PROGRAM, str(tmp_path), name],
