@@ -91,8 +91,9 @@ def test_a_process_that_ends_without_an_answer_does_not_stop_the_others(capfd):
 
 def test_a_process_that_ends_before_it_has_read_a_large_task_is_noticed(monkeypatch):
     """Its parent must not wait for a reader: the task is larger than a pipe holds."""
-    monkeypatch.setattr(sys.modules["__main__"], "__file__", str(Path(__file__).with_name("ends_at_once.py")))
-    monkeypatch.setattr(sys.modules["__main__"], "__spec__", None)
+    program, main = Path(__file__).with_name("ends_at_once.py"), sys.modules["__main__"]
+    monkeypatch.setattr(main, "__file__", str(program), raising=False)  # a worker of xdist has none
+    monkeypatch.setattr(main, "__spec__", None)
     answers = dict(in_processes(half, {"a": bytes(2**22)}, processes=1, report=silent))
     assert answers == {"a": ProcessFailed(5)}
 
