@@ -1,4 +1,4 @@
-"""How far the numbers of every solver on one stored mesh differ between systems.
+"""Differences between systems in the numbers of every solver on one stored mesh.
 
 A file of `golden/` is what `python -m tests.solvers.golden` printed on another system; in the container:
 `buildah run -v $PWD:/src:ro CONTAINER -- sh -c "cd /src; PYTHONPATH=/src python -m tests.solvers.golden"`.

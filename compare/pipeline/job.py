@@ -1,4 +1,4 @@
-"""What a comparison compares."""
+"""The job of a comparison: what is compared, and whether it can be."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
