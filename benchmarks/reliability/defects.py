@@ -114,5 +114,10 @@ DEFECTS = (
         "After the last rename had failed, `--resume` was refused beside the complete result.",
         "`test_output_folder.py`, a rename that fails",
     ),
+    (
+        "fuzzing",
+        "A camera file in YAML with words after the mark of its first document: OpenCV's reader never ended.",
+        "`test_camera.py`, opencv cannot take",
+    ),
 )
 """Found by, what happened, test."""

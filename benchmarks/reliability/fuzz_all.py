@@ -1,10 +1,12 @@
-"""Fuzzes every reader for a time, starting anew where a C library ended the process, and keeps the counts.
+"""Fuzzes every reader for a time, starting anew where a C library ended the process, and adds to the counts.
 
-`python -m benchmarks.reliability.fuzz_all SECONDS [READER ...]`; needs Atheris (`pip install atheris`).
+`python -m benchmarks.reliability.fuzz_all SECONDS [READER ...]`; needs Atheris (`pip install atheris`). The
+files that reached new branches are kept below `out`, and a later time goes on from them.
 """
 
 import csv
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -21,11 +23,23 @@ GRACE_S = 60.0
 """Time that a process may take to start and to end."""
 
 KEPT = Path("out/reliability/fuzzing")
-"""Folder of the inputs that were not handled."""
+"""Folder of the inputs that were not handled, and of those that reached new branches."""
+CORPUS = "corpus"
 
 
 class Row(NamedTuple):
-    """Counts of a reader, in seconds and bytes; `unhandled`: exceptions by place, `ended`: by a C library."""
+    """Counts of a reader over all times, in seconds and bytes.
+
+    Attributes:
+        reader: Name.
+        runs: Files that it was given.
+        read: Those that it took.
+        slowest: Time of the slowest.
+        peak: Memory of the largest process.
+        seconds: Time in all.
+        unhandled: Places of exceptions that are no refusal, of the last time alone.
+        ended: How often a C library ended the process, of the last time alone.
+    """
 
     reader: str
     runs: int
@@ -43,7 +57,8 @@ def main(seconds: float, names: Sequence[str]) -> None:
 
     rows = {row.reader: row for row in kept_rows()}
     for name in names or READERS:
-        rows[name] = fuzzed(name, seconds)
+        before = rows.get(name, Row(name, 0, 0, 0.0, 0, 0.0, 0, 0))
+        rows[name] = fuzzed(before, seconds)
         print(*rows[name], flush=True)
         lines = [Row._fields, *(rows[name] for name in READERS if name in rows)]
         write_text(ROWS, "".join(",".join(map(str, line)) + "\n" for line in lines))
@@ -69,17 +84,21 @@ def kept_rows() -> list[Row]:
         ]
 
 
-def fuzzed(name: str, seconds: float) -> Row:
-    """Fuzz one reader, in as many processes as it takes."""
-    row = Row(name, 0, 0, 0.0, 0, 0.0, 0, 0)
-    wrong: dict[str, str] = {}
+def fuzzed(row: Row, seconds: float) -> Row:
+    """Fuzz the reader of a row, in as many processes as it takes, and add to its counts."""
+    name, wrong = row.reader, dict[str, str]()
+    known, row = KEPT / name / CORPUS, row._replace(ended=0)
     end = time.monotonic() + seconds
     while (left := end - time.monotonic()) > 1:
         with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as place:
             folder = Path(place)
+            if known.is_dir():
+                shutil.copytree(known, folder / CORPUS)
             command = [sys.executable, "-m", "benchmarks.reliability.fuzzing", name, str(left), place]
             with (folder / "log").open("wb") as log:
                 code = _ended(command, log, left + GRACE_S)
+            if (folder / CORPUS).is_dir():
+                shutil.copytree(folder / CORPUS, known, dirs_exist_ok=True)
             found = folder / "found.json"
             if found.exists():
                 counts = json.loads(found.read_text())
@@ -95,11 +114,11 @@ def fuzzed(name: str, seconds: float) -> Row:
                 kept = KEPT / name / path.name
                 kept.parent.mkdir(parents=True, exist_ok=True)
                 kept.write_bytes(path.read_bytes())
+            if code and not found.exists() and not list(folder.glob("crash-*")):
+                raise SystemExit((folder / "log").read_text(errors="replace"))  # it does not even start
             if code:
                 row = row._replace(ended=row.ended + 1)
                 print(name, code, *(folder / "log").read_text(errors="replace").splitlines()[-3:], flush=True)
-            if code and not found.exists() and not list(folder.glob("crash-*")):
-                break  # it does not even start
     for key, text in wrong.items():
         print(name, key, text, flush=True)
     return row._replace(unhandled=len(wrong))

@@ -179,6 +179,8 @@ def test_derivatives_are_those_of_differences(camera):
         ("%YAML:1.0\n- 1\n", "it is not JSON or YAML as OpenCV writes it"),  # a list has no keys
         ('{"a": ' + "[" * 100_000 + "]" * 100_000 + "}", "it is nested too deeply"),  # ends OpenCV's reader
         ("%YAML:1.0\n---\na: " + "[" * 100_000 + "]" * 100_000, "it is nested too deeply"),
+        # OpenCV's reader never ends
+        ("%YAML:1.0\n---%YAML:1.0\n\ni---\nm", "it is not one YAML document as OpenCV writes it"),
         # its table of keys is broken, which OpenCV finds when it looks for the second one
         (
             f"%YAML:1.0\n---\nimage_width: 6{53 * '5'}40\nimag2_height: 480\nfisheye_model:%YA 0",

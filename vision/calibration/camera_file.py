@@ -18,6 +18,10 @@ Entry = int | float | str | list[str] | FloatArray
 FORMATS = (".json", ".yml", ".yaml")
 DEEPEST = 100
 """Depth of nested brackets in a camera file; its own have three."""
+MARKS = re.compile(r"^(?:---|\.\.\.|%).*$", re.MULTILINE)
+"""Lines of YAML between documents."""
+ONE_DOCUMENT = ([], ["---"], ["---", "..."])
+"""Those of a camera file after its first line. Where there are others, OpenCV's reader may never end."""
 
 
 def save_camera(path: Path, camera: Camera) -> None:
@@ -65,6 +69,9 @@ def load_camera(path: Path) -> Camera:
         text = path.read_text(encoding="utf-8-sig")
         if _depth(text) > DEEPEST:  # OpenCV's reader ends the process
             raise UserError(f"cannot read the camera {path}: it is nested too deeply")
+        marks = [mark.rstrip() for mark in MARKS.findall(text)]
+        if text.startswith("%") and marks[1:] not in ONE_DOCUMENT:
+            raise UserError(f"cannot read the camera {path}: it is not one YAML document as OpenCV writes it")
         storage = cv2.FileStorage(text, cv2.FileStorage_READ | cv2.FileStorage_MEMORY)
         return _camera(storage, path)  # OpenCV finds some faults only where it looks for a key
     except OSError as error:

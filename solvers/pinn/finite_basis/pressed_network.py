@@ -17,7 +17,7 @@ from solvers.constrained_elimination import ConstrainedElimination
 from solvers.cylinder_contact import ContactRegion, CylinderContact
 from solvers.lagrange import LagrangeSpace
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
-from solvers.pinn.finite_basis.energy import REGULARISATION
+from solvers.pinn.finite_basis.energy import REGULARISATION, piola_stress_and_tangent
 from solvers.pinn.finite_basis.network import FiniteBasisField
 from solvers.pinn.finite_basis.newton import FIRST_STEP, MIN_STEP, LoadStep
 from solvers.pinn.finite_basis.sparse_cholesky import Factors
@@ -143,14 +143,16 @@ class PressedNetwork:
             coarse: Of the coarser network, whose forces are taken.
             field: Its displacement.
         """
-        output, forces = self.network.project(field), coarse.state.forces
+        tangent, forces = self._tangent_near(field), coarse.state.forces
+        if tangent is None:
+            return None
         gently = replace(self.contact, stiffness=SOFT / STIFF * self.contact.stiffness)
         soft = replace(self, contact=gently)
-        found, first = soft._minimum(output, 1.0, forces, ROUGH, None)
+        found, first = soft._minimum(tangent.output, 1.0, forces, ROUGH, tangent)
         if found is None:
             return None
         forces = gently.forces(soft.stage(found.output, 1.0, forces))
-        state, iterations = self._equilibrium(found.output, 1.0, forces)
+        state, iterations = self._equilibrium(found.output, 1.0, forces, found.tangent)
         return None if state is None else self._load_step(1.0, state, first + iterations)
 
     def followed(self, progress: Progress) -> LoadStep:
@@ -189,10 +191,13 @@ class PressedNetwork:
         return LoadStep(fraction, state, iterations, ContactRegion.of(self.contact, stage))
 
     def _equilibrium(
-        self, output: torch.Tensor, fraction: float, multipliers: FloatArray
+        self, output: torch.Tensor, fraction: float, multipliers: FloatArray, tangent: Tangent | None = None
     ) -> tuple[NewtonIterate | None, int]:
-        """Equilibrium from a guess, None if the iteration fails, and the Newton iterations taken."""
-        tangent, iterations = self._tangent(output), 1
+        """Equilibrium from a guess, None if the iteration fails, and the Newton iterations taken.
+
+        A tangent that is not given is formed at the guess.
+        """
+        tangent, iterations = tangent or self._tangent(output), 1
         if tangent is None:
             return None, iterations
         output = self._held(output, fraction, multipliers, tangent)
@@ -290,6 +295,21 @@ class PressedNetwork:
         if not torch.isfinite(gradient).all():
             return None
         return Tangent(hessian.factorised(REGULARISATION, definite=False), output)
+
+    def _tangent_near(self, field: FiniteBasisField) -> Tangent | None:
+        """The tangent at another network's displacement, and the output layer nearest to it by that tangent.
+
+        None if a point is turned inside out.
+        """
+        energy = self.network.energy
+        gradient = energy.gradients_of(field)
+        _, tangent = piola_stress_and_tangent(gradient, energy.material.lame, energy.material.law)
+        if not torch.isfinite(tangent).all():
+            return None
+        forces = energy.forces(torch.einsum("nijkl,nkl->nij", tangent, gradient)[None])
+        factors = energy.hessian(tangent).factorised(REGULARISATION, definite=False)
+        output = factors.solve(forces.numpy().reshape(1, -1))
+        return Tangent(factors, torch.from_numpy(output).view_as(self.network.zero_output))
 
     def _step(self, stage: Stage, output: torch.Tensor, touching: IntArray, tangent: Tangent) -> Step | None:
         """Newton's step with given multipliers and nodes that touch; None if a point is turned inside out."""
