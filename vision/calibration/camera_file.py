@@ -20,7 +20,7 @@ DEEPEST = 100
 """Depth of nested brackets in a camera file; its own have three."""
 MARKS = re.compile(r"^(?:---|\.\.\.|%).*$", re.MULTILINE)
 """Lines of YAML between documents."""
-ONE_DOCUMENT = ([], ["---"], ["---", "..."])
+ONE_DOCUMENT: tuple[list[str], ...] = ([], ["---"], ["---", "..."])
 """Those of a camera file after its first line. Where there are others, OpenCV's reader may never end."""
 
 

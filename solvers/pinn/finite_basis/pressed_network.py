@@ -36,8 +36,8 @@ NEAR = 2e-3
 """Size of a Newton step below which the tangent before will do, if the step can be taken as a whole."""
 ROUNDING = 1e-12
 """The same below which the potential may rise by rounding."""
-SHORTEST = 2.0**-10
-"""Share of a Newton step below which the potential does not fall any more."""
+SHORTEST = 2.0**-9
+"""Shortest share of a Newton step that is tried; of one by an older tangent it is the whole."""
 
 
 class Stage(NamedTuple):
@@ -152,7 +152,9 @@ class PressedNetwork:
         if found is None:
             return None
         forces = gently.forces(soft.stage(found.output, 1.0, forces))
-        state, iterations = self._equilibrium(found.output, 1.0, forces, found.tangent)
+        held = self._held(found.output, 1.0, forces, found.tangent)
+        start = min((found.output, held), key=lambda each: self._potential(each, 1.0, forces))
+        state, iterations = self._equilibrium(start, 1.0, forces, found.tangent)
         return None if state is None else self._load_step(1.0, state, first + iterations)
 
     def followed(self, progress: Progress) -> LoadStep:
@@ -195,12 +197,14 @@ class PressedNetwork:
     ) -> tuple[NewtonIterate | None, int]:
         """Equilibrium from a guess, None if the iteration fails, and the Newton iterations taken.
 
-        A tangent that is not given is formed at the guess.
+        Without a tangent near the guess one is formed there, and takes the guess to the nodes with forces.
         """
-        tangent, iterations = tangent or self._tangent(output), 1
+        iterations = 0
         if tangent is None:
-            return None, iterations
-        output = self._held(output, fraction, multipliers, tangent)
+            tangent, iterations = self._tangent(output), 1
+            if tangent is None:
+                return None, iterations
+            output = self._held(output, fraction, multipliers, tangent)
         for _ in range(UPDATES):
             tolerance = EXACT if fraction == 1 else ROUGH
             found, taken = self._minimum(output, fraction, multipliers, tolerance, tangent)
@@ -240,7 +244,7 @@ class PressedNetwork:
             return output
         step = self._step(self.stage(output, fraction, multipliers), output, touching, tangent)
         length = 1.0
-        while step is not None and length > SHORTEST:
+        while step is not None and length >= SHORTEST:
             if np.isfinite(self.network.energy.total(moved := output + length * step.change)):
                 return moved
             length /= 2
@@ -252,7 +256,7 @@ class PressedNetwork:
         fraction: float,
         multipliers: FloatArray,
         tolerance: float,
-        tangent: Tangent | None,
+        tangent: Tangent,
     ) -> tuple[Minimum | None, int]:
         """The least potential with given multipliers, by Newton's method with a line search.
 
@@ -260,14 +264,16 @@ class PressedNetwork:
         """
         least = self._potential(output, fraction, multipliers)
         for iteration in range(1, ITERATIONS + 1):
-            stage, taken = self.stage(output, fraction, multipliers), None
-            if tangent is not None:
-                taken = self._taken(stage, output, tangent, least)
-            if tangent is None or taken is None or not (tangent.output is output or taken.near):
-                tangent = self._tangent(output)
-                taken = None if tangent is None else self._taken(stage, output, tangent, least)
-                if tangent is None or taken is None:
+            stage = self.stage(output, fraction, multipliers)
+            fresh = tangent.output is output
+            taken = self._taken(stage, output, tangent, least, SHORTEST if fresh else 1.0)
+            if not fresh and not (taken and taken.near):
+                formed = self._tangent(output)
+                if formed is None:
                     return None, iteration
+                tangent, taken = formed, self._taken(stage, output, formed, least)
+            if taken is None:
+                return None, iteration
             if taken.step.size < ROUNDING:
                 return Minimum(output, taken.step, tangent), iteration
             if taken.length == 0:
@@ -277,11 +283,13 @@ class PressedNetwork:
                 return Minimum(output, taken.step, tangent), iteration
         return None, ITERATIONS
 
-    def _taken(self, stage: Stage, output: torch.Tensor, tangent: Tangent, least: float) -> Taken | None:
+    def _taken(
+        self, stage: Stage, output: torch.Tensor, tangent: Tangent, least: float, shortest: float = SHORTEST
+    ) -> Taken | None:
         """So much of a step that the potential falls; None if a point is turned inside out."""
         step = self._step(stage, output, np.flatnonzero(self.contact.forces(stage) > 0), tangent)
         length = 1.0
-        while step is not None and length > SHORTEST:
+        while step is not None and length >= shortest:
             moved = output + length * step.change
             value = self._potential(moved, stage.fraction, stage.contact)
             if value < least:
