@@ -136,9 +136,9 @@ def _fuzzing() -> list[str]:
         "`python -m benchmarks.reliability.fuzz_all SECONDS` (Atheris, guided by the readers' branches): "
         "files that start from good ones, over several times, each with the code of its day. Of the last "
         "time alone: *unhandled*, places of exceptions that are no refusal in one line; *ended by a "
-        "library*, C code crashed or took longer than 10 s. What was found before is mended, see below; drawings and "
-        "meshes are read in a process of their own by the commands, "
-        "which say in one line that it ended.",
+        "library*, C code crashed or took longer than 10 s. What was found before is mended, see below; "
+        "drawings and meshes are read in a process of their own by the commands, which say in one line "
+        "that it ended.",
         "",
         *_table(header, rows, left=1),
         "",

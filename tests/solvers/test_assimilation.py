@@ -1,13 +1,13 @@
 """The misfit to the markers: its units, its derivative, and what each weighting means."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
 from geometry.finger.presets import load_design
 from geometry.observations import Observations
-from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, MarkerSettings, assimilates, misfit_of
+from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, MarkerSettings, Misfit, assimilates, misfit_of
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
 from solvers.registry import make_solver
@@ -28,6 +28,15 @@ def problem(coarse_mesh):
         coarse_mesh,
         observations=Observations(points, displacements, deviations, visible, "by a test", True, 0.8),
     )
+
+
+def test_what_is_not_given_is_as_documented():
+    """The settings of every published figure: the paper's weight, no deviation of the contact, centres."""
+    given = {"weights": "paper", "asm_weight": 1000.0, "scale": 1.0, "marker_radius": None}
+    assert asdict(MarkerSettings()) == given | {"contact_deviation": 0.0, "choose": "given"}
+    assert MIN_STANDARD_DEVIATION == 0.005
+    nothing = np.zeros((0, 2))
+    assert Misfit(nothing, nothing, nothing).radius == 0
 
 
 def test_no_observations_no_misfit(coarse_mesh):
