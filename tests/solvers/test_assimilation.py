@@ -5,9 +5,17 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from geometry.errors import UserError
 from geometry.finger.presets import load_design
 from geometry.observations import Observations
-from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, MarkerSettings, Misfit, assimilates, misfit_of
+from solvers.assimilation.misfit import (
+    MIN_STANDARD_DEVIATION,
+    MarkerSettings,
+    Misfit,
+    assimilates,
+    leave_one_out_displacements,
+    misfit_of,
+)
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
 from solvers.registry import make_solver
@@ -103,6 +111,17 @@ def test_without_a_marker_the_others_weigh_the_same(problem):
     moved[4] = misfit.observed[4]
     assert rest.value(np.delete(moved, 4, axis=0)) == pytest.approx(misfit.value(moved), rel=1e-14)
     assert rest.points.tolist() == np.delete(misfit.points, 4, axis=0).tolist()
+
+
+def test_a_prediction_without_a_marker_is_what_was_seen_less_the_residual(problem):
+    given = problem.observations
+    residuals = np.random.default_rng(0).normal(size=(len(given.visible) - 1, 2))
+    predicted = leave_one_out_displacements(problem, residuals)
+    assert np.isnan(predicted[2]).all()
+    others = np.delete(given.displacements, 2, axis=0) - residuals
+    np.testing.assert_allclose(np.delete(predicted, 2, axis=0), others, rtol=1e-15)
+    with pytest.raises(UserError, match="no markers to leave out"):
+        leave_one_out_displacements(replace(problem, observations=None), residuals)
 
 
 def test_a_marker_moves_by_the_mean_over_its_disc(problem):
