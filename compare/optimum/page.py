@@ -107,11 +107,13 @@ def summary(optimum: Optimum) -> list[str]:
     load = {name: value for name, value in study.fixed.items() if name in ("load", "stroke", "radius", "law")}
     said = ", ".join(f"{name} = {value}" for name, value in load.items())
     allowed = f", with {', '.join(limits)}" if limits else ""
+    crossed = sum(each.through_itself for each in optimum.measurements)
+    itself = f" {crossed} runs do not count: the finger goes through itself." if crossed else ""
     return [
         f"Wanted: {senses}{allowed}. {len(optimum.front)} of {len(optimum.measurements)} runs of "
         f"{study.solver} ({said + ', ' if said else ''}elements of {study.mesh_size:g} mm) are on the front: "
-        "none of them is beaten in every objective by another run. An emulator proposed fingers; all numbers "
-        "here are the solver's.",
+        f"none of them is beaten in every objective by another run.{itself} "
+        "An emulator proposed fingers; all numbers here are the solver's.",
         "A finger of the table: compare --design front/01.toml, or pinnray design --design front/01.toml for "
         "its CAD files.",
     ]

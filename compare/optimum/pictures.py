@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 
 from compare.figures.style import HALO, axes_at, heading
-from compare.optimum.search import Optimum
+from compare.optimum.search import Optimum, is_allowed
 from compare.sweep.quantities import QUANTITIES
 from geometry.arrays import FloatArray, IntArray
 from geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
@@ -27,12 +27,11 @@ def draw_front(optimum: Optimum, shown: Sequence[int]) -> Figure:
         heading(drawn, f"Pareto front: {senses}", note)
         axes = axes_at(drawn, (0.7, 0.55, WIDTH - 0.9, 2.75))
         others = [each for each in optimum.measurements if each.number not in optimum.front and each.values]
-        good = [each.state == "done" and optimum.question.allows(each.values) for each in others]
-        allowed = np.array(good, dtype=bool)
+        allowed = np.array([is_allowed(optimum.question, each) for each in others], dtype=bool)
         points = np.array([[each.values[name] for name in (first, second)] for each in others]).reshape(-1, 2)
         axes.plot(*points[allowed].T, "o", ms=3.5, mfc="none", c=MUTED, label="other runs")
         if not allowed.all():
-            axes.plot(*points[~allowed].T, "x", ms=3.5, c=MUTED, label="against a constraint")
+            axes.plot(*points[~allowed].T, "x", ms=3.5, c=MUTED, label="impossible or against a constraint")
         on_front = [optimum.measurements[run].values for run in optimum.front]
         best = np.array([[values[name] for name in (first, second)] for values in on_front])
         axes.plot(*best.T, "-" if not third else "", color=BLUE, lw=0.8)

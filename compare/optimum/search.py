@@ -173,24 +173,27 @@ def _proposed(
     return found + more[: count - len(found)]
 
 
+def is_allowed(question: Question, run: Measurement) -> bool:
+    """Whether a run has converged, obeys the constraints and is of a finger that can be so deformed."""
+    return run.state == "done" and not run.through_itself and question.allows(run.values)
+
+
 def _allowed_costs(question: Question, measured: list[Measurement]) -> FloatArray:
-    """Costs of the converged runs that obey the constraints, shape (n, m)."""
-    rows = [
-        question.costs(each.values)
-        for each in measured
-        if each.state == "done" and question.allows(each.values)
-    ]
+    """Costs of the runs that are allowed, shape (n, m)."""
+    rows = [question.costs(each.values) for each in measured if is_allowed(question, each)]
     return np.array(rows).reshape(-1, len(question.objectives))
 
 
 def _optimum(question: Question, fingers: list[dict[str, Value]], journal: Journal) -> Optimum:
     measured = journal.measurements()
-    allowed = [each for each in measured if each.state == "done" and question.allows(each.values)]
+    allowed = [each for each in measured if is_allowed(question, each)]
     if not allowed:
         found = sum(each.state == "done" for each in measured)
+        crossed = sum(each.through_itself for each in measured)
+        besides = f", {crossed} go through themselves" if crossed else ""
         raise UserError(
-            f"none of {len(measured)} runs obeys the constraints ({found} converged); relax a constraint "
-            "or widen the ranges"
+            f"none of {len(measured)} runs obeys the constraints ({found} converged{besides}); relax a "
+            "constraint, widen the ranges or take a smaller stroke"
         )
     costs = np.array([question.costs(each.values) for each in allowed])
     converged = [question.costs(each.values) for each in measured if each.state == "done"]

@@ -38,6 +38,11 @@ class Measurement:
     seconds: float
     values: dict[str, float] = field(default_factory=dict)
 
+    @property
+    def through_itself(self) -> bool:
+        """Whether the deformed body goes through itself: a result that no real finger has."""
+        return self.message.startswith(THROUGH_ITSELF)
+
 
 def measured(task: Task) -> Measurement:
     """Draw, mesh and solve one sample.

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from compare.cli import main
-from compare.optimum.page import front_grid, spread
+from compare.evaluation.deformed_body import THROUGH_ITSELF
+from compare.optimum.page import front_grid, spread, summary
 from compare.optimum.question import Limit, Question
 from compare.optimum.search import Optimum, OptimumJob, search_front
 from compare.runtime.stages import Stages
@@ -114,6 +115,25 @@ def test_the_table_has_a_row_for_each_finger_on_the_front(found: Optimum) -> Non
     assert grid.headings[:5] == ("finger", "run", "wrap_deg", "force_N", "von_mises_MPa")
     assert [int(row[1]) for row in grid.rows] == found.front
     assert len(set(map(len, grid.rows))) == 1
+
+
+def test_a_finger_that_goes_through_itself_is_not_on_the_front(
+    found: Optimum, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    best = found.fingers[found.front[0]]["rib_count"]
+
+    def strict(tasks: Mapping[int, Task], journal: Journal, *_: object) -> None:
+        for number in sorted(tasks.keys() - journal.numbers()):
+            crossed = tasks[number].definition["rib_count"] == best
+            said = f"{THROUGH_ITSELF}; converged" if crossed else ""
+            journal.add(Measurement(number, "done", said, 0.0, judged(tasks[number])))
+
+    monkeypatch.setattr("compare.optimum.search.finish", strict)
+    other = search_front(OptimumJob(QUESTION, Path(), tmp_path / "out", 1))
+    crossed = [n for n, finger in enumerate(other.fingers) if finger["rib_count"] == best]
+    assert crossed
+    assert not set(crossed) & set(other.front)
+    assert f" {len(crossed)} runs do not count: the finger goes through itself." in " ".join(summary(other))
 
 
 def test_constraints_that_nothing_obeys_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
