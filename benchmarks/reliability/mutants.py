@@ -34,7 +34,7 @@ TESTS: Mapping[str, tuple[str, ...]] = {
     "compare.evaluation.differences": ("tests/compare/test_metrics.py",),
     "solvers.assimilation.misfit": ("tests/solvers/test_assimilation.py",),
     "solvers.assimilation.marker_weighting": (
-        *("tests/solvers/test_assimilation.py", "tests/solvers/test_estimation.py"),
+        *("tests/solvers/test_marker_weighting.py", "tests/solvers/test_assimilation.py"),
     ),
     "compare.evaluation.certificate": ("tests/compare/test_certificate.py",),
     "vision.tracking.data_association": ("tests/vision/test_tracking.py", "tests/vision/test_identity.py"),

@@ -4,17 +4,21 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+import shapely
 
 from geometry.errors import UserError
 from geometry.finger.presets import load_design
+from geometry.mesh.boundary import boundary_edges
 from geometry.observations import Observations
 from solvers.assimilation.misfit import (
     MIN_STANDARD_DEVIATION,
     MarkerSettings,
     Misfit,
     assimilates,
+    disc_quadrature,
     leave_one_out_displacements,
     misfit_of,
+    radius_within,
 )
 from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
@@ -136,6 +140,29 @@ def test_a_marker_moves_by_the_mean_over_its_disc(problem):
 def test_without_a_radius_it_is_the_centre_that_moves(problem):
     points, shares = misfit_of(problem, MarkerSettings(marker_radius=0.0)).sampling()
     np.testing.assert_array_equal(shares @ points, misfit_of(problem).points)
+
+
+def test_the_mean_over_a_disc_is_that_of_polynomials():
+    """The rule's four rings and twelve angles take the mean of every polynomial of degree 8 exactly."""
+    centres, radius = np.array([[1.0, 2.0], [-3.0, 0.5]]), 0.7
+    points, weights = disc_quadrature(centres, radius)
+    x, y = (points - centres[0]).T
+    exact = {(0, 0): 1, (1, 0): 0, (0, 1): 0, (2, 0): 1 / 4, (1, 1): 0, (2, 2): 1 / 24, (4, 0): 1 / 8}
+    exact |= {(6, 0): 5 / 64, (0, 8): 7 / 128, (4, 4): 3 / 640, (5, 3): 0}
+    for (i, j), mean in exact.items():
+        scaled = (x / radius) ** i * (y / radius) ** j
+        assert weights[0] @ scaled == pytest.approx(mean, abs=1e-14), (i, j)
+    np.testing.assert_allclose(weights @ points, centres, atol=1e-14)
+
+
+def test_a_disc_is_as_large_as_the_distance_from_the_boundary(coarse_mesh):
+    """The distance is shapely's, also where an edge that is lengthened would be nearer."""
+    edges = coarse_mesh.points[boundary_edges(coarse_mesh.triangles)]
+    boundary = shapely.multilinestrings(shapely.linestrings(edges))
+    for point in coarse_mesh.points[coarse_mesh.triangles[::7]].mean(axis=1):
+        distance = shapely.distance(boundary, shapely.points(point))
+        assert radius_within(coarse_mesh, point[None], 100.0) == pytest.approx(distance, rel=1e-12)
+    assert radius_within(coarse_mesh, coarse_mesh.markers, 1e-3) == 1e-3
 
 
 def test_a_disc_does_not_reach_beyond_the_body(problem):
