@@ -92,7 +92,8 @@ def main(seconds: float = inf) -> Table:
     """Train from where an earlier start ended, and write figures, picture and table."""
     looks, end = {look[:3]: look for look in read()}, time.monotonic() + seconds
     for kind, seed in RUNS:
-        for look in train(kind, seed, {epoch for _, _, epoch in looks}, end):
+        known = {epoch for load, of, epoch in looks if (load, of) == (kind, seed)}
+        for look in train(kind, seed, known, end):
             looks[look[:3]] = look
             write(list(looks.values()))
             write_losses(kind, seed)
