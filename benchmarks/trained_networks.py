@@ -1,4 +1,4 @@
-"""`pinn-std --preset trained`, three seeds and twelve random fingers, against finite elements graded to corners.
+"""`pinn-std --preset trained`, three seeds and twelve random fingers, against elements graded to the corners.
 
 The reference has quadratic elements graded to 0.01 mm at the corners and an eighth of the contact's width
 there. A training takes about ten minutes on two quiet cores; what is in `trained_networks.csv` with the
