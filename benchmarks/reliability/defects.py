@@ -119,5 +119,15 @@ DEFECTS = (
         "A camera file in YAML with words after the mark of its first document: OpenCV's reader never ended.",
         "`test_camera.py`, opencv cannot take",
     ),
+    (
+        "fuzzing",
+        "A PNG of a hundred bytes with two headers and no pixels: OpenCV took 4 GB and 3.5 s.",
+        "`test_pictures.py`, unreadable",
+    ),
+    (
+        "fuzzing",
+        "A workspace file with a line break in an unknown key was refused in two lines.",
+        "`test_workspace.py`, one line",
+    ),
 )
 """Found by, what happened, test."""

@@ -91,6 +91,9 @@ def test_another_size_names_both_pictures(tmp_path):
         # a chunk of 3 GB, and one that OpenCV passes over to find such a length
         (encoded(1)[:PNG_HEADER] + b"\xbc" * 12 + encoded(1)[-12:], "one of its parts is damaged"),
         (encoded(1)[:PNG_HEADER] + bytes(4) + b"IDAT" + bytes(4) + encoded(1)[-12:], "one of its parts is"),
+        # OpenCV would take 4 GB
+        (encoded(1)[:PNG_HEADER] + encoded(1)[len(PNG) : PNG_HEADER] + encoded(1)[-12:], "more than one"),
+        (encoded(1)[:PNG_HEADER] + encoded(1)[-12:], "it has no pixels"),
         (encoded(1, ".jpg")[:-2], "its end is missing"),
         (encoded(1, ".tif", dtype=np.float32), "float32"),
     ],

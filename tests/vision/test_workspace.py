@@ -1,11 +1,13 @@
 """The fiducials around the finger."""
 
+import json
+
 import numpy as np
 import pytest
 
 from geometry.errors import UserError
 from geometry.finger.design import Design
-from vision.tracking.workspace import Workspace, default_workspace
+from vision.tracking.workspace import Workspace, default_workspace, load_workspace
 
 
 def test_the_default_layout_surrounds_the_finger_and_leaves_the_indenter_room():
@@ -35,3 +37,11 @@ def test_the_default_layout_is_no_turned_or_mirrored_copy_of_itself(turn):
 def test_a_layout_that_does_not_determine_the_plane_is_refused(fiducials, said):
     with pytest.raises(UserError, match=said):
         Workspace(fiducials=fiducials)
+
+
+def test_an_unknown_key_is_refused_in_one_line(tmp_path):
+    path = tmp_path / "workspace.json"
+    path.write_text(json.dumps(default_workspace(Design()).model_dump(mode="json") | {"marker\nplane": 0}))
+    with pytest.raises(UserError, match="marker plane") as caught:
+        load_workspace(path)
+    assert "\n" not in str(caught.value)

@@ -146,7 +146,7 @@ def _png_fault(content: bytes) -> str:
 
     Source: PNG specification, third edition, sections 5.3, 5.5 and 11.2.1.
     """
-    position, kind = len(PNG), b""
+    position, kind, kinds = len(PNG), b"", list[bytes]()
     while kind != b"IEND":
         length = int.from_bytes(content[position : position + 4], "big")
         body, end = content[position + 4 : position + 8 + length], position + 12 + length
@@ -154,8 +154,11 @@ def _png_fault(content: bytes) -> str:
         if end > len(content) or zlib.crc32(body) != int.from_bytes(content[end - 4 : end], "big"):
             return "one of its parts is damaged"
         position = end
-    if content[12:16] != b"IHDR" or len(content) < PNG_HEADER:
-        return "it has no header"
+        kinds.append(kind)
+    if kinds[0] != b"IHDR" or kinds.count(b"IHDR") > 1 or len(content) < PNG_HEADER:
+        return "it has no header, or more than one"
+    if b"IDAT" not in kinds:
+        return "it has no pixels"
     width, height = (int.from_bytes(content[at : at + 4], "big") for at in (16, 20))
     samples = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}.get(content[25], 1)
     if width * height * samples * content[24] // 8 > DEFLATE * len(content):

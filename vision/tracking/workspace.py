@@ -55,7 +55,7 @@ class Workspace(BaseModel):
             super().__init__(**values)
         except ValidationError as error:
             first = error.errors()[0]
-            place = ".".join(map(str, first["loc"]))
+            place = " ".join(".".join(map(str, first["loc"])).split())  # a key of a file may have line breaks
             said = first["msg"].removeprefix("Value error, ")
             raise UserError(f"workspace: {f'{place}: ' if place else ''}{said}") from None
 
