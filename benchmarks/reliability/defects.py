@@ -129,5 +129,17 @@ DEFECTS = (
         "A workspace file with a line break in an unknown key was refused in two lines.",
         "`test_workspace.py`, one line",
     ),
+    (
+        "fuzzing",
+        "An SVG or DXF curve with an infinite or huge coordinate was halved without end, as one far from the "
+        "origin, where rounding hides its shape.",
+        "`test_bad_drawings.py`, numbers without bounds",
+    ),
+    (
+        "fuzzing",
+        "An SVG file with a width of `10E`, an infinite scale, or another outermost element ended with a "
+        "`ValueError`, `LinAlgError` or `AttributeError`.",
+        "`test_bad_drawings.py`, numbers without bounds, outermost element",
+    ),
 )
 """Found by, what happened, test."""

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from geometry.arrays import FloatArray, IntArray
 from geometry.drawing.formats.drawing import place
-from geometry.drawing.formats.pieces import Piece
+from geometry.drawing.formats.pieces import FARTHEST, Piece, is_near
 from geometry.errors import UserError
 from geometry.section.loop import STRAIGHT, Loop
 
@@ -148,6 +148,10 @@ def _check_extent(pieces: Sequence[Piece]) -> None:
     if not pieces:
         raise UserError("there is no line or arc in it; draw the boundary of the section")
     ends = np.array([[piece.start, piece.end] for piece in pieces]).reshape(-1, 2)
+    if not is_near(ends):
+        raise UserError(
+            f"a coordinate is not finite or beyond {FARTHEST:g} mm; draw the section near the origin"
+        )
     extent = float(np.ptp(ends, axis=0).max())
     if not SMALLEST <= extent <= LARGEST:
         other = "metres for millimetres" if extent < SMALLEST else "micrometres for millimetres"

@@ -16,6 +16,9 @@ PROBES = np.linspace(0, 1, 17)[1:-1]
 DEEPEST = 24
 """Most halvings of a curve."""
 
+FARTHEST = 1e7
+"""Largest coordinate, mm. Farther away rounding is no longer far below `DEVIATION`."""
+
 Curve = Callable[[FloatArray], FloatArray]
 """Points (n, 2) of a curve at parameters (n,)."""
 
@@ -68,12 +71,25 @@ def arcs_along(curve: Curve, first: float, last: float, label: str, unit: float 
         last: Parameter of its end.
         label: Label of the pieces.
         unit: Length of one unit of the curve, mm.
+
+    Of a curve beyond `FARTHEST` only one line to a point out there comes, for the reader to refuse.
     """
-    ends = curve(np.array([first, last]))
+    with np.errstate(all="ignore"):  # of what has no finite coordinates
+        ends = curve(np.array([first, last]))
+        between = curve(first + PROBES * (last - first))
+    for point in (*ends, *between):
+        if not is_near(point, unit):
+            yield line(ends[0], point, label)
+            return
     closed = bool(np.linalg.norm(ends[1] - ends[0]) < 1e-9 * max(1.0, float(np.abs(ends).max())))
     cuts = np.linspace(first, last, 5 if closed else 2)
     for start, end in pairwise(cuts.tolist()):
         yield from _halved(curve, start, end, label, 0.8 * DEVIATION / unit, 0)
+
+
+def is_near(points: FloatArray, unit: float = 1.0) -> bool:
+    """Whether all coordinates, of `unit` mm each, are finite and at most `FARTHEST`."""
+    return bool((np.abs(points) <= FARTHEST / unit).all())
 
 
 def _halved(

@@ -42,7 +42,8 @@ def read_svg(path: Path, units: str | None = None) -> Drawing:
     """
     digest = sha256_of(path)
     try:
-        _check_copies(ET.parse(path).getroot(), path.name)
+        root = ET.parse(path).getroot()
+        _check_copies(root, path.name)
         parsed = svgelements.SVG.parse(str(path), reify=False)
     except (OSError, ET.ParseError, ValueError, UnicodeDecodeError) as error:
         raise UserError(f"cannot read {path.name} as SVG: {error}") from None
@@ -50,6 +51,8 @@ def read_svg(path: Path, units: str | None = None) -> Drawing:
         raise UserError(f"cannot read {path.name} as SVG: it is nested too deeply") from None
     except (ArithmeticError, AttributeError, LookupError, TypeError):  # of svgelements, at what is no SVG
         raise UserError(f"cannot read {path.name} as SVG: an attribute has no sound value") from None
+    if not isinstance(parsed, svgelements.SVG):
+        raise UserError(f"cannot read {path.name} as SVG: its outermost element is {_tag(root)}, not svg")
     _check_view_box(parsed, path.name)
     try:
         back = ~svgelements.Matrix(parsed.viewbox_transform or "")
@@ -60,6 +63,8 @@ def read_svg(path: Path, units: str | None = None) -> Drawing:
     pieces: list[Piece] = []
     for element, label in _shapes(parsed, ""):
         place = _Transformation(element.transform * back, unit)
+        if not place.is_finite:
+            raise UserError(f"{path.name}: the transformation of {_described(element)} is not finite")
         try:
             if not marks.took(*_mark(element, place), label):
                 pieces += _pieces(element.segments(transformed=False), label, place)
@@ -88,7 +93,12 @@ def _check_copies(root: ET.Element, file: str) -> None:
 
 
 def _is_copy(element: ET.Element) -> bool:
-    return isinstance(element.tag, str) and element.tag.rpartition("}")[2] == "use"
+    return _tag(element) == "use"
+
+
+def _tag(element: ET.Element) -> str:
+    """Name of an element without its namespace; empty for a comment."""
+    return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
 
 
 def _check_view_box(parsed: Any, file: str) -> None:
@@ -106,9 +116,10 @@ def _check_view_box(parsed: Any, file: str) -> None:
 
 
 def _described(element: Any) -> str:
-    return (
-        f"the element {element.id!r}" if element.id else f"a {type(element).__name__.lower()} without an id"
-    )
+    if element.id:
+        return f"the element {element.id!r}"
+    kind = type(element).__name__.lower()
+    return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind} without an id"
 
 
 def _unit(parsed: Any, file: str) -> float:
@@ -125,7 +136,11 @@ def _unit(parsed: Any, file: str) -> float:
     ):
         found = re.fullmatch(r"\s*([0-9.eE+-]+)\s*([a-z]*)\s*", str(text))
         if found and found[2] in LENGTHS:
-            units.append(float(found[1]) * LENGTHS[found[2]] / float(extent) if extent else LENGTHS[""])
+            try:
+                length = float(found[1])
+            except ValueError:
+                raise UserError(f"{file}: {text!r} is no width or height; write for instance 60mm") from None
+            units.append(length * LENGTHS[found[2]] / float(extent) if extent else LENGTHS[""])
     if not units:
         return LENGTHS[""]
     if max(units) > min(units) * 1.001:
@@ -160,6 +175,11 @@ class _Transformation:
         flip = np.array([[unit, 0.0], [0.0, -unit]])
         self._matrix = flip @ np.array([[matrix.a, matrix.c], [matrix.b, matrix.d]])
         self._shift = flip @ np.array([matrix.e, matrix.f])
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether it has neither an infinite number nor none."""
+        return bool(np.isfinite(self._matrix).all() and np.isfinite(self._shift).all())
 
     @property
     def scale(self) -> float | None:

@@ -144,6 +144,39 @@ def test_what_svgelements_stumbles_over_is_one_line(tmp_path, head, body):
         load_drawing(path)
 
 
+HEAD = 'width="100mm" height="60mm" viewBox="0 0 100 60"'
+FAR = r"a coordinate is not finite or beyond 1e\+07 mm; draw the section near"
+
+
+@pytest.mark.timeout(20)  # a curve that is halved for ever would take all time
+@pytest.mark.parametrize(
+    ("head", "body", "message"),
+    [
+        (HEAD, '<path d="M0 0C0 9 1e999 9 30 0L0 10Z"/>', FAR),
+        (HEAD, '<path d="M0 0C0 9 1e300 9 30 0L0 10Z"/>', FAR),
+        (HEAD, '<ellipse cx="1e15" cy="5" rx="20" ry="9"/>', FAR),
+        (HEAD, '<path d="M1e12 0h60v10h-60Z"/>', FAR),
+        (HEAD, '<rect transform="scale(1e999)" width="60" height="9"/>', "of a rect without an id is not"),
+        (HEAD, '<ellipse transform="scale(1e999)" rx="60" ry="9"/>', "of an ellipse without an id is not"),
+        ('width="10E" height="10E"', '<path d="M0 0H9V9Z"/>', "'10E' is no width or height"),
+    ],
+    ids=["infinite", "huge", "far ellipse", "far lines", "scale", "an ellipse", "width"],
+)
+def test_numbers_without_bounds_are_one_line(tmp_path, head, body, message):
+    path = write_svg(tmp_path / "a.svg", body, head)
+    with pytest.raises(UserError, match=message) as error:
+        load_drawing(path)
+    assert str(error.value).startswith("a.svg: ")
+    assert "\n" not in str(error.value)
+
+
+def test_the_outermost_element_must_be_svg(tmp_path):
+    path = tmp_path / "a.svg"
+    path.write_text('<path xmlns="http://www.w3.org/2000/svg" d="M0 0H60V10H0Z"/>')
+    with pytest.raises(UserError, match=r"cannot read a\.svg as SVG: its outermost element is path, not svg"):
+        load_drawing(path)
+
+
 def test_an_unknown_entity_of_a_dxf_file_is_named(tmp_path):
     path = write_dxf(tmp_path / "a.dxf", [BEAM])
     path.write_text(path.read_text().replace("LWPOLYLINE", "LVPOLYLINE"))
