@@ -52,7 +52,7 @@ class Reader:
 
 
 def _design(path: Path) -> Any:
-    """A design, without the ranges that a refusal proposes: they try a thousand others, for up to a second."""
+    """A design, without the ranges that a refusal proposes, for which it tries a thousand others."""
     from geometry.finger import presets, validation
 
     validation._ranges = lambda *_: []
