@@ -36,8 +36,8 @@ TESTS: Mapping[str, tuple[str, ...]] = {
     "solvers.assimilation.marker_weighting": (
         *("tests/solvers/test_marker_weighting.py", "tests/solvers/test_assimilation.py"),
     ),
-    "compare.evaluation.certificate": ("tests/compare/test_certificate.py",),
-    "vision.tracking.data_association": ("tests/vision/test_tracking.py", "tests/vision/test_identity.py"),
+    "compare.evaluation.certificate": ("tests/compare/test_certificate_limits.py",),
+    "vision.tracking.data_association": ("tests/vision/test_data_association.py",),
     "vision.tracking.rest_detection": ("tests/vision/test_rest.py",),
 }
 """Tests by module."""
