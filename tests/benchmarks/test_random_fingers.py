@@ -4,6 +4,6 @@ from benchmarks.reliability.inputs import tried
 
 
 def test_random_input_gives_a_result_or_one_line() -> None:
-    found = tried(40)
+    found = tried(60)
     assert not found.wrong
     assert found.states["done"] >= 5
