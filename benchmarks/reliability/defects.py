@@ -60,7 +60,8 @@ DEFECTS = (
     ),
     (
         "fuzzing",
-        "An SVG element that contained itself ended with a `RecursionError`.",
+        "An SVG element that contained itself ended with a `RecursionError`, or, where its link began with "
+        "another sign than `#`, not at all.",
         "`test_bad_drawings.py`, contains itself",
     ),
     (
@@ -140,6 +141,11 @@ DEFECTS = (
         "An SVG file with a width of `10E`, an infinite scale, or another outermost element ended with a "
         "`ValueError`, `LinAlgError` or `AttributeError`.",
         "`test_bad_drawings.py`, numbers without bounds, outermost element",
+    ),
+    (
+        "random input",
+        "A drawing whose whole boundary was called `front` ended with an `IndexError`.",
+        "`test_bad_drawings.py`, all is called front",
     ),
 )
 """Found by, what happened, test."""

@@ -1,4 +1,4 @@
-"""Random drawings of a section as SVG with lines of a description: sound ones, near misses and absurd ones."""
+"""Random drawings of a section as SVG with lines of a description: sound, near misses and absurd."""
 
 from typing import NamedTuple
 

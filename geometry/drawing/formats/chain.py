@@ -37,8 +37,10 @@ def closed_loops(pieces: Sequence[Piece], markings: frozenset[str] = frozenset()
     labels = sorted({piece.label for piece in pieces if piece.label in markings})
     for count in range(len(labels), 0, -1):
         for on_top in combinations(labels, count):
+            if not (rest := [piece for piece in pieces if piece.label not in on_top]):
+                continue  # they are all there is
             try:
-                loops = _chained([piece for piece in pieces if piece.label not in on_top])
+                loops = _chained(rest)
             except UserError:
                 continue  # they are part of the boundary
             for mark in (piece for piece in pieces if piece.label in on_top):

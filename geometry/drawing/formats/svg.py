@@ -77,13 +77,16 @@ def read_svg(path: Path, units: str | None = None) -> Drawing:
 
 def _check_copies(root: ET.Element, file: str) -> None:
     """Refuse elements that contain themselves, and copies of copies whose number grows without limit."""
-    by_id = {f"#{element.get('id')}": element for element in root.iter()}
+    by_id = {element.get("id"): element for element in root.iter()}
     sizes: dict[ET.Element, float] = {}
 
     def size(element: ET.Element) -> float:
         if element not in sizes:
             sizes[element] = inf  # while it is open, that is, if it contains itself
-            copied = by_id.get(element.get("href", element.get(LINK, ""))) if _is_copy(element) else None
+            link = element.get("href", element.get(LINK, ""))[
+                1:
+            ]  # whatever its first sign is: svgelements, too
+            copied = by_id.get(link) if _is_copy(element) else None
             sizes[element] = 1 + sum(map(size, element)) + (0 if copied is None else size(copied))
         return sizes[element]
 

@@ -184,8 +184,10 @@ def test_an_unknown_entity_of_a_dxf_file_is_named(tmp_path):
         load_drawing(path)
 
 
-def test_an_element_that_contains_itself_is_one_line(tmp_path):
-    path = write_svg(tmp_path / "a.svg", '<g id="a"><use href="#a"/></g>')
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize("link", ["#a", "'a"])  # svgelements takes any sign for that before a name
+def test_an_element_that_contains_itself_is_one_line(tmp_path, link):
+    path = write_svg(tmp_path / "a.svg", f'<g id="a" transform="scale(2)"><use href="{link}"/><rect/></g>')
     with pytest.raises(UserError, match=r"a\.svg as SVG: an element contains itself"):
         load_drawing(path)
 
@@ -196,6 +198,13 @@ def test_copies_of_copies_are_counted_before_they_are_made(tmp_path):
     path = write_svg(tmp_path / "a.svg", f'<g id="g0"><rect width="9" height="3"/></g>{levels}')
     with pytest.raises(UserError, match=r"a\.svg as SVG: its copies make \d+ elements"):
         load_drawing(path)
+
+
+def test_a_drawing_of_which_all_is_called_front_is_read(tmp_path):
+    """What is named may lie on the boundary, but here it is the boundary."""
+    path = write_svg(tmp_path / "a.svg", '<g id="front"><rect width="60" height="9"/></g>')
+    finger = load_drawing(path, Description(clamp=[[0, 0], [0, -9]], contact=[40, 0]))
+    assert np.ptp(finger.section.outline.points, axis=0) == pytest.approx([60, 9])
 
 
 def test_a_step_file_that_was_cut_off_is_one_line(tmp_path):
