@@ -85,7 +85,7 @@ def _check_copies(root: ET.Element, file: str) -> None:
             sizes[element] = inf  # while it is open, that is, if it contains itself
             link = element.get("href", element.get(LINK, ""))[
                 1:
-            ]  # whatever its first sign is: svgelements, too
+            ]  # as svgelements, which takes any sign for #
             copied = by_id.get(link) if _is_copy(element) else None
             sizes[element] = 1 + sum(map(size, element)) + (0 if copied is None else size(copied))
         return sizes[element]
