@@ -107,6 +107,15 @@ def test_without_detections_all_are_missing():
     assert associate_markers(np.empty((0, 2)), expected, rest_covariances(expected)).tolist() == [-1, -1]
 
 
+def test_many_markers_among_many_false_detections():
+    """More joint hypotheses than are kept, and weights whose sum no float's exponential holds."""
+    expected = np.column_stack([10.0 * np.arange(60), np.zeros(60)])
+    false = np.column_stack([10.0 * np.arange(300), np.full(300, 50.0)])
+    found = np.concatenate([false, expected[::-1] + [0.1, -0.1]])
+    names = associate_markers(found, expected, np.zeros((1, 2, 60, 60)))
+    assert names.tolist() == list(range(359, 299, -1))
+
+
 @pytest.mark.parametrize("variance", [0.0, 1.0])
 def test_one_detection_is_taken_up_to_the_distance_at_which_it_is_sure(variance):
     """r / (r + 1 - SEEN) = SURE, with r the density of the detection over that of false ones."""
