@@ -111,7 +111,7 @@ def test_many_markers_among_many_false_detections():
     """More joint hypotheses than are kept, and weights whose sum no float's exponential holds."""
     expected = np.column_stack([10.0 * np.arange(60), np.zeros(60)])
     false = np.column_stack([10.0 * np.arange(300), np.full(300, 50.0)])
-    found = np.concatenate([false, expected[::-1] + [0.1, -0.1]])
+    found = np.concatenate([false, np.add(expected[::-1], (0.1, -0.1))])
     names = associate_markers(found, expected, np.zeros((1, 2, 60, 60)))
     assert names.tolist() == list(range(359, 299, -1))
 
