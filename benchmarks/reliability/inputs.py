@@ -1,6 +1,6 @@
 """Random fingers, drawings, settings, materials and loads: each a valid result or one line, in bounded time.
 
-`python -m benchmarks.reliability.inputs COUNT [SOLVER [PROCESSES]]` keeps the counts; needs Hypothesis.
+`python -m benchmarks.reliability.inputs COUNT [SOLVER]` keeps the counts; needs Hypothesis.
 """
 
 import csv
@@ -14,7 +14,7 @@ import traceback
 import warnings
 from collections import Counter
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -196,20 +196,19 @@ def kept_rows() -> list[Row]:
         ]
 
 
-def main(count: int, solver: str = "fem", processes: int = 1) -> None:
-    """Try random inputs of a solver, and keep the counts after every block."""
+def main(count: int, solver: str = "fem") -> None:
+    """Try random inputs of a solver in blocks, and keep the counts after each."""
     found = Outcomes()
     rows = [each for each in kept_rows() if each.solver != solver]
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, mp_context=context, max_tasks_per_child=1) as pool:
-        for done in as_completed(pool.submit(block, solver, seed) for seed in range(-(-count // BLOCK))):
-            found.add(done.result())
-            ends = [found.states[state] for state in ("done", "not converged", "refused")]
-            row = Row(solver, found.states.total(), *ends, len(found.wrong), found.slowest, found.peak)
-            lines = [Row._fields, row, *rows]
-            write_text(ROWS, "".join(",".join(map(str, line)) + "\n" for line in lines))
-            print(*row, flush=True)
+    for seed in range(-(-count // BLOCK)):
+        with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+            found.add(pool.submit(block, solver, seed).result())
+        ends = [found.states[state] for state in ("done", "not converged", "refused")]
+        row = Row(solver, found.states.total(), *ends, len(found.wrong), found.slowest, found.peak)
+        lines = [Row._fields, row, *rows]
+        write_text(ROWS, "".join(",".join(map(str, line)) + "\n" for line in lines))
+        print(*row, flush=True)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), *sys.argv[2:3], *map(int, sys.argv[3:]))
+    main(int(sys.argv[1]), *sys.argv[2:])
