@@ -85,8 +85,9 @@ def _faults(rows: Sequence[Row]) -> list[str]:
         "- the same command, `compare` with `--resume`, then ends well, with the numbers of an undisturbed "
         "run to the bit: every JSON, CSV, array and VTU file without its times, every row of the journal.",
         "",
-        "*Left over*: trials after which temporary files remain, all of them in the cache. Pictures of "
-        "`compare` are blank here, which changes no file but the PNGs. Meshes are coarse (4 mm).",
+        "Kills strike at every point, the other faults at some of a job with many. *Left over*: trials after "
+        "which temporary files remain, all of them in the cache. Pictures of `compare` are blank here, which "
+        "changes no file but the PNGs. Meshes are coarse (4 mm).",
         "",
         *_table(HEADER, fault_rows(rows), left=1),
         "",
@@ -105,14 +106,19 @@ def _inputs() -> list[str]:
         for each in inputs.kept_rows()
     ]
     return [
-        "## Random fingers, materials and loads",
+        "## Random fingers, drawings, settings, materials and loads",
         "",
-        "`python -m benchmarks.reliability.inputs COUNT` (Hypothesis): presets with up to four parameters of "
-        "the design and three of material and load changed, half of them gently, the others to any value in "
-        "their range or at its ends, and in one of four inputs a value that is none: NaN, infinity, a number "
-        "of 400 digits, text, a list. Coarse elements, 2 to 20 mm. *Wrong* would be an error of the program, "
-        "a refusal without a reason or with one for programmers, a quantity that is not finite, or more than "
-        f"{inputs.LONGEST_S:.0f} s. The slowest is on a busy machine; memory is that of the whole process.",
+        "`python -m benchmarks.reliability.inputs COUNT SOLVER` (Hypothesis): three of four are presets with "
+        "up to four parameters of the design changed, one is a random drawing, an SVG file with lines of a "
+        "description, read as by `--section`. Up to three values of material and load are changed, and in "
+        "half of all inputs up to two settings of the solver. The other half is gentle: factors near one "
+        "instead of any value in the range or at its ends. One of four has a value that is none: NaN, "
+        "infinity, a number of 400 digits, text, a list; one drawing of three a word where a number belongs, "
+        "an end in the middle or a curve drawn twice. Coarse elements, 2 to 20 mm. *Wrong* are different "
+        "errors of the program, refusals without a reason, in several lines or for programmers, quantities "
+        f"that are not finite, and more than {inputs.LONGEST_S:.0f} s; all that were found are mended, see "
+        "below. The slowest is on a busy machine; memory is the largest of a process of "
+        f"{inputs.BLOCK} inputs.",
         "",
         *_table(header, rows, left=1),
         "",
@@ -138,7 +144,8 @@ def _fuzzing() -> list[str]:
         "time alone: *unhandled*, places of exceptions that are no refusal in one line; *ended by a "
         "library*, C code crashed or took longer than 10 s. What was found before is mended, see below; "
         "drawings and meshes are read in a process of their own by the commands, which say in one line "
-        "that it ended.",
+        "that it ended. Designs are read without the ranges that a refusal proposes, for which it tries a "
+        "thousand others.",
         "",
         *_table(header, rows, left=1),
         "",
