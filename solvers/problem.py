@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from math import cos, inf, radians, sin
+from numbers import Real
 from typing import Literal, Self
 
 import numpy as np
@@ -133,8 +134,11 @@ class Load(CheckedModel):
             radius: Of a cylinder, mm; None means `RADIUS`.
 
         Raises:
-            UserError: If the indenter does not press, or a value does not go with the kind.
+            UserError: If the indenter does not press, or a value is no number or does not go with the kind.
         """
+        for name, value in (("stroke", stroke), ("direction", direction)):
+            if not isinstance(value, Real):
+                raise UserError(f"{name} {value!r} is no number")
         if not 0 < stroke < inf:
             raise UserError(f"stroke {stroke:g}: the indenter presses; give its travel, above 0 mm")
         if not -90 < direction < 90:

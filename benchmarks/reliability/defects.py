@@ -147,5 +147,16 @@ DEFECTS = (
         "A drawing whose whole boundary was called `front` ended with an `IndexError`.",
         "`test_bad_drawings.py`, all is called front",
     ),
+    (
+        "random input",
+        "A drawing whose whole boundary was called `contact` had a contact of no width, and its mesh ended "
+        "with a `KeyError`.",
+        "`test_bad_drawings.py`, not the whole outline",
+    ),
+    (
+        "random input",
+        "A stroke or direction that was a list, from Python or a study, ended with a `TypeError`.",
+        "`test_problem.py`, a travel is a number",
+    ),
 )
 """Found by, what happened, test."""

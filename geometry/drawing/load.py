@@ -12,7 +12,7 @@ from geometry.drawing.checks import body, check_contact, check_markers
 from geometry.drawing.description import Description, description_beside, load_description
 from geometry.drawing.drawn_finger import DrawnFinger
 from geometry.drawing.formats.chain import straightened
-from geometry.drawing.formats.drawing import LABELS, Drawing, label_of
+from geometry.drawing.formats.drawing import LABELS, Drawing, label_of, place
 from geometry.drawing.outline import renamed, with_part
 from geometry.drawing.placement import placed
 from geometry.drawing.ready_mesh import ready_mesh
@@ -24,6 +24,9 @@ SUFFIXES = (".step", ".stp", ".dxf", ".svg", ".msh")
 
 DEPTH = 20.0
 """Proposed depth where neither drawing nor description has one, mm."""
+
+NARROWEST = 1e-6
+"""Least width of a contact, mm."""
 
 MARKER_HEIGHT = 0.6
 """Proposed depth of the markers' inlay, mm."""
@@ -123,6 +126,11 @@ def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
     else:
         ends = placement(contact.ends)[:, 0]
         x, width, width_source = float(ends.mean()), float(np.ptp(ends)), contact.source
+        if width < NARROWEST:
+            raise UserError(
+                f"the contact begins and ends at {place(contact.ends[0])}; call only the part contact that the "
+                "indenter touches"
+            )
     depth, depth_source = _first(
         given=_scaled(description.depth, drawing.unit), drawn=drawing.depth, proposed=DEPTH
     )

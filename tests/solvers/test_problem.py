@@ -98,3 +98,10 @@ def test_impossible_materials_and_loads_are_one_line(make, message):
     with pytest.raises(UserError, match=message) as refused:
         make()
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("value", [[1.0], (1, 2), "ten", None, 1j])
+@pytest.mark.parametrize("name", ["stroke", "direction"])
+def test_a_travel_is_a_number(name: str, value: object) -> None:
+    with pytest.raises(UserError, match=f"{name} .* is no number"):
+        Load.of_travel(**{name: value})

@@ -207,6 +207,12 @@ def test_a_drawing_of_which_all_is_called_front_is_read(tmp_path):
     assert np.ptp(finger.section.outline.points, axis=0) == pytest.approx([60, 9])
 
 
+def test_the_contact_is_not_the_whole_outline(tmp_path):
+    path = write_svg(tmp_path / "a.svg", '<g id="contact"><rect width="20" height="5" rx="0.2"/></g>')
+    with pytest.raises(UserError, match=r"the contact begins and ends at .*; call only the part contact"):
+        load_drawing(path)
+
+
 def test_a_step_file_that_was_cut_off_is_one_line(tmp_path):
     """OpenCASCADE prints about it to the standard output, on which the child process answers."""
     path = tmp_path / "cut.stp"
