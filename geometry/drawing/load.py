@@ -128,8 +128,8 @@ def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
         x, width, width_source = float(ends.mean()), float(np.ptp(ends)), contact.source
         if width < NARROWEST:
             raise UserError(
-                f"the contact begins and ends at {place(contact.ends[0])}; call only the part contact that the "
-                "indenter touches"
+                f"the contact begins and ends at {place(contact.ends[0])}; call only the part contact that "
+                "the indenter touches"
             )
     depth, depth_source = _first(
         given=_scaled(description.depth, drawing.unit), drawn=drawing.depth, proposed=DEPTH
