@@ -17,7 +17,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # one thread: numbers are to agre
 
 from rich.table import Table
 
-from benchmarks.reliability import fuzz_all, inputs, memory, mutants, same_answer
+from benchmarks.reliability import fuzz_all, inputs, memory, mutants, same_answer, same_image
 from benchmarks.reliability.defects import DEFECTS
 from benchmarks.reliability.faults import Row, run_faults
 from benchmarks.reliability.jobs import JOBS
@@ -40,7 +40,7 @@ def main(rows: str = "") -> Table:
 def page(rows: Sequence[Row]) -> str:
     """The page of all results that are kept."""
     return "\n".join(
-        [*_faults(rows), *_inputs(), *_fuzzing(), *_same(), *_memory(), *_mutants(), *_defects()]
+        [*_faults(rows), *_inputs(), *_fuzzing(), *_same(), *_image(), *_memory(), *_mutants(), *_defects()]
     )
 
 
@@ -201,6 +201,22 @@ def _same() -> list[str]:
 def _system(versions: dict[str, str], stored: dict[str, str]) -> str:
     """What differs on a system."""
     return ", ".join(f"{name} {version}" for name, version in versions.items() if version != stored[name])
+
+
+def _image() -> list[str]:
+    """What two builds of the image have in common."""
+    if (found := same_image.kept()) is None:
+        return []
+    names = [f"`/{name}`" for name in (*found.lone, *found.differ)]
+    return [
+        "## The image, built twice",
+        "",
+        "`python -m benchmarks.reliability.same_image FOLDER FOLDER`, the folders of two images that were "
+        "built one after the other without a cache, from the same packages, with a fixed time: of "
+        f"{found.files:,} files {len(found.lone)} are in one image only and {len(found.differ)} differ. "
+        + (f"These are {', '.join(names)}." if names else "All contents are the same to the bit."),
+        "",
+    ]
 
 
 def _mutants() -> list[str]:
