@@ -142,7 +142,9 @@ def _unit(parsed: Any, file: str) -> float:
             try:
                 length = float(found[1])
             except ValueError:
-                raise UserError(f"{file}: {text!r} is no width or height; write for instance 60mm") from None
+                length = 0.0
+            if not 0 < length < inf:
+                raise UserError(f"{file}: {text!r} is no width or height; write for instance 60mm")
             units.append(length * LENGTHS[found[2]] / float(extent) if extent else LENGTHS[""])
     if not units:
         return LENGTHS[""]

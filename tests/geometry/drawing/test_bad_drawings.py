@@ -159,8 +159,9 @@ FAR = r"a coordinate is not finite or beyond 1e\+07 mm; draw the section near"
         (HEAD, '<rect transform="scale(1e999)" width="60" height="9"/>', "of a rect without an id is not"),
         (HEAD, '<ellipse transform="scale(1e999)" rx="60" ry="9"/>', "of an ellipse without an id is not"),
         ('width="10E" height="10E"', '<path d="M0 0H9V9Z"/>', "'10E' is no width or height"),
+        ('width="-10"', '<path d="M0 0H9V9Z"/>', "'-10' is no width or height"),
     ],
-    ids=["infinite", "huge", "far ellipse", "far lines", "scale", "an ellipse", "width"],
+    ids=["infinite", "huge", "far ellipse", "far lines", "scale", "an ellipse", "width", "negative"],
 )
 def test_numbers_without_bounds_are_one_line(tmp_path, head, body, message):
     path = write_svg(tmp_path / "a.svg", body, head)
