@@ -138,8 +138,8 @@ DEFECTS = (
     ),
     (
         "fuzzing",
-        "An SVG file with a width of `10E` or below zero, an infinite scale, or another outermost element ended with a "
-        "`ValueError`, `IndexError`, `LinAlgError` or `AttributeError`.",
+        "An SVG file with a width of `10E` or below zero, an infinite scale, or another outermost element "
+        "ended with a `ValueError`, `IndexError`, `LinAlgError` or `AttributeError`.",
         "`test_bad_drawings.py`, numbers without bounds, outermost element",
     ),
     (

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.reliability.supervision import Ending, Fault, supervised
+from benchmarks.reliability.supervision import KINDS, Ending, Fault, Kind, supervised
 
 CACHE, OUT, TEMPORARY = "cache", "out", "tmp"
 
@@ -25,7 +25,8 @@ class Job:
         whole: Whether the output folder is replaced as a whole.
         watched: Folders whose changes count.
         files: Texts of input files by name.
-        most: Largest number of trials; None: every chosen point.
+        kinds: Faults that are tried.
+        most: Largest number of trials that do not kill; None: every chosen point. Kills strike at every one.
     """
 
     name: str
@@ -36,21 +37,18 @@ class Job:
     whole: bool = True
     watched: tuple[str, ...] = (OUT, f".{OUT}", CACHE)
     files: tuple[tuple[str, str], ...] = ()
+    kinds: tuple[Kind, ...] = KINDS
     most: int | None = None
 
 
-FEM = (
-    "compare",
-    "--design",
-    "default",
-    "--solvers",
-    "fem",
-    "--mesh-size",
-    "4",
-    "--out",
-    "FOLDER/out",
-    "--quiet",
-)
+def _comparison(solvers: str) -> tuple[str, ...]:
+    return (
+        *("compare", "--design", "default", "--solvers", solvers, "--mesh-size", "4"),
+        *("--out", "FOLDER/out", "--quiet"),
+    )
+
+
+FEM = _comparison("fem")
 RIG = (
     *("rig", "--mesh-size", "4", "--size", "320x240", "--rest", "4", "--moving", "2", "--held", "4"),
     *("--codec", "png", "--quiet"),
@@ -63,16 +61,18 @@ rib_angle = {from = -10, to = 20}
 
 JOBS = (
     Job("compare", FEM, again=("--resume",)),
-    Job("compare over an older result", FEM, again=("--resume",), earlier=(FEM,), most=120),
-    Job("cache", FEM, again=("--resume",), warm=False, watched=(CACHE, TEMPORARY), most=40),
+    Job("compare over an older result", FEM, again=("--resume",), earlier=(FEM,), most=60),
+    Job("compare of three solvers", _comparison("fem,gp,statfem"), again=("--resume",), kinds=("kill",)),
+    Job("compare in two processes", _comparison("fem,fem-nonlinear"), again=("--resume",), kinds=("kill",)),
+    Job("cache", FEM, again=("--resume",), warm=False, watched=(CACHE, TEMPORARY)),
     Job(
         "sweep",
         ("sweep", "FOLDER/study.toml", "--processes", "1", "--out", "FOLDER/out", "--quiet"),
         whole=False,
         files=(("study.toml", STUDY),),
-        most=24,
+        most=20,
     ),
-    Job("rig", (*RIG, "--out", "FOLDER/out"), most=24),
+    Job("rig", (*RIG, "--out", "FOLDER/out"), most=20),
     Job(
         "track",
         (

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from benchmarks.reliability.folders import broken, incomplete, leftovers, numbers
 from benchmarks.reliability.jobs import CACHE, OUT, Job, prepared, started
-from benchmarks.reliability.supervision import GROWING, KINDS, Ending, Fault, Kind, Point
+from benchmarks.reliability.supervision import GROWING, Ending, Fault, Point
 
 REFUSED, NOT_CONVERGED = 2, 3
 WHOLE = "the complete result is in"
@@ -82,16 +82,19 @@ def plain(path: str) -> str:
     return re.sub(r"\.[0-9a-f]{8}\.partial", ".partial", path)
 
 
-def faults(expected: Expected, kinds: Sequence[Kind] = KINDS) -> list[Fault]:
-    """Every fault that can strike at every chosen point."""
-    return [
+def faults(job: Job, expected: Expected) -> list[Fault]:
+    """The faults of a job: kills at every chosen point, and at most `job.most` others."""
+    found = [
         Fault(kind, at)
-        for kind in kinds
+        for kind in job.kinds
         for at in chosen(expected.points)
         if kind in ("kill", "EIO")
         or (kind == "torn" and expected.points[at].call == "write")
         or (kind == "ENOSPC" and expected.points[at].call in GROWING)
     ]
+    others = [fault for fault in found if fault.kind != "kill"]
+    step = -(-len(others) // (job.most or len(others) or 1)) or 1
+    return [*(fault for fault in found if fault.kind == "kill"), *others[::step]]
 
 
 def trials(job: Job, expected: Expected, which: Sequence[Fault], folder: Path) -> Iterator[Trial]:
