@@ -158,5 +158,11 @@ DEFECTS = (
         "A stroke or direction that was a list, from Python or a study, ended with a `TypeError`.",
         "`test_problem.py`, a travel is a number",
     ),
+    (
+        "random input",
+        "A rounding of 1e-300 mm ended with a `ZeroDivisionError`, one of 1e-9 mm was meshed for minutes. "
+        "They are refused now: 0 leaves it out, or 0.01 mm at least.",
+        "`test_design.py`, left out or there",
+    ),
 )
 """Found by, what happened, test."""

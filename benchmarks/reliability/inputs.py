@@ -13,9 +13,9 @@ import time
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -105,22 +105,35 @@ def answer_to(given: "Given", folder: Path) -> Measurement:
     return answer
 
 
+STEPS = ("broken_rule", "finger_from", "material_of", "load_of", "finger_mesh", "make_solver", "quantities")
+"""What a measurement calls, one after another."""
+
+
 @contextmanager
 def traced() -> Iterator[list[str]]:
-    """A list into which the tracebacks of a task's errors come, of which it tells only the last line."""
+    """A list for the tracebacks of a task's errors, of which its answer tells only the last line.
+
+    A refusal of several lines, which the answer would join, is an error, too.
+    """
     places: list[str] = []
-    original = measurement.quantities
 
-    def quantities(*given: Any, **named: Any) -> Any:
-        try:
-            return original(*given, **named)
-        except UserError:
-            raise
-        except Exception:
-            places.append(traceback.format_exc())
-            raise
+    def told(step: Callable[..., Any]) -> Callable[..., Any]:
+        def tried(*given: Any, **named: Any) -> Any:
+            try:
+                return step(*given, **named)
+            except UserError as error:
+                if "\n" in str(error):
+                    raise RuntimeError(f"a refusal of several lines: {error}") from error
+                raise
+            except Exception:
+                places.append(traceback.format_exc())
+                raise
 
-    with patch.object(measurement, "quantities", quantities):
+        return tried
+
+    with ExitStack() as patches:
+        for name in STEPS:
+            patches.enter_context(patch.object(measurement, name, told(getattr(measurement, name))))
         yield places
 
 

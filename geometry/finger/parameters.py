@@ -8,7 +8,7 @@ import reprlib
 from textwrap import shorten
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 from pydantic_core import ErrorDetails
 
 from geometry.content_hash import content_hash
@@ -25,6 +25,9 @@ def bounded(default: Any, low: float, high: float, unit: str, symbol: str, meani
         json_schema_extra={"unit": unit, "symbol": symbol, "low": low, "high": high},
     )
 
+
+LEAST = 0.01
+"""Least radius or height, mm, of what can be left out by 0; smaller ones could not be meshed."""
 
 MAX_NAMES = 120
 """Characters of the names that a message lists."""
@@ -132,6 +135,13 @@ class Parameters(CheckedModel):
     marker_count: int = bounded(9, 1, 60, "", "", "Number of markers of the layout `front`")
     marker_diameter: float = bounded(1.6, 0.1, 20, "mm", "", "Diameter of a marker")
     marker_height: float = bounded(0.6, 0.05, 50, "mm", "", "How deep a marker is inlaid into the side face")
+
+    @field_validator("tip_radius", "fillet_radius", "foot_height")
+    @classmethod
+    def _left_out_or_there(cls, length: float) -> float:
+        if 0 < length < LEAST:
+            raise ValueError(f"give 0 to leave it out, or at least {LEAST:g} mm")
+        return length
 
     @property
     def marker_radius(self) -> float:

@@ -191,3 +191,13 @@ def test_advice_never_promises_a_range_that_breaks_another_rule() -> None:
 def test_a_whole_number_with_more_digits_than_a_float_can_have_is_refused(name: str) -> None:
     """Its size cannot be printed with the usual format."""
     assert "\n" not in message_of({name: 10**400})
+
+
+@pytest.mark.parametrize("name", ["tip_radius", "fillet_radius", "foot_height"])
+def test_a_small_rounding_or_foot_is_left_out_or_there(name):
+    """Below a hundredth of a millimetre there is nothing to mesh, and far below that lengths underflow."""
+    for length in (1e-300, 1e-9, 0.0099):
+        with pytest.raises(UserError, match=f"{name} = .*: give 0 to leave it out, or at least 0.01 mm"):
+            Design(**{name: length})
+    for length in (0.0, 0.01):
+        assert getattr(Design(**{name: length}), name) == length
