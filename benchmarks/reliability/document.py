@@ -116,7 +116,8 @@ def _inputs() -> list[str]:
         "infinity, a number of 400 digits, text, a list; one drawing of three a word where a number belongs, "
         "an end in the middle or a curve drawn twice. Coarse elements, 2 to 20 mm. *Wrong* are different "
         "errors of the program, refusals without a reason, in several lines or for programmers, quantities "
-        f"that are not finite, and more than {inputs.LONGEST_S:.0f} s; all that these were, in four causes, are refused in one line since, see "
+        f"that are not finite, and more than {inputs.LONGEST_S:.0f} s; their four causes "
+        "are mended, see "
         "below. The slowest is on a busy machine; memory is the largest of a process of "
         f"{inputs.BLOCK} inputs.",
         "",
