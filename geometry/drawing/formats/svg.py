@@ -83,9 +83,8 @@ def _check_copies(root: ET.Element, file: str) -> None:
     def size(element: ET.Element) -> float:
         if element not in sizes:
             sizes[element] = inf  # while it is open, that is, if it contains itself
-            link = element.get("href", element.get(LINK, ""))[
-                1:
-            ]  # as svgelements, which takes any sign for #
+            # svgelements, too, takes any sign in place of the link's #
+            link = element.get("href", element.get(LINK, ""))[1:]
             copied = by_id.get(link) if _is_copy(element) else None
             sizes[element] = 1 + sum(map(size, element)) + (0 if copied is None else size(copied))
         return sizes[element]
