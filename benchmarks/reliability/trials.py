@@ -47,11 +47,13 @@ class Expected:
     Attributes:
         points: Its changes of files.
         numbers: Digests of its numbers.
+        cached: Digests of the numbers in its cache, by file name.
         folder: The folder before the run, to be copied.
     """
 
     points: tuple[Point, ...]
     numbers: dict[str, str]
+    cached: dict[str, str]
     folder: Path
 
 
@@ -64,8 +66,9 @@ def undisturbed(job: Job, folder: Path, cache: Path) -> Expected:
     if ending.code not in (0, NOT_CONVERGED):
         raise RuntimeError(f"{job.name}: {ending.text}")
     found = numbers(run / OUT)
+    cached = {Path(name).name: digest for name, digest in numbers(run / CACHE).items()}
     shutil.rmtree(run)
-    return Expected(ending.points, found, folder / "before")
+    return Expected(ending.points, found, cached, folder / "before")
 
 
 def chosen(points: Sequence[Point]) -> list[int]:
@@ -119,21 +122,35 @@ def trial(job: Job, expected: Expected, fault: Fault, folder: Path) -> Trial:
     wrong += [f"poisoned: {each}" for each in broken(folder / CACHE)]
     wrong += _after(job, expected, fault, hit, before, folder)
     if not job.again and WHOLE in hit.text:
-        wrong += differences(expected.numbers, numbers(folder / f"{OUT}.partial"))
+        wrong += differences(expected, numbers(folder / f"{OUT}.partial"))
         (folder / f"{OUT}.partial").rename(folder / "moved")
     again = started((*job.arguments, *job.again), folder, job.watched)
     if again.code not in (0, NOT_CONVERGED) or TRACE in again.text:
         wrong.append(f"the next run ends with {again.code}: {_last(again.text)}")
     else:
-        wrong += differences(expected.numbers, numbers(folder / OUT))
+        wrong += differences(expected, numbers(folder / OUT))
     point = hit.points[fault.at] if hit.struck else expected.points[fault.at]
     shown = Point(point.call, plain(point.path).replace(f"{folder}/", ""))
     left = tuple(each for each in leftovers(folder) if not each.startswith("tmp"))
     return Trial(job.name, fault, shown, hit.code, tuple(wrong), left)
 
 
-def differences(expected: dict[str, str], found: dict[str, str]) -> list[str]:
-    """Files whose numbers are not those of the undisturbed run."""
+def differences(expected: Expected, found: dict[str, str]) -> list[str]:
+    """Files whose numbers are not those of the undisturbed run.
+
+    A file that the cache could not keep may lie in the output folder, with the numbers it has in the cache.
+    """
+    return _differences(
+        expected.numbers,
+        {
+            name: digest
+            for name, digest in found.items()
+            if name in expected.numbers or expected.cached.get(Path(name).name) != digest
+        },
+    )
+
+
+def _differences(expected: dict[str, str], found: dict[str, str]) -> list[str]:
     names = sorted(name for name in expected.keys() | found.keys() if expected.get(name) != found.get(name))
     return [f"other numbers: {', '.join(names)}"] if names else []
 
@@ -149,12 +166,12 @@ def _after(
         elif hit.code == REFUSED and len(_lines(hit.text, "error:")) != 1:
             wrong.append(f"it did not say why in one line: {hit.text.strip()[-300:]}")
         elif hit.code == 0:
-            wrong += differences(expected.numbers, numbers(folder / OUT))
+            wrong += differences(expected, numbers(folder / OUT))
     if job.whole and (folder / OUT).exists():
         wrong += incomplete(folder / OUT)
         if (now := numbers(folder / OUT)) not in (before, expected.numbers):
             wrong.append("the output folder holds neither the last result nor the new one")
-            wrong += differences(before or expected.numbers, now)
+            wrong += _differences(before or expected.numbers, now)
     elif job.whole and before:
         wrong.append("the last result is no longer under its name")
     return wrong

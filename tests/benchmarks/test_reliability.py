@@ -11,7 +11,7 @@ import pytest
 from benchmarks.reliability.document import PAGE, page
 from benchmarks.reliability.faults import kept_rows
 from benchmarks.reliability.supervision import Fault, Kind, Point, supervised
-from benchmarks.reliability.trials import chosen, plain
+from benchmarks.reliability.trials import Expected, chosen, differences, plain
 from geometry.atomic import write_text
 from geometry.errors import UserError
 
@@ -72,6 +72,24 @@ def test_faults_leave_what_they_say(
     assert (ending.code, ending.struck) == (code, True)
     found = {plain(path.name): path.read_text() for path in (tmp_path / "watched").iterdir()}
     assert found == left
+
+
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        ({"metrics.csv": "1"}, []),
+        ({"metrics.csv": "1", "truths/truth.npz": "2"}, []),  # the cache could not keep it
+        ({"metrics.csv": "1", "truths/truth.npz": "3"}, ["other numbers: truths/truth.npz"]),
+        ({"metrics.csv": "1", "more.csv": "2"}, ["other numbers: more.csv"]),
+        ({"metrics.csv": "2"}, ["other numbers: metrics.csv"]),
+        ({}, ["other numbers: metrics.csv"]),
+    ],
+)
+def test_numbers_are_those_of_the_undisturbed_run_or_of_its_cache(
+    tmp_path: Path, found: dict[str, str], said: list[str]
+) -> None:
+    expected = Expected((), {"metrics.csv": "1"}, {"truth.npz": "2", "metrics.csv": "2"}, tmp_path)
+    assert differences(expected, found) == said
 
 
 def test_a_process_that_stays_behind_is_an_orphan(tmp_path: Path, monkeypatch) -> None:
