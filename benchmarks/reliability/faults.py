@@ -34,15 +34,22 @@ class Row(NamedTuple):
 
 
 def run_faults(words: Collection[str] = ()) -> list[Row]:
-    """Run the trials of the jobs with one of the words in their names, or of all, and keep their rows."""
+    """Run the trials that are not kept yet, or were not as promised, and keep their rows.
+
+    Args:
+        words: Only those of the jobs with one of these in their names; none means all.
+    """
     asked = [job for job in JOBS if not words or any(word in job.name for word in words)]
-    kept = [row for row in kept_rows() if row.job not in {job.name for job in asked}]
+    names = {job.name for job in asked}
+    kept = [row for row in kept_rows() if not row.faults or row.job not in names]
+    known = {(row.job, row.kind, row.at) for row in kept}
     with tempfile.TemporaryDirectory(prefix="reliability-") as name, filled(Path(name)) as cache:
         folder = Path(name)
         for job in asked:
             place = folder / "job"
             expected = undisturbed(job, place, cache)
-            for done in trials(job, expected, faults(job, expected), place):
+            left = [fault for fault in faults(expected) if (job.name, fault.kind, fault.at) not in known]
+            for done in trials(job, expected, left, place):
                 kept.append(_row(done))
                 print(*kept[-1], sep="  ", file=sys.stderr, flush=True)
                 write_rows(kept)

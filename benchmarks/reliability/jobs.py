@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.reliability.supervision import KINDS, Ending, Fault, Kind, supervised
+from benchmarks.reliability.supervision import Ending, Fault, supervised
 
 CACHE, OUT, TEMPORARY = "cache", "out", "tmp"
 
@@ -25,8 +25,6 @@ class Job:
         whole: Whether the output folder is replaced as a whole.
         watched: Folders whose changes count.
         files: Texts of input files by name.
-        kinds: Faults that are tried.
-        most: Largest number of trials that do not kill; None: every chosen point. Kills strike at every one.
     """
 
     name: str
@@ -37,8 +35,6 @@ class Job:
     whole: bool = True
     watched: tuple[str, ...] = (OUT, f".{OUT}", CACHE)
     files: tuple[tuple[str, str], ...] = ()
-    kinds: tuple[Kind, ...] = KINDS
-    most: int | None = None
 
 
 def _comparison(solvers: str) -> tuple[str, ...]:
@@ -61,18 +57,17 @@ rib_angle = {from = -10, to = 20}
 
 JOBS = (
     Job("compare", FEM, again=("--resume",)),
-    Job("compare over an older result", FEM, again=("--resume",), earlier=(FEM,), most=60),
-    Job("compare of three solvers", _comparison("fem,gp,statfem"), again=("--resume",), kinds=("kill",)),
-    Job("compare in two processes", _comparison("fem,fem-nonlinear"), again=("--resume",), kinds=("kill",)),
+    Job("compare over an older result", FEM, again=("--resume",), earlier=(FEM,)),
+    Job("compare of three solvers", _comparison("fem,gp,statfem"), again=("--resume",)),
+    Job("compare in two processes", _comparison("fem,fem-nonlinear"), again=("--resume",)),
     Job("cache", FEM, again=("--resume",), warm=False, watched=(CACHE, TEMPORARY)),
     Job(
         "sweep",
         ("sweep", "FOLDER/study.toml", "--processes", "1", "--out", "FOLDER/out", "--quiet"),
         whole=False,
         files=(("study.toml", STUDY),),
-        most=20,
     ),
-    Job("rig", (*RIG, "--out", "FOLDER/out"), most=20),
+    Job("rig", (*RIG, "--out", "FOLDER/out")),
     Job(
         "track",
         (
@@ -85,7 +80,6 @@ JOBS = (
             "--quiet",
         ),
         earlier=((*RIG, "--out", "FOLDER/film"),),
-        most=12,
     ),
     Job(
         "crossval",
@@ -94,7 +88,6 @@ JOBS = (
             *("--processes", "1", "--out", "FOLDER/out", "--quiet"),
         ),
         whole=False,
-        most=12,
     ),
     Job(
         "gridsearch",
@@ -113,7 +106,6 @@ JOBS = (
             *("--out", "FOLDER/out", "--quiet"),
         ),
         whole=False,
-        most=8,
     ),
 )
 

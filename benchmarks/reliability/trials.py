@@ -9,7 +9,7 @@ from pathlib import Path
 
 from benchmarks.reliability.folders import broken, incomplete, leftovers, numbers
 from benchmarks.reliability.jobs import CACHE, OUT, Job, prepared, started
-from benchmarks.reliability.supervision import GROWING, Ending, Fault, Point
+from benchmarks.reliability.supervision import GROWING, KINDS, Ending, Fault, Point
 
 REFUSED, NOT_CONVERGED = 2, 3
 WHOLE = "the complete result is in"
@@ -85,19 +85,15 @@ def plain(path: str) -> str:
     return re.sub(r"\.[0-9a-f]{8}\.partial", ".partial", path)
 
 
-def faults(job: Job, expected: Expected) -> list[Fault]:
-    """The faults of a job: kills at every chosen point, and at most `job.most` others."""
-    found = [
+def faults(expected: Expected) -> list[Fault]:
+    """Every fault at every chosen point: writes are torn, and a full disk stops what needs more of it."""
+    calls = {"torn": {"write"}, "ENOSPC": GROWING}
+    return [
         Fault(kind, at)
-        for kind in job.kinds
+        for kind in KINDS
         for at in chosen(expected.points)
-        if kind in ("kill", "EIO")
-        or (kind == "torn" and expected.points[at].call == "write")
-        or (kind == "ENOSPC" and expected.points[at].call in GROWING)
+        if expected.points[at].call in calls.get(kind, {expected.points[at].call})
     ]
-    others = [fault for fault in found if fault.kind != "kill"]
-    step = -(-len(others) // (job.most or len(others) or 1)) or 1
-    return [*(fault for fault in found if fault.kind == "kill"), *others[::step]]
 
 
 def trials(job: Job, expected: Expected, which: Sequence[Fault], folder: Path) -> Iterator[Trial]:
