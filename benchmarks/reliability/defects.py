@@ -164,5 +164,11 @@ DEFECTS = (
         "They are refused now: 0 leaves it out, or 0.01 mm at least.",
         "`test_design.py`, left out or there",
     ),
+    (
+        "hostile file",
+        "A file called `.msh` that was none, or one beside a mesh called `.msh.opt`, was run by Gmsh as a "
+        "script, which could start any program.",
+        "`test_readers.py`, no script of gmsh",
+    ),
 )
 """Found by, what happened, test."""

@@ -1,9 +1,11 @@
 """Reads a Gmsh mesh: a plane triangle mesh as it is, or the section of an extruded body's mesh."""
 
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import gmsh
@@ -37,6 +39,10 @@ SAME = 0.01
 
 ALONG = 0.999
 """Least cosine of the angle between an end face's normals and the extrusion."""
+
+
+STARTS = (b"$MeshFormat", b"$Comments")
+"""First words of a mesh. Gmsh runs any other file as a script, which may start programs."""
 
 
 class RawMesh(NamedTuple):
@@ -244,14 +250,20 @@ def _groups(dimension: int) -> Iterator[tuple[str, IntArray]]:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    """Gmsh's mesh of a file.
+    """Gmsh's mesh of a file, of which Gmsh gets a copy: it also runs what stands beside it in FILE.opt.
 
     Raises:
         UserError: If Gmsh cannot read it.
     """
-    with session():
+    with session(), TemporaryDirectory() as folder:
+        copy = Path(folder) / "mesh.msh"
+        shutil.copyfile(path, copy)
+        with copy.open("rb") as file:
+            if not file.read(16).startswith(STARTS):
+                raise UserError(f"{path.name} is no Gmsh mesh: its first line is not $MeshFormat")
         try:
-            gmsh.merge(str(path))
+            gmsh.merge(str(copy))
         except Exception as error:  # Gmsh raises no narrower class
-            raise UserError(f"cannot read {path.name} as a Gmsh mesh: {error}") from None
+            reason = str(error).replace(str(copy), path.name)
+            raise UserError(f"cannot read {path.name} as a Gmsh mesh: {reason}") from None
         yield gmsh.model.mesh

@@ -1,5 +1,6 @@
 """Every reader against areas that come from elsewhere, and the designs' own exports."""
 
+from contextlib import suppress
 from pathlib import Path
 
 import cadquery as cq
@@ -200,6 +201,17 @@ def test_layers_name_pieces(tmp_path):
     assert sorted(names) == ["0", "0", "0", "0", "clamp", "contact"]
 
 
+@pytest.mark.parametrize("name", ["a.msh", "beam.msh.opt"])
+def test_no_script_of_gmsh_is_run(tmp_path, name):
+    """Gmsh runs every file that is no mesh, and one beside a mesh that has its name."""
+    write_beam_mesh(tmp_path / "beam.msh", groups=())
+    mark = tmp_path / "was-run"
+    (tmp_path / name).write_text(f'Printf("run") > "{mark}";\n')
+    with suppress(UserError):
+        read_drawing(tmp_path / name.removesuffix(".opt"))
+    assert not mark.exists()
+
+
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
@@ -207,7 +219,8 @@ def test_layers_name_pieces(tmp_path):
         ("a.dxf", "no drawing", "cannot read a.dxf as DXF"),
         ("a.svg", "<svg", "cannot read a.svg as SVG"),
         ("a.step", "ISO", "cannot read a.step as STEP"),
-        ("a.msh", "$Mesh", "cannot read a.msh as a Gmsh mesh|holds no triangles"),
+        ("a.msh", "$Mesh", "a.msh is no Gmsh mesh: its first line is not"),
+        ("a.msh", "$MeshFormat", "cannot read a.msh as a Gmsh mesh"),
     ],
 )
 def test_unreadable_files(tmp_path, name, content, message):
