@@ -12,8 +12,8 @@ from typing import NamedTuple
 from unittest.mock import patch
 
 from benchmarks.reliability.jobs import CACHE, FEM, JOBS, started
-from benchmarks.reliability.supervision import KINDS
-from benchmarks.reliability.trials import Trial, faults, trials, undisturbed
+from benchmarks.reliability.supervision import KINDS, Fault, Kind
+from benchmarks.reliability.trials import TRIAL, Expected, Trial, faults, shown, trials, undisturbed
 from geometry.atomic import write_text
 
 ROWS = Path(__file__).with_name("faults.csv")
@@ -24,7 +24,7 @@ class Row(NamedTuple):
     """A trial as it is kept; what went wrong and what was left over with `SEPARATOR` between."""
 
     job: str
-    kind: str
+    kind: Kind
     at: int
     call: str
     path: str
@@ -40,21 +40,40 @@ def run_faults(words: Collection[str] = ()) -> list[Row]:
         words: Only those of the jobs with one of these in their names; none means all.
     """
     asked = [job for job in JOBS if not words or any(word in job.name for word in words)]
-    names = {job.name for job in asked}
-    kept = [row for row in kept_rows() if not row.faults or row.job not in names]
-    known = {(row.job, row.kind, row.at) for row in kept}
+    kept = kept_rows()
     with tempfile.TemporaryDirectory(prefix="reliability-") as name, filled(Path(name)) as cache:
         folder = Path(name)
         for job in asked:
             place = folder / "job"
             expected = undisturbed(job, place, cache)
-            left = [fault for fault in faults(expected) if (job.name, fault.kind, fault.at) not in known]
+            others = [row for row in kept if row.job != job.name]
+            known, left = known_trials([row for row in kept if row.job == job.name], expected, place)
+            kept = [*others, *known]
             for done in trials(job, expected, left, place):
                 kept.append(_row(done))
                 print(*kept[-1], sep="  ", file=sys.stderr, flush=True)
                 write_rows(kept)
             shutil.rmtree(place)
     return kept
+
+
+def known_trials(rows: Sequence[Row], expected: Expected, place: Path) -> tuple[list[Row], list[Fault]]:
+    """Rows of a job that hold for its points of today, numbered as these are, and the faults without one.
+
+    Two processes change their files in another order each time, so that a row is found by its file.
+    """
+    stock: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        if not row.faults:
+            stock.setdefault((row.kind, row.call, row.path), []).append(row)
+    known, left = [], []
+    for fault in faults(expected):
+        point = shown(expected.points[fault.at], place / TRIAL)
+        if found := stock.get((fault.kind, point.call, point.path)):
+            known.append(found.pop(0)._replace(at=fault.at))
+        else:
+            left.append(fault)
+    return known, left
 
 
 def kept_rows() -> list[Row]:

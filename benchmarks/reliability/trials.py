@@ -85,6 +85,11 @@ def plain(path: str) -> str:
     return re.sub(r"\.[0-9a-f]{8}\.partial", ".partial", path)
 
 
+def shown(point: Point, folder: Path) -> Point:
+    """A point with its path as seen from the folder of the run."""
+    return Point(point.call, plain(point.path).replace(f"{folder}/", ""))
+
+
 def faults(expected: Expected) -> list[Fault]:
     """Every fault at every chosen point: writes are torn, and a full disk stops what needs more of it."""
     calls = {"torn": {"write"}, "ENOSPC": GROWING}
@@ -126,9 +131,8 @@ def trial(job: Job, expected: Expected, fault: Fault, folder: Path) -> Trial:
     else:
         wrong += differences(expected, numbers(folder / OUT))
     point = hit.points[fault.at] if hit.struck else expected.points[fault.at]
-    shown = Point(point.call, plain(point.path).replace(f"{folder}/", ""))
     left = tuple(each for each in leftovers(folder) if not each.startswith("tmp"))
-    return Trial(job.name, fault, shown, hit.code, tuple(wrong), left)
+    return Trial(job.name, fault, shown(point, folder), hit.code, tuple(wrong), left)
 
 
 def differences(expected: Expected, found: dict[str, str]) -> list[str]:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.reliability.document import PAGE, page
-from benchmarks.reliability.faults import kept_rows
+from benchmarks.reliability.faults import Row, kept_rows, known_trials
 from benchmarks.reliability.supervision import Fault, Kind, Point, supervised
 from benchmarks.reliability.trials import Expected, chosen, differences, plain
 from geometry.atomic import write_text
@@ -105,6 +105,19 @@ def test_a_process_that_stays_behind_is_an_orphan(tmp_path: Path, monkeypatch) -
 def test_of_equal_calls_on_a_file_the_first_the_middle_and_the_last_are_chosen() -> None:
     points = [Point("open", "a"), *[Point("write", "a")] * 7, Point("write", "b"), Point("rename", "b")]
     assert chosen(points) == [0, 1, 4, 7, 8, 9]
+
+
+def test_kept_trials_are_those_of_the_same_file_by_whatever_number(tmp_path: Path) -> None:
+    points = (Point("write", f"{tmp_path}/trial/a"), Point("rename", f"{tmp_path}/trial/b"))
+    rows = [
+        Row("compare", "kill", 9, "rename", "b", -9, "", ""),  # the second point of today
+        Row("compare", "kill", 1, "rename", "gone", -9, "", ""),  # a file that is no more
+        Row("compare", "EIO", 0, "write", "a", 2, "other numbers", ""),  # not as promised
+    ]
+    known, left = known_trials(rows, Expected(points, {}, {}, tmp_path), tmp_path)
+    assert known == [rows[0]._replace(at=1)]
+    faults = [Fault("kill", 0), Fault("torn", 0), Fault("ENOSPC", 0), Fault("EIO", 0), Fault("EIO", 1)]
+    assert left == faults
 
 
 def test_the_page_is_that_of_the_kept_trials() -> None:
