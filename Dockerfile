@@ -13,8 +13,10 @@ COPY requirements/debian13.apt requirements/debian13.txt /tmp/
 RUN if python3 -c "import dolfinx" 2>/dev/null; then sed -i '/^python3-/d' /tmp/debian13.apt; else touch /tmp/locked; fi \
     && apt-get update \
     && DEBIAN_FRONTEND=noninteractive xargs apt-get install -y --no-install-recommends </tmp/debian13.apt \
-    && apt-get clean && rm -rf /var/lib/apt/lists/*
+    && apt-get clean && rm -rf /var/lib/apt/lists/* /var/log/* /var/cache/ldconfig/aux-cache
 
+# With it compiled modules tell the hash of their source instead of its time.
+ARG SOURCE_DATE_EPOCH
 ENV PATH=/venv/bin:$PATH
 RUN --mount=type=secret,id=pip,target=/etc/pip.conf,required=false \
     --mount=type=secret,id=ca,required=false \

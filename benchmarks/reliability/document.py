@@ -212,8 +212,8 @@ def _image() -> list[str]:
     return [
         "## The image, built twice",
         "",
-        "`python -m benchmarks.reliability.same_image FOLDER FOLDER`, the folders of two images that were "
-        "built one after the other without a cache, from the same packages, with a fixed time: of "
+        "`.ci/image-twice`: two images, built one after the other without a cache, from the same packages, "
+        "with a fixed time: of "
         f"{found.files:,} files {len(found.lone)} are in one image only and {len(found.differ)} differ. "
         + (f"These are {', '.join(names)}." if names else "All contents are the same to the bit."),
         "",

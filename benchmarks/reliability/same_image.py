@@ -1,8 +1,7 @@
 """Files of two builds of the image, by content: which are the same to the bit, and which are not.
 
-`python -m benchmarks.reliability.same_image FOLDER FOLDER` keeps the counts. The folders are what
-`buildah mount` gives for two images built as by `.ci/container`, but with `--no-cache` and
-`--timestamp SECONDS`.
+`python -m benchmarks.reliability.same_image FOLDER FOLDER` keeps the counts; `.ci/image-twice` builds the
+images and gives their folders.
 """
 
 import json
