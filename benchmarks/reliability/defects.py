@@ -170,5 +170,11 @@ DEFECTS = (
         "script, which could start any program.",
         "`test_readers.py`, no script of gmsh",
     ),
+    (
+        "torn write",
+        "A run of `statfem` in some eighty differed by a millionth from the same run: NumPy rounds the "
+        "logarithms of a diagonal by what lies beside it in memory, and a search enlarged that.",
+        "`test_statistical_fem.py`, the same to the bit",
+    ),
 )
 """Found by, what happened, test."""

@@ -1,5 +1,6 @@
 """`statfem` against conditioning by hand, and against data that its own model has made."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 from solvers.statistics.statistical_fem import StatFemSolver
+from solvers.statistics.statistical_posterior import log_root_determinant
 from tests.solvers.kernels import matern
 
 
@@ -180,3 +182,16 @@ def test_at_finite_strain_the_second_component_is_a_tangent(coarse_mesh):
     nominal = replace(other, load=Load(displacement=(0.0, -5.0)), observations=observed)
     solution = StatFemSolver(degree=1).solve(nominal)
     assert solution.stats["load_u"] * solution.stats["factor"] == pytest.approx(-0.5, abs=0.1)
+
+
+def test_the_determinant_is_the_same_to_the_bit_whatever_lies_beside_the_matrix() -> None:
+    """NumPy takes a diagonal's logarithms one by one if their array follows the matrix, else many at once.
+
+    Where it can take many at once, some of these matrices show it.
+    """
+    generator = np.random.default_rng(2)
+    for _ in range(200):
+        root = np.tril(generator.random((18, 18))) + np.eye(18)
+        found = log_root_determinant(root)
+        assert found == sum(math.log(root[row, row]) for row in range(18))
+        assert found == pytest.approx(np.linalg.slogdet(root @ root.T)[1] / 2, rel=1e-12)
