@@ -176,5 +176,16 @@ DEFECTS = (
         "logarithms of a diagonal by what lies beside it in memory, and a search enlarged that.",
         "`test_statistical_fem.py`, the same to the bit",
     ),
+    (
+        "fuzzing",
+        "A damaged FFV1 video corrupted memory, one time in some thousand: FFmpeg's threads each decoded a "
+        "frame of their own. Now they share one.",
+        "`test_video.py`, threads of ffv1",
+    ),
+    (
+        "reading",
+        "A file without pictures that was taken for a video stayed open.",
+        "`test_video.py`, without pictures",
+    ),
 )
 """Found by, what happened, test."""

@@ -29,6 +29,8 @@ ENCODERS = {"FFV1": ("ffv1", "bgr0"), "MJPG": ("mjpeg", "yuvj420p"), "mp4v": ("m
 """FFmpeg's name of a codec and its pixel format, by the codec's four letters."""
 CODECS = {".mkv": "FFV1", ".avi": "MJPG", ".mp4": "mp4v"}
 """By the suffix of a video that is written. FFV1 is lossless."""
+BY_SLICES = ("ffv1",)
+"""Decoders whose threads share a frame: with a frame for each, FFmpeg 8 corrupts memory at a damaged one."""
 MIN_QUANTISER, BITS_PER_PIXEL = "3", 4
 """Best quality and highest bit rate of the lossy codecs, as OpenCV has them."""
 MAX_TICKS = 65535
@@ -51,12 +53,15 @@ def video_frames(path: Path, rate: float | None = None) -> Frames:
         raise UserError(f"cannot read the video {path}: {error.strerror}") from None
     except (OSError, av.FFmpegError):
         container = None
-    if container is None or not container.streams.video:
+    if container is not None and not container.streams.video:
+        container.close()
+        container = None
+    if container is None:
         raise UserError(
             f"cannot read the video {path}: it is no video, its end is missing, or FFmpeg lacks its codec"
         )
     stream = container.streams.video[0]
-    stream.thread_type = "AUTO"
+    stream.thread_type = "SLICE" if stream.codec.name in BY_SLICES else "AUTO"
     rate = plausible_rate(float(stream.average_rate or 0), rate)
     duration = (container.duration or 0) / av.time_base
     count = stream.frames or round(duration * rate) or None
