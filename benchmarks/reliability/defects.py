@@ -164,5 +164,11 @@ DEFECTS = (
         "They are refused now: 0 leaves it out, or 0.01 mm at least.",
         "`test_design.py`, left out or there",
     ),
+    (
+        "hostile file",
+        "A module in the working folder, such as `selectors.py` beside a drawing of others, was run by the "
+        "process for CAD and meshing, and by those of `sweep`, `crossval` and `gridsearch`.",
+        "`test_working_folder.py`, no module",
+    ),
 )
 """Found by, what happened, test."""
