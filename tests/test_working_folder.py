@@ -1,6 +1,8 @@
 """Files in the working folder that a library or Python itself would take for settings or code of the user."""
 
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -9,7 +11,7 @@ import pytest
 
 from compare.runtime.processes import in_processes
 from compare.sweep.workers import Workers
-from geometry.worker import Worker
+from geometry.worker import Worker, child_environment
 
 
 def sum_of(number: int, progress: Callable[..., None]) -> int:
@@ -44,3 +46,30 @@ def test_workers_of_a_sweep_run_no_module_of_the_working_folder(hostile_folder: 
     with Workers(1) as workers:
         assert workers._connected().submit(os.getcwd).result() == str(hostile_folder)
     assert not (hostile_folder / "ran").exists()
+
+
+def test_fem_takes_no_options_from_the_working_folder(tmp_path: Path) -> None:
+    """PETSc would write a file of any name or load a library, DOLFINx pass any flag to the compiler."""
+    for name in (".petscrc", "petscrc"):
+        (tmp_path / name).write_text(f"-log_view :{tmp_path / 'written'}\n")
+    for name in ("parameters", "options"):  # until 0.5, and later
+        (tmp_path / f"dolfinx_jit_{name}.json").write_text('{"cffi_extra_compile_args": ["-fplugin=x.so"]}')
+        (tmp_path / f"ffcx_{name}.json").write_text('{"epsilon": 0.5}')
+    code = (
+        "from solvers.fem import dolfinx_compat as own\n"
+        "for package in (own.dolfinx.jit, own.ffcx):\n"
+        "    options = getattr(package, 'get_options', None) or package.get_parameters\n"
+        "    print(options().get('cffi_extra_compile_args'), options().get('epsilon'))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=child_environment(os.environ),
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "x.so" not in done.stdout
+    assert "0.5" not in done.stdout
+    assert done.stdout.count("\n") == 2
+    assert not (tmp_path / "written").exists()

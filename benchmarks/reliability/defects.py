@@ -170,5 +170,12 @@ DEFECTS = (
         "process for CAD and meshing, and by those of `sweep`, `crossval` and `gridsearch`.",
         "`test_working_folder.py`, no module",
     ),
+    (
+        "hostile file",
+        "A `.petscrc` in the working folder had PETSc load a library or write any file, and "
+        "`dolfinx_jit_options.json` and `ffcx_options.json` chose the flags of the compiler and what it "
+        "compiled.",
+        "`test_working_folder.py`, no options",
+    ),
 )
 """Found by, what happened, test."""
