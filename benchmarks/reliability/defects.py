@@ -177,5 +177,16 @@ DEFECTS = (
         "compiled.",
         "`test_working_folder.py`, no options",
     ),
+    (
+        "hostile file",
+        "A film that was a play list, or had a name such as `concat:a.mkv` or `http:a`, had FFmpeg read "
+        "other files or ask the network.",
+        "`test_video.py`, opens nothing",
+    ),
+    (
+        "hostile file",
+        "A film of a megabyte whose frames have 256 million pixels took 1.5 GB.",
+        "`test_video.py`, larger than any camera",
+    ),
 )
 """Found by, what happened, test."""
