@@ -188,5 +188,10 @@ DEFECTS = (
         "A film of a megabyte whose frames have 256 million pixels took 1.5 GB.",
         "`test_video.py`, larger than any camera",
     ),
+    (
+        "hostile file",
+        "The parts of a STEP assembly were read from other files, of any folder, that it named.",
+        "`test_bad_drawings.py`, reads no other file",
+    ),
 )
 """Found by, what happened, test."""
