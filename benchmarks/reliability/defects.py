@@ -193,5 +193,11 @@ DEFECTS = (
         "The parts of a STEP assembly were read from other files, of any folder, that it named.",
         "`test_bad_drawings.py`, reads no other file",
     ),
+    (
+        "hostile file",
+        "A link in an unfinished folder or a resumable one that somebody else had made was followed: all "
+        "files where it led were removed, and results were written there.",
+        "`test_output_folder.py`, `test_resumable_folder.py`, a link",
+    ),
 )
 """Found by, what happened, test."""
