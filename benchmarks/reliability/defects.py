@@ -199,5 +199,11 @@ DEFECTS = (
         "files where it led were removed, and results were written there.",
         "`test_output_folder.py`, `test_resumable_folder.py`, a link",
     ),
+    (
+        "hostile file",
+        "The folder of a sweep that somebody else had made could have SQLite remove any file: a rollback "
+        "journal names it.",
+        "`test_sweep.py`, removes no file",
+    ),
 )
 """Found by, what happened, test."""
