@@ -205,5 +205,11 @@ DEFECTS = (
         "journal names it.",
         "`test_sweep.py`, removes no file",
     ),
+    (
+        "hostile file",
+        "A picture in a run of others that was a link to any file, or EPS, was put into the page of "
+        "`report` as it is, or had Pillow start Ghostscript.",
+        "`test_foreign_text.py`, pictures alone, a link",
+    ),
 )
 """Found by, what happened, test."""

@@ -64,8 +64,8 @@ def check_links(folder: Path) -> None:
     """
     if found := next((path for path in folder.rglob("*") if path.is_symlink()), None):
         raise UserError(
-            f"{found} is a link, which no run has made and through which files elsewhere could be lost; "
-            "remove it, or name another folder with --out"
+            f"{found} is a link, which no run has made and which leads to files elsewhere; remove it, or "
+            "name another folder"
         )
 
 

@@ -16,7 +16,8 @@ from compare.figures import Picture
 from compare.pipeline.job import Job, checked
 from compare.report.html_report import render
 from compare.report.metrics_json import metrics
-from compare.runtime.html import template_environment
+from compare.report.runs import read_runs, write_runs
+from compare.runtime.html import PNG, SMALL, template_environment
 from geometry import Design, UserError
 from geometry.atomic import write_json
 from geometry.drawing.description import Description
@@ -71,7 +72,7 @@ def hostile(
 
 def test_the_report_escapes_every_text_of_others(hostile: Comparison, tmp_path: Path) -> None:
     path = tmp_path / 'a <b> & "c".png'
-    path.write_bytes(b"")
+    path.write_bytes(PNG)
     picture = Picture(path, HOSTILE, HOSTILE, HOSTILE)
     page = render(hostile, [picture], {HOSTILE: HOSTILE, "group": {HOSTILE: HOSTILE}})
     found, plain = Elements(page), Elements(render(hostile, [], {}))
@@ -94,6 +95,35 @@ def test_the_page_of_runs_escapes_numbers_and_folders_of_others(
     assert "x-evil" not in found.names
     assert found.running == []
     assert "x-evil" in found.text
+
+
+@pytest.mark.parametrize("padding", [0, SMALL], ids=["small", "large"])
+@pytest.mark.parametrize("content", [b"key of mine", b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n"])
+def test_the_page_of_runs_takes_pictures_alone(
+    hostile: Comparison, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes, padding: int
+) -> None:
+    """Another file would be passed on with the page, and for EPS Pillow runs a program."""
+    runs: list[object] = []
+    monkeypatch.setattr("subprocess.check_call", lambda *given, **_: runs.append(given))
+    for name in ("one", "two"):
+        write_json(tmp_path / name / "metrics.json", metrics(hostile))
+        write_json(tmp_path / name / "run.json", {})
+    picture = tmp_path / "one" / "figures" / "overlay.png"
+    picture.parent.mkdir()
+    picture.write_bytes(content + b"%" * padding)
+    with pytest.raises(UserError, match=r"overlay\.png is no PNG picture"):
+        write_runs(tmp_path / "both", read_runs([tmp_path / "one", tmp_path / "two"]))
+    assert runs == []
+
+
+def test_a_run_with_a_link_is_not_read(hostile: Comparison, tmp_path: Path) -> None:
+    write_json(tmp_path / "run" / "metrics.json", metrics(hostile))
+    write_json(tmp_path / "run" / "run.json", {})
+    (tmp_path / "mine.png").write_bytes(b"")
+    (tmp_path / "run" / "figures").mkdir()
+    (tmp_path / "run" / "figures" / "overlay.png").symlink_to(tmp_path / "mine.png")
+    with pytest.raises(UserError, match=r"figures/overlay\.png is a link, which no run has made"):
+        read_runs([tmp_path / "run"])
 
 
 def test_no_template_and_no_script_puts_text_in_as_html() -> None:
