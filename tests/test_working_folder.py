@@ -73,3 +73,19 @@ def test_fem_takes_no_options_from_the_working_folder(tmp_path: Path) -> None:
     assert "0.5" not in done.stdout
     assert done.stdout.count("\n") == 2
     assert not (tmp_path / "written").exists()
+
+
+def test_pictures_take_no_settings_from_the_working_folder(tmp_path: Path) -> None:
+    """LaTeX would be started, and could read any file into a picture."""
+    (tmp_path / "matplotlibrc").write_text("text.usetex: True\ntext.latex.preamble: \\input{/etc/hostname}\n")
+    code = (
+        "import sys, subprocess\n"
+        "from pathlib import Path\n"
+        "from geometry.figure import figure\n"
+        "subprocess.check_output = lambda *given, **_: sys.exit('a program was started')\n"
+        "with figure(1.0) as drawn:\n"
+        "    drawn.text(0.5, 0.5, 'text')\n"
+        "drawn.save(Path('a.png'))\n"
+    )
+    command = [sys.executable, "-c", code]
+    subprocess.run(command, env=child_environment(os.environ), cwd=tmp_path, check=True)

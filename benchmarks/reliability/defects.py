@@ -211,5 +211,11 @@ DEFECTS = (
         "`report` as it is, or had Pillow start Ghostscript.",
         "`test_foreign_text.py`, pictures alone, a link",
     ),
+    (
+        "hostile file",
+        "A `matplotlibrc` in the working folder had matplotlib start LaTeX, which reads any file that it "
+        "names.",
+        "`test_working_folder.py`, no settings",
+    ),
 )
 """Found by, what happened, test."""
