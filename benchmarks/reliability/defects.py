@@ -217,5 +217,11 @@ DEFECTS = (
         "names.",
         "`test_working_folder.py`, no settings",
     ),
+    (
+        "hostile file",
+        "A file for `compare --from` could choose any folder of the machine as the output folder, and "
+        "replace a result there.",
+        "`test_options_file.py`, one line",
+    ),
 )
 """Found by, what happened, test."""
