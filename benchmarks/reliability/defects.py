@@ -223,5 +223,11 @@ DEFECTS = (
         "replace a result there.",
         "`test_options_file.py`, one line",
     ),
+    (
+        "hostile file",
+        "Texts of files of others, such as a misspelt key, were printed with their control characters, and "
+        "a terminal obeys them; in a table a spreadsheet took them for formulas.",
+        "`test_foreign_text.py`, no formula",
+    ),
 )
 """Found by, what happened, test."""

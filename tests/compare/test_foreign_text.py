@@ -1,6 +1,7 @@
 """Text and names of others: they stay text in every page, and never lead out of the output folder."""
 
 import ast
+import csv
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -124,6 +125,27 @@ def test_a_run_with_a_link_is_not_read(hostile: Comparison, tmp_path: Path) -> N
     (tmp_path / "run" / "figures" / "overlay.png").symlink_to(tmp_path / "mine.png")
     with pytest.raises(UserError, match=r"figures/overlay\.png is a link, which no run has made"):
         read_runs([tmp_path / "run"])
+
+
+def test_a_text_of_others_is_no_formula_and_no_command_of_the_terminal(
+    hostile: Comparison, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    numbers = metrics(hostile)
+    numbers["solvers"]["=1+1\x1b[2J"] = numbers["solvers"].pop(numbers["reference"])
+    numbers["reference"] = "=1+1\x1b[2J"
+    for name in ("-one", "two"):
+        write_json(tmp_path / name / "metrics.json", numbers)
+        write_json(tmp_path / name / "run.json", {})
+    folders = [str(tmp_path / name) for name in ("-one", "two")]
+    assert main(["report", folders[0]]) == 0
+    assert main(["report", *folders, "--out", str(tmp_path / "both")]) == 0
+    assert main(["report", str(tmp_path / "\x1b[2J")]) == 2
+    said = "".join(capsys.readouterr())
+    assert "=1+1\N{REPLACEMENT CHARACTER}[2J" in said
+    assert "\x1b" not in said
+    cells = [cell for row in csv.reader((tmp_path / "both" / "runs.csv").open()) for cell in row]
+    assert {"'=1+1\x1b[2J", "'-one"} <= {*cells}
+    assert [cell for cell in cells if cell.startswith(("=", "+", "@", "-o"))] == []
 
 
 def test_no_template_and_no_script_puts_text_in_as_html() -> None:
