@@ -229,5 +229,11 @@ DEFECTS = (
         "a terminal obeys them; in a table a spreadsheet took them for formulas.",
         "`test_foreign_text.py`, no formula",
     ),
+    (
+        "hostile file",
+        "An archive of CAD files in a cache that somebody else had filled could name files of any folder, "
+        "which were written.",
+        "`test_cache.py`, stay in the output folder",
+    ),
 )
 """Found by, what happened, test."""
