@@ -48,6 +48,20 @@ def test_workers_of_a_sweep_run_no_module_of_the_working_folder(hostile_folder: 
     assert not (hostile_folder / "ran").exists()
 
 
+def test_gmsh_takes_no_options_from_the_working_folder(tmp_path: Path) -> None:
+    (tmp_path / ".petscrc").write_text(f"-history {tmp_path / 'written'}\n")
+    done = subprocess.run(
+        [sys.executable, "-c", "from geometry.mesh.gmsh_model import session\nwith session(): pass"],
+        env=child_environment(os.environ),
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert (done.stdout, done.stderr) == ("", "")
+    assert not (tmp_path / "written").exists()
+
+
 def test_fem_takes_no_options_from_the_working_folder(tmp_path: Path) -> None:
     """PETSc would write a file of any name or load a library, DOLFINx pass any flag to the compiler."""
     for name in (".petscrc", "petscrc"):

@@ -172,7 +172,7 @@ DEFECTS = (
     ),
     (
         "hostile file",
-        "A `.petscrc` in the working folder had PETSc load a library or write any file, and "
+        "A `.petscrc` in the working folder had PETSc, also that in Gmsh, load a library or write any file; "
         "`dolfinx_jit_options.json` and `ffcx_options.json` chose the flags of the compiler and what it "
         "compiled.",
         "`test_working_folder.py`, no options",
