@@ -210,7 +210,14 @@ def _cached(
 
 
 def _unpack(path: Path) -> dict[str, bytes]:
+    """The files in an archive.
+
+    Raises:
+        ValueError: If a name leads out of the folder that they are written to: the cache is somebody else's.
+    """
     with zipfile.ZipFile(path) as archive:
+        if any(Path(name).name != name for name in archive.namelist()):
+            raise ValueError("a file of another folder")
         return {name: archive.read(name) for name in archive.namelist()}
 
 

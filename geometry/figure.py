@@ -38,6 +38,8 @@ MEASURED = "#d1006c"
 """Colour of measurements: occurs in none of the colour maps and for no solver."""
 
 _RC: "dict[RcKeyType, Any]" = {
+    # A matplotlibrc of others in the working folder could have LaTeX read any file.
+    **{name: value for name, value in mpl.rcParamsDefault.items() if not name.startswith("backend")},
     "font.family": "DejaVu Sans",
     "font.size": 8.5,
     "axes.titlesize": 9,

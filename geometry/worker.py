@@ -27,6 +27,9 @@ from geometry.machine_memory import free_memory_gb, limit_memory
 FOREIGN_PREFIXES = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "I_MPI_", "MPI_", "HYDRA_", "MPIEXEC_")
 """Environment variables that would make the child a member of the parent's MPI run."""
 
+SAFE_PATH = {"PYTHONSAFEPATH": "1"}
+"""Environment in which Python imports nothing from the working folder, where files of others may lie."""
+
 EXTRA_SECONDS = 5
 USABLE = 0.9
 """Share of the free memory that a task may take."""
@@ -80,7 +83,7 @@ class Worker:
             stdout=subprocess.PIPE,
             stderr=self._errors,
             text=True,
-            env=child_environment(os.environ) | {"TMPDIR": str(self.folder)},
+            env=child_environment(os.environ) | SAFE_PATH | {"TMPDIR": str(self.folder)},
         )
 
     def answer(self, task: Mapping[str, Any], timeout_s: float) -> str:

@@ -187,5 +187,76 @@ DEFECTS = (
         "A file without pictures that was taken for a video stayed open.",
         "`test_video.py`, without pictures",
     ),
+    (
+        "hostile file",
+        "A module in the working folder, such as `selectors.py` beside a drawing of others, was run by the "
+        "process for CAD and meshing, and by those of `sweep`, `crossval` and `gridsearch`.",
+        "`test_working_folder.py`, no module",
+    ),
+    (
+        "hostile file",
+        "A `.petscrc` in the working folder had PETSc, also that in Gmsh, load a library or write any file; "
+        "`dolfinx_jit_options.json` and `ffcx_options.json` chose the flags of the compiler and what it "
+        "compiled.",
+        "`test_working_folder.py`, no options",
+    ),
+    (
+        "hostile file",
+        "A film that was a play list, or had a name such as `concat:a.mkv` or `http:a`, had FFmpeg read "
+        "other files or ask the network.",
+        "`test_video.py`, opens nothing",
+    ),
+    (
+        "hostile file",
+        "A film of a megabyte whose frames have 256 million pixels took 1.5 GB.",
+        "`test_video.py`, larger than any camera",
+    ),
+    (
+        "hostile file",
+        "The parts of a STEP assembly were read from other files, of any folder, that it named.",
+        "`test_bad_drawings.py`, reads no other file",
+    ),
+    (
+        "hostile file",
+        "A link in an unfinished folder or a resumable one that somebody else had made was followed: all "
+        "files where it led were removed, and results were written there.",
+        "`test_output_folder.py`, `test_resumable_folder.py`, a link",
+    ),
+    (
+        "hostile file",
+        "The folder of a sweep that somebody else had made could have SQLite remove any file: a rollback "
+        "journal names it.",
+        "`test_sweep.py`, removes no file",
+    ),
+    (
+        "hostile file",
+        "A picture in a run of others that was a link to any file, or EPS, was put into the page of "
+        "`report` as it is, or had Pillow start Ghostscript.",
+        "`test_foreign_text.py`, pictures alone, a link",
+    ),
+    (
+        "hostile file",
+        "A `matplotlibrc` in the working folder had matplotlib start LaTeX, which reads any file that it "
+        "names.",
+        "`test_working_folder.py`, no settings",
+    ),
+    (
+        "hostile file",
+        "A file for `compare --from` could choose any folder of the machine as the output folder, and "
+        "replace a result there.",
+        "`test_options_file.py`, one line",
+    ),
+    (
+        "hostile file",
+        "Texts of files of others, such as a misspelt key, were printed with their control characters, and "
+        "a terminal obeys them; in a table a spreadsheet took them for formulas.",
+        "`test_foreign_text.py`, no formula",
+    ),
+    (
+        "hostile file",
+        "An archive of CAD files in a cache that somebody else had filled could name files of any folder, "
+        "which were written.",
+        "`test_cache.py`, stay in the output folder",
+    ),
 )
 """Found by, what happened, test."""

@@ -1,7 +1,7 @@
 """Kills of a comparison on two threads: what `--resume` gives agrees with a run that was never interrupted.
 
-`python -m benchmarks.reliability.two_threads` keeps the largest difference. On one thread results agree to the
-bit (`faults`); two threads may add in another order.
+`python -m benchmarks.reliability.two_threads` keeps the largest difference. On one thread results agree to
+the bit (`faults`); two threads may add in another order.
 """
 
 import json
@@ -107,13 +107,14 @@ def _watched(folder: Path) -> list[Path]:
 
 
 def _values(folder: Path, _: Ending) -> dict[str, Any]:
-    """Numbers of a result by name: of `metrics.json`, and the arrays of every solution."""
-    metrics = json.loads((folder / OUT / "metrics.json").read_text(encoding="utf-8"))
-    found = dict(_numbers(metrics, "metrics"))
+    """Numbers of a result by name, without times: of `metrics.json`, and the arrays of every solution."""
+    found = dict(_numbers(json.loads((folder / OUT / "metrics.json").read_text(encoding="utf-8")), "metrics"))
     for path in sorted((folder / OUT / "solutions").glob("*.npz")):
         with np.load(path, allow_pickle=False) as arrays:
             found |= {
-                f"{path.stem}/{name}": arrays[name] for name in arrays if arrays[name].dtype.kind == "f"
+                f"{path.stem}/{name}": array
+                for name, array in arrays.items()
+                if array.dtype.kind == "f" and not any(word in name for word in TIMES)
             }
     return found
 

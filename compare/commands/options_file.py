@@ -34,13 +34,18 @@ def read_options_file(file: Path) -> dict[str, Any]:
     """The content of a TOML or JSON file with a table `options`: of a `run.json`, with its provenance.
 
     Raises:
-        UserError: If it cannot be read, has no options, or has a key beside them and is not of a run.
+        UserError: If it cannot be read, has no options, has a key beside them and is not of a run, or names
+            an output folder elsewhere: the file may be somebody else's.
     """
     is_json = file.suffix.lower() == ".json"
     content = read_json(file, "options file") if is_json else read_toml(file, "options file")
     options = content.get("options") if isinstance(content, dict) else None
     if not isinstance(options, dict):
         raise UserError(f'{file} has no table "options"; one line of it is, for example, mesh-size = 0.5')
+    out = options.get("out", "")
+    for folder in map(str, out if isinstance(out, list) else [out]):
+        if Path(folder).is_absolute() or ".." in Path(folder).parts:
+            raise UserError(f"{file}: out = {folder!r} leads out of the working folder; give it as --out")
     if (schema := content.get("schema", SCHEMA)) != SCHEMA:
         raise UserError(f"{file} has schema {schema}; this version of pinn-ray reads schema {SCHEMA}")
     if "files_sha256" not in content and (unknown := sorted({*content} - {"options", "schema"})):

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from compare.commands.options import OptionalOutputPath
+from compare.runtime.exits import shown
 from geometry.errors import UserError
 
 
@@ -35,10 +36,7 @@ def report(*runs: Path, out: OptionalOutputPath = None) -> int:
     if out is not None:
         raise UserError("--out is for several runs; the report of one is in its own folder")
     for answer in found[0].answers:
-        print(
-            "\n".join(
-                [answer.question, f"  {answer.verdict}", *(f"  - {each}" for each in answer.sentences), ""]
-            )
-        )
+        lines = [answer.question, f"  {answer.verdict}", *(f"  - {each}" for each in answer.sentences), ""]
+        print(shown("\n".join(lines)))
     print(f"report: {found[0].folder / 'report.html'}")
     return 0

@@ -12,7 +12,7 @@ from compare.evaluation.number_format import NONE, number, percent
 from compare.report.metrics_json import SCHEMA
 from compare.report.summary import Answer, answers
 from compare.runtime.html import picture_urls, template_environment
-from compare.runtime.output_folder import RUN_FILE
+from compare.runtime.output_folder import RUN_FILE, check_links
 from compare.runtime.tables import Cell, write_csv
 from geometry.atomic import write_text
 from geometry.errors import UserError
@@ -78,6 +78,7 @@ def read_runs(folders: Sequence[Path]) -> list[Run]:
 def _read(name: str, folder: Path) -> Run:
     if not folder.is_dir():
         raise UserError(f"there is no folder {folder}; give output folders of `compare`")
+    check_links(folder)
     found = []
     for file in ("metrics.json", RUN_FILE):
         try:

@@ -9,6 +9,10 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from PIL import Image
 
+from geometry.errors import UserError
+
+PNG = b"\x89PNG\r\n\x1a\n"
+
 SMALL = 300_000
 """Bytes up to which a picture, as a rule one of lines, is embedded as it is."""
 
@@ -30,8 +34,15 @@ def template_environment() -> Environment:
 
 
 def png_url(path: Path) -> str:
-    """A PNG file as a data URL."""
-    return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
+    """A PNG file as a data URL.
+
+    Raises:
+        UserError: If it is something else: a page that is passed on must not carry it.
+    """
+    content = path.read_bytes()
+    if not content.startswith(PNG):
+        raise UserError(f"{path} is no PNG picture; make the run again")
+    return "data:image/png;base64," + base64.b64encode(content).decode("ascii")
 
 
 def picture_urls(paths: Sequence[Path]) -> dict[Path, str]:
@@ -44,6 +55,9 @@ def _picture_url(path: Path) -> str:
     if path.stat().st_size <= SMALL:
         return png_url(path)
     buffer = BytesIO()
-    with Image.open(path) as picture:
-        picture.convert("RGB").save(buffer, "WEBP", quality=80, method=0)
+    try:
+        with Image.open(path, formats=["PNG"]) as picture:  # of others; Pillow would run Ghostscript for EPS
+            picture.convert("RGB").save(buffer, "WEBP", quality=80, method=0)
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
+        raise UserError(f"{path} is no PNG picture, or too large; make the run again") from None
     return "data:image/webp;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

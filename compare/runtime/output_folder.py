@@ -41,6 +41,7 @@ def check_output(out: Path) -> None:
             f"the output folder is replaced as a whole, so the program cannot run inside it ({out}); "
             "name another folder with --out"
         )
+    check_links(out)
     files = [path.relative_to(out) for path in out.rglob("[!.]*") if path.is_file()]
     ours = _written(out)
     if files and ours is None:
@@ -53,6 +54,18 @@ def check_output(out: Path) -> None:
         raise UserError(
             f"{out} holds {foreign}, which no run has written and which would be lost; "
             "move it, or name another folder with --out"
+        )
+
+
+def check_links(folder: Path) -> None:
+    """Raise a `UserError` if a folder holds a symbolic link: through it a run writes or removes elsewhere.
+
+    It may have come with the folder from somebody else; a run makes none.
+    """
+    if found := next((path for path in folder.rglob("*") if path.is_symlink()), None):
+        raise UserError(
+            f"{found} is a link, which no run has made and which leads to files elsewhere; remove it, or "
+            "name another folder"
         )
 
 
@@ -70,6 +83,9 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
     out = out.resolve()
     partial = out.with_name(f"{out.name}.partial")
     missing = [folder for folder in partial.parents if not folder.exists()]
+    if partial.is_symlink():
+        raise UserError(f"{partial} is a link, which no run has made; remove it, or choose another --out")
+    check_links(partial)
     try:
         partial.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -21,6 +21,7 @@ from typing import Generic, TypeVar
 from compare.runtime.interruption import leave_signals_alone
 from compare.runtime.provenance import cores
 from compare.runtime.stages import Stages
+from geometry.worker import SAFE_PATH
 from solvers.solver import Progress
 
 PR_SET_PDEATHSIG = 1
@@ -104,7 +105,7 @@ def in_processes(
                 name = next(iter(waiting))
                 ours, theirs = context.Pipe()
                 process = context.Process(target=_child, args=(work, theirs), name=name)
-                with _threads(max(1, cores() // min(processes, len(tasks)))):
+                with _environment(max(1, cores() // min(processes, len(tasks)))):
                     process.start()
                 theirs.close()
                 running[ours] = name, process
@@ -171,16 +172,17 @@ def in_stages(
 
 
 @contextmanager
-def _threads(count: int) -> Iterator[None]:
-    """Processes that start meanwhile have a number of threads, unless the user has chosen one."""
-    if THREADS in os.environ:
-        yield
-        return
-    os.environ[THREADS] = str(count)
+def _environment(threads: int) -> Iterator[None]:
+    """Processes that start meanwhile have a number of threads and a safe path, unless the user chose."""
+    added = {
+        name: text for name, text in ({THREADS: str(threads)} | SAFE_PATH).items() if name not in os.environ
+    }
+    os.environ.update(added)
     try:
         yield
     finally:
-        del os.environ[THREADS]
+        for name in added:
+            del os.environ[name]
 
 
 def end_with_parent() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 from pydantic_core import to_jsonable_python
 
+from compare.runtime.output_folder import check_links
 from compare.runtime.provenance import package_versions, sources_digest
 from geometry.atomic import is_partial
 from geometry.errors import UserError
@@ -54,6 +55,7 @@ def check_resumable_folder(
         raise UserError(f"{out} is a file; name a folder with --out")
     if not out.exists() or all(is_partial(path) for path in out.iterdir()):
         return
+    check_links(out)
     try:
         before = _flat(json.loads(file.read_text(encoding="utf-8")))
     except (OSError, ValueError):

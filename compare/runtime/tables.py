@@ -7,17 +7,35 @@ from pathlib import Path
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from compare.runtime.exits import shown
 from geometry.atomic import atomic_path
 
 Cell = str | int | float | bool
 
 
 def write_csv(path: Path, rows: Sequence[dict[str, Cell]]) -> None:
-    """Write rows with equal keys under a header, atomically; numbers keep all their digits."""
+    """Write rows with equal keys under a header, atomically; numbers keep all their digits.
+
+    A text that a spreadsheet would take for a formula, as a file of others may be called, gets an apostrophe.
+    """
     with atomic_path(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
         writer.writeheader()
-        writer.writerows(rows)
+        writer.writerows({key: plain(cell) for key, cell in row.items()} for row in rows)
+
+
+def plain(cell: Cell) -> Cell:
+    """The cell, a text that begins like a formula with an apostrophe before it.
+
+    Source: OWASP, CSV Injection.
+    """
+    if not isinstance(cell, str) or not cell.startswith(("=", "+", "-", "@", "\t", "\r")):
+        return cell
+    try:
+        float(cell)
+    except ValueError:
+        return f"'{cell}"
+    return cell
 
 
 def terminal_table(
@@ -51,5 +69,5 @@ def terminal_table(
     for heading in headings:
         table.add_column(heading, justify="left" if heading in left else "right", no_wrap=True)
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*map(shown, row))
     return table

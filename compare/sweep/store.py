@@ -13,6 +13,9 @@ from pathlib import Path
 from compare.sweep.measurement import Measurement
 from geometry.errors import UserError
 
+_NAMES_A_FILE = bytes.fromhex("d9d505f920a163d7")
+"""End of a rollback journal that names another file. Source: SQLite, pager.c, `aJournalMagic`."""
+
 _TABLE = """
 create table if not exists samples (
     number integer primary key,
@@ -71,6 +74,7 @@ def opened(file: Path) -> Iterator[Journal]:
     Raises:
         UserError: If the file is no journal or cannot be written.
     """
+    _check_rollback(file.with_name(f"{file.name}-journal"))
     try:
         with closing(sqlite3.connect(file)) as connection:
             yield Journal(connection)
@@ -79,3 +83,14 @@ def opened(file: Path) -> Iterator[Journal]:
             f"cannot use {file}: {error}; free some space if the disk is full, else remove the file to run "
             "every sample again"
         ) from None
+
+
+def _check_rollback(journal: Path) -> None:
+    """Refuse the rollback journal of a transaction over several files: SQLite removes the file that it names.
+
+    A sweep that is killed leaves one of its own file alone; another one comes from somebody else.
+    """
+    if journal.is_file() and journal.read_bytes().endswith(_NAMES_A_FILE):
+        raise UserError(
+            f"{journal} names another file, which SQLite would remove; no sweep leaves such a one: remove it"
+        )

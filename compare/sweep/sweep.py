@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from compare.runtime.output_folder import locked
+from compare.runtime.output_folder import check_links, locked
 from compare.runtime.provenance import package_versions, sources_digest
 from compare.runtime.resumable_folder import check_resumable_folder
 from compare.runtime.stages import Stages
@@ -147,6 +147,7 @@ def load_sweep(folder: Path) -> Sweep:
         study = Study(**read_json(folder / STUDY_FILE, "sweep")["study"])
     except (KeyError, TypeError):
         raise UserError(f"{folder / STUDY_FILE} is no description of a sweep") from None
+    check_links(folder)
     every = samples(study)
     with opened(folder / JOURNAL) as journal:
         found = [each for each in journal.measurements() if each.number < len(every)]

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from compare.runtime.tables import plain
 from compare.sweep.quantities import QUANTITIES, heading
 from compare.sweep.study import title
 from compare.sweep.sweep import Sweep
@@ -35,7 +36,7 @@ def write_tables(sweep: Sweep, folder: Path) -> list[Path]:
     buffer = BytesIO()
     frame.to_parquet(buffer, engine="pyarrow", index=False)
     write_bytes(folder / "samples.parquet", buffer.getvalue())
-    write_text(folder / "samples.csv", frame.to_csv(index=False, lineterminator="\n"))
+    write_text(folder / "samples.csv", frame.map(plain).to_csv(index=False, lineterminator="\n"))
     return [folder / "samples.parquet", folder / "samples.csv"]
 
 

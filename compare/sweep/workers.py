@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Self
 from compare.sweep.measurement import Measurement, measured
 from compare.sweep.study import Task
 from geometry.errors import UserError
+from geometry.worker import SAFE_PATH
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
@@ -140,7 +141,7 @@ class Workers:
         spawn = "distributed.nanny.pre-spawn-environ"  # one thread of OpenMP and BLAS a worker, among others
         dask.config.set(
             {
-                spawn: {**dask.config.get(spawn), "DASK_LOGGING__DISTRIBUTED": "critical"},
+                spawn: {**dask.config.get(spawn), **SAFE_PATH, "DASK_LOGGING__DISTRIBUTED": "critical"},
                 "distributed.scheduler.allowed-failures": 0,  # the deaths are counted here
                 "distributed.scheduler.worker-saturation": 1.0,
             }

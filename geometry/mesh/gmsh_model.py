@@ -34,10 +34,15 @@ class Triangulation:
 
 @contextmanager
 def session() -> Iterator[None]:
-    """Gmsh with this project's options: silent, one thread, the same random numbers every time."""
-    gmsh.initialize(argv=[], readConfigFiles=False, interruptible=False)
+    """Gmsh with this project's options: silent, one thread, the same random numbers every time.
+
+    The PETSc in it would take options from a `.petscrc` in the working folder, which may be of others: it
+    could load a library. Gmsh warns of the option against that, which is not its own, unless it is quiet.
+    """
+    gmsh.initialize(argv=["gmsh", "-v", "0", "-skip_petscrc"], readConfigFiles=False, interruptible=False)
     try:
         for option, value in (
+            ("General.Verbosity", 5),
             ("General.Terminal", 0),
             ("General.NumThreads", 1),
             ("Mesh.Algorithm", 6),

@@ -3,23 +3,39 @@
 import inspect
 import logging
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import chdir, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import time
 from typing import Any, Generic, TypeVar
 
+from solvers.petsc import PETSc  # before DOLFINx, which would start it with files of the working folder
+
+# isort: split
 import dolfinx
 import dolfinx.fem.petsc
+import ffcx
 import numpy as np
 import ufl
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
 from solvers.elasticity import Lame
 from solvers.fem.ranks import communicator
 from solvers.lagrange import LagrangeSpace, NodalSpace
+
+
+def _read_options() -> None:
+    """Let DOLFINx and FFCx read their files of options, which they do once: those of the user alone.
+
+    One of others in the working folder could choose the flags of the compiler and the text that it compiles.
+    """
+    with chdir(Path(dolfinx.__file__).parent):
+        for package in (dolfinx.jit, ffcx):
+            (getattr(package, "get_options", None) or package.get_parameters)()  # until 0.5
+
+
+_read_options()
 
 
 def _vector_element(dimension: int) -> Any:

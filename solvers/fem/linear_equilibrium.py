@@ -5,7 +5,6 @@ from typing import Any, Literal
 
 import numpy as np
 import ufl
-from petsc4py import PETSc
 
 from geometry.arrays import BoolArray, FloatArray
 from solvers.constrained_elimination import ConstrainedElimination
@@ -19,6 +18,7 @@ from solvers.fem.boundary_conditions import (
 from solvers.fem.dolfinx_compat import DistributedSpace
 from solvers.fem.linear_solvers import Factorisation, Multigrid
 from solvers.lagrange import LagrangeSpace
+from solvers.petsc import PETSc
 from solvers.problem import Problem
 
 LinearSolver = Literal["auto", "direct", "iterative"]

@@ -4,11 +4,11 @@ from typing import Any, ClassVar
 from weakref import finalize
 
 import numpy as np
-from petsc4py import PETSc
 
 from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
 from solvers.fem.dolfinx_compat import DistributedSpace
+from solvers.petsc import PETSc
 
 TOLERANCE = 1e-10
 """Residual force over the right-hand side at which the iteration ends."""

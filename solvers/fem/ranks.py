@@ -15,9 +15,9 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-import petsc4py
 from mpi4py import MPI
 
+import solvers.petsc  # noqa: F401 (on all ranks together: one alone would wait for the others when it solves)
 from geometry.worker import child_environment
 from solvers.problem import Problem
 from solvers.solver import Progress, silent
@@ -64,7 +64,6 @@ def lead(command: Callable[[], Any], guarded: Callable[[Callable[[], Any]], int]
         command: Run by rank 0.
         guarded: Runs it and reports errors; returns the exit code.
     """
-    petsc4py.init()  # on all ranks together: one alone would wait for the others when it first solves
     pool = RankPool(MPI.COMM_WORLD.Dup())
     # What this process starts from now on must not take itself for a rank of this run.
     for name in set(os.environ) - set(child_environment(os.environ)):

@@ -1,6 +1,7 @@
 """Text and names of others: they stay text in every page, and never lead out of the output folder."""
 
 import ast
+import csv
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,7 +17,8 @@ from compare.figures import Picture
 from compare.pipeline.job import Job, checked
 from compare.report.html_report import render
 from compare.report.metrics_json import metrics
-from compare.runtime.html import template_environment
+from compare.report.runs import read_runs, write_runs
+from compare.runtime.html import PNG, SMALL, template_environment
 from geometry import Design, UserError
 from geometry.atomic import write_json
 from geometry.drawing.description import Description
@@ -71,7 +73,7 @@ def hostile(
 
 def test_the_report_escapes_every_text_of_others(hostile: Comparison, tmp_path: Path) -> None:
     path = tmp_path / 'a <b> & "c".png'
-    path.write_bytes(b"")
+    path.write_bytes(PNG)
     picture = Picture(path, HOSTILE, HOSTILE, HOSTILE)
     page = render(hostile, [picture], {HOSTILE: HOSTILE, "group": {HOSTILE: HOSTILE}})
     found, plain = Elements(page), Elements(render(hostile, [], {}))
@@ -94,6 +96,56 @@ def test_the_page_of_runs_escapes_numbers_and_folders_of_others(
     assert "x-evil" not in found.names
     assert found.running == []
     assert "x-evil" in found.text
+
+
+@pytest.mark.parametrize("padding", [0, SMALL], ids=["small", "large"])
+@pytest.mark.parametrize("content", [b"key of mine", b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n"])
+def test_the_page_of_runs_takes_pictures_alone(
+    hostile: Comparison, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes, padding: int
+) -> None:
+    """Another file would be passed on with the page, and for EPS Pillow runs a program."""
+    runs: list[object] = []
+    monkeypatch.setattr("subprocess.check_call", lambda *given, **_: runs.append(given))
+    for name in ("one", "two"):
+        write_json(tmp_path / name / "metrics.json", metrics(hostile))
+        write_json(tmp_path / name / "run.json", {})
+    picture = tmp_path / "one" / "figures" / "overlay.png"
+    picture.parent.mkdir()
+    picture.write_bytes(content + b"%" * padding)
+    with pytest.raises(UserError, match=r"overlay\.png is no PNG picture"):
+        write_runs(tmp_path / "both", read_runs([tmp_path / "one", tmp_path / "two"]))
+    assert runs == []
+
+
+def test_a_run_with_a_link_is_not_read(hostile: Comparison, tmp_path: Path) -> None:
+    write_json(tmp_path / "run" / "metrics.json", metrics(hostile))
+    write_json(tmp_path / "run" / "run.json", {})
+    (tmp_path / "mine.png").write_bytes(b"")
+    (tmp_path / "run" / "figures").mkdir()
+    (tmp_path / "run" / "figures" / "overlay.png").symlink_to(tmp_path / "mine.png")
+    with pytest.raises(UserError, match=r"figures/overlay\.png is a link, which no run has made"):
+        read_runs([tmp_path / "run"])
+
+
+def test_a_text_of_others_is_no_formula_and_no_command_of_the_terminal(
+    hostile: Comparison, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    numbers = metrics(hostile)
+    numbers["solvers"]["=1+1\x1b[2J"] = numbers["solvers"].pop(numbers["reference"])
+    numbers["reference"] = "=1+1\x1b[2J"
+    for name in ("-one", "two"):
+        write_json(tmp_path / name / "metrics.json", numbers)
+        write_json(tmp_path / name / "run.json", {})
+    folders = [str(tmp_path / name) for name in ("-one", "two")]
+    assert main(["report", folders[0]]) == 0
+    assert main(["report", *folders, "--out", str(tmp_path / "both")]) == 0
+    assert main(["report", str(tmp_path / "\x1b[2J")]) == 2
+    said = "".join(capsys.readouterr())
+    assert "=1+1\N{REPLACEMENT CHARACTER}[2J" in said
+    assert "\x1b" not in said
+    cells = [cell for row in csv.reader((tmp_path / "both" / "runs.csv").open()) for cell in row]
+    assert {"'=1+1\x1b[2J", "'-one"} <= {*cells}
+    assert [cell for cell in cells if cell.startswith(("=", "+", "@", "-o"))] == []
 
 
 def test_no_template_and_no_script_puts_text_in_as_html() -> None:

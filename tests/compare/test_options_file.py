@@ -63,6 +63,9 @@ def test_other_versions_and_inputs_are_noted(first, tmp_path, capsys):
         ("mesh-size = 1", 'no table "options"'),
         # an option outside of the table
         ("mesh-size = 1\n[options]", "unknown key 'mesh-size'"),
+        # an output folder that the file, which may be of others, should not choose
+        ('[options]\nout = "/tmp/other"', "out = '/tmp/other' leads out of the working folder"),
+        ('[options]\nout = ["a/../../other"]', "out = 'a/../../other' leads out of the working folder"),
         # a file of a later version
         ("schema = 2\n[options]", "has schema 2; this version of pinn-ray reads schema 1"),
         ("[options", "cannot read the options file"),

@@ -207,6 +207,27 @@ def test_a_hidden_folder_of_the_user_is_not_lost(out):
     assert (previous / "thesis.tex").read_text() == "mine"
 
 
+@pytest.mark.parametrize("place", ["solutions", "training", "training/pinn-std", "."])
+def test_a_link_in_an_unfinished_folder_of_others_loses_no_file(tmp_path, place):
+    """It would have been followed: what lay there was removed, and the solutions were written there."""
+    mine, partial = tmp_path / "mine", tmp_path / "out.partial"
+    mine.mkdir()
+    (mine / "thesis.tex").write_text("mine")
+    (mine / MARK).touch()
+    (partial / place).parent.mkdir(parents=True, exist_ok=True)
+    (partial / place).symlink_to(mine, target_is_directory=True)
+    (partial / MARK).touch()
+    with pytest.raises(UserError, match="is a link, which no run has made"):
+        attempt(tmp_path / "out", keep=("pinn-std",), solutions=("fem",))
+    assert tree(mine) == {"thesis.tex": "mine"}
+
+
+def test_a_link_in_a_result_of_others_is_not_followed(out):
+    (out / "training").symlink_to(out.parent, target_is_directory=True)
+    with pytest.raises(UserError, match=r"run/training is a link, which no run has made"):
+        check_output(out)
+
+
 def test_a_file_is_not_replaced_by_a_folder(tmp_path):
     (tmp_path / "file").write_text("mine")
     with pytest.raises(UserError, match="is a file"):

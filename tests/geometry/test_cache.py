@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -237,6 +238,18 @@ def test_cad_files_come_from_the_cache_the_second_time(
     second = cad_files(Design(), tmp_path / "two", formats=["svg"], cache_dir=tmp_path / "cache")
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
     assert sorted(path.name for path in (tmp_path / "two").iterdir()) == ["section.svg"]
+
+
+@pytest.mark.parametrize("name", ["../up", "/tmp/up", "a/b"])
+def test_cad_files_of_a_foreign_cache_stay_in_the_output_folder(name: str, tmp_path: Path) -> None:
+    cad_files(Design(), tmp_path / "one", formats=["svg"], cache_dir=tmp_path / "cache")
+    (entry,) = (tmp_path / "cache").glob("*.zip")
+    with zipfile.ZipFile(entry, "a") as archive:
+        archive.writestr(name, "written")
+    with pytest.warns(RuntimeWarning, match="the cached file is damaged"):
+        cad_files(Design(), tmp_path / "two", formats=["svg"], cache_dir=tmp_path / "cache")
+    assert not (tmp_path / "up").exists()
+    assert [path.name for path in (tmp_path / "two").rglob("*")] == ["section.svg"]
 
 
 def test_import_needs_neither_cadquery_nor_gmsh() -> None:

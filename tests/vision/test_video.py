@@ -226,3 +226,30 @@ def test_a_full_disk_is_noticed_and_leaves_nothing(suffix, tmp_path):
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limit)
     assert not list(tmp_path.iterdir())
+
+
+NAMED = "secret.mkv"
+PLAYLISTS = {
+    "list.mkv": f"ffconcat version 1.0\nfile {NAMED}\n",  # known by its content, whatever its name
+    "list.m3u8": f"#EXTM3U\n#EXT-X-TARGETDURATION:9\n#EXTINF:9,\n{NAMED}\n#EXT-X-ENDLIST\n",
+    f"concat:{NAMED}": "x",  # names of FFmpeg's protocols
+    f"subfile,,start,0,end,0,,:{NAMED}": "x",
+    f"cache:{NAMED}": "x",
+    "frame%d.tga": "x",  # all of a sequence
+}
+
+
+@pytest.mark.parametrize("name", PLAYLISTS)
+def test_a_video_that_names_another_file_opens_nothing(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    written(Path(NAMED), smooth(3))
+    Path("frame0.tga").write_bytes(bytes([0, 0, 2, *[0] * 9, 8, 0, 8, 0, 24, 0]) + bytes(8 * 8 * 3))
+    Path(name).write_text(PLAYLISTS[name])
+    with pytest.raises(UserError, match=r"cannot read the video|no frame of the video"):
+        read(Path(name))
+
+
+def test_a_video_larger_than_any_camera_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("vision.frames.video.MOST_PIXELS", 64 * 48 - 1)
+    with pytest.raises(UserError, match="too large"):
+        read(written(tmp_path / "a.mkv", smooth(1)))

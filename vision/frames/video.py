@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from fractions import Fraction
+from io import BufferedReader
 from pathlib import Path
 from typing import cast
 
@@ -21,6 +22,7 @@ from av.video.reformatter import Colorspace, Interpolation, VideoReformatter
 
 from geometry.atomic import atomic_path
 from geometry.errors import ShapeError, UserError
+from vision import MOST_PIXELS
 from vision.frames.frame import MAX_RATE, RIG_MARK, CapturedImage, Frames, Image, ImageStream, plausible_rate
 
 MISSING_FRACTION = 0.02
@@ -33,6 +35,8 @@ BY_SLICES = ("ffv1",)
 """Decoders whose threads share a frame: with a frame for each, FFmpeg 8 corrupts memory at a damaged one."""
 MIN_QUANTISER, BITS_PER_PIXEL = "3", 4
 """Best quality and highest bit rate of the lossy codecs, as OpenCV has them."""
+ALONE = {"protocol_whitelist": "none"}
+"""Option with which FFmpeg opens no file or address that a video names, as a play list does."""
 MAX_TICKS = 65535
 """Of MPEG-4's clock in a second: the numerator of the rate."""
 
@@ -40,7 +44,9 @@ MAX_TICKS = 65535
 def video_frames(path: Path, rate: float | None = None) -> Frames:
     """Frames of a video file with the file's time stamps; `rate` counts if the file gives none.
 
-    Iterating warns if far fewer frames can be read than the file says that it has.
+    Nothing but the file is opened, whatever its content or its name says: FFmpeg takes `concat:a.mkv` for two
+    files and `http:a` for an address, so that it gets the open file. Frames of more than `MOST_PIXELS` are
+    not read. Iterating warns if far fewer frames can be read than the file says that it has.
 
     Raises:
         UserError: If it is no video, or not one frame can be read.
@@ -48,27 +54,32 @@ def video_frames(path: Path, rate: float | None = None) -> Frames:
     try:
         if not path.stat().st_size:
             raise UserError(f"cannot read the video {path}: the file is empty")
-        container = av.open(str(path), metadata_errors="ignore")
-    except PermissionError as error:
+        file = path.open("rb")
+    except OSError as error:
         raise UserError(f"cannot read the video {path}: {error.strerror}") from None
+    try:
+        container = av.open(file, "r", metadata_errors="ignore", options=ALONE)
     except (OSError, av.FFmpegError):
         container = None
-    if container is not None and not container.streams.video:
-        container.close()
-        container = None
-    if container is None:
+    if container is None or not container.streams.video:
+        if container is not None:
+            container.close()
+        file.close()
         raise UserError(
             f"cannot read the video {path}: it is no video, its end is missing, or FFmpeg lacks its codec"
         )
     stream = container.streams.video[0]
     stream.thread_type = "SLICE" if stream.codec.name in BY_SLICES else "AUTO"
+    stream.codec_context.options = {"max_pixels": str(MOST_PIXELS)}
     rate = plausible_rate(float(stream.average_rate or 0), rate)
     duration = (container.duration or 0) / av.time_base
     count = stream.frames or round(duration * rate) or None
-    return Frames(str(path), _images_of_video(path, container, rate, count), rate=rate, count=count)
+    return Frames(str(path), _images_of_video(path, file, container, rate, count), rate=rate, count=count)
 
 
-def _images_of_video(path: Path, container: InputContainer, rate: float, count: int | None) -> ImageStream:
+def _images_of_video(
+    path: Path, file: BufferedReader, container: InputContainer, rate: float, count: int | None
+) -> ImageStream:
     """Images with increasing times: a frame without a later time follows the last one by 1 / `rate`.
 
     A missing end is reported only if the last time falls short, too: where the rate varies, `count` is only
@@ -77,7 +88,7 @@ def _images_of_video(path: Path, container: InputContainer, rate: float, count: 
     read, first, last = 0, math.nan, -math.inf
     reformatter, tick = VideoReformatter(), container.streams.video[0].time_base
     simulated = RIG_MARK in container.metadata.values()
-    with container:
+    with file, container:
         for frame in _decoded(container):
             time = -math.inf if frame.pts is None or tick is None else float(frame.pts * tick)
             last = time if time > last else last + 1 / rate if read else 0.0
@@ -94,7 +105,9 @@ def _images_of_video(path: Path, container: InputContainer, rate: float, count: 
             yield CapturedImage(array, last, f"frame {read}", simulated)
             read += 1
     if not read:
-        raise UserError(f"no frame of the video {path} can be read: it is damaged, or FFmpeg lacks its codec")
+        raise UserError(
+            f"no frame of the video {path} can be read: it is damaged, too large, or FFmpeg lacks its codec"
+        )
     if count and max(read, (last - first) * rate + 1) < count - max(1, MISSING_FRACTION * count):
         warnings.warn(
             f"{path} says that it has {count} frames, but only the first {read} can be read: "

@@ -10,6 +10,9 @@ from typing import NamedTuple
 
 import cadquery as cq
 import numpy as np
+from OCP.IFSelect import IFSelect_ReturnStatus
+from OCP.STEPConstruct import STEPConstruct_ExternRefs
+from OCP.STEPControl import STEPControl_Reader
 
 from geometry.arrays import FloatArray
 from geometry.drawing.formats.chain import closed_loops
@@ -97,8 +100,9 @@ def _parts(path: Path) -> tuple[list[tuple[str, cq.Solid]], list[cq.Solid]]:
     """Solids with their names, and those that are markers.
 
     Raises:
-        UserError: If the file cannot be read.
+        UserError: If the file cannot be read, or refers to other files.
     """
+    _check_whole(path)
     try:
         named = [(name.rsplit("/", 1)[-1], shape) for shape, name, _, _ in cq.Assembly.importStep(str(path))]
     except ValueError:  # a single part is no assembly
@@ -112,6 +116,19 @@ def _parts(path: Path) -> tuple[list[tuple[str, cq.Solid]], list[cq.Solid]]:
         raise UserError(f"cannot read {path.name} as STEP: it holds no solid; export the body as a solid")
     bodies = [(name, solid) for name, solid in solids if not MARKER.match(name)]
     return bodies, [solid for name, solid in solids if MARKER.match(name)]
+
+
+def _check_whole(path: Path) -> None:
+    """Refuse a file whose parts are in other files, of any folder, which OpenCASCADE would read, too."""
+    reader = STEPControl_Reader()
+    if reader.ReadFile(str(path)) == IFSelect_ReturnStatus.IFSelect_RetDone:
+        others = STEPConstruct_ExternRefs(reader.WS())
+        others.LoadExternRefs()
+        if others.NbExternRefs():
+            raise UserError(
+                f"{path.name} refers to another file, {others.FileName(1)!r}, which is not read; export the "
+                "whole as one file"
+            )
 
 
 def _filled(body: cq.Solid, markers: Sequence[cq.Solid]) -> cq.Solid:

@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from geometry.arrays import FloatArray
 from solvers.fem.finite_strain.constraints import LoadState
 from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
+from solvers.petsc import PETSc
 
 SMALL = 1e-4
 """Least internal force over Young's modulus, mm, in the criterion: rounding of positions makes forces too."""

@@ -5,10 +5,10 @@ from typing import Any
 from weakref import finalize
 
 import numpy as np
-from petsc4py import PETSc
 
 from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
+from solvers.petsc import PETSc
 
 PREFIX = "pinnray_network_"
 LEAST_FILL = 2

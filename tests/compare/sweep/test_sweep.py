@@ -225,6 +225,29 @@ def test_an_empty_folder_is_no_sweep(tmp_path: Path) -> None:
         load_sweep(tmp_path)
 
 
+def test_a_journal_of_others_removes_no_file(tmp_path: Path) -> None:
+    """A rollback journal of an unfinished transaction may name a file, which SQLite removes after it."""
+    mine, journal, rollback = (tmp_path / name for name in ("thesis.tex", "a.sqlite", "a.sqlite-journal"))
+    mine.write_text("mine")
+    left = (  # a killed process leaves both files
+        "import os, signal, sqlite3, sys\n"
+        "sqlite3.connect(sys.argv[1]).executescript('create table samples (number integer)')\n"
+        "open_one = sqlite3.connect(sys.argv[1], isolation_level=None)\n"
+        "open_one.executescript('pragma cache_size = 1; begin immediate')\n"
+        "for n in range(20000): open_one.execute('insert into samples values (?)', (n,))\n"
+        "os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    subprocess.run([sys.executable, "-c", left, str(journal)], check=False)
+    name = bytes(mine)
+    sizes = (0x40000000 // 4096 + 1, len(name), sum(name))
+    first, *last = (size.to_bytes(4, "big") for size in sizes)
+    with rollback.open("ab") as file:
+        file.write(first + name + b"".join(last) + bytes.fromhex("d9d505f920a163d7"))
+    with pytest.raises(UserError, match=r"a\.sqlite-journal names another file"), opened(journal) as content:
+        content.numbers()
+    assert mine.read_text() == "mine"
+
+
 def test_the_same_study_has_the_same_results(swept: Path, tmp_path: Path) -> None:
     study = load_study(swept / "ribs.toml")
     first = load_sweep(swept / "out").measurements[0]

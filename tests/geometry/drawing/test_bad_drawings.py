@@ -1,12 +1,14 @@
 """Messages for drawings and descriptions that are no finger: one line each."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from geometry import UserError
 from geometry.cache import drawn_finger
 from geometry.drawing.description import Description, load_description
-from geometry.drawing.load import load_drawing
+from geometry.drawing.load import load_drawing, read_drawing
 from tests.geometry.drawing.files import BEAM, FINRAY, rectangle, write_dxf, write_svg
 
 HOLE = rectangle(40, -7, 10, 4)
@@ -220,6 +222,23 @@ def test_a_step_file_that_was_cut_off_is_one_line(tmp_path):
     path.write_bytes((FINRAY / "Finray_8.stp").read_bytes()[:3000])
     with pytest.raises(UserError, match=r"cannot read cut\.stp as STEP: STEP File could not be loaded"):
         drawn_finger(path, Description(), cache_dir=tmp_path / "cache")
+
+
+def test_a_step_file_reads_no_other_file(tmp_path, monkeypatch):
+    """OpenCASCADE reads the parts of an assembly from files of any folder."""
+    import cadquery as cq
+    from cadquery.occ_impl.exporters.assembly import toCAF
+    from OCP.STEPCAFControl import STEPCAFControl_Writer
+    from OCP.STEPControl import STEPControl_StepModelType
+
+    monkeypatch.chdir(tmp_path)
+    _, document = toCAF(cq.Assembly(name="whole").add(cq.Workplane().box(60, 10, 20), name="body"))
+    writer = STEPCAFControl_Writer()
+    writer.Transfer(document, STEPControl_StepModelType.STEPControl_AsIs, "part-")
+    writer.Write("whole.step")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["part-body.stp", "whole.step"]
+    with pytest.raises(UserError, match=r"whole\.step refers to another file, 'part-body\.stp'"):
+        read_drawing(Path("whole.step"))
 
 
 def test_a_marker_must_be_round(tmp_path):

@@ -1,0 +1,13 @@
+"""PETSc, started without the files of options that it reads from the working folder and from the home.
+
+A `.petscrc` or `petscrc` of others in the working folder could have it load a library or write any file. The
+variable `PETSC_OPTIONS` counts.
+"""
+
+import petsc4py
+
+petsc4py.init(["", "-skip_petscrc"])
+
+from petsc4py import PETSc  # noqa: E402
+
+__all__ = ["PETSc"]

@@ -1,0 +1,105 @@
+"""Files in the working folder that a library or Python itself would take for settings or code of the user."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from compare.runtime.processes import in_processes
+from compare.sweep.workers import Workers
+from geometry.worker import Worker, child_environment
+
+
+def sum_of(number: int, progress: Callable[..., None]) -> int:
+    return number + 1
+
+
+@pytest.fixture
+def hostile_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working folder, with modules that end every Python program which imports them from there."""
+    for name in ("selectors", "random", "signal", "tempfile"):
+        (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'a').write('{name} ')\n")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_worker_runs_no_module_of_the_working_folder(hostile_folder: Path) -> None:
+    worker = Worker()
+    task = {"kind": "cad", "what": "this", "formats": ["svg"], "finger": {}, "timeout_s": 60}
+    said = worker.answer({**task, "output": str(worker.folder / "made")}, timeout_s=60)
+    worker.stop()
+    assert (said, (hostile_folder / "ran").exists()) == ("", False)
+
+
+def test_processes_run_no_module_of_the_working_folder(hostile_folder: Path) -> None:
+    with closing(in_processes(sum_of, {"a": 1}, processes=1, report=lambda *_: None)) as answers:
+        assert list(answers) == [("a", 2)]
+    assert not (hostile_folder / "ran").exists()
+
+
+def test_workers_of_a_sweep_run_no_module_of_the_working_folder(hostile_folder: Path) -> None:
+    pytest.importorskip("distributed")
+    with Workers(1) as workers:
+        assert workers._connected().submit(os.getcwd).result() == str(hostile_folder)
+    assert not (hostile_folder / "ran").exists()
+
+
+def test_gmsh_takes_no_options_from_the_working_folder(tmp_path: Path) -> None:
+    (tmp_path / ".petscrc").write_text(f"-history {tmp_path / 'written'}\n")
+    done = subprocess.run(
+        [sys.executable, "-c", "from geometry.mesh.gmsh_model import session\nwith session(): pass"],
+        env=child_environment(os.environ),
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert (done.stdout, done.stderr) == ("", "")
+    assert not (tmp_path / "written").exists()
+
+
+def test_fem_takes_no_options_from_the_working_folder(tmp_path: Path) -> None:
+    """PETSc would write a file of any name or load a library, DOLFINx pass any flag to the compiler."""
+    for name in (".petscrc", "petscrc"):
+        (tmp_path / name).write_text(f"-log_view :{tmp_path / 'written'}\n")
+    for name in ("parameters", "options"):  # until 0.5, and later
+        (tmp_path / f"dolfinx_jit_{name}.json").write_text('{"cffi_extra_compile_args": ["-fplugin=x.so"]}')
+        (tmp_path / f"ffcx_{name}.json").write_text('{"epsilon": 0.5}')
+    code = (
+        "from solvers.fem import dolfinx_compat as own\n"
+        "for package in (own.dolfinx.jit, own.ffcx):\n"
+        "    options = getattr(package, 'get_options', None) or package.get_parameters\n"
+        "    print(options().get('cffi_extra_compile_args'), options().get('epsilon'))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=child_environment(os.environ),
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "x.so" not in done.stdout
+    assert "0.5" not in done.stdout
+    assert done.stdout.count("\n") == 2
+    assert not (tmp_path / "written").exists()
+
+
+def test_pictures_take_no_settings_from_the_working_folder(tmp_path: Path) -> None:
+    """LaTeX would be started, and could read any file into a picture."""
+    (tmp_path / "matplotlibrc").write_text("text.usetex: True\ntext.latex.preamble: \\input{/etc/hostname}\n")
+    code = (
+        "import sys, subprocess\n"
+        "from pathlib import Path\n"
+        "from geometry.figure import figure\n"
+        "subprocess.check_output = lambda *given, **_: sys.exit('a program was started')\n"
+        "with figure(1.0) as drawn:\n"
+        "    drawn.text(0.5, 0.5, 'text')\n"
+        "drawn.save(Path('a.png'))\n"
+    )
+    command = [sys.executable, "-c", code]
+    subprocess.run(command, env=child_environment(os.environ), cwd=tmp_path, check=True)
