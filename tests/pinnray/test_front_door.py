@@ -91,6 +91,10 @@ def test_measurements_can_be_a_data_frame_and_a_solver_an_object():
         (lambda: pr.compare("defualt"), "there is no design 'defualt'; the presets are default"),
         (lambda: pr.compare(solvers="fme"), "no solver is called 'fme'; did you mean 'fem'"),
         (lambda: pr.compare(solvers=[]), "no solver was asked for"),
+        (
+            lambda: pr.compare(solvers="fem", load=pr.Load(displacement=(0.0, 0.0))),
+            "the load does not move the contact: there is nothing to compare",
+        ),
         (lambda: pr.solver("fem", degre=1), "fem has no setting 'degre'"),
         (lambda: pr.mesh(size=-1), "size"),
         (lambda: pr.compare(measurements=pd.DataFrame({"x_mm": [1]})), "the data frame has no column y_mm"),
