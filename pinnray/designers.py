@@ -4,6 +4,7 @@ The worker processes run a calling script once more: in a script, what starts a 
 under `if __name__ == "__main__":`.
 """
 
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,7 +27,8 @@ def sweep(study: str | Path, *, out: str | Path, processes: int | None = None) -
         processes: Worker processes; None means one per core.
 
     Returns:
-        A row for every finished sample, with units in the headings, such as `force_N`.
+        A row for every finished sample, with units in the headings, such as `force_N`. Warns of samples
+        whose body goes through itself, or whose load or material looks like another unit.
 
     Raises:
         UserError: If the study cannot be run, or the folder holds another one.
@@ -36,7 +38,10 @@ def sweep(study: str | Path, *, out: str | Path, processes: int | None = None) -
     from compare.sweep.tables import table
 
     file = Path(study)
-    return table(run_sweep(SweepJob(load_study(file), file.parent, Path(out), processes or cores())))
+    done = run_sweep(SweepJob(load_study(file), file.parent, Path(out), processes or cores()))
+    for remark in done.remarks:
+        warnings.warn(remark, stacklevel=2)
+    return table(done)
 
 
 def predict(sweep: str | Path, fingers: Sequence[Mapping[str, object]]) -> "pd.DataFrame":

@@ -1,5 +1,6 @@
 """Functions of the front door: mesh, solve, compare, track, cross-validate."""
 
+import warnings
 from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import replace
@@ -86,6 +87,9 @@ def solve(
 ) -> Solution:
     """Solve a problem, or a design with the usual material and load, with one solver.
 
+    Warns of numbers that look like another unit, of unlikely measurements, and of a body that is turned
+    inside out or goes through itself, which the solution's status says, too.
+
     Args:
         problem: A problem, or a design in one of the ways of `mesh`.
         solver: A solver or its name; it takes the material law that it has.
@@ -95,8 +99,11 @@ def solve(
         measurements: Marker displacements, for a solver that assimilates them.
 
     Raises:
-        UserError: If the solver does not support the problem.
+        UserError: If the solver does not support the problem, or the measurements cannot be of it.
     """
+    from compare.evaluation.deformed_body import Body
+    from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
+
     chosen = _solver(solver)
     if not isinstance(problem, Problem):
         finger = _design(problem)
@@ -107,7 +114,16 @@ def solve(
         raise UserError(
             "a Problem has its own mesh, material, load and observations; give a design to choose them"
         )
-    return solved(chosen, replace(problem, material=with_law(problem.material, chosen)))
+    problem = replace(problem, material=with_law(problem.material, chosen))
+    remarks = [] if problem.finger is None else unit_remarks(problem)  # a body of a closed form has any unit
+    if (given := problem.observations) is not None:
+        check_positions(given, problem.mesh)
+        remarks += displacement_remarks(given, problem)
+    solution = solved(chosen, problem)
+    status, faults = Body(problem.mesh).status(solution)
+    for remark in [*remarks, *faults]:
+        warnings.warn(remark, stacklevel=2)
+    return replace(solution, status=status)
 
 
 def compare(

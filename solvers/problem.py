@@ -29,6 +29,10 @@ SOFTEST, STIFFEST = 1e-6, 1e7
 """Young's moduli of solids, MPa: a thousandth of the softest gels' to eight times diamond's."""
 
 
+LEAST_TRAVEL = 1e-9
+"""Smallest displacement of an indenter that moves, mm: a hundredth of an atom's size."""
+
+
 class Material(CheckedModel):
     """An isotropic elastic material.
 
@@ -102,6 +106,11 @@ class Load(CheckedModel):
     def _acts(self) -> Self:
         if all(value is None for value in self.displacement):
             raise ValueError("the load leaves both components free; prescribe u, v or both (mm)")
+        if 0 < max(abs(value or 0.0) for value in self.displacement) < LEAST_TRAVEL:
+            raise ValueError(
+                f"the load moves the contact by less than {LEAST_TRAVEL:g} mm, a hundredth of an atom's "
+                "size; give mm"
+            )
         if self.kind == "patch" and self.position is not None:
             raise ValueError(
                 "a patch lies on whole elements: mesh the finger with its contact_position there"

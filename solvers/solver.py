@@ -20,6 +20,9 @@ NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 RESERVED = "truth"
 """Name of the field of a simulated finger, which no solver can have."""
 
+NONE_SEEN = "none of the markers is visible; at least one is needed, or leave the measurements out"
+"""Refusal of observations that say nothing."""
+
 Progress = Callable[[float, str], None]
 """Called with the fraction done (0 to 1) and a short text; a fast solver may ignore it."""
 
@@ -100,7 +103,13 @@ def check_name(name: str) -> None:
 
 
 def check_problem(solver: Solver, problem: Problem) -> None:
-    """Raise an `UnsupportedProblemError` if the solver does not support the law or the kind of load."""
+    """Raise an `UnsupportedProblemError` if the solver does not support the law or the kind of load.
+
+    Raises:
+        UserError: If there are markers, none of which was seen.
+    """
+    if problem.observations is not None and not problem.observations.known:
+        raise UserError(f"{solver.name}: {NONE_SEEN}")
     if problem.material.law not in solver.laws:
         raise UnsupportedProblemError(
             f"{solver.name} has the law {' or '.join(solver.laws)}, not {problem.material.law}"
@@ -145,6 +154,11 @@ def solved(solver: Solver, problem: Problem, progress: Progress = silent) -> Sol
         raise SolverFailedError(solver, error) from error
     except SystemExit as ended:
         raise UserError(f"solver {solver.name} ended the program (exit code {ended.code!r})") from ended
+    return _checked(solver, solution, problem)
+
+
+def _checked(solver: Solver, solution: Solution, problem: Problem) -> Solution:
+    """The solution under its solver's name; else an error, as of `solved`."""
     for value, kind in ((solution, Solution), (getattr(solution, "status", None), Status)):
         if not isinstance(value, kind):
             said = f"{_named(value)} as its {kind.__name__}"
@@ -207,7 +221,9 @@ def _fault(solution: Solution, problem: Problem) -> str | None:
         if values.shape != shape or given is None:
             found = "that is None" if given is None else f"of shape {values.shape}"
             return f"{what} {found}; it must have the shape {shape}"
-        if what != "left_out" and not np.isfinite(values).all():
+        if what == "left_out" and problem.observations is not None:
+            values = values[problem.observations.visible]
+        if not np.isfinite(values).all():
             return f"{what} that is not finite everywhere"
     return None
 
@@ -261,5 +277,6 @@ class Transferable(Protocol):
 def refitter(solver: Solver, problem: Problem) -> Callable[[Observations], Solution]:
     """A function that solves a problem for any observations, sharing work where the solver can."""
     if isinstance(solver, Refittable):
-        return solver.refitter(problem)
+        refit = solver.refitter(problem)
+        return lambda seen: _checked(solver, refit(seen), replace(problem, observations=seen))
     return lambda observations: solved(solver, replace(problem, observations=observations))

@@ -258,5 +258,62 @@ DEFECTS = (
         "which were written.",
         "`test_cache.py`, stay in the output folder",
     ),
+    (
+        "trying",
+        "`fem` at Poisson's ratio 0.499999999999 gave an energy a third too large as converged: rounding "
+        "had spoilt the factors. A direct solution whose residual is above a thousandth of the load is "
+        "refused.",
+        "`test_fem.py`, rounding has spoilt",
+    ),
+    (
+        "trying",
+        "A stroke of 1e-200 mm, given from Python, ended with a `ZeroDivisionError`.",
+        "`test_problem.py`, materials and loads",
+    ),
+    (
+        "trying",
+        "With a tolerance of 1e30, `fem-nonlinear` took the linear guess for an equilibrium: converged after "
+        "no iteration. Tolerances above 0.001 are refused.",
+        "`test_fem_nonlinear.py`, takes any state",
+    ),
+    (
+        "trying",
+        "`pr.compare` under a load that does not move ended with a `ZeroDivisionError`.",
+        "`test_front_door.py`, a wrong input",
+    ),
+    (
+        "trying",
+        "`pr.solve` said nothing of a body that goes through itself, of units, or of measurements in metres.",
+        "`test_front_door.py`, no real finger, another unit, impossible measurements",
+    ),
+    (
+        "trying",
+        "Observations of which no marker is visible, or with nine at one place, ended with a `ValueError` "
+        "or as well determined.",
+        "`test_solver.py`, none was seen; `test_plausibility.py`, cannot be, one place",
+    ),
+    (
+        "trying",
+        "One marker near the tip was refused: its direction, which finite strain changes, looked swapped.",
+        "`test_plausibility.py`, one place",
+    ),
+    (
+        "trying",
+        "`crossval` said neither which solver did not converge nor that a body goes through itself, and "
+        "nothing of units.",
+        "`test_crossval.py`, speaks against",
+    ),
+    (
+        "trying",
+        "A prediction or refit of another package's solver that is no number made a mean `nan`.",
+        "`test_solver.py`, prediction without it, refit; `test_crossval.py`, no number; "
+        "`test_deformed_body.py`, not finite",
+    ),
+    (
+        "trying",
+        "`sweep` said nothing of bodies through themselves or units, and left what is no number out of "
+        "its medians.",
+        "`test_sweep.py`, goes wrong, no number",
+    ),
 )
 """Found by, what happened, test."""

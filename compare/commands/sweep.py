@@ -56,6 +56,8 @@ def sweep(
             Console().print(terminal_table(grid.title, headings, shown, left=left))
     for path in written:
         print(path)
+    for remark in done.remarks:
+        say(f"warning: {remark}")
     if bad := sum(each.state in ("failed", "not converged") for each in done.measurements):
         say(
             f"error: {bad} of {len(done.samples)} samples failed or did not converge; failed ones are tried "

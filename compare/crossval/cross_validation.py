@@ -13,7 +13,7 @@ from compare.crossval.solver_folds import SolverTask, run_folds
 from compare.crossval.study import Study, visible_markers
 from compare.crossval.true_fields import TrueField, TruthTask, simulate_truth
 from compare.crossval.weight_sweep import SWEPT, sweep_weights
-from compare.evaluation.plausibility import check_positions, displacement_remarks
+from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
 from compare.evaluation.virtual_experiment import experiment_source
 from compare.runtime.output_folder import locked
 from compare.runtime.processes import ProcessFailed, in_stages
@@ -53,7 +53,8 @@ def cross_validate(study: Study, stages: Stages | None = None) -> CrossvalResult
         if given:
             check_positions(given, mesh)
         problem = Problem(mesh, study.material, study.load)
-        for remark in displacement_remarks(given, problem) if given else ():
+        remarks = displacement_remarks(given, problem) if given else []
+        for remark in [*unit_remarks(problem), *remarks]:
             warnings.warn(remark, stacklevel=2)
     load_cases = load_cases_of(problem, others=LOAD in study.schemes and given is None)
     study.out.mkdir(parents=True, exist_ok=True)
@@ -96,6 +97,8 @@ def cross_validate(study: Study, stages: Stages | None = None) -> CrossvalResult
         provenance = {**definition, "problem_sha256": problem.digest, **stages.record()}
         with stages.stage("report"):
             write_results(study.out, found, results, sweeps, provenance)
+    for remark in found.remarks:
+        warnings.warn(remark, stacklevel=2)
     return found
 
 

@@ -81,6 +81,7 @@ class FoldResult:
             if the solver states none.
         force_within: Whether the magnitude of the true force lies in the stated interval; None likewise.
         position_within: Whether the place of the true force lies in the stated interval; None likewise.
+        message: What speaks against the result; empty if nothing does.
     """
 
     fold: Fold
@@ -94,6 +95,7 @@ class FoldResult:
     von_mises_coverage: float | None = None
     force_within: bool | None = None
     position_within: bool | None = None
+    message: str = ""
 
     @property
     def held(self) -> list[int]:

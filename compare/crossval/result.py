@@ -1,6 +1,6 @@
 """The scores of a finished cross-validation."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from math import isnan, nan
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
@@ -64,6 +64,7 @@ class LayoutResult:
         scores: By solver and scheme.
         differences: By solver, baseline, scheme and entry of `COMPARED`.
         failed: Error messages of the solvers that have no score.
+        remarks: What speaks against results: solvers that did not converge, and impossible bodies.
     """
 
     source: str
@@ -72,6 +73,7 @@ class LayoutResult:
     scores: Mapping[str, Mapping[str, Score]]
     differences: Mapping[str, Mapping[str, Mapping[str, Mapping[str, Difference]]]]
     failed: Mapping[str, str]
+    remarks: Sequence[str] = ()
 
     def difference(self, label: str, baseline: str, scheme: str, what: str) -> Difference | None:
         """One of the `differences`; None if there is no such one."""
@@ -115,6 +117,7 @@ class LayoutResult:
             },
             differences=differences,
             failed=failed,
+            remarks=list(_remarks(results)),
         )
 
     def held_out_rows(self) -> list[dict[str, Cell]]:
@@ -176,6 +179,7 @@ class LayoutResult:
                 if variant.label in self.scores
             },
             "failed": dict(self.failed),
+            "remarks": list(self.remarks),
         }
 
 
@@ -241,6 +245,15 @@ class CrossvalResult:
             for label, message in each.failed.items()
         }
 
+    @property
+    def remarks(self) -> list[str]:
+        """What speaks against results, with truth and layout if there are several."""
+        return [
+            ", ".join(filter(None, [case.said_among(self.cases), remark]))
+            for case, each in self.cases.items()
+            for remark in each.remarks
+        ]
+
     def table(self) -> "pd.DataFrame":
         """The columns of `held_out.csv` by truth, layout, solver and scheme; NaN where there is no number."""
         import pandas as pd
@@ -279,6 +292,15 @@ class CrossvalResult:
                 for truth in self.truths
             },
         }
+
+
+def _remarks(results: Mapping[str, SeedResults]) -> Iterator[str]:
+    """A sentence on each solver against whose results something speaks."""
+    for label, seeds in results.items():
+        every = [found for seed in seeds for found in seed]
+        against = [found.message for found in every if found.message]
+        if against:
+            yield f"{label}, {len(against)} of {len(every)} folds and seeds, the first of them: {against[0]}"
 
 
 def _with_verdicts(differences: Mapping[str, Difference]) -> dict[str, dict[str, Any]]:

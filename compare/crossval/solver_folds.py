@@ -14,6 +14,7 @@ from compare.crossval.folds import ALL, Fold, FoldResult, LoadCase, hide_markers
 from compare.crossval.scores import LEVEL
 from compare.crossval.study import SolverVariant, Study
 from compare.crossval.true_fields import FieldSampler, SampledField, TrueField
+from compare.evaluation.deformed_body import Body
 from compare.evaluation.truths import SLIDING, Truth
 from geometry.atomic import write_bytes
 from geometry.errors import UserError
@@ -115,6 +116,7 @@ class FoldRunner:
         self._true_law = replace(self.problem, material=(task.truth or SLIDING).material(material))
         markers = task.observations[0][0]
         self.sampler = FieldSampler.of(mesh, markers.points, markers.marker_radius)
+        self._body = Body(mesh)
         self._truths = [TrueField.load(path) for path in task.truths]
         self._unassimilated: dict[int, tuple[Solution, SampledField]] = {}
         self._refit: Callable[[Observations], Solution] | None = None
@@ -146,13 +148,19 @@ class FoldRunner:
                 noise = observations[0].standard_deviations
                 deviations = np.hypot(stated(self.sampler.centres), noise).tolist()
         own = replace(self.problem, material=solution.problem.material)  # a solver may have estimated it
+        status, faults = self._body.status(solution)
+        against = [*faults, *([] if status.converged else [f"did not converge: {solution.status.message}"])]
+        errors = sampled.markers - observations[fold.load_case].displacements
+        if not np.isfinite(errors).all():
+            raise UserError(f"{self._solver.name}: its displacement is not finite at every marker")
         return FoldResult(
             fold,
-            errors=(sampled.markers - observations[fold.load_case].displacements).tolist(),
+            errors=errors.tolist(),
             deviations=deviations,
             fields=self.distances(sampled, fold.load_case, own),
-            converged=bool(solution.status.converged),
+            converged=status.converged,
             given=given,
+            message="; ".join(against),
             **(self._against_truth(solution, sampled) if fold.scheme == ALL and self._truths else {}),
         )
 

@@ -13,6 +13,7 @@ from geometry.arrays import BoolArray, FloatArray, IntArray
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
 from solvers.lagrange import LagrangeSpace
+from solvers.solution import Solution, Status
 
 QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 """Nodes of the four triangles into which the middles of its edges cut a quadratic one."""
@@ -40,11 +41,13 @@ class Body:
     def _quarters(self) -> IntArray:
         return self._space.cell_nodes[:, QUARTERS].reshape(-1, 3)
 
-    def inside_out(self, evaluation: Evaluation) -> BoolArray:
-        """The triangles that are turned inside out, wholly or in one of their quarters, shape (t,)."""
-        moved = self._space.nodes + np.concatenate(
-            [evaluation.node_displacement, evaluation.edge_displacement]
-        )
+    def inside_out(self, displacement: FloatArray) -> BoolArray:
+        """The triangles that are turned inside out, wholly or in one of their quarters, shape (t,).
+
+        Args:
+            displacement: Of the mesh's nodes and the middles of its edges, shape (n + e, 2), mm.
+        """
+        moved = self._space.nodes + displacement
         return np.asarray((signed_areas(moved, self._quarters) <= 0).reshape(-1, len(QUARTERS)).any(axis=1))
 
     def crossings(self, displacement: FloatArray) -> FloatArray:
@@ -65,23 +68,51 @@ class Body:
         places = shapely.get_coordinates(shapely.centroid(shapely.intersection(lines[one], lines[other])))
         return np.asarray(places[places[:, 0].argsort()])
 
-    def faults(self, evaluation: Evaluation) -> dict[str, str]:
-        """What is impossible about a result, with the place."""
-        if not evaluation.finite:
+    def faults(self, displacement: FloatArray) -> dict[str, str]:
+        """What is impossible about a displacement, with the place.
+
+        Args:
+            displacement: Of the mesh's nodes and the middles of its edges, shape (n + e, 2), mm.
+        """
+        if not np.isfinite(displacement).all():
             return {NOT_FINITE: ""}
         faults = {}
-        turned = self.inside_out(evaluation)
+        turned = self.inside_out(displacement)
         if turned.any():
             x, y = self._mesh.points[self._mesh.triangles[turned]].mean(axis=1)[0]
             where = (
                 f" in {turned.sum()} of {len(turned)} triangles, one of them at rest at ({x:.3g}, {y:.3g}) mm"
             )
             faults[INSIDE_OUT] = where
-        crossed = self.crossings(evaluation.node_displacement)
+        crossed = self.crossings(displacement[: len(self._mesh.points)])
         if len(crossed):
             x, y = crossed[0]
             faults[THROUGH_ITSELF] = f" near ({x:.3g}, {y:.3g}) mm"
         return faults
+
+    def status(self, solution: Solution) -> tuple[Status, list[str]]:
+        """The status of a solution with what is impossible about its body, as `with_body_checks` judges it.
+
+        Returns:
+            The status, and a remark on each fault.
+        """
+        faults = self.faults(solution.displacement(self._space.at_nodes()))
+        status, law = solution.status, solution.problem.material.law
+        judged = Status(*_judged(bool(status.converged), status.message, law, faults))
+        return judged, [f"{solution.solver}: {fault}; {ADVICE[fault]}" for fault in faults]
+
+
+def _faults(body: Body, evaluation: Evaluation) -> dict[str, str]:
+    if not evaluation.finite:
+        return {NOT_FINITE: ""}
+    return body.faults(np.concatenate([evaluation.node_displacement, evaluation.edge_displacement]))
+
+
+def _judged(converged: bool, message: str, law: str, faults: dict[str, str]) -> tuple[bool, str]:
+    """Whether a result counts as converged, and its message with the faults that it does not say yet."""
+    fatal = NOT_FINITE in faults or (INSIDE_OUT in faults and law != CERTIFIED_LAW)
+    said = [f"{fault}{place}" for fault, place in faults.items() if fault not in message]
+    return converged and not fatal, "; ".join([message.rstrip(". "), *said]) if said else message
 
 
 def with_body_checks(
@@ -101,16 +132,14 @@ def with_body_checks(
     body, checked = Body(mesh), []
     having: dict[str, list[str]] = {}
     for evaluation in evaluations:
-        faults = body.faults(evaluation)
-        fatal = NOT_FINITE in faults or (INSIDE_OUT in faults and evaluation.law != CERTIFIED_LAW)
-        said = [f"{fault}{place}" for fault, place in faults.items() if fault not in evaluation.message]
-        if said:
-            message = "; ".join([evaluation.message.rstrip(". "), *said])
-            evaluation = replace(evaluation, message=message, converged=evaluation.converged and not fatal)
+        faults = _faults(body, evaluation)
+        if faults:
+            own = _judged(evaluation.converged, evaluation.message, evaluation.law, faults)
+            evaluation = replace(evaluation, converged=own[0], message=own[1])
         checked.append(evaluation)
         for fault in faults:
             having.setdefault(fault, []).append(evaluation.solver)
     if truth is not None:
-        for fault in body.faults(truth):
+        for fault in _faults(body, truth):
             having.setdefault(fault, []).append("the simulated finger")
     return checked, [f"{', '.join(names)}: {fault}; {ADVICE[fault]}" for fault, names in having.items()]

@@ -148,7 +148,10 @@ class Evaluation:
     @property
     def finite(self) -> bool:
         """True if displacement and stress are finite everywhere."""
-        fields = (self.node_displacement, self.edge_displacement, self.stress)
+        fields = (
+            *(self.node_displacement, self.edge_displacement, self.displacement, self.marker_displacement),
+            *(self.stress, self.von_mises, self.strain),
+        )
         return all(np.isfinite(values).all() for values in fields)
 
     def per_triangle(self, values: FloatArray) -> FloatArray:

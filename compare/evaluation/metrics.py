@@ -93,7 +93,7 @@ def _differences(evaluation: Evaluation, reference: Evaluation) -> ReferenceDiff
         stress={name: differ("stress", index) for name, index in COMPONENTS.items()},
         strain={name: differ("strain", index) for name, index in COMPONENTS.items()},
         mae_markers=float(markers.mean()),
-        energy=(evaluation.energy - reference.energy) / reference.energy,
+        energy=(evaluation.energy - reference.energy) / reference.energy if reference.energy else np.nan,
     )
 
 

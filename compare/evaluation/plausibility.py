@@ -13,9 +13,13 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Load, Problem
 from solvers.registry import make_solver
+from solvers.solver import NONE_SEEN
+from vision.measurements import SMALLEST_DISTANCE
 
 UNITS = {"metres": 1000.0, "inches": 25.4, "centimetres": 10.0, "micrometres": 0.001}
 """Millimetres in other units."""
+LOOKS_LIKE = "this looks like"
+"""Words before the unit that a number is taken to have."""
 IMPOSSIBLE_UNITS = ("metres", "micrometres")
 """Units that no other stroke explains: no camera sees a stroke a thousand times smaller."""
 POSITION_MIXUPS: Mapping[str, Callable[[FloatArray], FloatArray]] = {
@@ -39,13 +43,20 @@ TINY = 1e-3
 """Share of the finger's length below which a stroke or a radius looks like metres; strokes have per cents."""
 SOFT, STIFF = 0.02, 2e4
 """Young's moduli that are printed, MPa: the softest silicones have 0.05, filled plastics up to 15,000."""
+NARROW = 0.02
+"""Share of the finger's length within which markers tell of one place only: a disc has about that size."""
 SMALL = 0.1
 """Share of the stroke below which `fem`'s displacements at the markers say little of a direction."""
 
 
 def check_positions(observations: Observations, mesh: TriangleMesh) -> None:
-    """Raise a `UserError` if the markers are not on the body or all lie where their discs have no room."""
+    """Raise a `UserError` if no marker was seen, or they cannot be markers of the body.
+
+    They cannot if one is not on the body, two are at one place, or all lie where their discs have no room.
+    """
     points = observations.points
+    if not observations.known:
+        raise UserError(NONE_SEEN)
     try:
         mesh.locate(points)
     except OutsideBodyError as error:
@@ -56,6 +67,9 @@ def check_positions(observations: Observations, mesh: TriangleMesh) -> None:
             "positions are those before loading, in the finger's frame, in mm"
         ) from None
     apart = np.linalg.norm(points[:, None] - points, axis=2)[np.triu_indices(len(points), 1)]
+    if len(apart) and float(apart.min()) < SMALLEST_DISTANCE:
+        first, second = (int(ends[apart.argmin()]) + 1 for ends in np.triu_indices(len(points), 1))
+        raise UserError(f"the markers {first} and {second} are at one place; keep one")
     crowded = bool(len(apart)) and float(apart.min()) < 2 * observations.marker_radius
     for unit, factor in UNITS.items():
         if (crowded or unit == "metres") and factor > 1 and _inside(mesh, points * factor):
@@ -74,15 +88,15 @@ def unit_remarks(problem: Problem) -> list[str]:
         problem.material.young,
     )
     remarks = [
-        f"the {name} of {size:g} mm is {size / length:.1g} of the finger's length; this looks like metres, "
+        f"the {name} of {size:g} mm is {size / length:.1g} of the finger's length; {LOOKS_LIKE} metres, "
         "give mm"
         for name, size in (("stroke", float(np.abs(load.values).max())), ("radius", load.radius))
-        if size is not None and size < TINY * length
+        if size is not None and 0 < size < TINY * length
     ]
     if not SOFT <= young <= STIFF:
         unit = "gigapascals" if young < SOFT else "pascals"
         remarks.append(
-            f"Young's modulus of {young:g} MPa is no rubber's or plastic's; this looks like {unit}, give MPa"
+            f"Young's modulus of {young:g} MPa is no rubber's or plastic's; {LOOKS_LIKE} {unit}, give MPa"
         )
     return remarks
 
@@ -107,21 +121,37 @@ def displacement_remarks(observations: Observations, problem: Problem) -> list[s
             f"the measurements are impossible: marker {number} moved by {far:.4g} mm, and the finger is "
             f"{length:.4g} mm long; give displacements in mm, final minus initial position"
         )
+    spread = float(np.linalg.norm(np.ptp(points, axis=0)))
+    remarks = [] if spread > NARROW * length else [_of_one_place(len(points), spread)]
     if not moved.any():
-        return ["the measurements say that no marker moved"]
+        return [*remarks, "the measurements say that no marker moved"]
     try:
         expected = _expected(problem, points)
     except ImportError as error:
-        return [f"the measurements were not checked against fem, which needs DOLFINx: {error}"]
+        return [*remarks, f"the measurements were not checked against fem, which needs DOLFINx: {error}"]
     stroke = float(np.abs(problem.load.values).max())
     if float(np.sqrt((expected**2).sum(axis=1).mean())) < SMALL * stroke:
-        return []
-    return _compared(moved, expected, stroke, number)
+        return remarks
+    return [*remarks, *_compared(moved, expected, stroke, number, apart=not remarks)]
 
 
-def _compared(moved: FloatArray, expected: FloatArray, stroke: float, number: int) -> list[str]:
-    """Remarks on displacements beside those of `fem`, shapes (m, 2), mm; marker `number` moved farthest."""
-    own = _cosine(moved, expected)
+def _of_one_place(count: int, spread: float) -> str:
+    """The remark on markers that tell of one place only; all lie within `spread`, mm."""
+    seen = "one marker was seen" if count == 1 else f"all {count} markers seen lie within {spread:.2g} mm"
+    return (
+        f"{seen}: the measurements say what happens at one place, and nothing of the rest of the finger; "
+        "errors at markers do not either"
+    )
+
+
+def _compared(
+    moved: FloatArray, expected: FloatArray, stroke: float, number: int, *, apart: bool
+) -> list[str]:
+    """Remarks on displacements beside those of `fem`, shapes (m, 2), mm; marker `number` moved farthest.
+
+    At one place, where markers are not `apart`, their direction says nothing: at finite strain it is another.
+    """
+    own = _cosine(moved, expected) if apart else 1.0
     ratio = float(np.linalg.norm(moved) / np.linalg.norm(expected))
     likeness = {said: _cosine(undone(moved), expected) for said, undone in DISPLACEMENT_MIXUPS.items()}
     mixup = max(likeness, key=lambda said: likeness[said])
@@ -145,7 +175,11 @@ def _compared(moved: FloatArray, expected: FloatArray, stroke: float, number: in
             f"the markers' displacements are unlike those of fem (cosine {own:.2f}); check markers, columns, "
             "signs and load"
         )
-    elif np.abs(moved[:, 0]).max() > SMALL * stroke and _cosine(moved[:, 0], expected[:, 0]) < OPPOSED:
+    elif (
+        apart
+        and np.abs(moved[:, 0]).max() > SMALL * stroke
+        and _cosine(moved[:, 0], expected[:, 0]) < OPPOSED
+    ):
         remarks.append("u goes against that of fem: its sign looks reversed (u is positive towards the tip)")
     return remarks
 

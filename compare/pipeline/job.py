@@ -70,6 +70,10 @@ def checked(job: Job) -> Job:
         check_name(name)
     if len(set(job.names)) < len(job.names):
         raise UserError(f"a solver is named twice: {', '.join(job.names)}")
+    if not job.load.values.any():
+        raise UserError(
+            "the load does not move the contact: there is nothing to compare; give a stroke in mm"
+        )
     if job.adapt is not None:
         check_adaptable(job.adapt, job.load)
     if job.reference is not None and job.reference not in job.names:

@@ -4,8 +4,11 @@ import time
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from compare.evaluation.deformed_body import THROUGH_ITSELF, Body
-from compare.sweep.quantities import quantities
+from compare.evaluation.plausibility import unit_remarks
+from compare.sweep.quantities import FRACTIONS, quantities
 from compare.sweep.study import Task, load_of, material_of
 from geometry.cache import finger_mesh
 from geometry.drawing.definition import finger_from
@@ -41,7 +44,7 @@ class Measurement:
     @property
     def through_itself(self) -> bool:
         """Whether the deformed body goes through itself: a result that no real finger has."""
-        return self.message.startswith(THROUGH_ITSELF)
+        return THROUGH_ITSELF in self.message
 
 
 def measured(task: Task) -> Measurement:
@@ -68,7 +71,8 @@ def measured(task: Task) -> Measurement:
         return ended("refused", str(error))
     except Exception as error:
         return ended("failed", f"{type(error).__name__}: {error}")
-    said = solution.status.message
-    if len(Body(mesh).crossings(solution.displacement(mesh.points))):
-        said = f"{THROUGH_ITSELF}; {said}"
-    return ended("done" if solution.status.converged else "not converged", said, values)
+    status, _ = Body(mesh).status(solution)
+    said = "; ".join([status.message, *unit_remarks(problem)])
+    if unknown := [name for name, value in values.items() if np.isnan(value) and name not in FRACTIONS]:
+        return ended("not converged", f"{', '.join(unknown)} cannot be computed; {said}", values)
+    return ended("done" if status.converged else "not converged", said, values)

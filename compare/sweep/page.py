@@ -84,7 +84,7 @@ def summary(sweep: Sweep) -> list[str]:
             f"{found - good} have none, for the reasons in the table below. Statistics, pictures and "
             "sensitivities are of the converged ones."
         )
-    return sentences
+    return [*sentences, *(f"{remark}." for remark in sweep.remarks)]
 
 
 def sensitivity_caption(found: dict[str, Sensitivity]) -> str:

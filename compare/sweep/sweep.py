@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from compare.evaluation.deformed_body import ADVICE
+from compare.evaluation.plausibility import LOOKS_LIKE
 from compare.runtime.output_folder import check_links, locked
 from compare.runtime.provenance import package_versions, sources_digest
 from compare.runtime.resumable_folder import check_resumable_folder
@@ -21,6 +23,9 @@ from geometry.text_files import read_json
 from solvers.solver import Progress, silent
 
 STUDY_FILE, JOURNAL = "sweep.json", "journal.sqlite"
+
+FEW = 5
+"""Samples that a remark names."""
 
 POOLS = 50
 """Most times that the worker processes are started anew, because some of them died while they started."""
@@ -63,6 +68,17 @@ class Sweep:
     def good(self) -> list[Measurement]:
         """The converged results."""
         return [each for each in self.measurements if each.state == "done"]
+
+    @property
+    def remarks(self) -> list[str]:
+        """Remarks on samples that have a result that no real finger has, or look like another unit."""
+        found = []
+        for fault, advice in (*ADVICE.items(), (LOOKS_LIKE, "check the units of the study")):
+            having = [each.number for each in self.measurements if fault in each.message]
+            if having:
+                few = ", ".join(map(str, having[:FEW])) + (" ..." if having[FEW:] else "")
+                found.append(f"{len(having)} of {len(self.samples)} samples ({few}): {fault}; {advice}")
+        return found
 
 
 def run_sweep(job: SweepJob, stages: Stages | None = None) -> Sweep:

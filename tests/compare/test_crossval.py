@@ -50,10 +50,11 @@ from geometry.observations import Observations
 from solvers.assimilation.misfit import misfit_of
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
-from solvers.registry import make_solver
-from solvers.solution import DisplacementField, Solution, State
-from solvers.solver import silent
+from solvers.registry import BUILT_IN, make_solver
+from solvers.solution import DisplacementField, Solution, State, Status
+from solvers.solver import Progress, silent
 from tests.compare.drawn_pages import page_of
+from tests.solvers.conftest import observed_at
 
 NOISE = 0.005
 SETTINGS: dict[str, dict[str, object]] = {"gp": {}, "fem-id": {"degree": 1, "model": "fem"}}
@@ -593,6 +594,51 @@ def test_measured_markers_have_no_truth(tmp_path, capsys, in_line, observations)
     assert gp["fields"] == {}
     assert not (tmp_path / "out" / "fields.csv").exists()
     assert not (tmp_path / "out" / "fields.png").exists()
+
+
+class Stopped(FemSolver):
+    """`fem`, which says that it was not finished."""
+
+    name = "stopped"
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        return replace(super().solve(problem), status=Status(False, "stopped early; take more epochs"))
+
+
+def test_what_speaks_against_a_result_is_said_everywhere(tmp_path, capsys, monkeypatch, in_line, truth):
+    """A body that goes through itself, a solver that did not converge, and a modulus in pascals."""
+    from vision.measurements import write_measurements
+
+    monkeypatch.setitem(BUILT_IN, "stopped", f"{__name__}:Stopped")
+    points = truth.problem.mesh.markers
+    measured = observed_at(points, 6 * truth.displacement(points), NOISE)
+    write_measurements(tmp_path / "markers.csv", replace(measured, simulated=False))
+    line = f"--measurements {tmp_path / 'markers.csv'} --solvers fem,stopped --schemes tip-out --seeds 1"
+    assert run(f"{line} --stroke 60 --young 1e6", tmp_path / "out") == 3
+    printed = " ".join(capsys.readouterr().err.split())
+    assert "Young's modulus of 1e+06 MPa is no rubber's or plastic's; this looks like pascals" in printed
+    page = (tmp_path / "out" / "report.html").read_text()
+    through = "2 of 2 folds and seeds, the first of them: {}: THE BODY GOES THROUGH ITSELF; self-contact is"
+    for said in (
+        f"fem, {through.format('fem')}",
+        f"stopped, {through.format('stopped')}",
+        "did not converge: stopped early; take more epochs",
+    ):
+        assert said in printed
+        assert said in page
+    content = json.loads((tmp_path / "out" / "crossval.json").read_text())
+    assert len(content["truths"]["measured"]["layouts"]["measured"]["remarks"]) == 2
+
+
+def test_an_error_that_is_no_number_is_in_no_mean(task, monkeypatch):
+    """A displacement that is not finite at the markers alone, where no mesh node is."""
+    monkeypatch.setattr(
+        "compare.crossval.solver_folds.FieldSampler.of_solution",
+        lambda *_: replace(TrueField.load(task.truths[0]).sampled, markers=np.full((9, 2), np.nan)),
+    )
+    assert run_folds(replace(task, variant=variant("fem"))) == (
+        "fem: its displacement is not finite at every marker"
+    )
 
 
 def test_simulated_markers_of_a_file_are_called_simulated_everywhere(

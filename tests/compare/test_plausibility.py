@@ -10,7 +10,7 @@ import pytest
 
 from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
 from compare.evaluation.virtual_experiment import virtual_experiment
-from geometry.arrays import FloatArray
+from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
@@ -138,6 +138,32 @@ def test_unlikely_displacements_are_warned_of(
     assert said in remark
 
 
+def test_markers_that_cannot_be_are_refused(measured: Observations, problem: Problem) -> None:
+    with pytest.raises(UserError, match="none of the markers is visible"):
+        check_positions(replace(measured, visible=np.zeros(9, dtype=bool)), problem.mesh)
+    twice = measured.points[[0, 1, 2, 3, 4, 5, 6, 7, 4]]
+    with pytest.raises(UserError, match="the markers 5 and 9 are at one place; keep one"):
+        check_positions(replace(measured, points=twice), problem.mesh)
+
+
+@pytest.mark.parametrize(
+    ("places", "seen", "said"),
+    [
+        (np.arange(9), 1, "one marker was seen: the measurements say what happens at one place"),
+        (np.full(9, 4), 9, "all 9 markers seen lie within 0.08 mm: the measurements say what happens at one"),
+        (np.arange(9), 2, None),  # two places
+    ],
+)
+def test_markers_at_one_place_are_warned_of(
+    places: IntArray, seen: int, said: str | None, measured: Observations, problem: Problem
+) -> None:
+    points = measured.points[places] + np.outer(0.01 * np.arange(9), [float(places[0] == 4), 0.0])
+    moved, last = measured.displacements[places], np.arange(9) >= 9 - seen
+    changed = replace(measured, points=points, displacements=moved, visible=last)
+    remarks = displacement_remarks(changed, problem)
+    assert [said in remark for remark in remarks] == [True] if said else remarks == []
+
+
 def test_a_reversed_u_is_warned_of_at_a_small_stroke(measured: Observations, problem: Problem) -> None:
     """At a large one u of linear `fem` says nothing of its sign."""
     small = replace(problem, load=Load(displacement=(0, -2)))
@@ -152,4 +178,5 @@ def test_markers_that_hardly_move_in_fem_say_nothing_of_directions(
     only = np.arange(len(measured.points)) == 0
     reversed_ = replace(measured, displacements=-measured.displacements, visible=only)
     beside_base = replace(reversed_, points=np.vstack([[2.0, -1.0], measured.points[1:]]))
-    assert displacement_remarks(beside_base, problem) == []
+    (remark,) = displacement_remarks(beside_base, problem)
+    assert remark.startswith("one marker was seen")

@@ -91,6 +91,10 @@ def test_measurements_can_be_a_data_frame_and_a_solver_an_object():
         (lambda: pr.compare("defualt"), "there is no design 'defualt'; the presets are default"),
         (lambda: pr.compare(solvers="fme"), "no solver is called 'fme'; did you mean 'fem'"),
         (lambda: pr.compare(solvers=[]), "no solver was asked for"),
+        (
+            lambda: pr.compare(solvers="fem", load=pr.Load(displacement=(0.0, 0.0))),
+            "the load does not move the contact: there is nothing to compare",
+        ),
         (lambda: pr.solver("fem", degre=1), "fem has no setting 'degre'"),
         (lambda: pr.mesh(size=-1), "size"),
         (lambda: pr.compare(measurements=pd.DataFrame({"x_mm": [1]})), "the data frame has no column y_mm"),
@@ -156,6 +160,32 @@ def test_what_is_of_another_type_is_named(call: Callable[[], object], said: str)
 def test_a_load_that_does_not_move_has_no_displacement():
     solution = pr.solve("default", "fem", load=pr.Load(displacement=(0.0, 0.0)), **COARSE)
     assert not solution.reaction.any()
+
+
+def test_what_no_real_finger_does_is_said_of_a_solution():
+    with pytest.warns(UserWarning, match="fem: THE BODY GOES THROUGH ITSELF; self-contact is not modelled"):
+        solution = pr.solve("default", "fem", load=pr.Load(displacement=(0.0, -60.0)), **COARSE)
+    assert "THE BODY GOES THROUGH ITSELF near" in solution.status.message
+    assert "THE BODY GOES THROUGH ITSELF" in solution._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"load": pr.Load(displacement=(0.0, -0.01))}, "the stroke of 0.01 mm .* looks like metres"),
+        ({"material": pr.Material(young=1e6)}, "Young's modulus of 1e[+]06 MPa .* looks like pascals"),
+        ({"solver": "fem-asm", "measurements": FRAME[:1]}, "one marker was seen: the measurements say"),
+    ],
+)
+def test_what_looks_like_another_unit_is_warned_of_by_solve(settings: dict[str, object], said: str):
+    with pytest.warns(UserWarning, match=said):
+        pr.solve("default", **settings, **COARSE)
+
+
+def test_impossible_measurements_are_refused_by_solve():
+    metres = FRAME.assign(u_mm=FRAME["u_mm"] / 1000, v_mm=FRAME["v_mm"] / 1000)
+    with pytest.raises(pr.UserError, match="these look like metres; give mm"):
+        pr.solve("default", "fem-asm", measurements=metres, **COARSE)
 
 
 def test_a_sweep_is_a_data_frame_and_predicts(tmp_path: Path):

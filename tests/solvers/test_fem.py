@@ -99,6 +99,15 @@ def test_status_says_that_linear_elements_lock(coarse_mesh, degree, poisson, pla
     assert re.search(said, message) if said else "lock" not in message
 
 
+def test_a_solution_that_rounding_has_spoilt_is_refused(short_mesh):
+    """The energy would be a third too large. One digit less of Poisson's ratio is enough for a solution."""
+    spoilt, sound = (Problem(short_mesh, Material(poisson=0.5 - away)) for away in (1e-12, 1e-7))
+    with pytest.raises(UserError, match=r"rounding has spoilt .* Poisson's ratio farther from 0.5"):
+        FemSolver().solve(spoilt)
+    usual = FemSolver().solve(Problem(short_mesh, Material(poisson=0.4999))).energy
+    assert FemSolver().solve(sound).energy == pytest.approx(usual, rel=1e-3)
+
+
 def test_part_without_support_is_reported(coarse_mesh):
     """Two fingers, of which one is not clamped."""
     count = len(coarse_mesh.points)

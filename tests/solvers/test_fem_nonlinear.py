@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
+from geometry.errors import UserError
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem, contact_ends
@@ -100,3 +101,9 @@ def test_load_that_tears_the_mesh_stops_with_advice(coarse_mesh):
     assert "Newton's method fails beyond (SNES: diverged_" in solution.status.message
     assert "take a finer mesh" in solution.status.message
     assert solution.stats["halved_steps"] > 0
+
+
+@pytest.mark.parametrize("tolerance", [1e30, 0.1, 0.0, float("nan")])
+def test_a_tolerance_that_takes_any_state_for_an_equilibrium_is_refused(tolerance):
+    with pytest.raises(UserError, match=r"fem-nonlinear needs 0 < tolerance <= 0\.001"):
+        FemNonlinearSolver(tolerance=tolerance)

@@ -83,6 +83,7 @@ def test_a_contact_beyond_the_finger_is_refused(coarse_mesh):
         (lambda: Material(youngs=1), "unknown parameter 'youngs'; did you mean young"),
         (lambda: Load(displacement=(0.0, float("nan"))), "displacement = nan is not a finite number$"),
         (lambda: Load(displacement=(None, None)), "leaves both components free"),
+        (lambda: Load(displacement=(0.0, -1e-200)), "by less than 1e-09 mm, a hundredth of an atom's size"),
         (
             lambda: Load((0.0, -3.0)),
             r"by name only \(kind, displacement, position, radius\), not \(0.0, -3.0\)$",

@@ -13,10 +13,13 @@ from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.problem import Problem
+from geometry.observations import Observations
+from solvers.problem import Material, Problem
+from solvers.registry import make_solver
 from solvers.solution import Solution, Status
-from solvers.solver import Progress, SolverFailedError, silent, solved
+from solvers.solver import Progress, SolverFailedError, refitter, silent, solved
 from tests.meshes import permuted
+from tests.solvers.conftest import observed_at
 
 
 class Bending:
@@ -126,6 +129,45 @@ def test_what_is_no_solution_is_refused_with_the_solvers_name(
 ) -> None:
     with pytest.raises(UserError, match=f"solver beam .*{said}|solver {said}"):
         solved(Beam(fault), Problem(coarse_mesh))
+
+
+def test_a_marker_that_was_seen_has_a_prediction_without_it(coarse_mesh: TriangleMesh) -> None:
+    """Else its mean error would be no number."""
+    seen = observed_at(coarse_mesh.markers, np.zeros((9, 2)), 0.0, np.arange(9) != 3)
+    for hidden, sound in ((3, True), (4, False)):
+        left_out = np.zeros((9, 2))
+        left_out[hidden] = np.nan
+        beam = Beam(lambda solution, left_out=left_out: replace(solution, left_out=left_out))
+        if sound:
+            solved(beam, Problem(coarse_mesh, observations=seen))
+            continue
+        with pytest.raises(UserError, match="left_out that is not finite everywhere"):
+            solved(beam, Problem(coarse_mesh, observations=seen))
+
+
+class Refitted(Beam):
+    """A solver that fits again, with a displacement that is no number."""
+
+    def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
+        return lambda seen: self.solve(replace(problem, observations=seen))
+
+
+def test_a_refit_is_checked_like_a_solution(coarse_mesh: TriangleMesh) -> None:
+    beam = Refitted(lambda solution: replace(solution, field=Field(displacement=spoilt)))
+    seen = observed_at(coarse_mesh.markers, np.zeros((9, 2)), 0.0)
+    with pytest.raises(UserError, match="beam returned a displacement that is not finite everywhere"):
+        refitter(beam, Problem(coarse_mesh))(seen)
+
+
+@pytest.mark.parametrize(
+    "name", ["fem-asm", "fem-id", "gp", "statfem", "pinn-asm", "pinn-local-asm", "pinn-id"]
+)
+def test_markers_of_which_none_was_seen_are_refused(name: str, coarse_mesh: TriangleMesh) -> None:
+    unseen = observed_at(coarse_mesh.markers, np.zeros((9, 2)), 0.0, np.zeros(9, dtype=bool))
+    solver = make_solver(name)
+    problem = Problem(coarse_mesh, Material(law=solver.laws[0]), observations=unseen)
+    with pytest.raises(UserError, match="none of the markers is visible; at least one is needed"):
+        solver.solve(problem)
 
 
 def test_an_exception_tells_the_place_in_the_solvers_own_folder(coarse_mesh: TriangleMesh) -> None:

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
+from geometry.errors import UserError
 from solvers.cylinder_contact import ContactRegion
 from solvers.fem.boundary_conditions import reaction_by_residual_work
 from solvers.fem.finite_strain.constraints import DisplacementConstraints, LoadState
@@ -24,6 +25,14 @@ UPDATES = 30
 """Updates of the contact's multipliers in a step before it counts as failed."""
 PENETRATION = 1e-5
 """Largest gap of a node in contact and penetration of any node, mm."""
+LOOSEST = 1e-3
+"""Largest tolerance of Newton's method: with more, a state that is no equilibrium would count as one."""
+
+
+def check_tolerance(solver: str, tolerance: float) -> None:
+    """Raise a `UserError` unless Newton's method ends near an equilibrium."""
+    if not 0 < tolerance <= LOOSEST:
+        raise UserError(f"{solver} needs 0 < tolerance <= {LOOSEST:g}, not {tolerance:g}")
 
 
 class LoadPath:

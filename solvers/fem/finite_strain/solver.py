@@ -12,7 +12,7 @@ from geometry.errors import UserError
 from solvers.cylinder_contact import CONTACT_AT_END, ContactRegion
 from solvers.fem.error_estimate import ErrorEstimator, locking_advice
 from solvers.fem.finite_strain.constraints import DisplacementConstraints
-from solvers.fem.finite_strain.load_path import LoadPath
+from solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
 from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
@@ -52,6 +52,7 @@ class FemNonlinearSolver:
             raise UserError(f"fem-nonlinear has elements of degree 1 and 2, not {self.degree}")
         if not 0 < self.min_step <= self.first_step <= self.max_step <= 1:
             raise UserError("fem-nonlinear needs 0 < min_step <= first_step <= max_step <= 1")
+        check_tolerance(self.name, self.tolerance)
 
     def settings(self) -> dict[str, object]:
         """Element degree, load steps and Newton's criteria."""

@@ -9,7 +9,7 @@ import numpy as np
 from geometry.errors import UserError
 from geometry.machine_memory import free_memory_gb
 from solvers.cylinder_contact import CONTACT_AT_END, ContactRegion
-from solvers.fem.finite_strain.load_path import LoadPath
+from solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
 from solvers.fem.ranks import communicator, on_all_ranks
 from solvers.fem.solid.cost import Cost, LinearSolver, affordable
 from solvers.fem.solid.extrusion import ExtrudedSpace
@@ -73,6 +73,7 @@ class Fem3dSolver:
             raise UserError(f"fem-3d has the linear solvers {known}, not {self.linear_solver!r}")
         if not 0 < self.min_step <= self.max_step <= 1:
             raise UserError("fem-3d needs 0 < min_step <= max_step <= 1")
+        check_tolerance(self.name, self.tolerance)
 
     def settings(self) -> dict[str, object]:
         """Layers, face and side faces, linear solver, load steps and Newton's criteria."""

@@ -11,20 +11,23 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
 
 from compare.cli import main
 from compare.sweep.measurement import Measurement, measured
+from compare.sweep.quantities import quantities
 from compare.sweep.sampling import samples
 from compare.sweep.store import opened
 from compare.sweep.study import Study, TaskMaker, load_study
-from compare.sweep.sweep import JOURNAL, SweepJob, load_sweep, run_sweep
+from compare.sweep.sweep import JOURNAL, Sweep, SweepJob, load_sweep, run_sweep
 from compare.sweep.tables import failure_grid, table
 from geometry.cache import cad_files
 from geometry.errors import UserError
 from geometry.finger.design import Design
+from solvers.solution import Solution
 from tests.compare.programs import COMMAND
 
 STUDY = """
@@ -74,9 +77,29 @@ def test_what_goes_wrong_with_a_sample_is_its_answer(tmp_path: Path) -> None:
     task = maker.task(1, {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0})
     assert measured(task).state == "done"
     pressed = measured(replace(task, load={**task.load, "stroke": 60.0}))
-    assert (pressed.state, pressed.message[:28]) == ("done", "THE BODY GOES THROUGH ITSELF")
+    assert (pressed.state, pressed.through_itself) == ("done", True)
+    soft = measured(replace(task, load={**task.load, "stroke": 0.001}))
+    assert "this looks like metres" in soft.message
+    remarks = Sweep(study, [{}] * 2, [pressed, replace(soft, number=0)]).remarks
+    assert [remark.partition(";")[0] for remark in remarks] == [
+        "1 of 2 samples (1): THE BODY GOES THROUGH ITSELF",
+        "1 of 2 samples (0): this looks like",
+    ]
     object.__setattr__(task, "mesh_size", "broken")
     assert measured(task).state in ("refused", "failed")
+
+
+def test_a_quantity_that_is_no_number_is_no_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Statistics leave out what is no number: a sample that should have one must not be among them."""
+
+    def without_stress(*given: Any, **named: Any) -> tuple[Solution, dict[str, float]]:
+        solution, values = quantities(*given, **named)
+        return solution, {**values, "von_mises": float("nan")}
+
+    monkeypatch.setattr("compare.sweep.measurement.quantities", without_stress)
+    sample = {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0}
+    found = measured(TaskMaker(load_study(study_file(tmp_path, 1)), tmp_path).task(1, sample))
+    assert (found.state, found.message.partition(";")[0]) == ("not converged", "von_mises cannot be computed")
 
 
 @pytest.fixture(scope="module")
