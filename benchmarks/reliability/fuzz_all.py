@@ -38,7 +38,7 @@ class Row(NamedTuple):
         peak: Memory of the largest process.
         seconds: Time in all.
         unhandled: Places of exceptions that are no refusal, of the last time alone.
-        ended: How often a C library ended the process, of the last time alone.
+        ended: How often a C library ended the process that read, of the last time alone.
     """
 
     reader: str
@@ -108,6 +108,7 @@ def fuzzed(row: Row, seconds: float) -> Row:
                     slowest=max(row.slowest, counts["slowest"]),
                     peak=max(row.peak, counts["peak"]),
                     seconds=row.seconds + counts["seconds"],
+                    ended=row.ended + counts["ended"],
                 )
                 wrong |= counts["wrong"]
             for path in [*folder.glob("wrong-*"), *folder.glob("crash-*")]:

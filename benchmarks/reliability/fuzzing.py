@@ -19,15 +19,13 @@ from geometry.atomic import write_text
 
 MOST_MEMORY = 4 * 2**30
 """Memory that a reader may take, bytes."""
-LONGEST_S = 10
-"""Time that one file may take, s."""
 
 
 def main(name: str, seconds: float, folder: Path) -> None:
     """Fuzz a reader until the time is over."""
     import atheris
 
-    from benchmarks.reliability.readers import READERS
+    from benchmarks.reliability.readers import LONGEST_S, READERS, EndedError
 
     reader = READERS[name]
     with atheris.instrument_imports(include=list(reader.modules), enable_loader_override=False):
@@ -43,7 +41,7 @@ def main(name: str, seconds: float, folder: Path) -> None:
     for number, seed in enumerate(seeds):
         (corpus / f"seed-{number}").write_bytes(seed)
     started = time.monotonic()
-    counts = {"runs": 0, "read": 0, "slowest": 0.0}
+    counts = {"runs": 0, "read": 0, "slowest": 0.0, "ended": 0}
     wrong: dict[str, str] = {}
 
     def keep() -> None:
@@ -63,6 +61,9 @@ def main(name: str, seconds: float, folder: Path) -> None:
             begun = time.monotonic()
             try:
                 counts["read"] += reader.try_file(place)
+            except EndedError:
+                counts["ended"] += 1
+                (folder / f"crash-{counts['ended'] % 10}{reader.suffix}").write_bytes(data)
             except Exception as error:
                 key = _key(error)
                 if key not in wrong:
@@ -85,7 +86,7 @@ def main(name: str, seconds: float, folder: Path) -> None:
                 sys.argv[0],
                 str(corpus),
                 f"-max_len={reader.longest}",
-                f"-timeout={LONGEST_S}",
+                f"-timeout={2 * LONGEST_S}",
                 f"-dict={words}",
             ),
             *(

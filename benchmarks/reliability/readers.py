@@ -1,9 +1,12 @@
 """The readers of files that people give, each with files to start from."""
 
 import json
+import os
+import signal
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from multiprocessing import Pipe
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +14,8 @@ from geometry.errors import UserError
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT / "tests" / "data"
+LONGEST_S = 10
+"""Time that one file may take, s."""
 
 
 @dataclass(frozen=True)
@@ -95,10 +100,70 @@ def _workspace(path: Path) -> Any:
     return load_workspace(path)
 
 
-def _mesh(path: Path) -> Any:
+class EndedError(Exception):
+    """A C library ended the process that read a file."""
+
+
+class ForkedReader:
+    """Reads files in a forked process, which the next file finds as it was; a new one after it has ended."""
+
+    def __init__(self, read: Callable[[Path], Any]) -> None:
+        self._read, self._child = read, 0
+
+    def __call__(self, path: Path) -> None:
+        """Read a file.
+
+        Raises:
+            EndedError: If the process ended, or took longer than `LONGEST_S`.
+            Exception: What the reader raised, which the process passes on.
+        """
+        if not self._child:
+            self._start()
+        self._ours.send(path)
+        if self._ours.poll(LONGEST_S):
+            try:
+                error = self._ours.recv()
+            except (EOFError, OSError):
+                self._end()
+                raise EndedError from None
+            if error is not None:
+                raise error
+            return
+        self._end()
+        raise EndedError
+
+    def _start(self) -> None:
+        self._ours, theirs = Pipe()
+        self._child = os.fork()
+        if self._child:
+            theirs.close()
+            return
+        for number in range(1, signal.NSIG):
+            if number not in (signal.SIGKILL, signal.SIGSTOP) and signal.getsignal(number) is not None:
+                signal.signal(number, signal.SIG_DFL)  # the fuzzer's own would look at the crash
+        while True:
+            try:
+                self._read(theirs.recv())
+                theirs.send(None)
+            except EOFError:
+                os._exit(0)
+            except Exception as error:
+                theirs.send(error)
+
+    def _end(self) -> None:
+        os.kill(self._child, signal.SIGKILL)
+        os.waitpid(self._child, 0)
+        self._ours.close()
+        self._child = 0
+
+
+def _read_mesh(path: Path) -> Any:
     from geometry.drawing.formats.msh import read_msh
 
     return read_msh(path)
+
+
+_mesh = ForkedReader(_read_mesh)
 
 
 def _svg(path: Path) -> Any:
@@ -187,18 +252,27 @@ def _square() -> Any:
     )
 
 
-def _write_gmsh(path: Path) -> None:
-    import gmsh
+def _write_gmsh(version: float, *, binary: bool = False) -> Callable[[Path], None]:
+    """Writes a mesh with physical groups in a version of the format."""
 
-    from geometry.mesh.gmsh_model import session
+    def write(path: Path) -> None:
+        import gmsh
 
-    with session():
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.model.occ.addRectangle(0, -10, 0, 30, 10)
-        gmsh.model.occ.synchronize()
-        gmsh.option.setNumber("Mesh.MeshSizeMin", 20)
-        gmsh.model.mesh.generate(2)
-        gmsh.write(str(path))
+        from geometry.mesh.gmsh_model import session
+
+        with session():
+            gmsh.model.occ.addRectangle(0, -10, 0, 30, 10)
+            gmsh.model.occ.synchronize()
+            for tag, name in ((4, "base"), (3, "contact")):
+                gmsh.model.addPhysicalGroup(1, [tag], name=name)
+            gmsh.model.addPhysicalGroup(2, [1], name="body")
+            gmsh.option.setNumber("Mesh.MeshSizeMin", 20)
+            gmsh.model.mesh.generate(2)
+            gmsh.option.setNumber("Mesh.MshFileVersion", version)
+            gmsh.option.setNumber("Mesh.Binary", binary)
+            gmsh.write(str(path))
+
+    return write
 
 
 def _write_dxf(path: Path) -> None:
@@ -287,7 +361,15 @@ READERS = {
     ),
     "svg": Reader(".svg", _svg, lambda: [SVG, SVG_USE], ("geometry.drawing",)),
     "dxf": Reader(".dxf", _dxf, _written(".dxf", _write_dxf), ("geometry.drawing",), longest=32768),
-    "msh": Reader(".msh", _mesh, _written(".msh", _write_gmsh), ("geometry.drawing",)),
+    "msh": Reader(
+        ".msh",
+        _mesh,
+        _many(
+            *(_written(".msh", _write_gmsh(version)) for version in (4.1, 4.0, 2.2)),
+            *(_written(".msh", _write_gmsh(version, binary=True)) for version in (4.1, 2.2)),
+        ),
+        ("geometry.drawing",),
+    ),
     "picture": Reader(
         ".png", _picture, _encoded(".png", ".jpg", ".tif", ".bmp", ".ppm", ".webp"), ("vision.frames",)
     ),
