@@ -315,5 +315,10 @@ DEFECTS = (
         "its medians.",
         "`test_sweep.py`, goes wrong, no number",
     ),
+    (
+        "fuzzing",
+        "A mesh with the name of a group that is not in UTF-8 ended with a `UnicodeDecodeError`.",
+        "`test_readers.py`, names of groups",
+    ),
 )
 """Found by, what happened, test."""

@@ -108,10 +108,10 @@ def _two_threads() -> list[str]:
         return []
     return [
         "On two threads (`python -m benchmarks.reliability.two_threads`), "
-        f"`compare {' '.join(two_threads.ARGUMENTS)}` was killed {found.kills} times, evenly over its changes of "
-        "files, and resumed. The numbers in `metrics.json` and in the solutions then differ from those of a "
-        f"run that was never interrupted by at most {found.after_kills:.1e} of the largest of them; those of "
-        f"two whole runs by {found.undisturbed:.1e}.",
+        f"`compare {' '.join(two_threads.ARGUMENTS)}` was killed {found.kills} times, evenly over its "
+        "changes of files, and resumed. The numbers in `metrics.json` and in the solutions then differ from "
+        f"those of a run that was never interrupted by at most {found.after_kills:.1e} of the largest of "
+        f"them; those of two whole runs by {found.undisturbed:.1e}.",
         "",
     ]
 

@@ -6,6 +6,7 @@
 import json
 import logging
 import os
+import random
 import re
 import resource
 import sys
@@ -80,6 +81,10 @@ def main(name: str, seconds: float, folder: Path) -> None:
 
     words = folder / "words"
     words.write_text("\n".join(f'"{word}"' for word in sorted(_words(seeds))) + "\n")
+    if not reader.modules:
+        generator = random.Random(time.time_ns())
+        while True:
+            one(_changed(generator.choice(seeds), generator))
     atheris.Setup(
         [
             *(
@@ -99,6 +104,21 @@ def main(name: str, seconds: float, folder: Path) -> None:
         one,
     )
     atheris.Fuzz()
+
+
+def _changed(content: bytes, generator: random.Random) -> bytes:
+    """A file with up to three bytes changed, parts taken out or parts said again elsewhere."""
+    changed = bytearray(content)
+    for _ in range(generator.randint(1, 3)):
+        at, kind = generator.randrange(len(changed)), generator.randrange(3)
+        if kind == 0:
+            changed[at] = generator.randrange(256)
+        elif kind == 1:
+            del changed[at : at + generator.randint(1, 8)]
+        else:
+            start = generator.randrange(len(changed))
+            changed[at:at] = changed[start : start + generator.randint(1, 40)]
+    return bytes(changed)
 
 
 def _key(error: Exception) -> str:

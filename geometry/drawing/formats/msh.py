@@ -266,4 +266,7 @@ def _opened(path: Path) -> Iterator[Any]:
         except Exception as error:  # Gmsh raises no narrower class
             reason = str(error).replace(str(copy), path.name)
             raise UserError(f"cannot read {path.name} as a Gmsh mesh: {reason}") from None
-        yield gmsh.model.mesh
+        try:
+            yield gmsh.model.mesh
+        except UnicodeDecodeError:  # from Gmsh's Python layer
+            raise UserError(f"{path.name}: the name of a physical group is not in UTF-8; rename it") from None

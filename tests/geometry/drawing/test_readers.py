@@ -232,6 +232,15 @@ def test_unreadable_files(tmp_path, name, content, message):
         read_drawing(tmp_path / "missing" / name)
 
 
+def test_names_of_groups_are_utf_8(tmp_path):
+    path = write_beam_mesh(tmp_path / "beam.msh", groups=("base", "contact"))
+    path.write_bytes(path.read_bytes().replace(b'"contact"', b'"conta\xe9t"'))
+    with pytest.raises(
+        UserError, match=r"beam\.msh: the name of a physical group is not in UTF-8; rename it"
+    ):
+        read_drawing(path)
+
+
 def test_a_plane_cuts_solids_only(tmp_path):
     path = write_dxf(tmp_path / "a.dxf", [rectangle(0, 0, 10, 10)])
     with pytest.raises(UserError, match="plane already"):
