@@ -13,6 +13,7 @@ import sys
 import time
 import traceback
 import warnings
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,8 @@ def main(name: str, seconds: float, folder: Path) -> None:
     from benchmarks.reliability.readers import LONGEST_S, READERS, EndedError
 
     reader = READERS[name]
-    with atheris.instrument_imports(include=list(reader.modules), enable_loader_override=False):
+    guides = atheris.instrument_imports(include=list(reader.modules), enable_loader_override=False)
+    with guides if reader.modules else nullcontext():
         seeds = reader.seeds()
         place = folder / f"input{reader.suffix}"
         for seed in seeds:

@@ -1,5 +1,6 @@
 """The readers of files that people give, each with files to start from."""
 
+import importlib
 import json
 import os
 import signal
@@ -105,10 +106,10 @@ class EndedError(Exception):
 
 
 class ForkedReader:
-    """Reads files in a forked process, which the next file finds as it was; a new one after it has ended."""
+    """Reads files with a module's function in a forked process, and in a new one after it has ended."""
 
-    def __init__(self, read: Callable[[Path], Any]) -> None:
-        self._read, self._child = read, 0
+    def __init__(self, module: str, name: str) -> None:
+        self._module, self._name, self._child = module, name, 0
 
     def __call__(self, path: Path) -> None:
         """Read a file.
@@ -133,6 +134,7 @@ class ForkedReader:
         raise EndedError
 
     def _start(self) -> None:
+        read = getattr(importlib.import_module(self._module), self._name)  # here: once
         self._ours, theirs = Pipe()
         self._child = os.fork()
         if self._child:
@@ -143,7 +145,7 @@ class ForkedReader:
                 signal.signal(number, signal.SIG_DFL)  # the fuzzer's own would look at the crash
         while True:
             try:
-                self._read(theirs.recv())
+                read(theirs.recv())
                 theirs.send(None)
             except EOFError:
                 os._exit(0)
@@ -157,13 +159,7 @@ class ForkedReader:
         self._child = 0
 
 
-def _read_mesh(path: Path) -> Any:
-    from geometry.drawing.formats.msh import read_msh
-
-    return read_msh(path)
-
-
-_mesh = ForkedReader(_read_mesh)
+_mesh = ForkedReader("geometry.drawing.formats.msh", "read_msh")
 
 
 def _svg(path: Path) -> Any:
