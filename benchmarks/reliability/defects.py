@@ -320,5 +320,10 @@ DEFECTS = (
         "A mesh with the name of a group that is not in UTF-8 ended with a `UnicodeDecodeError`.",
         "`test_readers.py`, names of groups",
     ),
+    (
+        "trying",
+        "A board whose square was given in metres calibrated a camera without a word.",
+        "`test_board.py`, an impossible board",
+    ),
 )
 """Found by, what happened, test."""

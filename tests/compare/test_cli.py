@@ -218,7 +218,7 @@ BAD = [
     ("design --section beam.svg --clamp '[[nan, 0], [0, -10]]'", r"clamp = \[\[nan, .* is no pair of points"),
     ("fiducials --marker-plane nan", "workspace: marker_plane: Input should be a finite number"),
     ("fiducials --marker-plane 1e9", "workspace: marker_plane: Input should be less than or equal to 1000"),
-    ("fiducials --square 1e9", "a square of 1e[+]09 mm; its side must be above zero, at most 1000 mm"),
+    ("fiducials --square 1e9", "a square of 1e[+]09 mm; its side must be 0.2 to 1000 mm"),
     ("crossval --solvers fem --noise 1e6", "--noise 1e[+]06: .* zero or more, at most 100 mm"),  # a kilometre
     ("solve fem --out fields.csv", "give a name that ends in .vtu"),
     ("gridsearch --learning-rates 1e-3;1e-2", "--learning-rates 1e-3;1e-2: give numbers with commas"),

@@ -82,7 +82,8 @@ def test_a_board_is_read_from_text():
         ("9x-6", 25, "cannot read the board"),
         ("9x2", 25, "a board of 9x2 inner corners; either side"),
         ("9x600", 25, "a board of 9x600 inner corners"),
-        ("9x6", 0, "a square of 0 mm"),
+        ("9x6", 0, "a square of 0 mm; its side must be 0.2 to 1000 mm$"),
+        ("9x6", 0.025, "a square of 0.025 mm; .*; this looks like metres, give mm"),
         ("9x6", float("nan"), "a square of nan mm"),
     ],
 )

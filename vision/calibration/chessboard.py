@@ -12,8 +12,8 @@ from vision.frames.frame import GreyImage
 
 EDGE = 0.45
 """Radius around a corner in which only its own two edges lie, over a square's side."""
-LARGEST_SQUARE = 1000.0
-"""Largest side of a square, mm."""
+SMALLEST_SQUARE, LARGEST_SQUARE = 0.2, 1000.0
+"""Range of the side of a square, mm. Below it the side is in metres: nobody prints a board so fine."""
 RADII = (2.5, 12.0)
 """Smallest and largest radius of the pixels that a corner is fitted to."""
 LARGE = 1600
@@ -36,7 +36,8 @@ class Board:
         square: Side of a square, mm.
 
     Raises:
-        UserError: If there are fewer than 3 corners along a side, or the square has no size.
+        UserError: If there are fewer than 3 corners along a side, or the square is
+            smaller or larger than any board's.
     """
 
     columns: int
@@ -48,9 +49,11 @@ class Board:
             raise UserError(
                 f"a board of {self.columns}x{self.rows} inner corners; either side must have 3 to 100"
             )
-        if not 0 < self.square <= LARGEST_SQUARE:
+        if not SMALLEST_SQUARE <= self.square <= LARGEST_SQUARE:
+            metres = "; this looks like metres, give mm" if 0 < self.square < SMALLEST_SQUARE else ""
             raise UserError(
-                f"a square of {self.square:g} mm; its side must be above zero, at most {LARGEST_SQUARE:g} mm"
+                f"a square of {self.square:g} mm; its side must be {SMALLEST_SQUARE:g} to {LARGEST_SQUARE:g} "
+                f"mm{metres}"
             )
 
     def __str__(self) -> str:
