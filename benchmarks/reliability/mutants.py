@@ -8,6 +8,7 @@ they take too long. Docstrings, annotations, decorators and messages of errors a
 import ast
 import copy
 import csv
+import gc
 import importlib.abc
 import importlib.machinery
 import importlib.util
@@ -52,7 +53,9 @@ LIBRARIES = (
     "pydantic",
     "cv2",
     "ufl",
+    "hypothesis",
 )
+"""Loaded before the forks; pytest itself loads hypothesis at the end of every run."""
 
 OPPOSITE: Mapping[type, tuple[type, ...]] = {
     ast.Add: (ast.Sub,),
@@ -273,6 +276,7 @@ def main(modules: Sequence[str]) -> None:
     os.chdir(ROOT)
     for library in LIBRARIES:
         importlib.import_module(library)
+    gc.freeze()  # the collections of a fork pass over what is loaded already
     for module in modules or TESTS:
         known = {(row.line, row.change): row.judgement for row in kept_rows() if row.module == module}
         rows = [row._replace(judgement=known.get((row.line, row.change), "")) for row in judged(module)]
