@@ -40,6 +40,14 @@ TESTS: Mapping[str, tuple[str, ...]] = {
     "compare.evaluation.certificate": ("tests/compare/test_certificate_limits.py",),
     "vision.tracking.data_association": ("tests/vision/test_data_association.py",),
     "vision.tracking.rest_detection": ("tests/vision/test_rest.py",),
+    "solvers.assimilation.marker_forces": ("tests/solvers/test_marker_forces.py",),
+    "solvers.assimilation.estimation": (
+        *("tests/solvers/test_estimation_parts.py", "tests/solvers/test_estimation.py"),
+    ),
+    "vision.tracking.layout_matching": ("tests/vision/test_layout_matching.py",),
+    "vision.tracking.workspace": ("tests/vision/test_workspace_limits.py",),
+    "vision.tracking.trajectories": ("tests/vision/test_trajectories.py",),
+    "vision.tracking.camera_motion": ("tests/vision/test_camera_motion.py",),
 }
 """Tests by module."""
 
