@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
+from geometry.section.loop import Loop
+from geometry.section.section import Section
 from tests.fingers import beam
 from vision.tracking.workspace import Workspace, default_workspace, load_workspace, workspace_svg
 
@@ -45,6 +47,15 @@ def test_the_default_fiducials_stand_around_the_finger_beside_the_indenter(
     points = default_workspace(replace(beam(), contact_abscissa=position)).points
     front = [(x, 12.0) for x in (-12.0, *places, 112.0)]
     np.testing.assert_allclose(points, [*front, (-12, -22), (45, -22), (112, -22)], rtol=1e-12)
+
+
+def test_the_default_fiducials_move_with_the_finger() -> None:
+    section = Section(
+        Loop.polygon([(30, -10), (130, -10), (130, 0), (30, 0)], ("back", "tip", "front", "base"))
+    )
+    shifted = replace(beam(), section=section, markers=beam().markers + np.array([30.0, 0.0]))
+    points = default_workspace(replace(shifted, contact_abscissa=100.0)).points
+    np.testing.assert_allclose(points, default_workspace(beam()).points + np.array([30.0, 0.0]), rtol=1e-12)
 
 
 @pytest.mark.parametrize("least", [0.049, 0.051])
