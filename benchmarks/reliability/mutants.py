@@ -38,16 +38,20 @@ TESTS: Mapping[str, tuple[str, ...]] = {
         *("tests/solvers/test_marker_weighting.py", "tests/solvers/test_assimilation.py"),
     ),
     "compare.evaluation.certificate": ("tests/compare/test_certificate_limits.py",),
-    "vision.tracking.data_association": ("tests/vision/test_data_association.py",),
     "vision.tracking.rest_detection": ("tests/vision/test_rest.py",),
     "solvers.assimilation.marker_forces": ("tests/solvers/test_marker_forces.py",),
     "solvers.assimilation.estimation": (
         *("tests/solvers/test_estimation_parts.py", "tests/solvers/test_estimation.py"),
     ),
-    "vision.tracking.layout_matching": ("tests/vision/test_layout_matching.py",),
     "vision.tracking.workspace": ("tests/vision/test_workspace_limits.py",),
-    "vision.tracking.trajectories": ("tests/vision/test_trajectories.py",),
-    "vision.tracking.camera_motion": ("tests/vision/test_camera_motion.py",),
+    "vision.tracking.tracker": ("tests/vision/test_track.py",),
+    **{
+        f"vision.tracking.{name}": (f"tests/vision/test_{name}.py",)
+        for name in (
+            *("annotation", "camera_motion", "data_association", "fiducial_matching", "frame_means"),
+            *("frame_tracker", "layout_matching", "marker_plane", "plane_fit", "scene", "trajectories"),
+        )
+    },
 }
 """Tests by module."""
 
