@@ -56,16 +56,8 @@ TESTS: Mapping[str, tuple[str, ...]] = {
 """Tests by module."""
 
 LIBRARIES = (
-    "pytest",
-    "numpy",
-    "scipy.optimize",
-    "scipy.sparse.linalg",
-    "scipy.stats",
-    "torch",
-    "pydantic",
-    "cv2",
-    "ufl",
-    "hypothesis",
+    *("pytest", "numpy", "scipy.optimize", "scipy.sparse.linalg", "scipy.stats", "torch", "pydantic"),
+    *("cv2", "ufl", "hypothesis"),
 )
 """Loaded before the forks; pytest itself loads hypothesis at the end of every run."""
 
