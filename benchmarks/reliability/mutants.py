@@ -282,8 +282,15 @@ def main(modules: Sequence[str]) -> None:
         importlib.import_module(library)
     gc.freeze()  # the collections of a fork pass over what is loaded already
     for module in modules or TESTS:
-        known = {(row.line, row.change): row.judgement for row in kept_rows() if row.module == module}
-        rows = [row._replace(judgement=known.get((row.line, row.change), "")) for row in judged(module)]
+        known = {
+            (row.line, row.change): row.judgement
+            for row in kept_rows()
+            if row.module == module and row.judgement
+        }
+        rows = [
+            row._replace(judgement=known.get((row.line, row.change), "")) if row.end == "survived" else row
+            for row in judged(module)
+        ]
         write_rows([*(row for row in kept_rows() if row.module != module), *rows])
         killed = sum(row.end == "killed" for row in rows)
         print(f"{module}: {killed} of {len(rows)} killed", flush=True)

@@ -111,7 +111,7 @@ def test_one_frame_or_its_copies_keep_all_of_the_covariance_and_have_the_floor(
     assert np.isnan(mean.contrasts).all()  # of circles it is not known
 
 
-@pytest.mark.parametrize("count", [4, 10])
+@pytest.mark.parametrize("count", [2, 4, 10])
 def test_frames_that_scatter_as_their_covariances_say_reduce_them_by_their_number(count: int) -> None:
     """Alternating: the steps are larger than of independent frames, so no frame follows another."""
     size = np.sqrt((count - 1) / count)  # the sum of squares is that of the degrees of freedom
@@ -141,6 +141,15 @@ def test_the_scatter_is_the_median_over_the_discs() -> None:
     scatter = 12 * 0.2**2 / chi2.median(10) + np.sqrt(2) * chance(5, 6)
     excess = [1, 1, 1, 1, (8 + 12 * 81) / 18]
     np.testing.assert_allclose(found, np.array(excess) * (1 - scatter * (1 - 1 / 6)), rtol=1e-9)
+
+
+def test_the_scatter_of_a_disc_that_is_known_worse_is_over_its_noise_alone() -> None:
+    """Of variances four times the median 1.3 / 4 are noise; the sums of squares are 1, 4, 9, 4, 4 over 100."""
+    sizes = np.array([0.1, 0.2, 0.3, 0.2, 0.2])
+    found = shares(frames_of(series([1.0, -1.0] * 3, 5) * sizes[:, None], sizes=(1.0, 1.0, 1.0, 4.0, 4.0)))
+    scatter = 12 * 0.3**2 / chi2.median(10) + np.sqrt(2) * chance(5, 6)  # 4 / 0.325 is more than 9
+    noise = np.array([1, 1, 1, 1.3 / 4, 1.3 / 4])
+    np.testing.assert_allclose(found, 1 - noise * scatter * (1 - 1 / 6), rtol=1e-9)
 
 
 @pytest.mark.parametrize("count", [6, 12])
