@@ -144,7 +144,7 @@ def test_the_scatter_is_the_median_over_the_discs() -> None:
 
 
 def test_the_scatter_of_a_disc_that_is_known_worse_is_over_its_noise_alone() -> None:
-    """Of variances four times the median 1.3 / 4 are noise; the sums of squares are 1, 4, 9, 4, 4 over 100."""
+    """Of variances four times the median 1.3 / 4 are noise; the squares are as 1, 4, 9, 4 and 4."""
     sizes = np.array([0.1, 0.2, 0.3, 0.2, 0.2])
     found = shares(frames_of(series([1.0, -1.0] * 3, 5) * sizes[:, None], sizes=(1.0, 1.0, 1.0, 4.0, 4.0)))
     scatter = 12 * 0.3**2 / chi2.median(10) + np.sqrt(2) * chance(5, 6)  # 4 / 0.325 is more than 9
@@ -166,6 +166,13 @@ def test_frames_that_follow_each_other_count_for_less(count: int) -> None:
     squares = 2 * 4 * count * (count**2 - 1) / 12
     excess = (8 + squares) / (8 + 2 * (count - 1))
     np.testing.assert_allclose(found, excess / independent, rtol=1e-9)
+
+
+def test_of_frames_that_none_follows_nothing_is_known_of_a_correlation() -> None:
+    """Every disc is seen in every second frame: four frames of the usual scatter."""
+    size = np.sqrt(3 / 4)
+    errors = series([size, np.nan, -size, np.nan, size, np.nan, -size, np.nan], 3)
+    np.testing.assert_allclose(shares(frames_of(errors)), 1 / 4, rtol=1e-9)
 
 
 def test_no_frames_are_fewer_than_one() -> None:
