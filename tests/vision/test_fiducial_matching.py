@@ -137,6 +137,14 @@ def test_the_better_of_two_matches_with_as_many_fiducials_is_taken() -> None:
     assert names(both[::-1], of(FIVE)) == [9, 8, 7, 6, 5]
 
 
+@pytest.mark.parametrize(("nearer", "name"), [(0.75, 5), (0.65, 6)])
+def test_the_difference_of_the_radii_counts_as_much_as_a_distance(nearer: float, name: int) -> None:
+    """A disc 1 mm away, and one of 1.7 mm in place of 2 mm of radius on the other side."""
+    places = np.concatenate([of(FIVE).points, SIX[5] + np.array([[1.0, 0], [-nearer, 0]])])
+    found = names(seen(places), of(SIX), np.array([1, 1, 1, 1, 1, 1, 0.85]))
+    assert found == [0, 1, 2, 3, 4, name]
+
+
 @pytest.mark.parametrize(("first", "second"), [(1.2, 0.6), (1.0, 0.6)])
 def test_of_two_layouts_the_one_with_the_smaller_residual_is_taken(first: float, second: float) -> None:
     """In one the first fiducial is off, in the other the last one; each by its best four, by OpenCV."""
