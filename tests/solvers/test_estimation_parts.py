@@ -59,16 +59,16 @@ def test_a_positive_parameter_has_no_bound_at_zero_or_below() -> None:
 
 
 def as_found(sensitivities: FloatArray, inflation: float = 1.0, z: float = 0.0) -> Estimate:
-    count, parameters = len(sensitivities), [LENGTH, FACTOR][: sensitivities.shape[1]]
+    count, parameters = len(sensitivities), [LENGTH, FACTOR, ONE][: sensitivities.shape[1]]
     places = np.full(len(parameters), z)
     return Estimate(parameters, places, sensitivities, np.zeros(count), inflation, 1, converged=True)
 
 
-def test_the_condition_is_that_of_an_ellipse() -> None:
-    """Semi-axes 5 and 2: singular values of a diagonal matrix in any frame."""
-    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
-    found = as_found(turn @ np.diag([2.0, 5.0]))
-    np.testing.assert_allclose(found.singular_values, [5.0, 2.0], rtol=1e-12)
+def test_the_condition_is_that_of_an_ellipsoid() -> None:
+    """Semi-axes 5, 4 and 2: singular values of a diagonal matrix in any frame."""
+    turn = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
+    found = as_found(turn @ np.diag([2.0, 5.0, 4.0]))
+    np.testing.assert_allclose(found.singular_values, [5.0, 4.0, 2.0], rtol=1e-12)
     assert found.condition == pytest.approx(2.5, rel=1e-12)
     assert as_found(np.array([[1.0, 0.0]])).condition == inf
 
@@ -108,12 +108,12 @@ def test_the_misfit_is_noise_up_to_the_95th_percentile() -> None:
     assert inflation_of(np.sqrt([edge / 2 + 1, edge / 2]), 6) == pytest.approx(np.sqrt((edge + 1) / 6))
 
 
-@pytest.mark.parametrize("count", [1, 3])
-def test_the_inflation_satisfies_its_own_equation(count: int) -> None:
-    """φ² (n - tr H) is the misfit of the estimate under φ, by the normal equations."""
+@pytest.mark.parametrize(("count", "size"), [(1, 1.0), (3, 1.0), (2, 0.1)])
+def test_the_inflation_satisfies_its_own_equation(count: int, size: float) -> None:
+    """φ² (n - tr H) is the misfit under φ, by the normal equations; of small slopes the prior weighs most."""
     random = np.random.default_rng(3)
-    slopes = random.normal(size=(20, count))
-    observed = slopes @ np.full(count, 0.5) + random.normal(size=20)
+    slopes = size * random.normal(size=(20, count))
+    observed = slopes @ np.full(count, 0.5 / size) + random.normal(size=20)
     found = estimate(lambda values: (slopes @ values, slopes), observed, np.full(20, 0.2), [ONE] * count)
     scaled = slopes / 0.2 / found.inflation
     z = np.linalg.solve(scaled.T @ scaled + np.eye(count), scaled.T @ observed / 0.2 / found.inflation)
