@@ -102,19 +102,17 @@ def test_the_first_search_is_15_mm_around_the_design_for_discs_of_about_the_size
 
 def test_the_window_has_whole_pixels_around_the_part(listed: ListedDiscs) -> None:
     """The corners of a turned plane lie between pixels."""
+    turned = MarkerPlane(SIMILARITY, np.array([0.9, 7.7, 350.3, 100.2]), np.zeros((4, 4)), 0.0)
 
     class Turned(KnownPlane):
         def first_plane(self, image: Image) -> tuple[MarkerPlane, DiscDetections]:
-            plane = MarkerPlane(SIMILARITY, np.array([7.7, 0.9, 150.3, 200.2]), np.zeros((4, 4)), 0.0)
-            return plane, super().first_plane(image)[1]
+            return turned, super().first_plane(image)[1]
 
-    scene = Turned(FINGER, SCENE.workspace, colour=RED)
     with pytest.raises(UserError, match="0 of 7 markers"):
-        FrameTracker(scene, listed.picture())
+        FrameTracker(Turned(FINGER, SCENE.workspace, colour=RED), listed.picture())
     window = listed.requests[0].window
     (x0, y0), (x1, y1) = MARKERS.min(axis=0) - 15, MARKERS.max(axis=0) + 15
-    x, y = np.array([x0, x0, x1, x1]), np.array([y0, y1, y0, y1])
-    across, down = 7.7 * x + 0.9 * y + 150.3, 0.9 * x - 7.7 * y + 200.2
+    across, down = turned.pixels(np.array([[x0, y0], [x0, y1], [x1, y0], [x1, y1]])).T
     assert window is not None
     assert window[0] <= across.min() < window[0] + 1
     assert window[1] <= down.min() < window[1] + 1
@@ -143,6 +141,7 @@ def test_markers_are_looked_for_at_the_size_that_the_first_frame_shows(
     for request in near:
         np.testing.assert_allclose(request.radii, size * RADIUS * SCALE)
     again = [r for r in listed.requests if r.window is not None][-1]
+    assert len(again.radii), "of partly hidden discs, too"
     np.testing.assert_allclose(again.radii, size * RADIUS * SCALE)
     assert again.limits == pytest.approx((size * 6.4 / 1.3, size * 6.4 * 1.3))
 
@@ -235,6 +234,19 @@ def test_markers_that_stay_lost_are_searched_for_in_every_frame_of_a_film_and_ev
         counts.append(searches(listed) - before)
     # The first loss is searched for at once, as is one more at the end.
     assert counts == ([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1] if live else [1] * 12)
+
+
+@pytest.mark.parametrize("live", [False, True])
+def test_markers_that_the_first_frame_lacks_are_searched_for_as_often(
+    listed: ListedDiscs, live: bool
+) -> None:
+    tracker = FrameTracker(SCENE, shown(listed, hidden=[2]), live=live)
+    counts = []
+    for _ in range(11):
+        before = searches(listed)
+        tracker.see(shown(listed, hidden=[2]))
+        counts.append(searches(listed) - before)
+    assert counts == ([0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0] if live else [1] * 11)
 
 
 def test_nothing_lost_is_nothing_searched_for(listed: ListedDiscs) -> None:
