@@ -48,7 +48,7 @@ class ListedDiscs:
 
     def all_of(self, image: Image, colour: Colour) -> DiscDetections:
         """The discs of a colour in an image."""
-        found = [discs for own, discs in self.pictures[int(image[0, 0])] if own is colour]
+        found = [discs for own, discs in self.pictures[int(image.flat[0])] if own is colour]
         empty = DiscDetections(np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0), np.empty(0))
         return DiscDetections(*(np.concatenate(part) for part in zip(empty, *found, strict=True)))
 

@@ -7,8 +7,10 @@ import pytest
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
+from geometry.section.loop import Loop
+from geometry.section.section import Section
 from tests.fingers import beam
-from tests.vision.listed_discs import ListedDiscs
+from tests.vision.listed_discs import NOISE, ListedDiscs
 from vision.calibration.camera import Camera, Pose
 from vision.discs.colour import DARK, ColourRange
 from vision.discs.disc_detector import DiscDetections
@@ -16,6 +18,7 @@ from vision.frames.frame import Image
 from vision.rig.virtual_camera import viewing_pose
 from vision.tracking.fiducial_matching import UnseenError
 from vision.tracking.marker_plane import SIMILARITY, CameraProjection
+from vision.tracking.plane_fit import camera_plane
 from vision.tracking.scene import FilmedScene
 from vision.tracking.workspace import Workspace
 
@@ -27,6 +30,8 @@ FIDUCIALS = (
 SPACE = Workspace(fiducials=FIDUCIALS)
 PINHOLE = Camera(1280, 720, 1100.0, 1100.0, 650.0, 350.0)
 BENT = replace(PINHOLE, distortion=(-0.2, 0.05, 1e-3, -1e-3, 0.0))
+FISHY = replace(PINHOLE, distortion=(-0.8, 0.0, 0.0, 0.0, 0.0))
+"""Too much to make out the fiducials where it is not undone."""
 POSE = viewing_pose(PINHOLE, SPACE, tilt=8.0)
 RED = ColourRange((20.0, 40.0, 20.0), (80.0, 90.0, 80.0))
 
@@ -101,11 +106,11 @@ def test_the_plane_of_markers_is_of_those_that_are_seen() -> None:
     np.testing.assert_allclose(plane.parameters, [9, 1, 100, 300], rtol=1e-6)
 
 
-@pytest.mark.parametrize("camera", [None, PINHOLE, BENT])
+@pytest.mark.parametrize("camera", [None, PINHOLE, BENT, FISHY])
 def test_fiducials_are_found_among_discs_that_fit_the_image(
     listed: ListedDiscs, camera: Camera | None
 ) -> None:
-    image = filmed(listed, camera=camera or PINHOLE)
+    image = np.dstack([filmed(listed, camera=camera or PINHOLE)] * 3)  # in colour
     found = FilmedScene(FINGER, SPACE, camera).find_fiducials(image)
     np.testing.assert_array_equal(found.centres, seen(SPACE.points, camera or PINHOLE))
     (request,) = listed.requests
@@ -158,8 +163,14 @@ def test_where_all_are_off_none_is_left_out(listed: ListedDiscs) -> None:
     """
     image = filmed(listed, ALL_OFF)
     assert np.isfinite(FilmedScene(FINGER, SPACE).find_fiducials(image).radii).all()
-    with pytest.raises(UserError, match=r"mm from where the workspace has them, more than 0\.5 mm"):
+    noise = np.tile(NOISE**2 * np.eye(2), (7, 1, 1))
+    residual = camera_plane(PINHOLE, SPACE.points, seen(SPACE.points + ALL_OFF), noise).residual
+    with pytest.raises(
+        UserError, match=rf"lie {residual:.2f} mm from where the workspace has them, more than 0\.5 mm"
+    ):
         FilmedScene(FINGER, SPACE, PINHOLE).find_fiducials(image)
+    with pytest.raises(UnseenError):
+        FilmedScene(FINGER, SPACE).find_fiducials(filmed(listed, camera=FISHY))
 
 
 @pytest.mark.parametrize(
@@ -186,7 +197,9 @@ def test_the_first_plane_is_that_of_the_fiducials(listed: ListedDiscs) -> None:
 
 
 def test_without_fiducials_the_markers_may_give_the_plane(listed: ListedDiscs) -> None:
-    uneven = replace(FINGER, markers=FINGER.markers * (1, -0.7) + np.array([0.0, -6.0]))
+    corners = [(30, -10), (130, -10), (130, 0), (30, 0)]
+    section = Section(Loop.polygon(corners, ("back", "tip", "front", "base")))
+    uneven = replace(FINGER, section=section, markers=FINGER.markers * (1, -0.7) + np.array([0.0, -6.0]))
     pixels = SIMILARITY.pixels(uneven.markers, np.array([9.0, 1.0, 100.0, 300.0]))
     image = listed.picture((RED, pixels, 0.8 * np.hypot(9, 1), 100.0))
     scene = FilmedScene(uneven, SPACE, colour=RED, markers_only=True)
