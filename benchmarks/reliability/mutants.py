@@ -44,7 +44,7 @@ TESTS: Mapping[str, tuple[str, ...]] = {
         *("tests/solvers/test_estimation_parts.py", "tests/solvers/test_estimation.py"),
     ),
     "vision.tracking.workspace": ("tests/vision/test_workspace_limits.py",),
-    "vision.tracking.tracker": ("tests/vision/test_track.py",),
+    "vision.tracking.tracker": ("tests/vision/test_track.py", "tests/vision/test_track_markers.py"),
     **{
         f"vision.tracking.{name}": (f"tests/vision/test_{name}.py",)
         for name in (
