@@ -222,7 +222,8 @@ def test_markers_half_a_millimetre_from_the_design_are_worth_a_warning(
 
 
 def test_markers_that_one_end_does_not_show_are_named(listed: ListedDiscs) -> None:
-    tracking = track(film(pressed(listed, lost=(1, 5))), SCENE)
+    tracking = track(film(pressed(listed, lost=(1, 5), hidden=(2,))), SCENE)
+    assert "1 of 6 fiducials were not seen" in tracking.warnings
     assert tracking.warnings[-1] == "not seen at rest both before and after, so reported missing: marker 2, 6"
     assert np.nonzero(~tracking.visible)[0].tolist() == [1, 5]
     assert np.isnan(tracking.pixels[6, 1]).all()
