@@ -120,6 +120,12 @@ def test_errors_of_the_camera_are_in_the_covariance_of_pose_and_intrinsics() -> 
     in_deviations(covariance, slopes @ root @ root.T @ slopes.T)
 
 
+def test_fiducials_that_no_pose_explains_are_one_line() -> None:
+    """By a camera of half the height, every pose that the search tries is lost."""
+    with pytest.raises(UserError, match="do not determine where the camera is; give the design or workspace"):
+        fitted("camera", seen(POINTS), camera=replace(CAMERA, fy=600.0))
+
+
 def misfit_of(plane: MarkerPlane, pixels: FloatArray) -> float:
     return float((squares_of(plane, pixels, plane.parameters) ** 2).sum())
 
