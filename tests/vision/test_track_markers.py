@@ -8,7 +8,7 @@ import pytest
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from tests.vision.listed_discs import ListedDiscs
+from tests.vision.listed_discs import NOISE, ListedDiscs
 from tests.vision.test_track import FINGER, MARKERS, PRESSED, RED, SHARES, SPACE, film
 from vision.discs.disc_detector import DiscDetections
 from vision.tracking.marker_plane import SIMILARITY
@@ -29,6 +29,7 @@ def markers_only(
         pixels = SIMILARITY.pixels(markers + share * moved, np.array([cos, -sin, 640.0, 360.0]))
         pixels = (pixels - (640, 360)) * (1, -1 if mirrored else 1) + (640, 360)
         pictures.append(listed.picture((RED, pixels, 0.8 * 9, 100.0)))
+        listed.pictures[-1][0][1].covariances[:] *= np.arange(1, 8)[:, None, None]
     return track(film(pictures), scene)
 
 
@@ -49,7 +50,8 @@ def test_the_markers_alone_give_the_plane_and_their_motion_its_direction(
     assert tracking.warnings[1:] == (
         (f"the finger points at {said} degrees in the image, by its motion",) if said else ()
     )
-    assert np.isfinite(tracking.covariances).all()
+    each = NOISE**2 * np.arange(1, 8)[:, None, None] * np.eye(2)
+    np.testing.assert_allclose(tracking.covariances, np.tile(each, (8, 1, 1, 1)))
 
 
 def test_markers_that_move_out_of_the_front_are_of_a_mirrored_image(listed: ListedDiscs) -> None:
@@ -71,6 +73,7 @@ def of(count: int, hidden: Sequence[int]) -> list[DiscDetections | None]:
     [
         ((0, 1, 2, 3, 7, 8, 9), (0, 1, 2), (8, 9)),  # those in the frames at rest
         ((0, 5), (0,), (5,)),  # none at the end: the last one
+        ((0, 4, 5), (0,), (5,)),
         ((0, 8), (0,), (8,)),
         ((4, 5), (4,), (5,)),  # none at either end: the nearest ones
     ],
