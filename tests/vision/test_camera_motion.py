@@ -6,6 +6,7 @@ import pytest
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from tests.fingers import beam
+from vision.calibration.camera import Camera
 from vision.discs.disc_detector import DiscDetections
 from vision.tracking.camera_motion import CameraMotion, find_camera_motion
 from vision.tracking.scene import FilmedScene
@@ -91,6 +92,19 @@ def test_what_is_undone_has_the_poses_share_of_the_noise(hidden: tuple[int, ...]
     assert motion.deviation == pytest.approx(np.sqrt(variance))
     undone = motion.undone(discs(moved(BETWEEN), variance=0.01))
     np.testing.assert_allclose(undone.covariances, np.tile((0.01 + variance) * np.eye(2), (3, 1, 1)))
+
+
+@pytest.mark.parametrize("camera", [None, Camera(1280, 720, 1100.0, 1100.0, 640.0, 360.0)])
+def test_fiducials_in_a_row_tell_of_a_motion_but_do_not_undo_it(camera: Camera | None) -> None:
+    """As the four before the finger, where the three behind it are hidden in the end."""
+    row = Workspace(
+        fiducials=(*((x, 12.0) for x in (-12.0, 15.0, 80.0, 112.0)), (-12.0, -22.0), (112.0, -22.0))
+    )
+    scene = FilmedScene(beam(), row, camera)
+    pixels = pictured(row.points)
+    motion = find_camera_motion(scene, discs(pixels), discs(moved(pixels), hidden=(4, 5)))
+    assert motion.planes is None
+    assert motion.shift > 1
 
 
 def test_a_lens_that_is_not_known_cancels_however_well_the_ends_are_known() -> None:
