@@ -22,7 +22,8 @@ class CameraMotion(NamedTuple):
 
     Attributes:
         shift: Median over the fiducials, pixels.
-        planes: Of the markers at start and end; None if the camera is static or there are too few fiducials.
+        planes: Of the markers at start and end; None if the camera is static, or the fiducials are too few or
+            in a row.
         deviation: Standard deviation of a coordinate that is corrected by the planes, pixels.
     """
 
@@ -60,5 +61,8 @@ def find_camera_motion(scene: FilmedScene, before: DiscDetections, after: DiscDe
     numbers = np.where(common, np.arange(len(common)), -1)
     # Equal weights make the distortion of the lens cancel, also where it is not known.
     alike = after._replace(covariances=before.covariances)
-    start, end = (scene.plane(fiducials.numbered(numbers)) for fiducials in (before, alike))
+    try:
+        start, end = (scene.plane(fiducials.numbered(numbers)) for fiducials in (before, alike))
+    except UserError:  # those that both ends show lie in a row
+        return CameraMotion(shift, None)
     return CameraMotion(shift, (start, end), noise * np.sqrt(UNKNOWNS / (2 * count)))

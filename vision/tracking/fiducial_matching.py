@@ -33,7 +33,10 @@ class UnseenError(UserError):
 
 
 class FiducialMatch(NamedTuple):
-    """Discs of the fiducials, shape (f,), -1 for those not found, and the sum of the residuals, mm."""
+    """Discs of the fiducials, shape (f,), -1 for those not found, and the sum of the residuals, mm.
+
+    A residual is the distance of a disc from its fiducial and the difference of their radii.
+    """
 
     discs: IntArray
     residual: float
@@ -128,7 +131,8 @@ def _match(
     distance = np.linalg.norm(seen[upright, :, None] - pixels, axis=3) / scale
     size = radii / (scale * workspace.fiducial_diameter / 2)
     allowed = (distance < GATE) & (size < SAME_SIZE) & (size > 1 / SAME_SIZE)
-    distance = np.where(allowed, distance, np.inf)
+    # Any four discs fit four fiducials, in any turn: then only the sizes tell which is which.
+    distance = np.where(allowed, distance + np.abs(size - 1) * workspace.fiducial_diameter / 2, np.inf)
     nearest = distance.argmin(axis=2)
     residuals = distance.min(axis=2)
     count = np.isfinite(residuals).sum(axis=1)

@@ -86,7 +86,7 @@ class FrameTracker:
                 f"{count} of {len(names)} markers are where the design has them, and {least} must be; "
                 "show the finger before it is pressed, and give its design, workspace and markers' colour"
             )
-        self._lost = 0
+        self._lost = 1  # frames since the last search
         self.first = self._accepted(detections, names, image)
         self._step = np.zeros_like(self._rest)
 

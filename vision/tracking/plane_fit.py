@@ -64,15 +64,18 @@ def camera_plane(
 
 def homography_plane(points: FloatArray, pixels: FloatArray, covariances: FloatArray) -> MarkerPlane:
     """Fit a homography, without a camera; arguments as of `camera_plane`."""
-    start = cv2.findHomography(points, pixels, 0)[0]
-    start = (start / start[2, 2]).ravel()[:8]
-    return _plane_without_lens(HOMOGRAPHY, start, points, pixels, covariances)
+    start = cv2.findHomography(points, pixels, 0)[0]  # its last entry is 1
+    if start is None:
+        raise UserError(f"{UNDETERMINED}; spread them around the finger")
+    return _plane_without_lens(
+        HOMOGRAPHY, np.ravel(start).astype(np.float64)[:8], points, pixels, covariances
+    )
 
 
 def similarity_plane(points: FloatArray, pixels: FloatArray, covariances: FloatArray) -> MarkerPlane:
     """Fit a scale, rotation and shift; arguments as of `camera_plane`."""
-    start = np.array([1.0, 0.0, 0.0, 0.0])
-    return _plane_without_lens(SIMILARITY, start, points, pixels, covariances)
+    # The pixels are linear in a similarity: from any start the first step leads to its end.
+    return _plane_without_lens(SIMILARITY, np.zeros(4), points, pixels, covariances)
 
 
 def plane_of_markers(points: FloatArray, pixels: FloatArray, covariances: FloatArray) -> MarkerPlane:

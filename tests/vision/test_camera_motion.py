@@ -1,0 +1,130 @@
+"""The camera's motion from fiducials that were moved by a known map, without a lens."""
+
+import numpy as np
+import pytest
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from tests.fingers import beam
+from vision.calibration.camera import Camera
+from vision.discs.disc_detector import DiscDetections
+from vision.tracking.camera_motion import CameraMotion, find_camera_motion
+from vision.tracking.scene import FilmedScene
+from vision.tracking.workspace import Workspace
+
+CORNERS = ((0.0, 0.0), (100.0, 0.0), (100.0, 60.0), (0.0, 60.0), (40.0, 70.0), (110.0, 25.0))
+SCENE = FilmedScene(beam(), Workspace(fiducials=CORNERS))
+NOISE = 0.05
+"""Of a coordinate in one mean, pixels: a difference has √2 of it."""
+
+
+def pictured(places: FloatArray) -> FloatArray:
+    """A tilted camera, without a lens."""
+    x, y = places.T
+    depth = 1 + 1e-3 * x - 5e-4 * y
+    return np.column_stack([100 + 8 * x + y, 700 - 7 * y + 0.5 * x]) / depth[:, None]
+
+
+def moved(pixels: FloatArray) -> FloatArray:
+    """A camera that was turned a little."""
+    x, y = pixels.T
+    depth = 1 + 1e-6 * x + 2e-6 * y
+    return np.column_stack([1.5 + x - 2e-3 * y, -0.7 + y + 2e-3 * x]) / depth[:, None]
+
+
+def discs(pixels: FloatArray, *, hidden: tuple[int, ...] = (), variance: float = NOISE**2) -> DiscDetections:
+    count = len(pixels)
+    centres, radii = pixels.copy(), np.full(count, 16.0)
+    covariances = np.tile(variance * np.eye(2), (count, 1, 1))
+    for number in hidden:
+        centres[number] = covariances[number] = radii[number] = np.nan
+    return DiscDetections(centres, covariances, radii, np.full(count, 100.0))
+
+
+START = pictured(SCENE.workspace.points)
+BETWEEN = pictured(np.array([[20.0, 30.0], [90.0, 20.0], [50.0, 50.0]]))
+
+
+def test_the_shift_is_the_median_over_the_fiducials_seen_at_both_ends() -> None:
+    shifts = np.array([[3.0, 4], [0, 1], [6, 8], [0, 7], [300, 0], [0, 2]])
+    motion = find_camera_motion(SCENE, discs(START, hidden=(4,)), discs(START + shifts))
+    assert motion.shift == pytest.approx(5.0)  # of 1, 2, 5, 7 and 10
+
+
+@pytest.mark.parametrize(("deviations", "static"), [(1.95, True), (2.05, False)])
+def test_a_camera_is_static_below_two_standard_deviations(deviations: float, static: bool) -> None:
+    """Two fiducials are known worse than the others, which does not count."""
+    shift = deviations * np.sqrt(NOISE**2 + (2 * NOISE) ** 2)
+    after = discs(START + np.array([shift, 0]), variance=(2 * NOISE) ** 2)
+    after.covariances[:2] *= 100
+    motion = find_camera_motion(SCENE, discs(START), after)
+    assert motion.shift == pytest.approx(shift)
+    assert (motion.planes is None) == static
+
+
+@pytest.mark.parametrize("hidden", [(0, 1), (0, 1, 2)])
+def test_four_fiducials_undo_a_motion_and_three_do_not(hidden: tuple[int, ...]) -> None:
+    motion = find_camera_motion(
+        SCENE, discs(START, hidden=hidden[:1]), discs(moved(START), hidden=hidden[1:])
+    )
+    assert (motion.planes is None) == (len(hidden) == 3)
+
+
+def test_a_motion_is_undone_exactly_where_there_is_no_noise() -> None:
+    """But for a thousandth of a pixel: the fiducials' middles are not quite where a homography has them."""
+    motion = find_camera_motion(SCENE, discs(START, hidden=(2,)), discs(moved(START)))
+    final = discs(moved(BETWEEN), hidden=(1,), variance=0.01)
+    undone = motion.undone(final)
+    np.testing.assert_allclose(undone.centres[[0, 2]], BETWEEN[[0, 2]], atol=1e-3)
+    assert np.isnan(undone.centres[1]).all()
+    np.testing.assert_array_equal(final.centres[0], moved(BETWEEN)[0])  # what was given stays
+    np.testing.assert_array_equal(undone.radii, final.radii)
+    assert motion.planes is not None
+    np.testing.assert_allclose(motion.planes[0].pixels(SCENE.workspace.points), START, atol=0.05)
+    np.testing.assert_allclose(motion.planes[1].pixels(SCENE.workspace.points), moved(START), atol=0.05)
+
+
+@pytest.mark.parametrize("hidden", [(), (5,)])
+def test_what_is_undone_has_the_poses_share_of_the_noise(hidden: tuple[int, ...]) -> None:
+    """Of 2 n coordinates with the noise of a difference, six are spent on the pose."""
+    motion = find_camera_motion(SCENE, discs(START), discs(moved(START), hidden=hidden))
+    variance = 2 * NOISE**2 * 6 / (2 * (6 - len(hidden)))
+    assert motion.deviation == pytest.approx(np.sqrt(variance))
+    undone = motion.undone(discs(moved(BETWEEN), variance=0.01))
+    np.testing.assert_allclose(undone.covariances, np.tile((0.01 + variance) * np.eye(2), (3, 1, 1)))
+
+
+@pytest.mark.parametrize("camera", [None, Camera(1280, 720, 1100.0, 1100.0, 640.0, 360.0)])
+def test_fiducials_in_a_row_tell_of_a_motion_but_do_not_undo_it(camera: Camera | None) -> None:
+    """As the four before the finger, where the three behind it are hidden in the end."""
+    row = Workspace(
+        fiducials=(*((x, 12.0) for x in (-12.0, 15.0, 80.0, 112.0)), (-12.0, -22.0), (112.0, -22.0))
+    )
+    scene = FilmedScene(beam(), row, camera)
+    pixels = pictured(row.points)
+    motion = find_camera_motion(scene, discs(pixels), discs(moved(pixels), hidden=(4, 5)))
+    assert motion.planes is None
+    assert motion.shift > 1
+
+
+def test_a_lens_that_is_not_known_cancels_however_well_the_ends_are_known() -> None:
+    """A shift of all discs by the same is undone to the last digit, though no homography fits them."""
+    shift = np.array([5.0, -3.0])
+    bent = START + 2 * np.sin(START[:, ::-1])
+    after = discs(bent + shift)
+    after.covariances[:3] *= 50
+    motion = find_camera_motion(SCENE, discs(bent), after)
+    undone = motion.undone(discs(BETWEEN + shift))
+    np.testing.assert_allclose(undone.centres, BETWEEN, atol=1e-5)
+
+
+def test_a_static_camera_leaves_the_discs_as_they_are() -> None:
+    final = discs(BETWEEN)
+    static = CameraMotion(0.1, None)
+    assert static.undone(final) is final
+    assert static.deviation == 0
+
+
+def test_no_fiducial_at_both_ends_is_one_line() -> None:
+    with pytest.raises(UserError, match="no fiducial is seen in the end where it was at the start"):
+        find_camera_motion(SCENE, discs(START, hidden=(0, 1, 2)), discs(START, hidden=(3, 4, 5)))

@@ -1,0 +1,198 @@
+"""Limits of what counts as a fiducial: distance, size, obliqueness, number; layouts of few discs."""
+
+from itertools import combinations, permutations
+
+import cv2
+import numpy as np
+import pytest
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from vision.tracking.fiducial_matching import FiducialMatch, UnseenError, identify_fiducials
+from vision.tracking.workspace import Workspace
+
+SCALE = 6.0
+"""Pixels per mm."""
+FIVE = ((0.0, 0.0), (80.0, 5.0), (95.0, 60.0), (10.0, 50.0), (40.0, 75.0))
+SIX = (*FIVE, (52.0, 27.0))
+
+
+def of(fiducials: tuple[tuple[float, float], ...]) -> Workspace:
+    return Workspace(fiducials=fiducials)
+
+
+def seen(places: FloatArray, stretch: float = 1.0, turn: float = 0.0, tilt: float = 0.0) -> FloatArray:
+    """Pixels of places, mm: stretched along x, turned by an angle in degrees, tilted, with y down."""
+    cos, sin = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+    x, y = np.array([[cos, -sin], [sin, cos]]) @ (places * (stretch, 1)).T
+    pixels = np.column_stack([700 + SCALE * x, 600 - SCALE * y])
+    return np.asarray(pixels / (1 + tilt * places @ (2e-3, 1e-3))[:, None])
+
+
+def names(
+    pixels: FloatArray, workspace: Workspace, sizes: FloatArray | float = 1.0, diameter: float = 4.0
+) -> list[int]:
+    radii = np.broadcast_to(sizes, len(pixels)) * SCALE * diameter / 2
+    return identify_fiducials(pixels, radii, workspace).tolist()
+
+
+@pytest.mark.parametrize("turn", [0, 63, 180, 250])
+@pytest.mark.parametrize("tilt", [0.0, 0.4, -0.5])
+def test_fiducials_are_known_however_the_camera_is_held(turn: int, tilt: float) -> None:
+    order = np.random.default_rng(turn).permutation(5)
+    found = names(seen(of(FIVE).points, turn=turn, tilt=tilt)[order], of(FIVE))
+    assert order[found].tolist() == list(range(5))
+
+
+def test_the_order_of_the_discs_is_of_no_account() -> None:
+    """All orders of four discs, which fit in any turn: only one has the right sizes."""
+    workspace = of(FIVE[:4])
+    for order in permutations(range(4)):
+        found = names(seen(workspace.points, turn=20)[list(order)], workspace)
+        assert np.array(order)[found].tolist() == list(range(4))
+
+
+@pytest.mark.parametrize("direction", [(1, 0), (-0.6, 0.8)])
+@pytest.mark.parametrize(("away", "name"), [(1.9, 5), (2.1, -1)])
+def test_a_disc_is_no_fiducial_more_than_two_millimetres_away(
+    direction: tuple[float, float], away: float, name: int
+) -> None:
+    """The five others have their places exactly, and the misfit of other four would be larger."""
+    places = of(SIX).points
+    places[5] += away * np.array(direction)
+    assert names(seen(places, tilt=0.2), of(SIX)) == [0, 1, 2, 3, 4, name]
+
+
+@pytest.mark.parametrize(("size", "name"), [(1.28, 5), (0.78, 5), (1.32, -1), (0.76, -1)])
+def test_a_disc_of_another_size_is_no_fiducial(size: float, name: int) -> None:
+    """Beyond a ratio of 1.3."""
+    assert names(seen(of(SIX).points), of(SIX), np.array([1, 1, 1, 1, 1, size])) == [0, 1, 2, 3, 4, name]
+
+
+@pytest.mark.parametrize(("size", "fits"), [(1.28, True), (1.32, False), (0.78, True), (0.76, False)])
+def test_discs_are_as_large_as_the_workspace_has_them(size: float, fits: bool) -> None:
+    if fits:
+        assert names(seen(of(FIVE).points), of(FIVE), size) == list(range(5))
+    else:
+        with pytest.raises(UnseenError, match=r"at best \d fit, and 5 must"):
+            names(seen(of(FIVE).points), of(FIVE), size)
+
+
+def test_the_size_counts_where_the_fiducial_is() -> None:
+    """A plane so oblique that its far discs are seen at three quarters of the near ones' size."""
+    places, step = of(FIVE).points, 1e-4
+    pixels = seen(places, tilt=0.8)
+    along, across = ((seen(places + step * axis, tilt=0.8) - pixels) / step for axis in np.eye(2))
+    scales = np.sqrt(np.abs(along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0])) / SCALE
+    assert scales.max() / scales.min() > 1.3
+    assert names(pixels, of(FIVE), scales) == list(range(5))
+
+
+@pytest.mark.parametrize(
+    ("stretch", "fits"), [(1.55, True), (1.65, False), (1 / 1.55, True), (1 / 1.65, False)]
+)
+def test_a_plane_is_not_seen_more_obliquely_than_at_50_degrees(stretch: float, fits: bool) -> None:
+    """There one direction is 1.6 times as long as the other; size is the root of the area."""
+    pixels = seen(of(FIVE).points, stretch, turn=30)
+    if fits:
+        assert names(pixels, of(FIVE), stretch**0.5) == list(range(5))
+    else:
+        with pytest.raises(UnseenError):
+            names(pixels, of(FIVE), stretch**0.5)
+
+
+@pytest.mark.parametrize(("shown", "enough"), [(5, True), (4, False)])
+def test_five_fiducials_must_be_seen(shown: int, enough: bool) -> None:
+    pixels = seen(of(SIX).points, tilt=0.3)[:shown]
+    if enough:
+        assert names(pixels, of(SIX)) == [0, 1, 2, 3, 4, -1]
+    else:
+        with pytest.raises(UnseenError, match="6 fiducials cannot be made out among 4 discs: at best 4 fit"):
+            names(pixels, of(SIX))
+
+
+def test_of_four_fiducials_all_must_be_seen() -> None:
+    workspace = of(FIVE[:4])
+    assert names(seen(workspace.points), workspace) == [0, 1, 2, 3]
+    with pytest.raises(UnseenError, match="at best 0 fit, and 4 must"):
+        names(seen(workspace.points)[:3], workspace)
+
+
+def test_a_mirrored_image_is_told_from_one_that_is_not() -> None:
+    with pytest.raises(UserError, match="the image is mirrored"):
+        names(seen(of(FIVE).points) * (-1, 1), of(FIVE))
+    symmetric = of(((0.0, 0.0), (80.0, 0.0), (20.0, 50.0), (60.0, 50.0), (40.0, 75.0)))
+    mirrored = seen(symmetric.points) * (-1, 1)
+    assert names(mirrored, symmetric) == [1, 0, 3, 2, 4]  # the same layout, seen from its front
+    with pytest.raises(UnseenError):
+        names(seen(of(SIX).points)[:4] * (-1, 1), of(SIX))  # too few to be sure that it is mirrored
+
+
+def test_the_better_of_two_matches_with_as_many_fiducials_is_taken() -> None:
+    """Each fiducial has a second disc 1 mm beside it: those without a residual are taken, in any order."""
+    places = of(FIVE).points
+    offsets = np.array([[1.0, 0.2], [-0.9, 0.4], [0.3, -1.0], [0.1, 1.1], [-0.7, -0.7]])
+    both = np.concatenate([seen(places), seen(places + offsets)])
+    assert names(both, of(FIVE)) == [0, 1, 2, 3, 4]
+    assert names(both[::-1], of(FIVE)) == [9, 8, 7, 6, 5]
+
+
+@pytest.mark.parametrize(("nearer", "name"), [(0.75, 5), (0.65, 6)])
+def test_the_difference_of_the_radii_counts_as_much_as_a_distance(nearer: float, name: int) -> None:
+    """A disc 1 mm away, and one of 1.7 mm in place of 2 mm of radius on the other side."""
+    places = np.concatenate([of(FIVE).points, SIX[5] + np.array([[1.0, 0], [-nearer, 0]])])
+    found = names(seen(places), of(SIX), np.array([1, 1, 1, 1, 1, 1, 0.85]))
+    assert found == [0, 1, 2, 3, 4, name]
+
+
+@pytest.mark.parametrize(("first", "second"), [(1.2, 0.6), (1.0, 0.6)])
+def test_of_two_layouts_the_one_with_the_smaller_residual_is_taken(first: float, second: float) -> None:
+    """In one the first fiducial is off, in the other the last one; each by its best four, by OpenCV."""
+    places, way = of(FIVE).points, np.array([1, -1]) / np.sqrt(2)
+    copies = [places.copy(), places.copy()]
+    copies[0][0] += first * way
+    copies[1][4] -= second * way
+    pixels = [seen(copies[0]), seen(copies[1] - (0, 130))]
+    least = []
+    for copy in pixels:
+        missed = []
+        for four in map(list, combinations(range(5), 4)):
+            back = cv2.getPerspectiveTransform(copy[four].astype(np.float32), places[four].astype(np.float32))
+            missed.append(
+                np.linalg.norm(cv2.perspectiveTransform(copy[None], back)[0] - places, axis=1).sum()
+            )
+        least.append(min(missed))
+    assert abs(least[0] - least[1]) > 0.05
+    expected = [0, 1, 2, 3, 4] if least[0] < least[1] else [5, 6, 7, 8, 9]
+    assert names(np.concatenate(pixels), of(FIVE)) == expected
+
+
+@pytest.mark.parametrize(("others", "searched"), [(11, True), (12, False)])
+def test_sixteen_discs_of_one_size_are_searched(others: int, searched: bool) -> None:
+    false = np.random.default_rng(7).uniform(-150, -20, (others, 2))
+    pixels = seen(np.concatenate([of(FIVE).points, false]))
+    if searched:
+        assert names(pixels, of(FIVE)) == [0, 1, 2, 3, 4]
+    else:
+        with pytest.raises(UnseenError, match="among 17 discs: at best 0 fit"):
+            names(pixels, of(FIVE))
+
+
+def test_many_discs_of_other_sizes_do_not_hide_the_fiducials() -> None:
+    false = np.random.default_rng(8).uniform(-150, 150, (20, 2))
+    pixels = seen(np.concatenate([false, of(FIVE).points]))
+    assert names(pixels, of(FIVE), np.repeat([2.0, 1.0], [20, 5])) == [20, 21, 22, 23, 24]
+    assert names(pixels, of(FIVE), np.repeat([0.5, 1.0], [20, 5])) == [20, 21, 22, 23, 24]
+
+
+def test_fiducials_of_which_three_are_on_a_line_are_known_by_the_others() -> None:
+    """Their triangle has no orientation, so rounding may not decide."""
+    rows = of(((0.0, 0.0), (40.0, 0.0), (80.0, 0.0), (10.0, 50.0), (75.0, 60.0)))
+    for turn in (0, 17, 90):
+        assert names(seen(rows.points, turn=turn, tilt=0.3), rows) == list(range(5))
+        noisy = seen(rows.points, turn=turn) + np.random.default_rng(turn).normal(0, 0.2, (5, 2))
+        assert names(noisy, rows) == list(range(5))
+
+
+def test_the_number_found_is_that_of_the_fiducials_with_a_disc() -> None:
+    assert FiducialMatch(np.array([3, -1, 0, -1]), 0.1).found == 2
