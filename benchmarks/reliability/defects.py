@@ -325,5 +325,22 @@ DEFECTS = (
         "A board whose square was given in metres calibrated a camera without a word.",
         "`test_board.py`, an impossible board",
     ),
+    (
+        "mutant",
+        "A workspace of exactly four fiducials was named by rounding, because any four discs fit in any "
+        "turn: of 100 views of a layout near a parallelogram 51 were right. The discs' sizes count now.",
+        "`test_fiducial_matching.py`, sizes",
+    ),
+    (
+        "mutant",
+        "A film whose fiducials at both ends lie in a row, while its camera moved, ended with a `TypeError`, "
+        "or was refused.",
+        "`test_camera_motion.py`, `test_plane_fit.py`, in a row",
+    ),
+    (
+        "mutant",
+        "A film skipped the search for lost markers in its second frame, and a camera waited a frame too long.",
+        "`test_frame_tracker.py`, lacks",
+    ),
 )
 """Found by, what happened, test."""

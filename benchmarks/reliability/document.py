@@ -251,7 +251,7 @@ def _mutants() -> list[str]:
             f"{100 * killed / len(group):.0f} %",
             str(sum(row.judgement.startswith("equal") for row in group)),
         )
-        for name, group in groups.items()
+        for name, group in {**groups, "all": rows}.items()
     ]
     survivors = [row for row in rows if row.end == "survived"]
     return [
