@@ -339,7 +339,8 @@ DEFECTS = (
     ),
     (
         "mutant",
-        "A film skipped the search for lost markers in its second frame, and a camera waited a frame too long.",
+        "A film skipped the search for lost markers in its second frame, and a camera waited a frame too "
+        "long.",
         "`test_frame_tracker.py`, lacks",
     ),
 )

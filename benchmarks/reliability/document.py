@@ -109,11 +109,15 @@ def _two_threads() -> list[str]:
     return [
         "On two threads (`python -m benchmarks.reliability.two_threads`), "
         f"`compare {' '.join(two_threads.ARGUMENTS)}` was killed {found.kills} times, evenly over its "
-        "changes of files, and resumed. The numbers in `metrics.json` and in the solutions then differ from "
-        f"those of a run that was never interrupted by at most {found.after_kills:.1e} of the largest of "
-        f"them; those of two whole runs by {found.undisturbed:.1e}.",
+        "changes of files, and resumed. Largest difference of the numbers in `metrics.json` and in the "
+        f"solutions from those of a run that was never interrupted: {_relative(found.after_kills)}; between "
+        f"two whole runs: {_relative(found.undisturbed)}.",
         "",
     ]
+
+
+def _relative(difference: float) -> str:
+    return f"{difference:.1e} of the largest of them" if difference else "none, they are equal to the bit"
 
 
 def _inputs() -> list[str]:
