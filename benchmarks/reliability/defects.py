@@ -343,5 +343,10 @@ DEFECTS = (
         "long.",
         "`test_frame_tracker.py`, lacks",
     ),
+    (
+        "hostile file",
+        "A `metrics.json` of others that lacked a number ended `report` with a traceback.",
+        "`test_runs.py`, lacks a number",
+    ),
 )
 """Found by, what happened, test."""

@@ -88,11 +88,23 @@ def _read(name: str, folder: Path) -> Run:
         except ValueError:
             raise UserError(f"{folder / file} is damaged: it is no JSON; make the run again") from None
     metrics, record = found
-    if not isinstance(metrics, dict) or metrics.get("schema") != SCHEMA or "solvers" not in metrics:
+    if (
+        not isinstance(record, dict)
+        or not isinstance(metrics, dict)
+        or metrics.get("schema") != SCHEMA
+        or "solvers" not in metrics
+    ):
         raise UserError(
             f"{folder / 'metrics.json'} is not of `compare`, or of another version; make the run again"
         )
-    return Run(name, folder, metrics, record)
+    run = Run(name, folder, metrics, record)
+    try:  # what is asked of it later
+        _ = run.answers, run.settings, table([run])
+    except (AttributeError, LookupError, TypeError, ValueError):
+        raise UserError(
+            f"{folder / 'metrics.json'} is damaged: a number is missing; make the run again"
+        ) from None
+    return run
 
 
 def _flat(value: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:

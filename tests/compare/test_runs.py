@@ -118,3 +118,20 @@ def test_a_wrong_folder_is_refused_in_a_line(
     assert main(["report", *arguments]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert words in line
+
+
+@pytest.mark.parametrize(
+    ("solver", "key", "value"),
+    [("pinn-std", "to_reference", None), ("pinn-std", "energy", "1.1"), ("fem-asm", "markers", [])],
+)
+def test_a_run_that_lacks_a_number_is_one_line(
+    save: Save, capsys: pytest.CaptureFixture[str], solver: str, key: str, value: object
+) -> None:
+    folder = save("first")
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    content["solvers"][solver][key] = value
+    write_json(folder / "metrics.json", content)
+    assert main(["report", str(folder)]) == 2
+    assert capsys.readouterr().err.endswith(
+        "metrics.json is damaged: a number is missing; make the run again\n"
+    )
