@@ -18,7 +18,16 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # one thread: numbers are to agre
 
 from rich.table import Table
 
-from benchmarks.reliability import fuzz_all, inputs, memory, mutants, same_answer, same_image, two_threads
+from benchmarks.reliability import (
+    audit,
+    fuzz_all,
+    inputs,
+    memory,
+    mutants,
+    same_answer,
+    same_image,
+    two_threads,
+)
 from benchmarks.reliability.defects import DEFECTS
 from benchmarks.reliability.faults import Row, run_faults
 from benchmarks.reliability.jobs import JOBS
@@ -41,7 +50,17 @@ def main(rows: str = "") -> Table:
 def page(rows: Sequence[Row]) -> str:
     """The page of all results that are kept."""
     return "\n".join(
-        [*_faults(rows), *_inputs(), *_fuzzing(), *_same(), *_image(), *_memory(), *_mutants(), *_defects()]
+        [
+            *_faults(rows),
+            *_inputs(),
+            *_fuzzing(),
+            *_same(),
+            *_image(),
+            *_audit(),
+            *_memory(),
+            *_mutants(),
+            *_defects(),
+        ]
     )
 
 
@@ -237,6 +256,29 @@ def _image() -> list[str]:
         "with a fixed time: of "
         f"{found.files:,} files {len(found.lone)} are in one image only and {len(found.differ)} differ. "
         + (f"These are {', '.join(names)}." if names else "All contents are the same to the bit."),
+        "",
+    ]
+
+
+def _audit() -> list[str]:
+    """Advisories of the locked packages."""
+    if (found := audit.kept()) is None:
+        return []
+    unknown = [f"{each.name} {each.version}" for each in found.packages if each.advisories is None]
+    weak = [
+        f"{each.name} {each.version} ({', '.join(each.advisories or []) or 'withdrawn'})"
+        for each in found.weak
+    ]
+    return [
+        "## Dependencies",
+        "",
+        f"`make sbom` lists all of them, with licences. `python -m benchmarks.reliability.audit` asked PyPI on "
+        f"{found.day} for advisories of the {len(found.packages)} releases of both lock files: "
+        f"{len(found.known)} can be judged from here, because they are the newest of their projects. With an "
+        f"advisory, or withdrawn: {', '.join(weak) or 'none'}.",
+        "",
+        f"Not judged: {', '.join(unknown) or 'none'}. `pip-audit -r requirements/debian12.txt --no-deps` judges "
+        "them where PyPI's pages of releases can be reached, and Debian's tracker its own packages.",
         "",
     ]
 

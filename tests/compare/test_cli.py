@@ -52,7 +52,7 @@ INPUTS: dict[str, str | bytes] = {
     "header.csv": f"{HEADER}\n",
     "empty.csv": "",
     "binary.csv": bytes(range(256)),
-    "good.csv": f"{HEADER}\n20,-1,0,-5\n",
+    "good.csv": f"{HEADER}\n20,-1,0,-5\n85,-1,-2,-0.5\n",
     "file": "",
     "far.csv": f"{HEADER}\n20,-1,1e308,0\n",
     "underscore.csv": f"{HEADER}\n2_0,-1,0,0\n",
@@ -177,7 +177,7 @@ BAD = [
     ("compare --solver-set fem.degree=1 --load cylinder", "fem takes the loads mean, point, patch, not 'cyl"),
     (
         "compare --solvers gp --mesh-size 1 --quiet --measurements good.csv",
-        "gp .* needs 4 .*, not 1",
+        "gp .* needs 4 .*, not 2",
     ),
     # measurements
     ("compare --measurements absent.csv", "there is no file absent.csv"),
@@ -663,7 +663,7 @@ def test_a_terminal_without_greek_letters_shows_the_tables(folder, monkeypatch, 
         monkeypatch.setattr("sys.stdout", terminal)
         assert main([*SMALL, "--measurements", "good.csv", "--out", "here"]) == 0
         shown = terminal.buffer.getvalue()
-    assert b"Mean absolute error at 1 marker" in shown
+    assert b"Mean absolute error at 2 markers" in shown
     assert b"?" in shown
 
 

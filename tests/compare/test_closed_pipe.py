@@ -65,7 +65,7 @@ def test_so_does_a_closed_pipe_of_messages(words, tmp_path):
 
 def test_the_results_are_kept(tmp_path):
     out, markers = tmp_path / "run", tmp_path / "markers.csv"
-    markers.write_text("x_mm,y_mm,u_mm,v_mm\n20,-1,0,-5\n")
+    markers.write_text("x_mm,y_mm,u_mm,v_mm\n20,-1,0,-5\n85,-1,-2,-0.5\n")
     words = f"compare --solvers fem --mesh-size 1 --measurements {markers} --json --out {out}"
     done = unread(WITHOUT_PICTURES, words, "stdout")
     assert (done.returncode, done.stderr) == (141, "")
