@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.reliability.audit import audited, locked
+
 MAKEFILE = Path(__file__).parents[1] / "Makefile"
 
 CLOSED = re.compile(r"AGPL|Affero|SSPL|Commons Clause|Proprietary|NonCommercial|CC-BY-NC", re.IGNORECASE)
@@ -46,6 +48,20 @@ def test_the_list_has_every_installed_package_and_no_licence_that_forbids_its_us
     licences = {name: json.dumps(each.get("licenses", [])) for name, each in found.items()}
     assert not {name: text for name, text in licences.items() if CLOSED.search(text)}
     assert {name for name, text in licences.items() if text == "[]"} <= UNSTATED
+
+
+JUDGED: set[str] = set()
+"""Advisories that do not concern what this project does with the package, each with a reason here."""
+
+
+@pytest.mark.slow
+def test_no_locked_release_has_an_advisory_or_was_withdrawn():
+    try:
+        found = audited(locked())
+    except OSError as error:
+        pytest.skip(f"PyPI does not answer: {error}")
+    assert len(found.known) > len(found.packages) / 2
+    assert not [each for each in found.weak if each.withdrawn or not JUDGED.issuperset(each.advisories or [])]
 
 
 def canonical(name: str) -> str:
