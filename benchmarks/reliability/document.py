@@ -272,8 +272,8 @@ def _audit() -> list[str]:
     return [
         "## Dependencies",
         "",
-        "`make sbom` lists all of them, with licences. `python -m benchmarks.reliability.audit` asked PyPI on "
-        f"{found.day} for advisories of the {len(found.packages)} releases of both lock files, as the slow "
+        "`make sbom` lists all of them, with licences. `python -m benchmarks.reliability.audit` asked PyPI "
+        f"on {found.day} for advisories of the {len(found.packages)} releases of both lock files, as the slow "
         f"test `test_sbom.py` does: {len(found.known)} can be judged from here, because they are the newest "
         f"of their projects. With an advisory, or withdrawn: {', '.join(weak) or 'none'}.",
         "",
