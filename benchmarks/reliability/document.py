@@ -273,9 +273,9 @@ def _audit() -> list[str]:
         "## Dependencies",
         "",
         "`make sbom` lists all of them, with licences. `python -m benchmarks.reliability.audit` asked PyPI "
-        f"on {found.day} for advisories of the {len(found.packages)} releases of both lock files, as the slow "
-        f"test `test_sbom.py` does: {len(found.known)} can be judged from here, because they are the newest "
-        f"of their projects. With an advisory, or withdrawn: {', '.join(weak) or 'none'}.",
+        f"on {found.day} for advisories of the {len(found.packages)} releases of both lock files, as the "
+        f"slow test `test_sbom.py` does: {len(found.known)} can be judged from here, because they are the "
+        f"newest of their projects. With an advisory, or withdrawn: {', '.join(weak) or 'none'}.",
         "",
         f"Not judged: {', '.join(unknown) or 'none'}. `pip-audit -r requirements/debian12.txt --no-deps` "
         "judges them where PyPI's pages of releases can be reached, and Debian's tracker its own packages.",
