@@ -348,5 +348,11 @@ DEFECTS = (
         "A `metrics.json` of others that lacked a number ended `report` with a traceback.",
         "`test_runs.py`, lacks a number",
     ),
+    (
+        "trying",
+        "After a sweep from Python its workers' environment stayed in the caller's process: one thread of "
+        "linear algebra for all that it started later.",
+        "`test_working_folder.py`, workers of a sweep",
+    ),
 )
 """Found by, what happened, test."""

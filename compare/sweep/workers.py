@@ -5,10 +5,11 @@ workers is taken to be their cause.
 """
 
 import logging
+import os
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any, Self
 
 from compare.sweep.measurement import Measurement, measured
@@ -139,9 +140,11 @@ class Workers:
         from distributed import Client
 
         spawn = "distributed.nanny.pre-spawn-environ"  # one thread of OpenMP and BLAS a worker, among others
+        given = {**dask.config.get(spawn), **SAFE_PATH, "DASK_LOGGING__DISTRIBUTED": "critical"}
+        self._stack.enter_context(_kept_variables([*given, "PYTHONHASHSEED"]))
         dask.config.set(
             {
-                spawn: {**dask.config.get(spawn), **SAFE_PATH, "DASK_LOGGING__DISTRIBUTED": "critical"},
+                spawn: given,
                 "distributed.scheduler.allowed-failures": 0,  # the deaths are counted here
                 "distributed.scheduler.worker-saturation": 1.0,
             }
@@ -161,6 +164,20 @@ class Workers:
         if not client.nthreads():
             raise UserError(f"--scheduler {self._scheduler}: the scheduler has no workers; start some first")
         return client
+
+
+@contextmanager
+def _kept_variables(names: Sequence[str]) -> Iterator[None]:
+    """Environment variables are as before after the block: Dask sets its workers' in this process, too."""
+    before = {name: os.environ.get(name) for name in names}
+    try:
+        yield
+    finally:
+        for name, text in before.items():
+            if text is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = text
 
 
 def _local_cluster(count: int) -> "LocalCluster":

@@ -61,11 +61,12 @@ def test_plane_strain_for_plane_stress(case, monkeypatch):
 
 
 def test_too_few_integration_points(monkeypatch):
-    """One point a triangle leaves P2 motions without energy, at which MUMPS fails or not, by rounding."""
+    """One point a triangle leaves P2 motions without energy: MUMPS fails, or rounding spoils its solution."""
     monkeypatch.setattr(linear_equilibrium.ufl, "dx", ufl.dx(metadata={"quadrature_degree": 1}))
     rows, refused = (), ""
     try:
         rows = MANUFACTURED.measure()
     except UserError as error:
         refused = str(error)
-    assert "cannot factorise" in refused or not passes(rows, degree=2)
+    told = ("cannot factorise", "rounding has spoilt")
+    assert any(words in refused for words in told) if refused else not passes(rows, degree=2)
