@@ -142,6 +142,7 @@ class Workers:
         spawn = "distributed.nanny.pre-spawn-environ"  # one thread of OpenMP and BLAS a worker, among others
         given = {**dask.config.get(spawn), **SAFE_PATH, "DASK_LOGGING__DISTRIBUTED": "critical"}
         self._stack.enter_context(_kept_variables([*given, "PYTHONHASHSEED"]))
+        os.environ.update(SAFE_PATH)  # for the process that tracks resources, which starts before the workers
         dask.config.set(
             {
                 spawn: given,
