@@ -167,6 +167,13 @@ def test_a_file_without_pictures_is_closed(tmp_path):
     assert str(path) not in [os.path.realpath(each) for each in Path("/proc/self/fd").iterdir()]
 
 
+def test_a_codec_that_nobody_knows_is_one_line(tmp_path):
+    path = written(tmp_path / "a.mkv", smooth(2))
+    path.write_bytes(path.read_bytes().replace(b"V_FFV1", b"V_NONE"))
+    with pytest.raises(UserError, match="it is no video, its end is missing, or FFmpeg lacks its codec"):
+        video_frames(path)
+
+
 def test_an_absent_source_is_one_line(tmp_path):
     for absent in (tmp_path / "absent.mkv", ""):
         with pytest.raises(UserError, match=f"'{absent}': there is no such video"):

@@ -61,14 +61,14 @@ def video_frames(path: Path, rate: float | None = None) -> Frames:
         container = av.open(file, "r", metadata_errors="ignore", options=ALONE)
     except (OSError, av.FFmpegError):
         container = None
-    if container is None or not container.streams.video:
+    stream = container.streams.video[0] if container and container.streams.video else None
+    if container is None or stream is None or stream.codec_context is None:
         if container is not None:
             container.close()
         file.close()
         raise UserError(
             f"cannot read the video {path}: it is no video, its end is missing, or FFmpeg lacks its codec"
         )
-    stream = container.streams.video[0]
     stream.thread_type = "SLICE" if stream.codec.name in BY_SLICES else "AUTO"
     stream.codec_context.options = {"max_pixels": str(MOST_PIXELS)}
     rate = plausible_rate(float(stream.average_rate or 0), rate)
