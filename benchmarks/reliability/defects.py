@@ -354,5 +354,10 @@ DEFECTS = (
         "linear algebra for all that it started later.",
         "`test_working_folder.py`, workers of a sweep",
     ),
+    (
+        "fuzzing",
+        "A mesh with every solid element twice ended with an `IndexError`.",
+        "`test_readers.py`, without a boundary",
+    ),
 )
 """Found by, what happened, test."""

@@ -127,6 +127,8 @@ def _plane_mesh(raw: RawMesh, file: str, digest: str, unit: float) -> Drawing:
 
 def _extruded_mesh(raw: RawMesh, file: str, digest: str, unit: float) -> Drawing:
     faces = _once([face for count, cells in raw.cells.items() for face in _faces(cells, count)])
+    if not faces:
+        raise UserError("its elements have no outer face; is each there twice?")
     normals, areas = _normals(raw.points, faces)
     volume = _volume(raw)
     for normal in _main_directions(normals, areas):

@@ -241,6 +241,23 @@ def test_names_of_groups_are_utf_8(tmp_path):
         read_drawing(path)
 
 
+@pytest.mark.parametrize(
+    ("elements", "message"),
+    [
+        (["1 4 2 1 1 1 2 3 4", "2 4 2 1 1 1 2 3 4"], "its elements have no outer face; is each there twice"),
+        (["1 2 2 1 1 1 2 3", "2 2 2 1 1 1 2 3"], "there is no line or arc in it"),
+        (["1 4 2 1 1 1 2 3 9"], "cannot read a.msh as a Gmsh mesh: Wrong node index 9"),
+    ],
+)
+def test_meshes_without_a_boundary_are_refused(tmp_path, elements, message):
+    (tmp_path / "a.msh").write_text(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
+        + "\n".join(["$Elements", str(len(elements)), *elements, "$EndElements\n"])
+    )
+    with pytest.raises(UserError, match=message):
+        read_drawing(tmp_path / "a.msh")
+
+
 def test_a_plane_cuts_solids_only(tmp_path):
     path = write_dxf(tmp_path / "a.dxf", [rectangle(0, 0, 10, 10)])
     with pytest.raises(UserError, match="plane already"):
