@@ -359,5 +359,11 @@ DEFECTS = (
         "A mesh with every solid element twice ended with an `IndexError`.",
         "`test_readers.py`, without a boundary",
     ),
+    (
+        "fuzzing",
+        "An element of a damaged mesh with a node that was not there took the last node for it, or ended "
+        "with an `IndexError`.",
+        "`test_readers.py`, the file lacks",
+    ),
 )
 """Found by, what happened, test."""

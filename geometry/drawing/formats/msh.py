@@ -223,7 +223,7 @@ def _raw(path: Path) -> RawMesh:
                     raise UserError(f"{path.name} holds elements of type {name}, which cannot be read")
                 _, nodes = mesh.getElementsByType(kind)
                 whole = int(mesh.getElementProperties(kind)[3])
-                cells = number[nodes.astype(np.int64).reshape(-1, whole)[:, : CORNERS[kind]]]
+                cells = _numbers(number, nodes.reshape(-1, whole)[:, : CORNERS[kind]], path)
                 by_dimension[dimension].setdefault(CORNERS[kind], []).append(cells)
         dimension = 3 if by_dimension[3] else 2
         if not by_dimension[dimension]:
@@ -232,9 +232,17 @@ def _raw(path: Path) -> RawMesh:
             points=coordinates.reshape(-1, 3),
             cells={count: np.concatenate(parts) for count, parts in by_dimension[dimension].items()},
             dimension=dimension,
-            edges={name: number[nodes.reshape(-1, 2)] for name, nodes in _groups(1)},
-            nodes={name: number[nodes.ravel()] for name, nodes in _groups(0)},
+            edges={name: _numbers(number, nodes.reshape(-1, 2), path) for name, nodes in _groups(1)},
+            nodes={name: _numbers(number, nodes.ravel(), path) for name, nodes in _groups(0)},
         )
+
+
+def _numbers(number: IntArray, tags: IntArray, path: Path) -> IntArray:
+    """Numbers of nodes by their tags; `number` has -1 for a tag that no node has."""
+    tags = tags.astype(np.int64)
+    if tags.max(initial=0) >= len(number) or number[tags].min(initial=0) < 0:
+        raise UserError(f"{path.name}: an element has a node that the file lacks")
+    return np.asarray(number[tags])
 
 
 def _groups(dimension: int) -> Iterator[tuple[str, IntArray]]:

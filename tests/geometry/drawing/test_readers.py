@@ -13,6 +13,7 @@ from geometry.cad import write_dxf as export_dxf
 from geometry.cad import write_step as export_step
 from geometry.cad import write_svg as export_svg
 from geometry.drawing.checks import body
+from geometry.drawing.formats import msh
 from geometry.drawing.formats.drawing import Drawing
 from geometry.drawing.load import read_drawing
 from tests.geometry.drawing.files import (
@@ -256,6 +257,15 @@ def test_meshes_without_a_boundary_are_refused(tmp_path, elements, message):
     )
     with pytest.raises(UserError, match=message):
         read_drawing(tmp_path / "a.msh")
+
+
+@pytest.mark.parametrize("tag", [0, 3, 9])
+def test_nodes_that_the_file_lacks_are_refused(tag):
+    """Gmsh gives such tags, as it finds them in its memory, for damaged files of version 2."""
+    number = np.array([-1, 0, 1, -1, 2])  # of the nodes 1, 2 and 4
+    assert msh._numbers(number, np.array([[1, 2, 4]], np.uint64), Path("a.msh")).tolist() == [[0, 1, 2]]
+    with pytest.raises(UserError, match=r"a\.msh: an element has a node that the file lacks"):
+        msh._numbers(number, np.array([[1, 2, tag]], np.uint64), Path("a.msh"))
 
 
 def test_a_plane_cuts_solids_only(tmp_path):
