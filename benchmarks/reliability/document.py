@@ -185,8 +185,8 @@ def _fuzzing() -> list[str]:
         "library*, C code crashed or took longer than 10 s. What was found before is mended, see below. "
         "Gmsh's reader of meshes is the one that damaged files still crash: commands read drawings and "
         "meshes in a process of their own and say in one line that it ended, and so are they read here, "
-        "unguided; as each crash costs seconds, far fewer of them. Designs are read without the ranges that a refusal proposes, for which it tries a "
-        "thousand others.",
+        "unguided; as each crash costs seconds, far fewer of them. Designs are read without the ranges that "
+        "a refusal proposes, for which it tries a thousand others.",
         "",
         *_table(header, rows, left=1),
         "",
