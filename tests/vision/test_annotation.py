@@ -1,4 +1,4 @@
-"""What is drawn into an image of tracked markers, measured in the image: places, sizes and colours."""
+"""Annotations of tracked markers, measured in the image: places, sizes and colours."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""What a layout of fiducials may be, where the default ones lie, and the sheet, on a beam of 100 by 10 mm."""
+"""Limits of a workspace's layout, the default one, and the sheet, on a beam of 100 by 10 mm."""
 
 import json
 import xml.etree.ElementTree as ET
