@@ -17,6 +17,7 @@ import numpy as np
 from geometry.arrays import FloatArray, IntArray
 from solvers.lagrange import NodalSpace
 from solvers.problem import Problem, contact_ends, front_points
+from solvers.solution import Contact
 
 STIFFNESS = 10.0
 """k over Young's modulus: a larger one needs fewer updates of the multipliers but more Newton iterations."""
@@ -221,3 +222,17 @@ class ContactRegion:
             force=(float(state.contact @ normal[:, 0]), float(state.contact @ normal[:, 1])),
             at_end=first == 0 or last == len(x) - 1,
         )
+
+
+def contact_of(problem: Problem, position: float | None, region: ContactRegion | None) -> Contact | None:
+    """The contact of a solution, from the abscissa of its force, mm; None where the indenter does not touch.
+
+    Args:
+        problem: With the load.
+        position: None without a force.
+        region: Where a cylinder touches; None for another load.
+    """
+    if position is None or (problem.load.kind == "cylinder" and region is None):
+        return None
+    start, end = contact_ends(problem) if region is None else (region.start, region.end)
+    return Contact(position, start, end)

@@ -1,8 +1,8 @@
 """The solution that every solver returns, with strain and stress derived from the displacement gradient."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, Protocol, runtime_checkable
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,6 +38,61 @@ class SolidField(DisplacementField, Protocol):
     def solid_gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j at `location.points`, shape (n, 3, 3)."""
         ...
+
+
+@runtime_checkable
+class MovedWallsField(DisplacementField, Protocol):
+    """A displacement of the drawn material, of a solver that finds that the walls are not as drawn."""
+
+    def displacement_in_space(self, location: LocatedPoints) -> FloatArray:
+        """Displacement of the material that is at `location.points` before the load, shape (n, 2), mm."""
+        ...
+
+
+class Uncertainty(NamedTuple):
+    """Standard deviations of a solution that was estimated from markers, as functions of position.
+
+    Attributes:
+        displacement: Of `Solution.displacement_in_space`, shape (n, 2), mm.
+        von_mises: Of the von Mises stress, shape (n,), MPa, where the solver knows it.
+    """
+
+    displacement: Callable[[LocatedPoints], FloatArray]
+    von_mises: Callable[[LocatedPoints], FloatArray] | None = None
+
+
+class Contact(NamedTuple):
+    """Contact between indenter and finger at the full load: abscissae on the drawn front, mm.
+
+    Attributes:
+        position: Where the resultant force acts.
+        start: End of the contact nearer to the base.
+        end: The other end.
+    """
+
+    position: float
+    start: float
+    end: float
+
+
+class Estimated(NamedTuple):
+    """A number estimated from markers, with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+class IdentifiedForce(NamedTuple):
+    """The indenter's force, identified from markers.
+
+    Attributes:
+        size: N/mm.
+        position: Abscissa of the contact on the drawn front, mm; None where it was not an unknown.
+    """
+
+    size: Estimated
+    position: Estimated | None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,6 +164,9 @@ class Solution:
         error: The discretisation error, where the solver estimates it.
         left_out: From a solver that assimilates: the displacement of each observed marker as predicted
             without it, shape (m, 2), mm; NaN where it was not seen.
+        uncertainty: Standard deviations of the field, from a solver that estimates it.
+        contact: Where the indenter presses, from a solver of finite strain; None if it does not touch.
+        identified: The force, from a solver that identifies it.
     """
 
     solver: str
@@ -122,6 +180,9 @@ class Solution:
     states: Sequence[DisplacementField] = ()
     error: ErrorEstimate | None = None
     left_out: FloatArray | None = None
+    uncertainty: Uncertainty | None = None
+    contact: Contact | None = None
+    identified: IdentifiedForce | None = None
 
     def displacement(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Displacement at points of shape (n, 2), mm: shape (n, 2), mm.
@@ -137,8 +198,9 @@ class Solution:
         It is `displacement` unless the solver has found that the walls are not as drawn, so that other
         material is there.
         """
-        found = getattr(self.field, "displacement_in_space", self.field.displacement)
-        return np.asarray(found(self._locate(points)))
+        if isinstance(self.field, MovedWallsField):
+            return self.field.displacement_in_space(self._locate(points))
+        return self.displacement(points)
 
     def gradient(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j at points of shape (n, 2), mm: shape (n, 2, 2).

@@ -4,9 +4,9 @@ import re
 import sys
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +22,8 @@ RESERVED = "truth"
 
 NONE_SEEN = "none of the markers is visible; at least one is needed, or leave the measurements out"
 """Refusal of observations that say nothing."""
+
+Family = Literal["finite elements", "neural network", "statistics"]
 
 Progress = Callable[[float, str], None]
 """Called with the fraction done (0 to 1) and a short text; a fast solver may ignore it."""
@@ -62,6 +64,7 @@ class Solver(Protocol):
     """A method that solves a `Problem`.
 
     A solver is made without arguments for its defaults; the three properties may be plain class attributes.
+    It may also have the attributes of `Traits`.
     """
 
     @property
@@ -90,6 +93,27 @@ class Solver(Protocol):
     def settings(self) -> dict[str, object]:
         """Every setting that changes the result, as JSON-ready values; recorded with the result."""
         ...
+
+
+@dataclass(frozen=True)
+class Traits:
+    """Optional attributes of a solver, with their values for a solver that lacks them.
+
+    Attributes:
+        assimilates: Whether it uses the observations of a problem.
+        family: Kind of method; None if unknown.
+        twin: Name of the solver by finite elements that fits the markers in the same way, if there is one.
+    """
+
+    assimilates: bool = False
+    family: Family | None = None
+    twin: str | None = None
+
+    @classmethod
+    def of(cls, solver: Solver) -> "Traits":
+        """The traits of a solver."""
+        given: dict[str, Any] = {each.name: getattr(solver, each.name, each.default) for each in fields(cls)}
+        return cls(**given)
 
 
 def check_name(name: str) -> None:

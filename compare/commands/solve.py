@@ -42,9 +42,8 @@ def solve(
     from compare.figures.force_chart import draw_force_displacement
     from compare.report.vtu_file import write_vtu
     from compare.runtime.stages import Stages
-    from solvers.assimilation.misfit import assimilates
     from solvers.problem import Problem
-    from solvers.solver import solved, with_law
+    from solvers.solver import Traits, solved, with_law
     from vision.measurements import read_measurements
 
     chosen, settings = finger.read(options.preset)
@@ -62,7 +61,7 @@ def solve(
     given = None
     if file := existing_table(measurements):
         given = read_measurements(file, marker_radius=chosen.marker_radius)
-    if given and not assimilates(made):
+    if given and not Traits.of(made).assimilates:
         raise UserError(f"{made.name} does not assimilate markers; `compare` compares it with --measurements")
     with Stages() as stages:
         triangles, adaptation = shared_mesh(

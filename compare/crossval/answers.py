@@ -7,7 +7,7 @@ from compare.crossval.result import BASELINES, CrossvalResult, LayoutResult
 from compare.crossval.scores import FIELD_NAMES
 from compare.crossval.truth_summary import held_out_scheme, verdict_sentences
 from compare.evaluation.number_format import percent
-from solvers.assimilation.misfit import assimilates
+from solvers.solver import Traits
 
 
 def answers(result: CrossvalResult) -> Mapping[str, list[str]]:
@@ -15,7 +15,7 @@ def answers(result: CrossvalResult) -> Mapping[str, list[str]]:
 
     With several truths the questions are about what holds with which of them.
     """
-    given = [variant.label for variant in result.study.variants if assimilates(variant.make(0))]
+    given = [variant.label for variant in result.study.variants if Traits.of(variant.make(0)).assimilates]
     if len(result.truths) > 1:
         question = "With which truths is a solver better than the null models and fem-asm?"
         return {question: _by_truth(result)}

@@ -21,7 +21,7 @@ from compare.crossval.study import SolverVariant, Study
 from compare.crossval.true_fields import TrueContact
 from compare.runtime.tables import Cell
 from geometry.observations import Observations
-from solvers.assimilation.misfit import assimilates
+from solvers.solver import Traits
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -168,7 +168,7 @@ class LayoutResult:
                 variant.label: {
                     "solver": variant.solver,
                     "settings": dict(variant.settings),
-                    "assimilates": assimilates(variant.make(0)),
+                    "assimilates": Traits.of(variant.make(0)).assimilates,
                     "schemes": {scheme: asdict(one) for scheme, one in self.scores[variant.label].items()},
                     "against": {
                         baseline: {scheme: _with_verdicts(each) for scheme, each in by_scheme.items()}

@@ -20,12 +20,12 @@ from geometry.atomic import write_bytes
 from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
-from solvers.assimilation.misfit import assimilates
 from solvers.problem import Problem
 from solvers.solution import Solution
 from solvers.solver import (
     Progress,
     Solver,
+    Traits,
     Transferable,
     UnsupportedProblemError,
     refitter,
@@ -137,16 +137,16 @@ class FoldRunner:
 
     def _result(self, observations: Sequence[Observations], fold: Fold) -> FoldResult:
         """One fold, of which `observations` holds the markers at every load."""
-        given, deviations = assimilates(self._solver), None
+        given, deviations = Traits.of(self._solver).assimilates, None
         if not given:
             solution, sampled = self._without_markers(fold.load_case)
         else:
             solution = self._fitted(observations[0], fold.held)
             sampled = self._at_load_case(solution, fold.load_case)
-            stated = getattr(solution.field, "standard_deviation", None)
-            if stated is not None and fold.load_case == 0:
+            if solution.uncertainty and fold.load_case == 0:
                 noise = observations[0].standard_deviations
-                deviations = np.hypot(stated(self.sampler.centres), noise).tolist()
+                stated = solution.uncertainty.displacement(self.sampler.centres)
+                deviations = np.hypot(stated, noise).tolist()
         own = replace(self.problem, material=solution.problem.material)  # a solver may have estimated it
         status, faults = self._body.status(solution)
         against = [*faults, *([] if status.converged else [f"did not converge: {solution.status.message}"])]
@@ -179,19 +179,17 @@ class FoldRunner:
 
     def _against_truth(self, solution: Solution, sampled: SampledField) -> dict[str, Any]:
         """Force, place of the contact and stated intervals against the truth at the full load."""
-        truth, stats = self._truths[0], solution.stats
+        truth, identified = self._truths[0], solution.identified
         contact = truth.contact
         found: dict[str, Any] = {}
         if np.isfinite(solution.reaction).all():
             found["force"] = float(np.linalg.norm(solution.reaction)) / contact.force - 1
-        if "position" in stats:
-            found["position"] = float(stats["position"]) - contact.position
-        for name, value in (("force", contact.force), ("position", contact.position)):
-            if f"{name}_low" in stats:
-                low, high = (float(stats[f"{name}_{end}"]) for end in ("low", "high"))
-                found[f"{name}_within"] = low <= value <= high
-        stated = getattr(solution.field, "von_mises_deviation", None)
-        if stated is not None:
+        if identified:
+            found["force_within"] = identified.size.low <= contact.force <= identified.size.high
+            if place := identified.position:
+                found["position"] = place.value - contact.position
+                found["position_within"] = place.low <= contact.position <= place.high
+        if solution.uncertainty and (stated := solution.uncertainty.von_mises):
             inside = self.sampler.inside_of(solution, self.problem.mesh)
             errors = sampled.state(solution.problem).von_mises - truth.sampled.state(self._true_law).von_mises
             within = np.abs(errors) <= norm.ppf((1 + LEVEL) / 2) * stated(inside)

@@ -23,7 +23,7 @@ from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.mesh.wall_motion import WallMotion
 from solvers.assimilation.misfit import disc_quadrature, radius_within
-from solvers.problem import Load, Problem, contact_ends
+from solvers.problem import Load, Problem
 from solvers.solution import SolidField, Solution, State
 from solvers.solver import Progress, silent
 
@@ -281,10 +281,8 @@ def _kept(field: TrueField, entry: Path, own: Path) -> Path:
 
 def _contact(solution: Solution) -> TrueContact:
     """Force and place of the contact in a simulation."""
-    if "force_abscissa_mm" not in solution.stats:  # the cylinder has slipped off
+    if solution.contact is None:  # the cylinder has slipped off
         raise UserError(f"the virtual experiment: {solution.status.message}")
-    start, end = contact_ends(solution.problem)
-    if solution.problem.load.kind == "cylinder":
-        start, end = (float(solution.stats[f"contact_{name}_mm"]) for name in ("start", "end"))
+    position, start, end = solution.contact
     u, v = solution.reaction.tolist()
-    return TrueContact((u, v), float(solution.stats["force_abscissa_mm"]), 0.5 * (start + end), end - start)
+    return TrueContact((u, v), position, 0.5 * (start + end), end - start)

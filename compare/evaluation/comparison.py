@@ -44,7 +44,7 @@ class Comparison:
         truth: The fields of the virtual experiment; None where the markers were measured.
         adaptation: Rounds of mesh refinement, if it was asked for.
         settings: Settings of each solver, by its name.
-        left_out: Reasons why solvers were left out, by their names.
+        unsupported: Reasons why solvers do not support the problem, by their names.
         failed: The exceptions of solvers that raised one, by their names.
         warnings: Remarks of the marker tracking and on unlikely measurements.
     """
@@ -59,9 +59,14 @@ class Comparison:
     truth: Evaluation | None = None
     adaptation: Adaptation | None = None
     settings: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
-    left_out: Mapping[str, str] = field(default_factory=dict)
+    unsupported: Mapping[str, str] = field(default_factory=dict)
     failed: Mapping[str, str] = field(default_factory=dict)
     warnings: Sequence[str] = ()
+
+    @property
+    def left_out(self) -> Mapping[str, str]:
+        """The same as `unsupported`: its former name."""
+        return self.unsupported
 
     def __getitem__(self, solver: str) -> Evaluation:
         named = {evaluation.solver: evaluation for evaluation in self.evaluations}
@@ -78,7 +83,7 @@ class Comparison:
     @property
     def remarks(self) -> list[str]:
         """Solvers that were left out, with the reason, and the warnings."""
-        return [*left_out_remarks(self.left_out), *self.warnings]
+        return [*unsupported_remarks(self.unsupported), *self.warnings]
 
     @property
     def unconverged(self) -> list[Evaluation]:
@@ -125,22 +130,24 @@ def supported_solvers(
         UnsupportedProblemError: If one does not that is not among the spare ones, or none does.
     """
     chosen: list[Solver] = []
-    left_out: dict[str, str] = {}
+    unsupported: dict[str, str] = {}
     for solver in solvers:
         try:
             check_load(solver, load)
             with_law(material, solver)
             chosen.append(solver)
         except UnsupportedProblemError as error:
-            left_out[solver.name] = f"no load {load.kind!r}" if load.kind not in solver.loads else str(error)
-            if solver.name not in spare or len(left_out) == len(solvers):
+            unsupported[solver.name] = (
+                f"no load {load.kind!r}" if load.kind not in solver.loads else str(error)
+            )
+            if solver.name not in spare or len(unsupported) == len(solvers):
                 raise
-    return chosen, left_out
+    return chosen, unsupported
 
 
-def left_out_remarks(left_out: Mapping[str, str]) -> list[str]:
+def unsupported_remarks(unsupported: Mapping[str, str]) -> list[str]:
     """A line a reason, with the solvers that it holds for."""
     reasons: dict[str, list[str]] = {}
-    for name, reason in left_out.items():
+    for name, reason in unsupported.items():
         reasons.setdefault(reason, []).append(name)
     return [f"left out: {', '.join(names)} ({reason})" for reason, names in reasons.items()]

@@ -57,8 +57,10 @@ class Evaluation:
         uncertainty: The solver's estimate of its own error, as differences of the exact solution from it.
         marker_uncertainty: The same at the markers, absolute, shape (m, 2), mm.
         in_sample: Whether the solver was given the observations: its errors at them are training errors.
-        left_out: What the solver says of each marker if it is not given that one, shape (m, 2), mm; None
-            where it does not tell.
+        family: Kind of method, of `Traits`.
+        twin: Name of the solver by finite elements that fits the markers in the same way, if there is one.
+        left_out: Displacement of each marker as the solver predicts it without that marker, shape (m, 2), mm;
+            None where it does not tell.
         solid: Whether the field is a plane of a body in three dimensions.
         path: Displacement of the nodes at every row of the history, shape (k, n, 2), mm, from a solver that
             follows the load; None from any other.
@@ -86,6 +88,8 @@ class Evaluation:
     uncertainty: ReferenceDifferences | None = None
     marker_uncertainty: FloatArray | None = None
     in_sample: bool = False
+    family: str | None = None
+    twin: str | None = None
     left_out: FloatArray | None = None
     solid: bool = False
     path: FloatArray | None = None

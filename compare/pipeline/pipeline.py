@@ -34,10 +34,9 @@ from compare.runtime.stages import Stages
 from geometry.atomic import write_json
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.assimilation.misfit import assimilates
 from solvers.problem import Problem
 from solvers.shared_work import SharedWork
-from solvers.solver import Solver
+from solvers.solver import Solver, Traits
 from vision.frames.frame import Frame
 from vision.measurements import write_measurements
 
@@ -94,7 +93,7 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
         UserError: If the mesh, the virtual experiment or a solver refuses.
     """
     given = job.measurements if isinstance(job.measurements, Observations) else None
-    solvers, left_out = supported_solvers(job.solvers, job.spare, job.material, job.load)
+    solvers, unsupported = supported_solvers(job.solvers, job.spare, job.material, job.load)
     mesh, adaptation = shared_mesh(
         job.design,
         job.mesh,
@@ -114,7 +113,7 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
                 observations, truth = virtual_experiment(problem, radius, progress, TRUTHS[job.truth])
             except UnfinishedExperimentError as error:
                 solvers, without = _without_markers(solvers, job.spare, error)
-                left_out |= without
+                unsupported |= without
                 observations, remarks = no_displacements(problem, radius, str(error)), [f"no truth: {error}"]
     outcome = solve_all(job, solvers, problem, observations, folder, stages)
     with stages.stage("certificate"):
@@ -132,7 +131,7 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
         truth=truth,
         adaptation=adaptation,
         settings={each.name: each.settings() for each in solvers if each.name in outcome.evaluations},
-        left_out=left_out | outcome.left_out,
+        unsupported=unsupported | outcome.unsupported,
         failed={
             name: f"{fault}; its traceback is in {ERRORS}/{name}.txt"
             for name, fault in outcome.failed.items()
@@ -149,8 +148,8 @@ def _without_markers(
     Raises:
         UserError: The given one, if a solver that needs markers is not spare, or all need them.
     """
-    chosen = [solver for solver in solvers if not assimilates(solver)]
-    needing = [solver.name for solver in solvers if assimilates(solver)]
+    chosen = [solver for solver in solvers if not Traits.of(solver).assimilates]
+    needing = [solver.name for solver in solvers if Traits.of(solver).assimilates]
     if not chosen or not set(needing) <= set(spare):
         raise error
     return chosen, dict.fromkeys(needing, "no markers to assimilate")

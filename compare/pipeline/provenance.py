@@ -28,7 +28,7 @@ def provenance(folder: Path, job: Job, comparison: Comparison, stages: Stages) -
         "measurements_sha256": file_digest(folder / "observations.csv"),
         "film": job.measurements.provenance() if isinstance(job.measurements, Film) else None,
         "solvers": settings,
-        "left_out": comparison.left_out,
+        "left_out": comparison.unsupported,
         "failed": comparison.failed,
         "seed": {name: own["seed"] for name, own in settings.items() if "seed" in own},
         "device": {each.solver: each.stats.get("device", "cpu") for each in comparison.evaluations},

@@ -21,7 +21,6 @@ from geometry.atomic import write_text
 from geometry.content_hash import content_hash
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.assimilation.misfit import assimilates
 from solvers.problem import Problem
 from solvers.shared_work import SharedWork
 from solvers.solver import (
@@ -30,6 +29,7 @@ from solvers.solver import (
     SolverFailedError,
     TrainedSolver,
     TrainingContext,
+    Traits,
     UnsupportedProblemError,
     silent,
     solved,
@@ -57,12 +57,12 @@ class Outcome:
 
     Attributes:
         evaluations: By the names of the solvers.
-        left_out: Reasons why solvers do not support the problem, by their names.
+        unsupported: Reasons why solvers do not support the problem, by their names.
         failed: Exceptions of solvers, by their names.
     """
 
     evaluations: dict[str, Evaluation] = field(default_factory=dict)
-    left_out: dict[str, str] = field(default_factory=dict)
+    unsupported: dict[str, str] = field(default_factory=dict)
     failed: dict[str, str] = field(default_factory=dict)
 
 
@@ -129,7 +129,7 @@ def _one_after_another(part: _Part, stages: Staged) -> Outcome:
         except UnsupportedProblemError as error:
             if solver.name not in job.spare:
                 raise
-            outcome.left_out[solver.name] = str(error)
+            outcome.unsupported[solver.name] = str(error)
         except SolverFailedError as error:
             if solver.name == job.reference:
                 raise
@@ -223,7 +223,8 @@ def _in_context(solver: Solver, part: _Part, finished: Mapping[str, Evaluation])
 def _evaluate(part: _Part, solver: Solver, stages: Staged) -> Evaluation:
     """Solve and sample, or take over what an earlier run finished."""
     job, folder, problem, observations = part.job, part.folder, part.problem, part.observations
-    given = observations if assimilates(solver) else None
+    traits = Traits.of(solver)
+    given = observations if traits.assimilates else None
     own = replace(problem, material=with_law(job.material, solver), observations=given)
     key = _key(solver, own, observations)
     kept = folder / SOLUTIONS / f"{solver.name}.npz"
@@ -239,6 +240,7 @@ def _evaluate(part: _Part, solver: Solver, stages: Staged) -> Evaluation:
         # A solver that hands its work to another one may return the other's name.
         solution = replace(solution, solver=solver.name)
         evaluation = evaluated(solution, problem.mesh, observations.points)
+        evaluation = replace(evaluation, family=traits.family, twin=traits.twin)
         evaluation.save(kept, key)
     return evaluation
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from jinja2 import Template
 
-from compare.evaluation.comparison import Comparison, left_out_remarks
+from compare.evaluation.comparison import Comparison, unsupported_remarks
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import force_error, indistinct, reference_differences, truth_differences
 from compare.evaluation.number_format import distance, number, percent
@@ -54,7 +54,7 @@ def render(
     return _template().render(
         comparison=comparison,
         observations=comparison.observations,
-        answers=answers(numbers, left_out=comparison.left_out, failed=comparison.failed),
+        answers=answers(numbers, unsupported=comparison.unsupported, failed=comparison.failed),
         reference=reference,
         reference_label=reference.label,
         own=reference.uncertainty,
@@ -66,7 +66,7 @@ def render(
         truth_sentences=truth_sentences(comparison),
         entries=[_entry(evaluation, comparison) for evaluation in comparison.evaluations],
         presets=text.preset_meanings(comparison.settings),
-        left_out=[*left_out_remarks(comparison.left_out), *comparison.failed.values()],
+        unsupported=[*unsupported_remarks(comparison.unsupported), *comparison.failed.values()],
         design_rows=design.facts(),
         headline=text.headline(design),
         has_symbols=any(symbol for _, symbol, _ in design.facts()),

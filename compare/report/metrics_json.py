@@ -53,6 +53,8 @@ def _solver(evaluation: Evaluation, comparison: Comparison) -> dict[str, Any]:
     errors, held_out = marker_errors(evaluation, observations), held_out_errors(evaluation, observations)
     differences = reference_differences(evaluation, reference)
     return {
+        "family": evaluation.family,
+        "twin": evaluation.twin,
         "law": evaluation.law,
         "status": "converged" if evaluation.converged else "not converged",
         "message": evaluation.message,

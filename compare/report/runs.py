@@ -43,8 +43,8 @@ class Run:
     @property
     def answers(self) -> list[Answer]:
         """The answers that its report opens with."""
-        left_out, failed = (self.record.get(key) or {} for key in ("left_out", "failed"))
-        return answers(self.metrics, left_out=left_out, failed=failed)
+        unsupported, failed = (self.record.get(key) or {} for key in ("left_out", "failed"))
+        return answers(self.metrics, unsupported=unsupported, failed=failed)
 
     @property
     def settings(self) -> dict[str, str]:

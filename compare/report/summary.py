@@ -47,26 +47,28 @@ class Answer(NamedTuple):
 
 
 def answers(
-    metrics: Numbers, *, left_out: Mapping[str, str] | None = None, failed: Mapping[str, str] | None = None
+    metrics: Numbers, *, unsupported: Mapping[str, str] | None = None, failed: Mapping[str, str] | None = None
 ) -> list[Answer]:
     """The answers of a run.
 
     Args:
         metrics: The content of `metrics.json`.
-        left_out: Reasons why solvers were left out, by their names.
+        unsupported: Reasons why solvers do not support the problem, by their names.
         failed: Messages of solvers that raised an exception, by their names.
     """
     label = {
         name: name if own["status"] == "converged" else f"{name} (not converged)"
         for name, own in metrics["solvers"].items()
     }
-    solvers = {label[name]: own for name, own in metrics["solvers"].items()}
+    solvers = {
+        label[name]: {**own, "twin": label.get(own.get("twin"))} for name, own in metrics["solvers"].items()
+    }
     metrics = {**metrics, "solvers": solvers, "reference": label[metrics["reference"]]}
     found = [
         _warnings(metrics),
         _trust(metrics),
         _markers(metrics),
-        _convergence(metrics, left_out or {}, failed or {}),
+        _convergence(metrics, unsupported or {}, failed or {}),
     ]
     return [answer for answer in found if answer is not None]
 
@@ -83,15 +85,14 @@ def _warnings(metrics: Numbers) -> Answer | None:
 def _trust(metrics: Numbers) -> Answer | None:
     """Whether the networks that were given no markers solve the equations of the reference."""
     solvers, reference = metrics["solvers"], metrics["reference"]
-    networks = {name: own for name, own in solvers.items() if name.startswith("pinn")}
+    networks = {name: own for name, own in solvers.items() if own.get("family") == "neural network"}
     if not networks or reference in networks:
         return None
     plain = {name: own for name, own in networks.items() if not own["markers"]["in_sample"]}
     verdicts = [_verdict(name, own, metrics) for name, own in plain.items()]
     sentences = [said for name, own in plain.items() for said in _against_reference(name, own, metrics)]
     for name, own in networks.items():
-        twin = name.replace("pinn-local", "fem").replace("pinn", "fem")
-        if name not in plain and twin in solvers:
+        if name not in plain and (twin := own["twin"]):
             sentences.append(_beside_twin(name, own, twin, solvers[twin], metrics["measurements"]["source"]))
     return Answer("May the network be trusted here?", " ".join(verdicts), list(filter(None, sentences)))
 
@@ -215,13 +216,13 @@ def _force_interval(name: str, own: Numbers, metrics: Numbers) -> str:
     return f"{said} from the {source} markers; that of the simulated finger is {number(true, 3)}, {where} it."
 
 
-def _convergence(metrics: Numbers, left_out: Mapping[str, str], failed: Mapping[str, str]) -> Answer:
+def _convergence(metrics: Numbers, unsupported: Mapping[str, str], failed: Mapping[str, str]) -> Answer:
     """The solvers that did not converge, and how far the others are from the exact solution."""
     solvers, reference = metrics["solvers"], metrics["reference"]
     faulty = {name: own["message"] for name, own in solvers.items() if own["status"] != "converged"}
     sentences = [f"{name}: {message.rstrip('. ')}." for name, message in faulty.items()]
     sentences += [f"{name} failed: {message.rstrip('. ')}." for name, message in failed.items()]
-    sentences += [f"{name} was left out: {message.rstrip('. ')}." for name, message in left_out.items()]
+    sentences += [f"{name} was left out: {message.rstrip('. ')}." for name, message in unsupported.items()]
     bad = [*faulty, *failed]
     count = len(solvers) + len(failed)
     met = "the solver met its" if count == 1 else f"all {count} solvers met their"

@@ -20,10 +20,9 @@ from geometry.finger.parameters import (
 )
 from geometry.finger.presets import load_design
 from geometry.text_files import read_toml
-from solvers.assimilation.misfit import assimilates
 from solvers.problem import Load, LoadKind, Material
 from solvers.registry import make_solver
-from solvers.solver import Solver, check_load
+from solvers.solver import Solver, Traits, check_load
 
 MATERIAL = ("young", "poisson", "plane", "law")
 LOAD = ("load", "stroke", "direction", "slide", "radius")
@@ -143,7 +142,7 @@ class Study(CheckedModel):
     def made_solver(self) -> Solver:
         """The solver with its settings."""
         solver = make_solver(self.solver, **self.settings)
-        if assimilates(solver):
+        if Traits.of(solver).assimilates:
             raise UserError(f"solver {self.solver} needs measured markers, which a study does not have")
         return solver
 

@@ -26,7 +26,6 @@ from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Problem
-from solvers.solver import Solver
 
 Weighting = Literal["paper", "precision"]
 Choice = Literal["given", "left-out", "evidence"]
@@ -159,8 +158,3 @@ def radius_within(mesh: TriangleMesh, points: FloatArray, radius: float) -> floa
     along, offset = end - start, points[:, None] - start
     share = ((offset * along).sum(axis=2) / (along**2).sum(axis=1)).clip(0, 1)
     return min(radius, float(np.linalg.norm(offset - share[..., None] * along, axis=2).min()))
-
-
-def assimilates(solver: Solver) -> bool:
-    """True if a solver declares that it uses the observations of a problem."""
-    return bool(getattr(solver, "assimilates", False))

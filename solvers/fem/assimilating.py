@@ -26,7 +26,7 @@ from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
-from solvers.solver import Progress, check_problem, silent
+from solvers.solver import Family, Progress, check_problem, silent
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +96,7 @@ class FemAsmSolver:
     contact_deviation: float = 0.0
     choose: Choice = "given"
     name: ClassVar[str] = "fem-asm"
+    family: ClassVar[Family] = "finite elements"
     laws: ClassVar[tuple[str, ...]] = FemSolver.laws + FemNonlinearSolver.laws
     loads: ClassVar[tuple[str, ...]] = FemSolver.loads
     assimilates: ClassVar[bool] = True

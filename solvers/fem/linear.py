@@ -13,7 +13,7 @@ from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Problem
 from solvers.solution import ErrorEstimate, Solution, Status
-from solvers.solver import Progress, check_problem, silent
+from solvers.solver import Family, Progress, check_problem, silent
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,7 @@ class FemSolver:
     estimate: bool = True
     linear_solver: LinearSolver = "auto"
     name: ClassVar[str] = "fem"
+    family: ClassVar[Family] = "finite elements"
     laws: ClassVar[tuple[str, ...]] = ("linear",)
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
 

@@ -10,9 +10,14 @@ from solvers.assimilation.misfit import leave_one_out_displacements
 from solvers.identification.field import STEP, IdentifiedField, Member, Snapshot
 from solvers.identification.fit import PROBABLE, Fit, Identified
 from solvers.identification.hypothesis import Unknowns
-from solvers.identification.summary import identified_sentence, identified_stats, standard_errors
+from solvers.identification.summary import (
+    identified_force,
+    identified_sentence,
+    identified_stats,
+    standard_errors,
+)
 from solvers.problem import Problem
-from solvers.solution import Solution, Status, unstable_phrase
+from solvers.solution import Solution, Status, Uncertainty, unstable_phrase
 
 
 def identified_solution(
@@ -35,21 +40,24 @@ def identified_solution(
     sentence = identified_sentence(found, missed)
     if unstable:
         sentence = f"{unstable_phrase(unstable)}; {sentence}"
+    field = IdentifiedField(
+        [
+            _member(fit, float(probability), problem)
+            for fit, probability in zip(found.fits, found.probabilities, strict=True)
+            if fit is best or probability >= PROBABLE
+        ]
+    )
     return Solution(
         solver=name,
         problem=_with_values(best.markers.unknowns, best.response.values, problem),
-        field=IdentifiedField(
-            [
-                _member(fit, float(probability), problem)
-                for fit, probability in zip(found.fits, found.probabilities, strict=True)
-                if fit is best or probability >= PROBABLE
-            ]
-        ),
+        field=field,
         energy=best.model.body.energy(best.response.state, hypothesis.lame, hypothesis.changes),
         reaction=hypothesis.force,
         status=Status(best.estimate.converged and best.exact and not unstable, sentence),
         stats={**stats, **identified_stats(found), "unstable_directions": unstable},
         left_out=leave_one_out_displacements(problem, left_out),
+        uncertainty=Uncertainty(field.standard_deviation, field.von_mises_deviation),
+        identified=identified_force(found),
     )
 
 

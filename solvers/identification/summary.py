@@ -6,6 +6,7 @@ from scipy.stats import norm, t
 from geometry.arrays import FloatArray
 from solvers.assimilation.estimation import LEVEL, Estimate, degrees_of_freedom
 from solvers.identification.fit import Fit, Identified
+from solvers.solution import Estimated, IdentifiedForce
 
 MENTIONED = 0.2
 """Least coefficient of a parameter named in a combination."""
@@ -115,6 +116,19 @@ def force_interval(found: Identified) -> tuple[float, float, float]:
         variance += float(probability) * (deviation**2 + (own - size) ** 2)
     half = float(norm.ppf((1 + LEVEL) / 2)) * float(np.sqrt(variance))
     return size, max(size - half, 0.0), size + half
+
+
+def identified_force(found: Identified) -> IdentifiedForce:
+    """Size and place of the force, with their intervals."""
+    estimate = found.best.estimate
+    places = [
+        Estimated(float(value), float(low), float(high))
+        for parameter, value, (low, high) in zip(
+            estimate.parameters, estimate.values, estimate.intervals, strict=True
+        )
+        if parameter.name == "position"
+    ]
+    return IdentifiedForce(Estimated(*force_interval(found)), places[0] if places else None)
 
 
 def identified_stats(found: Identified) -> dict[str, float | int | str]:

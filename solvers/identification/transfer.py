@@ -53,6 +53,8 @@ def transferred(solution: Solution, problem: Problem, other: Problem) -> Solutio
         energy=member.model.body.energy(response.state, hypothesis.lame, hypothesis.changes),
         reaction=hypothesis.force,
         left_out=None,
+        uncertainty=None,
+        identified=None,
     )
 
 

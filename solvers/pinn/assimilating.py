@@ -31,6 +31,7 @@ class PinnAsmSolver(MarkerSettings, PinnStdSolver):
     """The network of `PinnStdSolver`, random hidden weights and exact outputs, with the markers' misfit."""
 
     name: ClassVar[str] = "pinn-asm"
+    twin: ClassVar[str] = "fem-asm"
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
     refitter = network_refitter
 
@@ -40,6 +41,7 @@ class PinnLocalAsmSolver(MarkerSettings, PinnLocalSolver):
     """The network of `PinnLocalSolver` with the markers' misfit, as in `PinnAsmSolver`."""
 
     name: ClassVar[str] = "pinn-local-asm"
+    twin: ClassVar[str] = "fem-asm"
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
     refitter = network_refitter
 
@@ -57,4 +59,5 @@ class PaperPinnAsmSolver(PaperPinnSolver):
     scale: float = 1.0
     marker_radius: float | None = 0.0
     name: ClassVar[str] = "pinn-asm"
+    twin: ClassVar[str] = "fem-asm"
     assimilates: ClassVar[bool] = True

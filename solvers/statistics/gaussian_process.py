@@ -28,8 +28,8 @@ from solvers.assimilation.misfit import (
 )
 from solvers.energy_and_force import energy_and_force
 from solvers.problem import Problem
-from solvers.solution import Solution, Status
-from solvers.solver import Progress, UnsupportedProblemError, check_problem, silent
+from solvers.solution import Solution, Status, Uncertainty
+from solvers.solver import Family, Progress, UnsupportedProblemError, check_problem, silent
 from solvers.statistics.kernel_field import SMOOTHNESS, Kernel, KernelField
 
 MIN_MARKERS = 3
@@ -56,6 +56,7 @@ class GaussianProcessSolver:
     clamp: bool = False
     kernel: Kernel = "matern52"
     name: ClassVar[str] = "gp"
+    family: ClassVar[Family] = "statistics"
     laws: ClassVar[tuple[str, ...]] = ("linear",)
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
     assimilates: ClassVar[bool] = True
@@ -122,6 +123,7 @@ class GaussianProcessSolver:
                     float(process.log_marginal_likelihood_value_) for process in field.processes
                 ),
             },
+            uncertainty=Uncertainty(field.standard_deviation),
         )
         return solution, misfit, deviations
 

@@ -36,8 +36,8 @@ from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.lagrange import LagrangeField
 from solvers.problem import Problem
-from solvers.solution import Solution, Status
-from solvers.solver import Progress, check_problem, silent
+from solvers.solution import Solution, Status, Uncertainty
+from solvers.solver import Family, Progress, check_problem, silent
 from solvers.statistics.kernel_field import Kernel
 from solvers.statistics.statistical_posterior import Posterior, StatFemData, StatFemField
 
@@ -59,6 +59,7 @@ class StatFemSolver:
     stroke_deviation: float = 0.5
     kernel: Kernel = "matern52"
     name: ClassVar[str] = "statfem"
+    family: ClassVar[Family] = "statistics"
     laws: ClassVar[tuple[str, ...]] = (*FemSolver.laws, *FemNonlinearSolver.laws)
     loads: ClassVar[tuple[str, ...]] = FemSolver.loads
     assimilates: ClassVar[bool] = True
@@ -168,6 +169,7 @@ class StatFemSolver:
                 f"load_{'uv'[axis]}": float(value)
                 for axis, value in zip(problem.load.prescribed, posterior.load, strict=True)
             },
+            uncertainty=Uncertainty(field.standard_deviation),
         )
 
 

@@ -97,7 +97,8 @@ def evaluate(mesh: TriangleMesh) -> Callable[..., Evaluation]:
             history=history or {},
             error=None if off is None else error_of(scale, scale * (1 + off), mesh),
         )
-        return evaluated(solution, mesh)
+        family = "neural network" if solver.startswith("pinn") else "finite elements"
+        return replace(evaluated(solution, mesh), family=family)
 
     return make
 

@@ -3,7 +3,7 @@ from typing import ClassVar
 
 import pytest
 
-from compare.evaluation.comparison import left_out_remarks, supported_solvers
+from compare.evaluation.comparison import supported_solvers, unsupported_remarks
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution
 from solvers.solver import Progress, UnsupportedProblemError, silent
@@ -33,9 +33,9 @@ def test_every_solver_that_can_stays_in_its_place():
 
 
 def test_a_spare_solver_that_cannot_is_left_out():
-    chosen, left_out = supported_solvers(SOLVERS, ("a", "b", "c"), Material(), PATCH)
+    chosen, unsupported = supported_solvers(SOLVERS, ("a", "b", "c"), Material(), PATCH)
     assert [solver.name for solver in chosen] == ["b"]
-    assert left_out == {"a": "no load 'patch'", "c": "no load 'patch'"}
+    assert unsupported == {"a": "no load 'patch'", "c": "no load 'patch'"}
 
 
 def test_a_solver_that_was_asked_for_is_not():
@@ -49,7 +49,7 @@ def test_a_job_that_no_solver_can_do_is_refused():
 
 
 def test_solvers_with_the_same_reason_share_a_line():
-    assert left_out_remarks({"a": "no load", "b": "too few markers", "c": "no load"}) == [
+    assert unsupported_remarks({"a": "no load", "b": "too few markers", "c": "no load"}) == [
         "left out: a, c (no load)",
         "left out: b (too few markers)",
     ]

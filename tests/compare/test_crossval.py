@@ -51,7 +51,7 @@ from solvers.assimilation.misfit import misfit_of
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 from solvers.registry import BUILT_IN, make_solver
-from solvers.solution import DisplacementField, Solution, State, Status
+from solvers.solution import Estimated, IdentifiedForce, Solution, State, Status, Uncertainty
 from solvers.solver import Progress, silent
 from tests.compare.drawn_pages import page_of
 from tests.solvers.conftest import observed_at
@@ -220,24 +220,20 @@ def test_a_solver_that_is_given_nothing_has_nothing_in_sample(task):
     assert outcomes[0].errors == outcomes[1].errors
 
 
-class Stating:
-    """A field that states the von Mises stress exactly near the base, and without bounds elsewhere."""
-
-    def __init__(self, field: DisplacementField) -> None:
-        self.displacement, self.gradient = field.displacement, field.gradient
-
-    def von_mises_deviation(self, location: LocatedPoints) -> FloatArray:
-        return np.where(location.points[:, 0] < 30.0, 0.0, 1e9)
+def deviation(location: LocatedPoints) -> FloatArray:
+    """The von Mises stress is known exactly near the base, and not at all elsewhere."""
+    return np.where(location.points[:, 0] < 30.0, 0.0, 1e9)
 
 
 def test_force_place_and_stated_intervals_are_judged_by_the_truth(task, coarse_mesh, truth, monkeypatch):
     """The truth's own field with twice its force, a contact 1.5 mm off, and intervals by hand."""
     force = float(np.linalg.norm(truth.reaction))
-    stats = {
-        **{"position": 36.5, "position_low": 35.5, "position_high": 37.5},
-        **{"force_low": 0.9 * force, "force_high": 1.1 * force},
-    }
-    stating = replace(truth, field=Stating(truth.field), stats=stats, reaction=2 * truth.reaction)
+    stating = replace(
+        truth,
+        reaction=2 * truth.reaction,
+        identified=IdentifiedForce(Estimated(force, 0.9 * force, 1.1 * force), Estimated(36.5, 35.5, 37.5)),
+        uncertainty=Uncertainty(lambda location: np.zeros_like(location.points), deviation),
+    )
     monkeypatch.setattr("compare.crossval.solver_folds.refitter", lambda *_: lambda observations: stating)
     full, one, _ = judged(task)
     assert full.force == pytest.approx(1.0)

@@ -65,7 +65,7 @@ def hostile(
         truth=replace(fem, solver="truth"),
         design=Design.model_construct(**{**Design().model_dump(), "name": HOSTILE}),
         settings={HOSTILE: {HOSTILE: HOSTILE}},
-        left_out={HOSTILE: HOSTILE},
+        unsupported={HOSTILE: HOSTILE},
         failed={HOSTILE: HOSTILE},
         warnings=[HOSTILE],
     )

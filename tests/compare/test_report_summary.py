@@ -134,6 +134,20 @@ def test_a_found_force_has_its_interval(
 def test_what_raised_an_exception_or_was_left_out_is_named(
     compared: Callable[..., Comparison], fem: Evaluation
 ) -> None:
-    answer = asked(compared(fem), failed={"mine": "it broke"}, left_out={"gp": "no markers"})[CONVERGED]
+    answer = asked(compared(fem), failed={"mine": "it broke"}, unsupported={"gp": "no markers"})[CONVERGED]
     assert answer.verdict == "1 of 2 solvers: mine."
     assert {"mine failed: it broke.", "gp was left out: no markers."} <= set(answer.sentences)
+
+
+@pytest.mark.parametrize("converged", [True, False])
+def test_a_network_stands_beside_its_twin_whether_it_converged_or_not(
+    compared: Callable[..., Comparison],
+    fem: Evaluation,
+    given: Evaluation,
+    evaluate: Callable[..., Evaluation],
+    converged: bool,
+) -> None:
+    network = evaluate("pinn-asm", 1.02, converged=converged)
+    network = replace(network, in_sample=True, left_out=given.left_out, twin="fem-asm")
+    sentences = asked(compared(fem, given, network))[TRUST].sentences
+    assert any("fem-asm, its twin by finite elements, 0.100 mm" in said for said in sentences)

@@ -41,6 +41,8 @@ UNCERTAINTY = {
     "markers_v": list,
 }
 SOLVER = {
+    "family": str,
+    "twin": (str, type(None)),
     "law": str,
     "status": str,
     "message": str,

@@ -110,7 +110,7 @@ def test_the_fault_of_a_solver_in_the_second_process_is_kept_for_the_reader(solv
     outcome, _ = solve(2, FemSolver(), Ending("faulty"), Ending("unsupporting"), spare=["unsupporting"])
     assert list(outcome.evaluations) == ["fem"]
     assert outcome.failed["faulty"].startswith("solver faulty raised ZeroDivisionError: by nothing (")
-    assert outcome.left_out == {"unsupporting": "unsupporting: no markers here"}
+    assert outcome.unsupported == {"unsupporting": "unsupporting: no markers here"}
     assert "raise ZeroDivisionError" in (tmp_path / "2" / "errors" / "faulty.txt").read_text()
 
 

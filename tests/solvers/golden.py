@@ -17,10 +17,9 @@ from compare.runtime.provenance import package_versions
 from geometry.finger.design import Design
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
-from solvers.assimilation.misfit import assimilates
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
-from solvers.solver import with_law
+from solvers.solver import Traits, with_law
 
 DATA = Path(__file__).parents[1] / "data"
 NUMBERS, MESH = DATA / "golden.json", DATA / "golden-mesh.npz"
@@ -56,7 +55,7 @@ def golden(name: str) -> dict[str, float]:
     settings, material, load = JOBS[name]
     solver, mesh = make_solver(name.partition(" ")[0], **settings), TriangleMesh.load(MESH)
     problem = Problem(mesh, with_law(material, solver), load, finger=Design())
-    if assimilates(solver):
+    if Traits.of(solver).assimilates:
         exact, all_seen = np.zeros_like(DISPLACEMENTS), np.full(len(DISPLACEMENTS), True)
         measured = Observations(mesh.markers, DISPLACEMENTS, exact, all_seen, "stored", True, 0.8)
         problem = replace(problem, observations=measured)

@@ -13,7 +13,7 @@ from solvers.energy_and_force import energy_and_force, harmonic_slope, section_s
 from solvers.problem import Load, Material, Problem, contact_functional
 from solvers.registry import make_solver, usable_solvers
 from solvers.solution import Solution
-from solvers.solver import with_law
+from solvers.solver import Traits, with_law
 from tests.solvers.bodies import BODIES, body_mesh, mesh_of, ring
 from tests.solvers.conftest import observed_at
 from tests.solvers.test_contract import QUICK
@@ -89,7 +89,7 @@ def test_every_solver_takes_every_body(solver, body):
     reference = by_fem(body, COARSE)
     mesh = reference.problem.mesh
     problem = replace(reference.problem, material=with_law(Material(), made))
-    if getattr(made, "assimilates", False):
+    if Traits.of(made).assimilates:
         seen = reference.displacement(mesh.markers)
         problem = replace(problem, observations=observed_at(mesh.markers, seen, 0.01))
     solution = made.solve(problem)

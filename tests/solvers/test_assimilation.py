@@ -14,13 +14,11 @@ from solvers.assimilation.misfit import (
     MIN_STANDARD_DEVIATION,
     MarkerSettings,
     Misfit,
-    assimilates,
     disc_quadrature,
     leave_one_out_displacements,
     misfit_of,
     radius_within,
 )
-from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
 from solvers.registry import make_solver
 
@@ -179,14 +177,6 @@ def test_the_disc_is_that_of_the_designs_markers(problem, preset, name):
     observed = replace(problem, observations=replace(problem.observations, marker_radius=radius))
     assert make_solver(name).weighting.misfit(observed).radius == radius
     assert make_solver(name, marker_radius=0.3).weighting.misfit(observed).radius == 0.3
-
-
-def test_only_a_solver_that_says_so_assimilates():
-    class Assimilating(FemSolver):
-        assimilates = True
-
-    assert not assimilates(FemSolver())
-    assert assimilates(Assimilating())
 
 
 def test_observations_make_another_problem(problem):

@@ -12,7 +12,6 @@ from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.quadrature import body_quadrature
 from geometry.observations import Observations
-from solvers.assimilation.misfit import assimilates
 from solvers.fem.assimilating import FemAsmSolver
 from solvers.pinn.assimilating import PaperPinnAsmSolver, PinnAsmSolver, PinnLocalAsmSolver
 from solvers.pinn.finite_basis.newton import find_equilibrium
@@ -20,7 +19,7 @@ from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.pinn.paper.trained_field import MlpField
 from solvers.problem import Load, Material, Problem, contact_functional
 from solvers.registry import make_solver
-from solvers.solver import TrainedSolver
+from solvers.solver import TrainedSolver, Traits
 from tests.solvers.autograd_reference import PlainPinn
 from tests.solvers.conftest import bar_mesh
 
@@ -319,13 +318,13 @@ def test_the_papers_loss_is_energy_plus_misfit_over_the_area(problem, settings):
 
 def test_they_say_that_they_assimilate():
     names = ("pinn-asm", "pinn-local-asm", "pinn-std", "pinn-local")
-    assert [assimilates(make_solver(name)) for name in names] == [True, True, False, False]
+    assert [Traits.of(make_solver(name)).assimilates for name in names] == [True, True, False, False]
 
 
 def test_the_papers_preset_is_trained_and_takes_the_centres():
     solver = make_solver("pinn-asm", preset="paper")
     assert isinstance(solver, TrainedSolver)
-    assert assimilates(solver)
+    assert solver.assimilates
     assert solver.settings()["marker_radius"] == 0
     assert make_solver("pinn-asm").settings()["marker_radius"] is None
 

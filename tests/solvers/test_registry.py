@@ -3,7 +3,8 @@
 import pytest
 
 from geometry.errors import UserError
-from solvers.registry import PRESETS, make_solver, solver_names, usable_solvers
+from solvers.registry import BUILT_IN, PRESETS, make_solver, solver_names, usable_solvers
+from solvers.solver import Traits
 
 
 def test_settings_are_converted_from_text():
@@ -52,6 +53,21 @@ def test_a_package_adds_a_solver_by_its_entry_point(plugin_folder, monkeypatch):
     monkeypatch.syspath_prepend(str(plugin_folder))
     assert solver_names()[-1] == "skfem-p2"
     assert make_solver("skfem-p2").name == "skfem-p2"
+
+
+def test_a_solver_that_lacks_the_traits_has_their_defaults(plugin_folder, monkeypatch):
+    """As a package written before there were any."""
+    monkeypatch.syspath_prepend(str(plugin_folder))
+    assert Traits.of(make_solver("skfem-p2")) == Traits(assimilates=False, family=None, twin=None)
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_a_solver_of_ours_has_its_family_and_its_twin_assimilates_too(name):
+    traits = Traits.of(make_solver(name))
+    kinds = {"fem": "finite elements", "pinn": "neural network"}
+    assert traits.family == kinds.get(name.partition("-")[0], "statistics")
+    if traits.twin:
+        assert Traits.of(make_solver(traits.twin)) == Traits(True, "finite elements")
 
 
 def test_a_broken_package_warns_and_the_rest_goes_on(tmp_path, monkeypatch):

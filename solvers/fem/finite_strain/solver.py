@@ -9,7 +9,7 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from solvers.cylinder_contact import CONTACT_AT_END, ContactRegion
+from solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
 from solvers.fem.error_estimate import ErrorEstimator, locking_advice
 from solvers.fem.finite_strain.constraints import DisplacementConstraints
 from solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
@@ -17,7 +17,7 @@ from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import ErrorEstimate, Solution, Status, unstable_phrase
-from solvers.solver import Progress, check_problem, silent
+from solvers.solver import Family, Progress, check_problem, silent
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,7 @@ class FemNonlinearSolver:
     tolerance: float = 1e-8
     max_iterations: int = 12
     name: ClassVar[str] = "fem-nonlinear"
+    family: ClassVar[Family] = "finite elements"
     laws: ClassVar[tuple[str, ...]] = ("neo-hookean", "st-venant-kirchhoff", "gent")
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch", "cylinder")
 
@@ -127,6 +128,7 @@ class FemNonlinearSolver:
             },
             states=[LagrangeField(space, point.nodal) for point in points],
             error=error,
+            contact=contact_of(problem, abscissa, regions[-1]),
         )
 
 

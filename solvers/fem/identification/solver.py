@@ -20,7 +20,7 @@ from solvers.identification.transfer import transferred
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
-from solvers.solver import Progress, check_problem, silent
+from solvers.solver import Family, Progress, check_problem, silent
 
 Model = Literal["fem-nonlinear", "fem"]
 
@@ -39,6 +39,7 @@ class FemIdSolver(IdentificationSettings):
     model: Model = "fem-nonlinear"
     degree: int = 2
     name: ClassVar[str] = "fem-id"
+    family: ClassVar[Family] = "finite elements"
 
     def __post_init__(self) -> None:
         if self.model not in get_args(Model):

@@ -8,7 +8,7 @@ import numpy as np
 
 from geometry.errors import UserError
 from geometry.machine_memory import free_memory_gb
-from solvers.cylinder_contact import CONTACT_AT_END, ContactRegion
+from solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
 from solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
 from solvers.fem.ranks import communicator, on_all_ranks
 from solvers.fem.solid.cost import Cost, LinearSolver, affordable
@@ -17,7 +17,7 @@ from solvers.fem.solid.plane_guide import PlaneGuide
 from solvers.fem.solid.side_face import Face, FaceField
 from solvers.problem import Problem
 from solvers.solution import Solution, Status, unstable_phrase
-from solvers.solver import Progress, check_problem, silent
+from solvers.solver import Family, Progress, check_problem, silent
 
 PLANE_SHARE = 0.1
 """Share of the plane solution in the progress."""
@@ -54,6 +54,7 @@ class Fem3dSolver:
     tolerance: float = 1e-8
     max_iterations: int = 20
     name: ClassVar[str] = "fem-3d"
+    family: ClassVar[Family] = "finite elements"
     laws: ClassVar[tuple[str, ...]] = ("linear", "neo-hookean", "st-venant-kirchhoff")
     loads: ClassVar[tuple[str, ...]] = ("mean", "patch", "cylinder")
 
@@ -154,6 +155,7 @@ class Fem3dSolver:
                 "reaction_y": reactions[:, 1],
             },
             states=[FaceField(space, point.nodal, self.face) for point in points],
+            contact=contact_of(problem, abscissa, region),
         )
 
     def _status(

@@ -13,7 +13,7 @@ from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
 from solvers.assimilation.marker_forces import MarkerFit
 from solvers.assimilation.marker_weighting import MarkerWeighting
-from solvers.assimilation.misfit import MarkerSettings, Misfit, assimilates, leave_one_out_displacements
+from solvers.assimilation.misfit import MarkerSettings, Misfit, leave_one_out_displacements
 from solvers.cylinder_contact import CONTACT_AT_END
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
 from solvers.pinn.finite_basis.energy import NetworkEnergy
@@ -31,7 +31,7 @@ from solvers.pinn.threading import pool
 from solvers.problem import Problem
 from solvers.shared_work import shared
 from solvers.solution import Solution, Status, unstable_phrase
-from solvers.solver import Progress, check_problem, silent
+from solvers.solver import Family, Progress, check_problem, silent
 
 Train = Callable[[float, FiniteBasisField | None, Progress], tuple[ConstrainedNetwork, LoadStep]]
 """Trains one refinement level, of a scale of the spacings, starting from the coarser level's field."""
@@ -79,6 +79,8 @@ class FiniteBasisSolver(ABC):
     base_length: float = 5.0
     seed: int = 0
     name: ClassVar[str]
+    family: ClassVar[Family] = "neural network"
+    assimilates: ClassVar[bool] = False
     laws: ClassVar[tuple[str, ...]] = ("linear", "neo-hookean", "st-venant-kirchhoff")
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch", "cylinder")
 
@@ -108,7 +110,7 @@ class FiniteBasisSolver(ABC):
     @property
     def weighting(self) -> MarkerWeighting | None:
         """The weights of the markers; None for a solver that does not assimilate them."""
-        return MarkerWeighting.of(self) if assimilates(self) else None
+        return MarkerWeighting.of(self) if self.assimilates else None
 
     def misfit(self, problem: Problem) -> Misfit | None:
         """The misfit that is minimised together with the energy, if any; see `MarkerWeighting.misfit`."""

@@ -22,7 +22,7 @@ from solvers.pinn.finite_basis.local import PinnLocalSolver
 from solvers.pinn.identification.network_body import NetworkBody
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
-from solvers.solver import Progress, check_problem, silent
+from solvers.solver import Family, Progress, check_problem, silent
 
 COST_CHANGE = 1e-3
 """Relative change of the cost at which a search ends: its derivatives are known to that by iteration."""
@@ -65,6 +65,8 @@ class PinnIdSolver(IdentificationSettings):
     fine: float = 1.5
     seed: int = 0
     name: ClassVar[str] = "pinn-id"
+    family: ClassVar[Family] = "neural network"
+    twin: ClassVar[str] = "fem-id"
     laws: ClassVar[tuple[str, ...]] = ("neo-hookean", "st-venant-kirchhoff")
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
 

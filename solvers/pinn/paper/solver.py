@@ -11,7 +11,6 @@ from geometry.arrays import FloatArray
 from geometry.content_hash import content_hash
 from geometry.errors import UserError
 from solvers.assimilation.marker_weighting import MarkerWeighting
-from solvers.assimilation.misfit import assimilates
 from solvers.pinn.paper.collocation import Collocation, base_points, collocation_points
 from solvers.pinn.paper.loss import (
     ONE_PROCESS,
@@ -33,7 +32,7 @@ from solvers.pinn.paper.training import (
 from solvers.pinn.threading import pool, torch_threads
 from solvers.problem import Problem, contact_functional
 from solvers.solution import Solution
-from solvers.solver import Progress, TrainingContext, check_problem, silent
+from solvers.solver import Family, Progress, TrainingContext, check_problem, silent
 
 PRECISIONS = {"single": torch.float32, "double": torch.float64}
 
@@ -84,6 +83,8 @@ class PaperPinnSolver:
     seed: int = 0
     _context: TrainingContext = field(default=TrainingContext(), init=False, repr=False, compare=False)
     name: ClassVar[str] = "pinn-std"
+    family: ClassVar[Family] = "neural network"
+    assimilates: ClassVar[bool] = False
     laws: ClassVar[tuple[str, ...]] = ("linear",)
     loads: ClassVar[tuple[str, ...]] = ("mean", "point")
 
@@ -119,7 +120,7 @@ class PaperPinnSolver:
     @property
     def weighting(self) -> MarkerWeighting | None:
         """The weights of the markers; None for a solver that does not assimilate them."""
-        return MarkerWeighting.of(self) if assimilates(self) else None
+        return MarkerWeighting.of(self) if self.assimilates else None
 
     @property
     def network(self) -> ModifiedMlp:

@@ -14,7 +14,7 @@ from geometry.errors import UserError
 from geometry.mesh.boundary import mean_thickness
 from geometry.mesh.point_location import LocatedPoints
 from solvers.assimilation.marker_weighting import MarkerWeighting
-from solvers.assimilation.misfit import Misfit, Weighting, assimilates
+from solvers.assimilation.misfit import Misfit, Weighting
 from solvers.energy_and_force import energy_and_force
 from solvers.pinn.paper.modified_mlp import ModifiedMlp
 from solvers.pinn.threading import map_in_threads, pool, slices
@@ -23,7 +23,7 @@ from solvers.pinn.trained.squares import PIECE, Squares
 from solvers.pinn.trained.streams import Streams
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
-from solvers.solver import Progress, check_problem, silent
+from solvers.solver import Family, Progress, check_problem, silent
 
 OUTPUT = 0.7
 """Standard deviation of the first outputs, in strokes: larger ones make the energy nearly quadratic in the
@@ -61,6 +61,8 @@ class TrainedPinnSolver:
     matrix_points: int = 5000
     seed: int = 0
     name: ClassVar[str] = "pinn-std"
+    family: ClassVar[Family] = "neural network"
+    assimilates: ClassVar[bool] = False
     laws: ClassVar[tuple[str, ...]] = ("linear",)
     loads: ClassVar[tuple[str, ...]] = ("mean", "point")
 
@@ -79,7 +81,7 @@ class TrainedPinnSolver:
     @property
     def weighting(self) -> MarkerWeighting | None:
         """The weights of the markers; None for a solver that does not assimilate them."""
-        return MarkerWeighting.of(self) if assimilates(self) else None
+        return MarkerWeighting.of(self) if self.assimilates else None
 
     def misfit(self, problem: Problem) -> Misfit | None:
         """The misfit that is minimised together with the energy, if any; see `MarkerWeighting.misfit`."""
@@ -170,6 +172,7 @@ class TrainedPinnAsmSolver(TrainedPinnSolver):
     scale: float = 1.0
     marker_radius: float | None = None
     name: ClassVar[str] = "pinn-asm"
+    twin: ClassVar[str] = "fem-asm"
     assimilates: ClassVar[bool] = True
 
 
