@@ -9,49 +9,41 @@ from rich.console import Console, RenderableType
 from geometry.errors import UserError
 
 BENCHMARKS = {
-    "fem": "fem_against_scikit_fem",
-    "million": "million_triangles",
-    "pinn": "pinn_against_fem",
-    "designs": "networks_on_designs",
-    "drawings": "networks_on_drawings",
-    "sizes": "network_sizes",
-    "inference": "inference",
-    "deepxde": "deepxde_against_ours",
-    "recipes": "pinn_recipes",
-    "epochs": "deepxde_epochs",
-    "kernels": "kernels",
-    "meshing": "meshing",
-    "scenes": "tracker_scenes",
-    "stress": "tracker_stress",
-    "live": "live_tracking",
-    "localisation": "localisation",
-    "dots": "printed_dots",
-    "validation": "validation.document",
-    "results": "default_run",
-    "default": "default_time",
-    "readings": "readings",
-    "plane_strain": "plane_strain",
-    "paper": "paper_run",
-    "contact": "network_contact",
-    "trained": "trained_networks",
-    "sweep": "sweeping",
-    "predict": "emulators",
-    "optimise": "fronts",
-    "reliability": "reliability.document",
+    "results": "results.default_run:main",
+    "default": "results.default_time:main",
+    "readings": "results.readings:main",
+    "fem": "elements.scikit_fem:main",
+    "million": "elements.million_triangles:main",
+    "plane_strain": "elements.plane_strain:main",
+    "pinn": "networks.graded:pinn",
+    "designs": "networks.graded:designs",
+    "drawings": "networks.graded:drawings",
+    "contact": "networks.graded:contact",
+    "trained": "networks.graded:trained",
+    "paper": "networks.paper_run:main",
+    "scenes": "tracker.scenes:main",
+    "stress": "tracker.stress:main",
+    "live": "tracker.live:main",
+    "localisation": "tracker.localisation:main",
+    "dots": "tracker.printed_dots:main",
+    "sweep": "sweeps.speed:main",
+    "optimise": "sweeps.fronts:main",
+    "validation": "validation.document:main",
+    "reliability": "reliability.document:main",
 }
-"""Names and modules; the modules' docstrings have descriptions and times."""
+"""Names, and functions that return a table; the modules' docstrings have descriptions and times."""
 
-WIDEST = 400
-"""Columns of the widest table."""
+SETTLED = ("recipes", "deepxde", "epochs", "sizes", "inference", "kernels", "meshing", "predict")
+"""Benchmarks whose question is settled: their figures and the commit with their code are on a page."""
+
 SHORT = ("fem", "pinn")
-TIMED = ("deepxde", "recipes", "paper", "trained")
-ROWED = ("stress", "reliability")
+TIMED, ROWED = ("paper",), ("stress", "reliability")
 
 
 def show(table: RenderableType, console: Console | None = None) -> None:
     """Print a table as wide as it is: a terminal of 80 columns would cut the headings of its columns."""
     console = console or Console()
-    wide = console.measure(table, options=console.options.update(max_width=WIDEST)).maximum
+    wide = console.measure(table, options=console.options.update(max_width=400)).maximum
     console.width = max(console.width, wide)
     console.print(table)
 
@@ -65,15 +57,19 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, help=f"budget of each training in {' and '.join(TIMED)}")
     parser.add_argument("--rows", default="", help=f"words in the names of the rows of {' and '.join(ROWED)}")
     arguments = parser.parse_args()
-    unknown = [name for name in arguments.names if name not in BENCHMARKS]
-    if unknown:
-        parser.error(f"no benchmark {unknown[0]!r}; there are {', '.join(BENCHMARKS)}")
+    for name in arguments.names:
+        if name in SETTLED:
+            parser.error(
+                f"{name} is settled: docs/evidence/settled.md has its figures and the commit that ran it"
+            )
+        if name not in BENCHMARKS:
+            parser.error(f"no benchmark {name!r}; there are {', '.join(BENCHMARKS)}")
     for name in arguments.names or SHORT:
         options = {"seconds": arguments.seconds} if arguments.seconds and name in TIMED else {}
         options |= {"rows": arguments.rows} if arguments.rows and name in ROWED else {}
+        module, _, function = BENCHMARKS[name].partition(":")
         try:
-            module = importlib.import_module(f"benchmarks.{BENCHMARKS[name]}")
-            show(module.main(**options))
+            show(getattr(importlib.import_module(f"benchmarks.{module}"), function)(**options))
         except ModuleNotFoundError as error:
             print(f"error: {name} needs {error.name}; pip install 'pinn-ray[bench]'", file=sys.stderr)
             return 2

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from benchmarks.default_run import PAGES, TABLES, Figures, kept_figures, marks
+from benchmarks.results.default_run import PAGES, TABLES, Figures, kept_figures
+from benchmarks.tables import table_of
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -20,9 +21,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
     ids=lambda value: getattr(value, "name", value),
 )
 def test_the_page_has_the_table_of_the_default_run(page, name):
-    begin, end = marks(name)
-    text = page.read_text(encoding="utf-8")
-    assert text.partition(begin)[2].partition(end)[0] == TABLES[name](kept_figures())
+    assert table_of(page, name) == TABLES[name](kept_figures())
 
 
 @pytest.mark.slow

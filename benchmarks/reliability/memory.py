@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.live_tracking import film
+from benchmarks.tracker.live import film
 from geometry.atomic import write_text
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design

@@ -1,11 +1,14 @@
-"""The tables of `python -m benchmarks` in a narrow terminal."""
+"""`python -m benchmarks`: its names and its tables in a narrow terminal."""
 
+import importlib
+import sys
 from io import StringIO
 
+import pytest
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.__main__ import show
+from benchmarks.__main__ import BENCHMARKS, SETTLED, main, show
 
 
 def test_headings_are_whole_in_a_terminal_of_80_columns() -> None:
@@ -15,3 +18,23 @@ def test_headings_are_whole_in_a_terminal_of_80_columns() -> None:
     console = Console(file=StringIO(), width=80)
     show(table, console)
     assert all(heading in console.file.getvalue() for heading in headings)
+
+
+@pytest.mark.parametrize("name", BENCHMARKS)
+def test_every_name_is_a_function(name: str) -> None:
+    module, _, function = BENCHMARKS[name].partition(":")
+    assert callable(getattr(importlib.import_module(f"benchmarks.{module}"), function))
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        *((name, "docs/evidence/settled.md") for name in SETTLED),
+        ("fme", "no benchmark 'fme'; there are results, default"),
+    ],
+)
+def test_settled_and_unknown_names_are_refused_in_one_line(name, said, monkeypatch, capsys) -> None:
+    monkeypatch.setattr(sys, "argv", ["benchmarks", name])
+    with pytest.raises(SystemExit, match="2"):
+        main()
+    assert said in capsys.readouterr().err.splitlines()[-1]

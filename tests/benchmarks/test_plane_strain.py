@@ -4,35 +4,33 @@ import re
 
 import pytest
 
-from benchmarks.plane_strain import (
-    BEGIN,
+from benchmarks.elements.plane_strain import (
     COARSE,
     DRAWN,
-    END,
     FINE,
     LAYERS,
     PAGE,
     PRESETS,
     Case,
     finger_rows,
-    kept_rows,
+    kept,
     measured,
     tables,
 )
+from benchmarks.tables import table_of
 
 DEPTHS = sorted(set(LAYERS) - {20.0})
 """Depths of the default finger other than its own, mm."""
 
 
 def test_the_page_has_the_tables_of_the_figures():
-    page = PAGE.read_text(encoding="utf-8")
-    for name, table in tables(kept_rows()).items():
-        assert page.partition(BEGIN.format(name))[2].partition(END)[0] == table
+    for name, table in tables(kept()).items():
+        assert table_of(PAGE, name) == table
 
 
 def test_every_case_is_there():
     """Without drawing the random fingers again, which takes half a minute."""
-    rows = kept_rows()
+    rows = kept()
     assert len({row.key for row in rows}) == len(rows)
     for size in (COARSE, FINE):
         those = [row for row in rows if row.size == size and row.model == "strain"]
@@ -46,9 +44,9 @@ def test_every_case_is_there():
 def test_the_figures_are_those_of_the_program():
     """Of the thinnest body; Gmsh's versions differ by a few elements."""
     case = Case("default", "linear", 5.0, COARSE)
-    kept = {row.model: row for row in kept_rows() if row[:4] == case}
+    those = {row.model: row for row in kept() if row[:4] == case}
     for row in measured(case):
-        assert row[5:] == pytest.approx(kept[row.model][5:], rel=0.03, abs=1e-3)
+        assert row[5:] == pytest.approx(those[row.model][5:], rel=0.03, abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -62,7 +60,7 @@ def test_the_figures_are_those_of_the_program():
 )
 def test_the_ranges_in_the_text_are_those_of_the_presets(said, model, name, scale):
     text = " ".join(PAGE.read_text(encoding="utf-8").split())
-    rows = [row for row in finger_rows(kept_rows(), PRESETS) if row.law == "linear" and row.model == model]
+    rows = [row for row in finger_rows(kept(), PRESETS) if row.law == "linear" and row.model == model]
     values = sorted(scale * getattr(row, name) for row in rows)
     digits = 2 if scale == 1 else 0
     ((low, high),) = re.findall(said, text)
@@ -70,7 +68,7 @@ def test_the_ranges_in_the_text_are_those_of_the_presets(said, model, name, scal
 
 
 def test_plane_stress_is_no_better_at_the_markers():
-    rows = {row.key: row for row in finger_rows(kept_rows(), PRESETS) if row.law == "linear"}
+    rows = {row.key: row for row in finger_rows(kept(), PRESETS) if row.law == "linear"}
     for key, row in rows.items():
         if row.model == "strain":
             assert rows[(*key[:4], "stress")].side_markers > 0.95 * row.side_markers

@@ -5,13 +5,13 @@ import re
 import numpy as np
 import pytest
 
-from benchmarks.readings import BEGIN, END, LAYOUTS, LOADS, PAGE, SHAPES, kept_readings, markdown, read_all
+from benchmarks.results.readings import LAYOUTS, LOADS, MARK, PAGE, SHAPES, kept_readings, read_all, table
+from benchmarks.tables import table_of
 from geometry.mesh.settings import MeshSettings
 
 
 def test_the_page_has_the_table_of_the_figures():
-    page = PAGE.read_text(encoding="utf-8")
-    assert page.partition(BEGIN)[2].partition(END)[0] == markdown(kept_readings())
+    assert table_of(PAGE, MARK) == table(kept_readings())
 
 
 def test_every_reading_is_there_once_and_the_nearest_comes_first():

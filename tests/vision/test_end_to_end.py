@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.tracker_films import Finger, Score, coverage
-from benchmarks.tracker_scenes import random_recording, scored
-from benchmarks.tracker_stress import CASES, JUMP, filmed, seen
+from benchmarks.tracker.films import Finger, Score, coverage
+from benchmarks.tracker.scenes import random_recording, scored
+from benchmarks.tracker.stress import CASES, JUMP, filmed, seen
 from geometry.cache import finger_mesh
 from geometry.mesh.settings import MeshSettings
 from tests.vision.films import DESIGN, bent

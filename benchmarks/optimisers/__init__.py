@@ -1,1 +1,0 @@
-"""Optimisers that torch lacks, one a file, for the training recipes."""

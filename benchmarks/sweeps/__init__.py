@@ -1,0 +1,1 @@
+"""Speed of sweeps, and fronts against an optimiser without an emulator."""

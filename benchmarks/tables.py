@@ -1,0 +1,68 @@
+"""Tables of figures: kept as CSV files, and in Markdown between two marks of a page."""
+
+import csv
+import platform
+from collections.abc import Callable, Iterable, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
+
+from geometry.atomic import atomic_path, write_text
+
+DOCS = Path(__file__).parents[1] / "docs"
+END = "<!-- end of the table -->\n"
+Row = TypeVar("Row", bound=tuple[Any, ...])
+
+
+def kept_rows(path: Path, kind: type[Row]) -> list[Row]:
+    """The rows of a CSV file as named tuples; none if there is no file."""
+    if not path.exists():
+        return []
+    numbers: dict[Any, Callable[[str], Any]] = {int: int, float: float, float | None: _number}
+    readers = [numbers.get(each, str) for each in get_type_hints(kind).values()]
+    with path.open(encoding="utf-8", newline="") as file:
+        lines = list(csv.reader(file))[1:]
+    return [kind(*(read(cell) for read, cell in zip(readers, line, strict=True))) for line in lines]
+
+
+def keep_rows(path: Path, kind: type[Row], rows: Iterable[Row]) -> None:
+    """Write named tuples as a CSV file; None is an empty cell."""
+    with atomic_path(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows([kind._fields, *rows])  # type: ignore[attr-defined]
+
+
+def markdown(header: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> str:
+    """A table whose first columns are aligned to the left, the others to the right."""
+    rule = ["---"] * left + ["---:"] * (len(header) - left)
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in (header, rule, *rows))
+
+
+def begin_of(name: str) -> str:
+    """The mark before a table."""
+    return f"<!-- {name} -->\n"
+
+
+def table_of(page: Path, name: str) -> str:
+    """The table between its marks on a page."""
+    return page.read_text(encoding="utf-8").partition(begin_of(name))[2].partition(END)[0]
+
+
+def fill(page: Path, name: str, table: str) -> None:
+    """Put a table between its marks on a page."""
+    before, begin, rest = page.read_text(encoding="utf-8").partition(begin_of(name))
+    if not begin:
+        raise ValueError(f"{page} has no mark {begin_of(name).strip()}")
+    write_text(page, before + begin + table + END + rest.partition(END)[2])
+
+
+def _number(cell: str) -> float | None:
+    return float(cell) if cell else None
+
+
+def made_by(command: str) -> str:
+    """When, where and with what versions a command made a table."""
+    return (
+        f"Made by `python -m benchmarks {command}` on {datetime.now(UTC):%Y-%m-%d}: {platform.machine()}, "
+        f"Python {platform.python_version()}, numpy {version('numpy')}"
+    )

@@ -1,0 +1,1 @@
+"""The tracker and the fit of discs, on films and pictures whose truth is known."""
