@@ -187,6 +187,10 @@ def test_markers_pull_the_network_to_them(problem, trained):
     own = replace(problem, observations=observed_at(markers, wanted, 0.01))
     settings = {name: value for name, value in SMALL.settings().items() if name != "preset"}
     with_markers = TrainedPinnAsmSolver(**settings).solve(own)
+    record = with_markers.history
+    assert record["energy"][-1] == pytest.approx(with_markers.energy, rel=1e-4)
+    assert record["misfit"][-1] > 0.01 * with_markers.energy
+    assert "the energy and misfit fell by" in with_markers.status.message
     missed = [np.abs(solution.displacement(markers) - wanted).mean() for solution in (trained, with_markers)]
     assert missed[1] < 0.1 * missed[0]
 

@@ -94,23 +94,30 @@ class TrainedPinnSolver:
         shape = ModifiedMlp(width=self.width, layers=self.layers)
         with pool():
             squares = Squares.of(problem, shape, self.misfit(problem), base_length=self.base_length)
-            history: list[tuple[float, float, float]] = []
+            history: list[tuple[float, ...]] = []
             parameters = self.initial(squares, problem)
             for step in self._steps(squares, parameters):
                 parameters = step.parameters
-                history.append((len(history) + 1, step.value, time.perf_counter() - started))
+                misfit = squares.misfit(parameters)
+                elapsed = time.perf_counter() - started
+                history.append((len(history) + 1, step.value - misfit, misfit, elapsed))
                 share = len(history) / (self.sampled_steps + self.subset_steps)
-                progress(share, f"step {len(history)}, energy {step.value:.4f} N mm/mm")
+                progress(share, f"step {len(history)}, {self._minimised} {step.value:.4f} N mm/mm")
             field = TrainedField(squares.with_type(torch.float64), parameters.double())
             energy, reaction = energy_and_force(problem, field)
-        columns = np.array(history).reshape(-1, 3).T
+        columns = dict(
+            zip(("step", "energy", "misfit", "seconds"), np.array(history).reshape(-1, 4).T, strict=True)
+        )
+        status = training_status(columns["energy"] + columns["misfit"], self._minimised)
+        if not self.assimilates:
+            del columns["misfit"]
         return Solution(
             solver=self.name,
             problem=problem,
             field=field,
             energy=energy,
             reaction=reaction,
-            status=training_status(columns[1]),
+            status=status,
             stats={
                 "seconds": time.perf_counter() - started,
                 "steps": len(history),
@@ -119,8 +126,12 @@ class TrainedPinnSolver:
                 "seed": self.seed,
                 "device": "cpu",
             },
-            history=dict(zip(("step", "energy", "seconds"), columns, strict=True)),
+            history=columns,
         )
+
+    @property
+    def _minimised(self) -> str:
+        return "energy and misfit" if self.assimilates else "energy"
 
     def _steps(self, squares: Squares, start: torch.Tensor) -> Iterator[Step]:
         for step in sampled_steps(squares, start, self.sample_points, self.sampled_steps, self.seed):
@@ -210,11 +221,11 @@ class TrainedField:
         return np.asarray(torch.cat(parts, dim=2).permute(2, 0, 1).numpy())
 
 
-def training_status(energy: FloatArray) -> Status:
-    """Whether the energy has settled, from its values after each step."""
-    tenth = max(len(energy) // 10, 1)
-    fell = 1 - energy[-1] / energy[-1 - tenth] if len(energy) > tenth else math.inf
-    message = f"{len(energy)} steps; over their last tenth the energy fell by {fell:.2%} "
+def training_status(values: FloatArray, minimised: str = "energy") -> Status:
+    """Whether the training has settled, from what it minimises after each step, N mm/mm."""
+    tenth = max(len(values) // 10, 1)
+    fell = 1 - values[-1] / values[-1 - tenth] if len(values) > tenth else math.inf
+    message = f"{len(values)} steps; over their last tenth the {minimised} fell by {fell:.2%} "
     message += f"(criterion {SETTLED:.0%}); "
     if fell <= SETTLED:
         return Status(

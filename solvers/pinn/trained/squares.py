@@ -213,6 +213,10 @@ class Squares:
         )
         return sum(pieces) + float(self._misfit(parameters, shift))
 
+    def misfit(self, parameters: torch.Tensor) -> float:
+        """The misfit alone, N mm/mm."""
+        return float(self._misfit(parameters, self.shift(parameters)))
+
     def value_and_gradient(self, parameters: torch.Tensor) -> tuple[float, torch.Tensor]:
         """The same, and its derivatives by the parameters, of their shape."""
         trained = parameters.detach().requires_grad_()
