@@ -70,10 +70,7 @@ def solver(name: str, **settings: Any) -> Solver:
     Raises:
         UserError: If there is no such solver or setting, or a library that it needs is missing.
     """
-    try:
-        return make_solver(name, **settings)
-    except ImportError as error:
-        raise UserError(f"solver {name!r} cannot be loaded: {error}") from None
+    return make_solver(name, **settings)
 
 
 def solve(

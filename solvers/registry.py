@@ -48,6 +48,10 @@ BUILT_IN = {
 }
 
 
+class MissingLibraryError(UserError):
+    """A library that a solver needs is missing."""
+
+
 def solver_names() -> list[str]:
     """Names of all solvers, ours first."""
     return [*BUILT_IN, *sorted({entry.name for entry in entry_points(group=GROUP)} - set(BUILT_IN))]
@@ -60,6 +64,7 @@ def make_solver(name: str, **settings: Any) -> Solver:
 
     Raises:
         UserError: If there is no such solver or preset, or a package that offers it cannot be loaded.
+        MissingLibraryError: If a library that it needs is missing.
     """
     if name in BUILT_IN:
         place = BUILT_IN[name]
@@ -68,7 +73,10 @@ def make_solver(name: str, **settings: Any) -> Solver:
                 raise UserError(f"{name} has no preset {preset!r}; it has {', '.join(PRESETS[name])}")
             place = PRESETS[name][preset]
         module, _, attribute = place.partition(":")
-        factory = getattr(import_module(module), attribute)
+        try:
+            factory = getattr(import_module(module), attribute)
+        except ImportError as error:
+            raise MissingLibraryError(f"solver {name!r} cannot be loaded: {error}") from error
     else:
         found = [entry for entry in entry_points(group=GROUP) if entry.name == name]
         if not found:
@@ -101,7 +109,7 @@ def usable_solvers() -> dict[str, Solver]:
     for name in solver_names():
         try:
             solvers[name] = make_solver(name)
-        except (UserError, ImportError) as error:
+        except UserError as error:
             warnings.warn(f"solver {name!r} is left out: {error}", stacklevel=2)
     return solvers
 

@@ -12,11 +12,11 @@ from compare.figures.force_track_chart import draw_force_track
 from compare.runtime.newest import NewestOnly
 from compare.runtime.tables import Cell, terminal_table, write_csv
 from geometry.arrays import BoolArray, FloatArray
-from geometry.errors import UserError
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.identification.frame_by_frame import ForceReading, LawTracker
 from solvers.problem import Material, Problem
+from solvers.registry import make_solver
 from solvers.solver import Progress
 from vision.frames.frame import Frame
 from vision.tracking.frame_tracker import FrameDetections
@@ -58,10 +58,9 @@ def force_tracker(mesh: TriangleMesh, material: Material, points: FloatArray, ra
     Raises:
         UserError: If DOLFINx is missing.
     """
-    try:
-        from solvers.fem.identification.frames import fem_law_tracker
-    except ImportError as error:
-        raise UserError(f"--force needs DOLFINx: {error}") from None
+    make_solver("fem-id")  # or says which library is missing
+    from solvers.fem.identification.frames import fem_law_tracker
+
     problem = Problem(mesh, material)
     if material.law == "linear":
         return fem_law_tracker(problem, points, radius)

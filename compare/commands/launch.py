@@ -175,8 +175,9 @@ def _with_enough_files(command: Callable[[], Any]) -> Any:
 
 
 def _on_ranks(command: Callable[[], Any]) -> int:
-    try:
-        from solvers.fem.ranks import lead
-    except ImportError as error:
-        raise UserError(f"mpirun needs {error.name}, which comes with DOLFINx; run without it") from None
+    from solvers.registry import make_solver
+
+    make_solver("fem")  # or says which library is missing
+    from solvers.fem.ranks import lead
+
     return lead(command, guarded)

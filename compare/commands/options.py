@@ -259,12 +259,9 @@ def _settings(names: list[str], texts: tuple[str, ...]) -> dict[str, dict[str, o
 
 def _made(name: str, given: Mapping[str, object], shared: Mapping[str, object]) -> Solver:
     """The solver with its own settings and those of the shared settings that it has."""
-    try:
-        solver = make_solver(name, **given)
-        had = {key: value for key, value in shared.items() if key in solver.settings() and key not in given}
-        return make_solver(name, **given, **had)
-    except ImportError as error:
-        raise UserError(f"solver {name!r} cannot be loaded: {error}") from None
+    solver = make_solver(name, **given)
+    had = {key: value for key, value in shared.items() if key in solver.settings() and key not in given}
+    return make_solver(name, **given, **had)
 
 
 def comma_list(text: str) -> list[str]:

@@ -14,6 +14,7 @@ from compare.evaluation.differences import field_difference
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.number_format import percent
 from solvers.problem import Problem
+from solvers.registry import MissingLibraryError, make_solver
 
 if TYPE_CHECKING:
     from solvers.fem.finite_strain.nearby import Equilibrium
@@ -89,10 +90,12 @@ def _unlike(first: Evaluation, second: Evaluation) -> bool:
 def _branches(evaluations: Sequence[Evaluation], problem: Problem) -> tuple[list[_Branch], list[str]]:
     """The stable equilibria beside results, that of least energy first; names of results that have none."""
     try:
-        from solvers.fem.finite_strain.nearby import equilibria_near
-    except ImportError as error:
+        make_solver("fem-nonlinear")
+    except MissingLibraryError as error:
         warnings.warn(f"results differ, and nobody looks for branches: {error}", stacklevel=2)
         return [], []
+    from solvers.fem.finite_strain.nearby import equilibria_near
+
     starts = [np.concatenate([entry.node_displacement, entry.edge_displacement]) for entry in evaluations]
     branches: list[_Branch] = []
     lost = []

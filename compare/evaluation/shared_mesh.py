@@ -7,12 +7,12 @@ from compare.runtime.exits import say
 from compare.runtime.stages import Stages
 from compare.runtime.tables import write_csv
 from geometry.cache import finger_mesh
-from geometry.errors import UserError
 from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.adaptation import Adaptation, check_adaptable
 from solvers.problem import Load, Material, Problem
+from solvers.registry import make_solver
 from solvers.solver import Solver
 
 
@@ -50,10 +50,9 @@ def shared_mesh(
             check(mesh)
     if tolerance is None:
         return mesh, None
-    try:
-        from solvers.fem.adaptive_refinement import adapted
-    except ImportError as error:
-        raise UserError(f"--adapt refines by the estimate of fem, which needs DOLFINx: {error}") from None
+    make_solver("fem")  # or says which library is missing
+    from solvers.fem.adaptive_refinement import adapted
+
     degrees = [solver.settings()["degree"] for solver in solvers if solver.name == "fem"]
     linear = material.model_copy(update={"law": "linear"})
     with stages.stage("adapt") as progress:

@@ -147,10 +147,7 @@ def _richer(
             "the virtual experiment presses where the mesh has its contact: mesh the finger with its "
             "contact_position there"
         )
-    try:
-        solver = make_solver(truth.solver, **settings)
-    except ImportError as error:
-        raise UserError(f"the virtual experiment: {error}") from None
+    solver = make_solver(truth.solver, **settings)
     richer = Problem(
         mesh=problem.mesh,
         material=truth.material(problem.material),

@@ -2,6 +2,7 @@
 
 import json
 import math
+import sys
 from dataclasses import replace
 from numbers import Real
 
@@ -173,3 +174,10 @@ def test_a_solver_that_did_not_converge_says_so(numbers, fem, failed):
 def test_a_solver_that_does_not_tell_its_time(numbers, fem):
     told = numbers(evaluations=[replace(fem, stats={})], reference=fem)["solvers"]["fem"]
     assert math.isnan(told["seconds"])
+
+
+def test_without_dolfinx_no_result_is_certified_and_a_warning_says_so(estimated, mesh, monkeypatch):
+    monkeypatch.setitem(sys.modules, "solvers.fem.linear", None)
+    with pytest.warns(UserWarning, match="no result is certified: solver 'fem' cannot be loaded"):
+        (plain,) = with_certificates([estimated], Problem(mesh))
+    assert plain.certificate is None

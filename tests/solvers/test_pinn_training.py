@@ -158,6 +158,7 @@ def test_tensorboard_gets_every_epoch_once_if_it_is_installed(problem, tmp_path,
         def flush(self) -> None:
             pass
 
+    monkeypatch.setattr("solvers.pinn.paper.checkpoint.find_spec", lambda name: name)
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", SimpleNamespace(SummaryWriter=SummaryWriter))
     context = TrainingContext(tmp_path, resume=True)
     for epochs in (10, 20):

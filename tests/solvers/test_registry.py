@@ -1,9 +1,11 @@
 """Solvers by name, from here and from other packages."""
 
+import sys
+
 import pytest
 
 from geometry.errors import UserError
-from solvers.registry import BUILT_IN, PRESETS, make_solver, solver_names, usable_solvers
+from solvers.registry import BUILT_IN, PRESETS, MissingLibraryError, make_solver, solver_names, usable_solvers
 from solvers.solver import Traits
 
 
@@ -68,6 +70,14 @@ def test_a_solver_of_ours_has_its_family_and_its_twin_assimilates_too(name):
     assert traits.family == kinds.get(name.partition("-")[0], "statistics")
     if traits.twin:
         assert Traits.of(make_solver(traits.twin)) == Traits(True, "finite elements")
+
+
+def test_a_missing_library_is_said_and_the_other_solvers_work(monkeypatch):
+    monkeypatch.setitem(sys.modules, "solvers.fem.linear", None)
+    with pytest.raises(MissingLibraryError, match=r"solver 'fem' cannot be loaded: .*solvers\.fem\.linear"):
+        make_solver("fem")
+    with pytest.warns(UserWarning, match="solver 'fem' is left out"):
+        assert "pinn-std" in usable_solvers()
 
 
 def test_a_broken_package_warns_and_the_rest_goes_on(tmp_path, monkeypatch):

@@ -4,6 +4,7 @@ Checkpoints are safetensors files, replaced atomically; the history is CSV and, 
 """
 
 from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -62,11 +63,10 @@ class HistoryFiles:
     def __init__(self, folder: Path, columns: Sequence[str], done: int) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._path, self._columns, self._done = folder / "history.csv", columns, done
-        try:
+        self._board: Any = None
+        if find_spec("tensorboard"):
             from torch.utils.tensorboard import SummaryWriter
-        except ImportError:
-            self._board: Any = None
-        else:
+
             self._board = SummaryWriter(folder, purge_step=done + 1)
 
     def write(self, history: FloatArray) -> None:
