@@ -36,7 +36,7 @@ BUILT_IN = {
     "fem": "solvers.fem.linear:FemSolver",
     "fem-nonlinear": "solvers.fem.finite_strain.solver:FemNonlinearSolver",
     "fem-3d": "solvers.fem.solid.solver:Fem3dSolver",
-    "fem-id": "solvers.fem.identification.solver:FemIdSolver",
+    "fem-id": "solvers.fem.identification:FemIdSolver",
     "fem-asm": "solvers.fem.assimilating:FemAsmSolver",
     "gp": "solvers.statistics.gaussian_process:GaussianProcessSolver",
     "statfem": "solvers.statistics.statistical_fem:StatFemSolver",

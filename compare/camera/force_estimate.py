@@ -14,7 +14,7 @@ from compare.runtime.tables import Cell, terminal_table, write_csv
 from geometry.arrays import BoolArray, FloatArray
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.identification.frame_by_frame import ForceReading, LawTracker
+from solvers.identification.tracker import ForceReading, LawTracker
 from solvers.problem import Material, Problem
 from solvers.registry import make_solver
 from solvers.solver import Progress
@@ -59,7 +59,7 @@ def force_tracker(mesh: TriangleMesh, material: Material, points: FloatArray, ra
         UserError: If DOLFINx is missing.
     """
     make_solver("fem-id")  # or says which library is missing
-    from solvers.fem.identification.frames import fem_law_tracker
+    from solvers.fem.identification import fem_law_tracker
 
     problem = Problem(mesh, material)
     if material.law == "linear":

@@ -137,19 +137,25 @@ class Estimate:
         return np.array([float(u.value(z)) for u, z in zip(self.parameters, self.z, strict=True)])
 
     @property
+    def slopes(self) -> FloatArray:
+        """Derivatives of the values by z, shape (p,)."""
+        return np.array([u.derivative(z) for u, z in zip(self.parameters, self.z, strict=True)])
+
+    @property
     def deviations(self) -> FloatArray:
         """Standard deviations of the values, shape (p,); to first order where the prior is logarithmic."""
-        slopes = [u.derivative(z) for u, z in zip(self.parameters, self.z, strict=True)]
-        return np.sqrt(np.diagonal(self.covariance)) * slopes
+        return np.sqrt(np.diagonal(self.covariance)) * self.slopes
+
+    @property
+    def quantile(self) -> float:
+        """Half a confidence interval of z at `LEVEL` over its standard deviation."""
+        return quantile_of(self.inflation, degrees_of_freedom(self.sensitivities))
 
     @property
     def intervals(self) -> FloatArray:
-        """Confidence intervals at `LEVEL`, shape (p, 2); by Student's t where φ was estimated."""
-        upper = (1 + LEVEL) / 2
-        times = (
-            norm.ppf(upper) if self.inflation == 1 else t.ppf(upper, degrees_of_freedom(self.sensitivities))
-        )
-        ends = self.z[:, None] + times * np.sqrt(np.diagonal(self.covariance))[:, None] * [-1, 1]
+        """Confidence intervals of the values at `LEVEL`, shape (p, 2)."""
+        half = self.quantile * np.sqrt(np.diagonal(self.covariance))
+        ends = self.z[:, None] + half[:, None] * [-1, 1]
         return np.array(
             [np.clip(u.value(e), u.low, u.high) for u, e in zip(self.parameters, ends, strict=True)]
         )
@@ -164,7 +170,7 @@ class Estimate:
         """Mask of the parameters that the observations determine, shape (p,)."""
         return np.asarray(self.resolution >= MIN_RESOLUTION)
 
-    def left_out(self, rows: IntArray) -> FloatArray:
+    def residuals_without(self, rows: IntArray) -> FloatArray:
         """Residuals over φ σ of observations left out together, shape (k,), to first order: (I - H)^-1 r.
 
         H = A (A^T A + 1)^-1 A^T; exact for a linear model and the same φ (D. M. Allen, Technometrics 16
@@ -267,6 +273,12 @@ def _linear_inflation(residuals: FloatArray, derivatives: FloatArray, z: FloatAr
         if abs(inflation / used - 1) < 0.1 * INFLATION_CHANGE:
             break
     return inflation
+
+
+def quantile_of(inflation: float, freedom: float) -> float:
+    """Half an interval of `LEVEL` over the standard deviation; Student's where φ was estimated."""
+    upper = (1 + LEVEL) / 2
+    return float(norm.ppf(upper) if inflation == 1 else t.ppf(upper, freedom))
 
 
 def inflation_of(residuals: FloatArray, freedom: float) -> float:

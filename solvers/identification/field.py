@@ -9,8 +9,8 @@ from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.wall_motion import WallMotion
 from solvers.identification.body import Body
-from solvers.identification.clamp import RigidMotion
-from solvers.identification.response import Response, ResponseModel
+from solvers.identification.boundary import RigidMotion
+from solvers.identification.model import Response, ResponseModel
 from solvers.problem import Problem
 from solvers.solution import DisplacementField, State
 
@@ -20,7 +20,7 @@ STEP = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """The finger for one set of values of the unknowns.
+    """The finger for one set of values of the unknowns, a displacement field.
 
     Positions are those of the drawing: the material drawn at X is at X + W(X) before the load.
 
@@ -61,11 +61,6 @@ class Snapshot:
         """Gradient of the displacement by the place before the load, shape (n, 2, 2)."""
         return self._gradient(self.drawn.gradient(location), location)
 
-    def von_mises(self, location: LocatedPoints) -> FloatArray:
-        """Von Mises stress, shape (n,), MPa."""
-        (found,) = von_mises_stresses([self], location)
-        return found
-
     def _gradient(self, drawn: FloatArray, location: LocatedPoints) -> FloatArray:
         """`gradient` from that by the drawn position without the clamp, both of shape (n, 2, 2)."""
         walls = np.einsum("k,ktij->tij", self.changes, self.walls.gradients())[location.cells]
@@ -92,7 +87,7 @@ class Member:
     Attributes:
         probability: Of the law.
         found: The finger that was found.
-        steps: The same, `STEP` times each of p independent standard errors away.
+        steps: The finger `STEP` times each of p independent standard errors away.
         response: The equilibrium.
         model: The finger as a function of the unknowns.
         coarser: The finger that a coarser discretisation finds, if there is one.
@@ -108,7 +103,7 @@ class Member:
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedField:
-    """The displacement by the most probable law.
+    """The displacement by the most probable law; see `Snapshot` for its methods.
 
     Its deviations include those of the other laws from it, and of a coarser discretisation.
 
@@ -139,7 +134,7 @@ class IdentifiedField:
         return self._deviation(lambda them: von_mises_stresses(them, location))
 
     def _deviation(self, quantities: Callable[[Sequence[Snapshot]], list[FloatArray]]) -> FloatArray:
-        """Of a quantity that is asked for snapshots of one body at a time."""
+        """Standard deviation of a quantity, a function of snapshots of one body."""
         best: FloatArray | None = None
         variance: FloatArray | float = 0.0
         for member in self.members:

@@ -9,16 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry.arrays import FloatArray
 from geometry.errors import UserError
-from solvers.identification.field import IdentifiedField, Snapshot
-from solvers.identification.response import EXACT, Response, ResponseModel
+from solvers.identification.field import IdentifiedField
+from solvers.identification.model import EXACT, Response, ResponseModel
 from solvers.problem import Problem, contact_ends
 from solvers.solution import Solution
-
-ITERATIONS, TOLERANCE = 12, 1e-5
-"""Newton steps for the size of the force, and the missed displacement of the contact that ends them, mm."""
-FORCES = ("normal_force", "tangential_force")
 
 
 def transferred(solution: Solution, problem: Problem, other: Problem) -> Solution:
@@ -42,9 +37,8 @@ def transferred(solution: Solution, problem: Problem, other: Problem) -> Solutio
     return replace(
         solution,
         problem=replace(found.problem, load=other.load),
-        field=Snapshot(
-            problem=found.problem,
-            walls=found.walls,
+        field=replace(
+            found,
             changes=hypothesis.changes,
             clamp=response.motion,
             body=member.model.body,
@@ -59,28 +53,24 @@ def transferred(solution: Solution, problem: Problem, other: Problem) -> Solutio
 
 
 def _response(model: ResponseModel, start: Response, share: float, shift: float) -> Response:
-    """The response at a share of the contact's displacement, the contact shifted along x by mm."""
-    unknowns, into = model.unknowns, model.unknowns.directions[0]
+    """The response at a share of the contact's displacement, the contact shifted along x by mm.
+
+    The size of the force is found by Newton's method, to 1e-5 mm of the contact's displacement.
+    """
+    names, into = model.unknowns.names, model.unknowns.directions[0]
     target = share * float(start.contact @ into)
-    sizes = [unknowns.names.index(name) for name in FORCES if name in unknowns.names]
-    direction = np.zeros(len(unknowns.names))
-    direction[sizes] = start.values[sizes]
-    values = start.values - direction
-    if "position" in unknowns.names:
-        values[unknowns.names.index("position")] += shift
+    force = np.array([name in ("normal_force", "tangential_force") for name in names])
+    direction, values = np.where(force, start.values, 0.0), np.where(force, 0.0, start.values)
+    if "position" in names:
+        values[names.index("position")] += shift
     model.restart(start)
     scale = share
-    for _ in range(ITERATIONS):
+    for _ in range(12):
         response = model.response(values + scale * direction, EXACT)
         if response is None:
             break
         missed = target - float(response.contact @ into)
-        if abs(missed) < TOLERANCE:
+        if abs(missed) < 1e-5:
             return response
-        scale += missed / _slope(response, direction, into)
+        scale += missed / float(direction @ response.contact_slopes @ into)
     raise UserError("no equilibrium of the identified finger was found at the other load")
-
-
-def _slope(response: Response, direction: FloatArray, into: FloatArray) -> float:
-    """Displacement of the contact into the finger per change of the force along a direction, mm."""
-    return float(direction @ response.contact_slopes @ into)

@@ -10,7 +10,7 @@ import pytest
 from compare.camera.force_estimate import FrameForce, LiveForce, LiveRate, force_line, force_rows, force_table
 from compare.cli import main
 from compare.runtime.exits import BAD_INPUT
-from solvers.identification.frame_by_frame import ForceReading
+from solvers.identification.tracker import ForceReading
 from vision.discs.disc_detector import DiscDetections
 from vision.frames.frame import Frame
 from vision.frames.sources import open_frames

@@ -50,17 +50,6 @@ def observed_at(points, displacements, deviations, visible=None) -> Observations
     return Observations(points, displacements, deviations, visible, "by a test", True, 0.8)
 
 
-def taylor_remainders(model, place, which, scale) -> tuple[np.ndarray, np.ndarray]:
-    """Remainders of the first-order expansion of displacements and forces, for a step and for half of it."""
-    here, remainders = model.response(place), []
-    for step in (0.04 * scale, 0.02 * scale):
-        there = model.response(place + step * np.eye(len(place))[which])
-        left = there.nodal - here.nodal - step * here.nodal_slopes[which]
-        forces = there.forces - here.forces - step * here.force_slopes[which]
-        remainders.append(np.array([np.linalg.norm(left), np.linalg.norm(forces)]))
-    return remainders[0], remainders[1]
-
-
 def bar_mesh(
     length: float, height: float, columns: int, rows: int, *, contact: tuple[float, float]
 ) -> TriangleMesh:

@@ -167,15 +167,6 @@ def test_sections_by_x_are_taken_where_they_separate_base_and_contact():
         assert (np.abs(slope[:, 1]).max() == 0) == linear, body
 
 
-def test_parts_that_a_body_does_not_have_are_refused_in_one_line():
-    for body in ("ring", "beam"):
-        made = make_solver("fem-id", model="fem", parameters="back_stiffness")
-        mesh = body_mesh(body, COARSE)
-        seen = observed_at(mesh.markers, np.zeros((len(mesh.markers), 2)), 0.01)
-        with pytest.raises(UserError, match="has no back beside cavities: leave out back_stiffness"):
-            made.solve(replace(problem_of(body, COARSE), observations=seen))
-
-
 def test_a_contact_over_a_gap_of_the_front_is_refused():
     mesh = body_mesh("beam", COARSE)
     x = mesh.points[mesh.boundary("front")].mean(axis=1)[:, 0]

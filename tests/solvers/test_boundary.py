@@ -89,3 +89,16 @@ def test_points_are_spread_evenly_over_all_pieces_of_a_base(body, length):
 @pytest.mark.parametrize("body", ["ring", "beam", "notched"])
 def test_a_body_without_a_back_has_no_walls_and_ribs(body):
     assert not any(mask.any() for mask in walls_and_ribs(body_mesh(body, 1.0)).values())
+
+
+def test_walls_and_ribs_have_the_areas_of_the_drawing(medium_mesh):
+    """Walls of 2 mm beside cavities that end 2 mm from the base; ribs of 2 mm, 20 degrees from the normal."""
+    parts = walls_and_ribs(medium_mesh)
+    areas = {name: medium_mesh.areas[mask].sum() for name, mask in parts.items()}
+    assert not np.any(np.sum(list(parts.values()), axis=0) > 1)
+    assert medium_mesh.at_centroids().points[parts["front"], 1].min() > -2
+    # From the base wall to the tip, 2 to 70 mm and a little less: triangles are taken whole.
+    assert areas["front"] == pytest.approx(2 * 67, rel=0.03)
+    assert areas["back"] == pytest.approx(2 * 68 / np.cos(np.arctan(1 / 3)), rel=0.03)
+    # Four ribs between walls that leave 26 mm at the base: lengths fall with the distance from it.
+    assert 80 < areas["rib"] < 130

@@ -93,7 +93,7 @@ def test_what_is_left_out_is_what_a_refit_predicts(slopes):
     refitted = fitted(slopes[kept], observed[kept])
     assert found.inflation == refitted.inflation == 1
     np.testing.assert_allclose(
-        found.left_out(rows), (slopes[rows] @ refitted.values - observed[rows]) / 0.1, rtol=1e-6
+        found.residuals_without(rows), (slopes[rows] @ refitted.values - observed[rows]) / 0.1, rtol=1e-6
     )
 
 

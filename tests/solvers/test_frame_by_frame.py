@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from geometry.errors import ShapeError, UserError
-from solvers.fem.identification.body import FemBody
-from solvers.fem.identification.frames import fem_force_tracker
-from solvers.identification.frame_by_frame import ForceTracker, LawTracker
-from solvers.identification.hypothesis import DEFAULT, Unknowns
-from solvers.identification.response import EXACT, ResponseModel
-from solvers.identification.settings import LAWS
+from solvers.fem.identification import FemBody, fem_force_tracker
+from solvers.identification.model import EXACT, ResponseModel
+from solvers.identification.search import LAWS
+from solvers.identification.tracker import ForceTracker, LawTracker
+from solvers.identification.unknowns import DEFAULT, Unknowns
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
 

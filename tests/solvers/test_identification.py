@@ -8,12 +8,9 @@ import pytest
 from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.identification.body import FemBody
-from solvers.fem.identification.solver import FemIdSolver
-from solvers.identification.hypothesis import CONTACT, DEFAULT, Unknowns
-from solvers.identification.reading import Reading
-from solvers.identification.response import EXACT, MarkerModel, ResponseModel
-from solvers.identification.settings import IdentificationSettings
+from solvers.fem.identification import FemBody, FemIdSolver
+from solvers.identification.model import EXACT, MarkerModel, Measurement, ResponseModel
+from solvers.identification.unknowns import CONTACT, DEFAULT, Unknowns
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
 from tests.solvers.conftest import observed_at
@@ -56,16 +53,13 @@ def model(problem):
 
 @pytest.fixture(scope="module")
 def markers(problem, model):
-    observed = observed_at(problem.mesh.markers, np.zeros((9, 2)), NOISE)
-    return MarkerModel.of(model.body, model.unknowns, misfit(replace(problem, observations=observed)))
+    return marked(model)
 
 
-def misfit(problem):
-    from solvers.assimilation.misfit import misfit_of
-
-    found = misfit_of(problem)
-    assert found is not None
-    return found
+def marked(model):
+    """The default finger's markers in a model."""
+    observed = observed_at(model.unknowns.problem.mesh.markers, np.zeros((9, 2)), NOISE)
+    return MarkerModel.of(model, Measurement.of(model.unknowns.problem.mesh, observed, None, None))
 
 
 def values_of(unknowns, changed=VALUES):
@@ -73,16 +67,16 @@ def values_of(unknowns, changed=VALUES):
     return np.array([(drawn | changed)[name] for name in unknowns.names])
 
 
-def test_a_reading_of_some_markers_is_the_one_without_the_others(problem):
+def test_a_measurement_of_some_markers_is_the_one_without_the_others(problem):
     """A marker that was dropped as doubtful stays dropped where the fit goes on with other deviations."""
     moved = np.arange(18.0).reshape(9, 2)
     seen = np.arange(9) != 4
     observed = replace(observed_at(problem.mesh.markers, moved, NOISE), visible=seen)
-    reading = Reading.of(problem, observed, None, None)
     kept = np.array([0, 2, 3, 6, 7])
-    np.testing.assert_array_equal(reading.only(kept).kept, kept)
-    np.testing.assert_array_equal(reading.only(kept).misfit.observed, moved[seen][kept])
-    assert reading.only(kept).noise.shape == (10,)
+    found = Measurement.of(problem.mesh, observed, None, None).only(kept)
+    np.testing.assert_array_equal(found.kept, kept)
+    np.testing.assert_array_equal(found.displacements, moved[seen][kept])
+    assert found.noise.shape == (10,)
 
 
 def test_a_last_step_that_turns_a_point_inside_out_is_not_taken(problem, monkeypatch):
@@ -186,11 +180,9 @@ def twin(problem, law, values, *, noise=NOISE, seed=0):
     model = model_of(own, DEFAULT)
     response = model.response(values_of(model.unknowns, values), EXACT)
     assert response is not None
-    observed = observed_at(problem.mesh.markers, np.zeros((9, 2)), NOISE)
-    marked = MarkerModel.of(model.body, model.unknowns, misfit(replace(own, observations=observed)))
-    moved = marked.predicted(response)[0].reshape(-1, 2)
+    moved = marked(model).predicted(response)[0].reshape(-1, 2)
     moved = moved + noise * np.random.default_rng(seed).normal(size=moved.shape)
-    return replace(observed, displacements=moved), response
+    return observed_at(problem.mesh.markers, moved, NOISE), response
 
 
 TRUE = {"position": 37.5, "normal_force": 0.18, "tangential_force": -0.02, "rib_thickness": 2.08}
@@ -374,10 +366,13 @@ def test_without_markers_it_is_fem_nonlinear(problem):
         ({"reaction": 0.0}, "a force other than zero"),
         ({"marker_radius": -1.0}, "marker_radius must be zero or more"),
         ({"degree": 3}, "degree 1 and 2, not 3"),
+        ({"parameters": " , "}, "finds a force: give normal_force"),
+        ({"reaction": -1.0, "reaction_error": np.nan}, "reaction_error must be positive"),
+        ({"model": "fem"}, "the linear model is gone; leave out model for finite strain, or take fem-asm"),
+        ({"model": "pinn-std"}, "model must be fem-nonlinear, got 'pinn-std'"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(settings, said):
-    assert issubclass(FemIdSolver, IdentificationSettings)
     with pytest.raises(UserError, match=said):
         FemIdSolver(**settings)
 
@@ -393,12 +388,7 @@ def under(problem, loads):
         about = body.linearised(state, problem.material.lame, still)
         assert about is not None
         state = state + about.solve((fraction * total - about.force)[None])[0]
-    marked = MarkerModel.of(
-        body,
-        model.unknowns,
-        misfit(replace(problem, observations=observed_at(problem.mesh.markers, np.zeros((9, 2)), NOISE))),
-    )
-    moved = np.einsum("maxy,xy->ma", marked.rows, state)
+    moved = np.einsum("maxy,xy->ma", marked(model).rows, state)
     moved = moved + NOISE * np.random.default_rng(4).normal(size=moved.shape)
     return replace(problem, observations=observed_at(problem.mesh.markers, moved, NOISE))
 

@@ -19,7 +19,6 @@ SOLVERS: dict[str, dict[str, object]] = {
     "fem-asm, weights chosen": {"degree": 1, "weights": "precision", "choose": "left-out"},
     "fem-asm, without weight": {"degree": 1, "asm_weight": 0.0},
     "fem-asm, a soft contact": {"degree": 1, "weights": "precision", "contact_deviation": 1.0},
-    "fem-id": {"degree": 1, "model": "fem"},
     "gp": {},
     "statfem": {"degree": 1},
     "pinn-asm": QUICK,
@@ -82,17 +81,3 @@ def test_another_solver_is_just_asked_again(coarse_mesh, observed):
 
     found = refitter(Plain(), Problem(coarse_mesh))(observed[1])
     assert found.problem.observations is observed[1]
-
-
-def test_parameters_are_carried_to_another_load(coarse_mesh, observed):
-    """The truth is off by (-1, 1) of 10 mm: at 5 mm and 4 mm nearer to the tip by half of it there."""
-    solver = make_solver("fem-id", degree=1, model="fem")
-    problem = Problem(coarse_mesh, observations=observed[0])
-    solution = solver.solve(problem)
-    other = Problem(coarse_mesh, load=Load(displacement=(0.0, -5.0), position=39.0))
-    transferred = solver.transferred(solution, problem, other)
-    assert transferred.problem.load.displacement == pytest.approx((-0.5, -4.5), abs=0.01)
-    assert transferred.problem.load.position == pytest.approx(39.0, abs=0.1)
-    again = FemSolver(degree=1, estimate=False).solve(replace(transferred.problem, observations=None))
-    np.testing.assert_allclose(transferred.field.values, again.field.values, atol=1e-7)
-    np.testing.assert_allclose(transferred.reaction, again.reaction, rtol=1e-6)

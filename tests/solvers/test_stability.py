@@ -12,10 +12,10 @@ import pytest
 from solvers.constrained_elimination import ConstrainedElimination
 from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.identification.body import FemBody
+from solvers.fem.identification import FemBody
 from solvers.fem.solid.solver import Fem3dSolver
-from solvers.identification.hypothesis import Unknowns
-from solvers.identification.response import ResponseModel
+from solvers.identification.model import ResponseModel
+from solvers.identification.unknowns import Unknowns
 from solvers.lagrange import LagrangeSpace
 from solvers.pinn.finite_basis import newton
 from solvers.pinn.finite_basis.local import PinnLocalSolver

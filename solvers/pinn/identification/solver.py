@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -11,28 +11,16 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.elasticity import LawName
-from solvers.identification.fit import Fit, Identified
-from solvers.identification.hypothesis import Unknowns
-from solvers.identification.identifier import Identifier
-from solvers.identification.response import ResponseModel
-from solvers.identification.settings import LAWS, IdentificationSettings
-from solvers.identification.solution import identified_solution
-from solvers.identification.transfer import transferred
+from solvers.identification.model import ResponseModel
+from solvers.identification.result import Fit, Identified
+from solvers.identification.search import LAWS, Identifier, IdentifyingSolver, carried
+from solvers.identification.unknowns import Unknowns
 from solvers.pinn.finite_basis.local import PinnLocalSolver
 from solvers.pinn.identification.network_body import NetworkBody
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Family, Progress, check_problem, silent
 
-COST_CHANGE = 1e-3
-"""Relative change of the cost at which a search ends: its derivatives are known to that by iteration."""
-PLAIN = 0.02
-"""Tolerance of the network without markers."""
-SINGLE = 0.5
-"""Share of a quadrature cell below which an element of the mesh has one point, where the unknowns are sought.
-
-On the default mesh this halves the points, at no cost in displacement.
-"""
 SEARCHED, SOLVED = 0.6, 0.45
 """Cell of the quadrature, in window spacings, where the unknowns are sought and of the final network.
 
@@ -42,12 +30,10 @@ but Newton's method then found no equilibrium for three of eight truths.
 """
 COARSE_ERROR, FINE_ERROR, FINAL_ERROR = 0.005, 0.001, 0.0003
 """Error of the network on each level over the largest displacement of a marker: it adds to the markers'."""
-NEAR = 0.2
-"""Largest change of a marker for which a refit is of first order, mm."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class PinnIdSolver(IdentificationSettings):
+class PinnIdSolver(IdentifyingSolver):
     """The network of `pinn-local` at finite strain, whose contact, walls and law are found from the markers.
 
     One law is fitted on a coarse level, from there all laws on a fine one; the network's error on each counts
@@ -57,7 +43,7 @@ class PinnIdSolver(IdentificationSettings):
 
     Attributes:
         coarse: Spacing of the windows on the coarse level over that of `pinn-local`.
-        fine: The same on the fine level.
+        fine: Spacing on the fine level over that of `pinn-local`.
         seed: Of the random numbers.
     """
 
@@ -67,7 +53,7 @@ class PinnIdSolver(IdentificationSettings):
     name: ClassVar[str] = "pinn-id"
     family: ClassVar[Family] = "neural network"
     twin: ClassVar[str] = "fem-id"
-    laws: ClassVar[tuple[str, ...]] = ("neo-hookean", "st-venant-kirchhoff")
+    laws: ClassVar[tuple[str, ...]] = LAWS
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
 
     def __post_init__(self) -> None:
@@ -75,34 +61,29 @@ class PinnIdSolver(IdentificationSettings):
             raise UserError(f"pinn-id needs 0 < fine <= coarse, got {self.fine} and {self.coarse}")
         if self.seed < 0:
             raise UserError(f"pinn-id: the seed must be zero or more, got {self.seed}")
-        self.check(self.unknowns)
-
-    def settings(self) -> dict[str, object]:
-        """What is sought, the priors and the network."""
-        return asdict(self)
+        super().__post_init__()
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
-        """Find the parameters and solve with them; see `Solver`. Without observations it is `pinn-local`."""
+        """Find the unknowns and solve with them; see `Solver`. Without markers it is `pinn-local`."""
         check_problem(self, problem)
-        if problem.observations is None:
-            network = self._network
-            level = replace(
-                network,
-                wall_spacing=self.fine * network.wall_spacing,
-                corner_spacing=self.fine * network.corner_spacing,
-                growth=self.fine * network.growth,
-                tolerance=PLAIN,
-            )
-            plain = level.solve(problem, progress)
-            said = f"without markers, this is pinn-local: {plain.status.message}"
-            return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
-        return self._solved(problem, problem.observations, progress)[0]
+        if problem.observations is not None:
+            return self._solved(problem, problem.observations, progress)[0]
+        network = self._network
+        level = replace(
+            network,
+            wall_spacing=self.fine * network.wall_spacing,
+            corner_spacing=self.fine * network.corner_spacing,
+            growth=self.fine * network.growth,
+            tolerance=0.02,
+        )
+        plain = level.solve(problem, progress)
+        said = f"without markers, this is pinn-local: {plain.status.message}"
+        return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
-        """A function that finds the parameters for other observations; see `Refittable`.
+        """A function that finds the unknowns for other observations; see `Refittable`.
 
-        Where the same markers have moved by less than `NEAR` from those that were fitted first, it is of
-        first order about them.
+        It is of first order about the first fit where the same markers have moved by 0.2 mm less or more.
         """
         kept: list[tuple[Observations, Identifier, Identified]] = []
 
@@ -110,20 +91,14 @@ class PinnIdSolver(IdentificationSettings):
             if kept and _near(observations, kept[0][0]):
                 started = time.perf_counter()
                 _, identifier, found = kept[0]
-                given = _with_error(observations, FINAL_ERROR)
-                again = identifier.updated(found, given, self.measured_reaction)
-                own = replace(problem, observations=observations)
-                return self._solution(own, again, started, 0.0)
+                again = identifier.updated(found, _with_error(observations, FINAL_ERROR))
+                return self._solution(replace(problem, observations=observations), again, started, 0.0)
             solution, identifier, found = self._solved(problem, observations, silent)
             if observations.visible.all() and not found.doubtful:
                 kept[:] = [(observations, identifier, found)]
             return solution
 
         return refit
-
-    def transferred(self, solution: Solution, problem: Problem, other: Problem) -> Solution:
-        """The solution at another load with the finger of a solution; see `transfer`."""
-        return transferred(solution, problem, other)
 
     def _solved(
         self, problem: Problem, observations: Observations, progress: Progress
@@ -133,29 +108,25 @@ class PinnIdSolver(IdentificationSettings):
         law: LawName = LAWS[0] if self.law == "evidence" else problem.material.law
         coarse, fine = self._identifier(problem, self.coarse, [law]), self._identifier(problem, self.fine)
         first = coarse.identify(
-            _with_error(observations, COARSE_ERROR),
-            self.measured_reaction,
-            lambda share, text: progress(0.4 * share, text),
+            _with_error(observations, COARSE_ERROR), lambda share, text: progress(0.4 * share, text)
         ).best
         coarse_seconds = time.perf_counter() - started
-        fine.start_from(_carried(first, fine.models[law]))
+        start = carried(first.response, _projected(first, fine.models[law]))
+        fine.start_from(first._replace(model=fine.models[law], response=start))
         found = fine.identify(
-            _with_error(observations, FINE_ERROR),
-            self.measured_reaction,
-            lambda share, text: progress(0.4 + 0.4 * share, text),
+            _with_error(observations, FINE_ERROR), lambda share, text: progress(0.4 + 0.4 * share, text)
         )
         progress(0.8, f"{found.best.law}: finer")
-        given = _with_error(observations, FINAL_ERROR)
         best, *others = found.fits
-        found = replace(found, fits=[self._refined(fine, best, given), *others])
+        refined = self._refined(fine, best, _with_error(observations, FINAL_ERROR))
+        found = replace(found, fits=[refined, *others])
         return self._solution(problem, found, started, coarse_seconds), fine, found
 
     def _refined(self, identifier: Identifier, fit: Fit, observations: Observations) -> Fit:
-        """A fit by the final network; the same, marked as inexact, if that finds no equilibrium."""
+        """A fit by the final network; if that finds no equilibrium, the given one, marked as inexact."""
         unknowns = fit.model.unknowns
         network = replace(self._network, cell=SOLVED)
-        body = NetworkBody.of(network, unknowns.problem, unknowns.motion)
-        model = ResponseModel(body, unknowns)
+        model = ResponseModel(NetworkBody.of(network, unknowns.problem, unknowns.motion), unknowns)
         refined = identifier.refined(fit, model, _projected(fit, model), observations)
         return fit._replace(exact=False) if refined is None else refined
 
@@ -170,7 +141,7 @@ class PinnIdSolver(IdentificationSettings):
             "seed": self.seed,
             "device": "cpu",
         }
-        return identified_solution(self.name, problem, found, stats)
+        return found.solution(self.name, problem, stats)
 
     @property
     def _network(self) -> PinnLocalSolver:
@@ -180,23 +151,20 @@ class PinnIdSolver(IdentificationSettings):
     def _identifier(
         self, problem: Problem, scale: float, laws: Sequence[LawName] | None = None
     ) -> Identifier:
-        network = self._network
+        """The search on a level; the derivatives of its networks are known to 1e-3, by iteration.
+
+        An element of the mesh that is smaller than half a quadrature cell has one point: on the default mesh
+        this halves the points, at no cost in displacement.
+        """
 
         def body(unknowns: Unknowns) -> NetworkBody:
-            return NetworkBody.of(network, unknowns.problem, unknowns.motion, scale, SINGLE)
+            return NetworkBody.of(self._network, unknowns.problem, unknowns.motion, scale, 0.5)
 
-        return self.identifier(problem, body, laws, COST_CHANGE)
-
-
-def _carried(fit: Fit, model: ResponseModel) -> Fit:
-    """A fit as the start of a search on another level."""
-    state = _projected(fit, model)
-    slopes = np.zeros((len(fit.response.values), *state.shape))
-    return fit._replace(model=model, response=replace(fit.response, state=state, slopes=slopes))
+        return Identifier(self, problem, body, laws=laws, cost_change=1e-3)
 
 
 def _projected(fit: Fit, model: ResponseModel) -> FloatArray:
-    """The state of another network that is nearest to that of a fit."""
+    """The state of another network that is nearest to a fit's."""
     here, there, hypothesis = fit.model.body, model.body, fit.response.hypothesis
     if not (isinstance(here, NetworkBody) and isinstance(there, NetworkBody)):
         raise TypeError("the bodies of pinn-id are networks")
@@ -204,15 +172,15 @@ def _projected(fit: Fit, model: ResponseModel) -> FloatArray:
 
 
 def _with_error(observations: Observations, share: float) -> Observations:
-    """The observations with an error more: a share of the largest displacement."""
+    """The observations with another error, a share of the largest displacement."""
     size = share * float(np.abs(observations.displacements[observations.visible]).max(initial=0.0))
     return replace(observations, standard_deviations=np.hypot(observations.standard_deviations, size))
 
 
 def _near(observations: Observations, first: Observations) -> bool:
-    """Whether the same markers, or some of them, have moved by nearly the same."""
+    """True if the markers are those of the first observations and none has moved by 0.2 mm more or less."""
     if not np.array_equal(observations.points, first.points):
         return False
     seen = observations.visible
     moved = observations.displacements[seen] - first.displacements[seen]
-    return bool(np.abs(moved).max(initial=0.0) < NEAR)
+    return bool(np.abs(moved).max(initial=0.0) < 0.2)

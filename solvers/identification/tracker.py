@@ -1,4 +1,4 @@
-"""The force of the indenter in one frame after another, from the tracked markers.
+"""The force of the indenter in one frame of a video after another, from the tracked markers.
 
 A frame's unknowns are those of the whole inverse problem: the contact's place, width and force, and the
 finger's walls, clamp and Poisson's ratio. With the markers linearised about an equilibrium, y + A (z - z0)
@@ -18,43 +18,26 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2, norm, t
+from scipy.stats import chi2, norm
 
 from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import ShapeError, UserError
-from solvers.assimilation.estimation import LEVEL, degrees_of_freedom, inflation_of
-from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, Misfit
+from solvers.assimilation.estimation import LEVEL, degrees_of_freedom, inflation_of, quantile_of
+from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION
 from solvers.elasticity import LawName
-from solvers.identification.hypothesis import CONTACT
-from solvers.identification.response import MarkerModel, Response, ResponseModel
+from solvers.identification.model import MarkerModel, Measurement, ResponseModel
+from solvers.identification.unknowns import CONTACT
 
 FEWEST = 3
 """Markers that a frame must show: six numbers for the four of the contact."""
 NEAR = 0.3
 """Motion of a marker, mm, over which the markers are linear: a curvature of one in some 30 mm, the thickness
 of a finger, leaves 0.002 mm."""
-STRIDE = 3.0
-"""Longest motion of a marker in one step of the search, mm."""
-MOST = 16
-"""Equilibria that are looked for in one frame, enough for a jump from rest by forty millimetres."""
-TOLERANCE = 0.02
-"""Relative size, in the energy norm, of the Newton step after which an equilibrium is taken.
-
-What it leaves is about the square of that, no more than what `NEAR` leaves; one does for a slow motion.
-"""
-HALVINGS = 4
-"""Times that a step is halved where it has no equilibrium."""
 GROWTH = 1.02
-"""Motion of the markers, over the largest so far, from which a frame replaces what is known of the finger.
+"""Motion of the markers, over the largest so far, from which a frame replaces the knowledge of the finger.
 
 Frames with less, down to the inverse of this, join the mean.
 """
-CLEAR = 7.0
-"""Logarithm of the ratio of evidences, about a thousand, from which the less probable law is dropped."""
-RECHECK = 1.25
-"""Motion of the markers over that of the last comparison of the laws from which they are compared again."""
-ROUNDS = 20
-"""Rounds for φ at most; it is known to a thousandth much earlier."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +75,6 @@ class _Linearised(NamedTuple):
     z: FloatArray
     predicted: FloatArray
     slopes: FloatArray
-    response: Response
 
 
 class _Prior(NamedTuple):
@@ -123,8 +105,7 @@ class ForceTracker:
 
     Attributes:
         largest: Root mean square motion of the markers, mm, in the frame with the largest one so far.
-        log_evidence: Logarithm of the evidence for the law in the frame with the largest motion so far, up to
-            what all laws share (`Fit.log_evidence`).
+        log_evidence: Logarithm of the evidence for the law in that frame; see `Fit.log_evidence`.
 
     Raises:
         UserError: If the unknowns lack the force or its place.
@@ -133,19 +114,22 @@ class ForceTracker:
     def __init__(
         self, model: ResponseModel, points: FloatArray, radius: float, *, prior: float = 1.0
     ) -> None:
-        unknowns = model.unknowns
-        if missing := {"normal_force", "position"} - set(unknowns.names):
+        self._unknowns, names = model.unknowns, model.unknowns.names
+        if missing := {"normal_force", "position"} - set(names):
             raise UserError(f"a force is followed with {' and '.join(sorted(missing))} among the unknowns")
         self._model = model
-        self._parameters = unknowns.parameters(model.flexibility(), prior)
+        self._parameters = model.unknowns.parameters(model.flexibility(), prior)
         self._bounds = np.array([parameter.bounds for parameter in self._parameters]).T
         still = np.zeros_like(points)
-        self._markers = MarkerModel.of(model.body, unknowns, Misfit(points, still, still, radius))
-        self._of_finger = np.array([name not in CONTACT for name in unknowns.names])
-        self._drawn = _Prior(np.zeros(len(unknowns.names)), np.eye(len(unknowns.names)))
+        self._markers = MarkerModel.of(
+            model, Measurement(points, still, still, radius, np.arange(len(points)))
+        )
+        self._of_finger = np.array([name not in CONTACT for name in names])
+        self._of_place = np.array([name in ("position", "eccentricity") for name in names], dtype=np.float64)
+        self._drawn = _Prior(np.zeros(len(names)), np.eye(len(names)))
         self._known, self.largest, self._learnt = self._drawn, 0.0, 0
         self.log_evidence = 0.0
-        rest = self._linearised(np.zeros(len(unknowns.names)))
+        rest = self._linearised(np.zeros(len(names)))
         if rest is None:
             raise UserError("the finger has no equilibrium at rest")
         self._last = rest
@@ -161,64 +145,69 @@ class ForceTracker:
         Raises:
             ShapeError: If the arrays are not those of m markers.
         """
-        started, count = time.perf_counter(), len(self._markers.centres)
-        if displacements.shape != (count, 2) or deviations.shape != (count, 2) or visible.shape != (count,):
+        started, shape = time.perf_counter(), self._markers.measurement.points.shape
+        if displacements.shape != shape or deviations.shape != shape or visible.shape != shape[:1]:
             raise ShapeError(
-                f"a frame has displacements and deviations of shape {(count, 2)} and a mask of shape "
-                f"{(count,)}, got {displacements.shape}, {deviations.shape} and {visible.shape}"
+                f"a frame has displacements and deviations of shape {shape} and a mask of shape {shape[:1]}, "
+                f"got {displacements.shape}, {deviations.shape} and {visible.shape}"
             )
+        self._evaluations = 0
+        reading = self._updated(displacements, deviations, visible)
+        return replace(reading, evaluations=self._evaluations, seconds=time.perf_counter() - started)
+
+    def _updated(self, displacements: FloatArray, deviations: FloatArray, visible: BoolArray) -> ForceReading:
         if (seen := int(visible.sum())) < FEWEST:
-            said = f"{seen} of {count} markers are seen, too few for a force"
-            return self._unknown(said, 0, started)
+            return self._unknown(f"{seen} of {len(visible)} markers are seen, too few for a force")
         rows = np.repeat(visible, 2)
         observed = displacements.ravel()[rows]
         noise = np.maximum(deviations.ravel()[rows], MIN_STANDARD_DEVIATION)
         moved = float(np.sqrt((displacements[visible] ** 2).sum(axis=1).mean()))
         grown, near = moved > GROWTH * self.largest, GROWTH * moved > self.largest
-        prior = self._drawn if near else self._known
-        found, evaluations, settled = self._searched(prior, rows, observed, noise)
-        if settled and near:
+        found = self._searched(self._drawn if near else self._known, rows, observed, noise)
+        if found is not None and near:
             self._learn(found, anew=grown)
             if grown:
                 self.largest, self.log_evidence = moved, found.log_evidence
             else:
-                found, more, settled = self._searched(self._known, rows, observed, noise)
-                evaluations += more
-        if not settled:
-            return self._unknown("no equilibrium of the finger is near the markers", evaluations, started)
-        hidden = [str(number + 1) for number in np.flatnonzero(~visible)]
-        remarks = [f"hidden: marker {', '.join(hidden)}"] if hidden else []
+                found = self._searched(self._known, rows, observed, noise)
+        if found is None:
+            return self._unknown("no equilibrium of the finger is near the markers")
+        remarks = []
+        if not visible.all():
+            hidden = ", ".join(str(number + 1) for number in np.flatnonzero(~visible))
+            remarks.append(f"hidden: marker {hidden}")
         if found.inflation > 1:
             remarks.append(f"the markers are {found.inflation:.2g} times as far off as noise explains")
-        return self._reading(found, evaluations, started, "; ".join(remarks))
+        return self._reading(found, "; ".join(remarks))
 
     def _searched(
         self, prior: _Prior, rows: BoolArray, observed: FloatArray, noise: FloatArray
-    ) -> tuple[_Posterior, int, bool]:
-        """The estimate, the number of equilibria on the way, and whether it was found."""
-        for evaluations in range(MOST + 1):
+    ) -> _Posterior | None:
+        """The estimate; None if no equilibrium is found near it."""
+        for _ in range(17):  # equilibria: enough for a jump from rest by forty millimetres
             last = self._last
             slopes = last.slopes[rows] / noise[:, None]
             found = self._posterior(prior, slopes, (last.predicted[rows] - observed) / noise)
             motion = (last.slopes @ (found.z - last.z)).reshape(-1, 2)
             longest = float(np.linalg.norm(motion, axis=1).max())
             if longest <= NEAR:
-                return found, evaluations, True
-            share = min(1.0, STRIDE / longest)
-            for _ in range(HALVINGS):
+                return found
+            share = min(1.0, 3.0 / longest)  # no marker moves by more than 3 mm in one step
+            for _ in range(4):
                 if (reached := self._linearised(last.z + share * (found.z - last.z))) is not None:
-                    self._last = reached
                     break
                 share /= 2
             else:
-                break
-        return found, evaluations, False
+                return None
+            self._last = reached
+            self._evaluations += 1
+        return None
 
     def _posterior(self, prior: _Prior, slopes: FloatArray, residuals: FloatArray) -> _Posterior:
         """The minimum for residuals (n,) over σ at the last equilibrium and their derivatives (n, p)."""
         z, inflation = self._last.z, 1.0
         spread = np.linalg.inv(np.linalg.cholesky(prior.precision)).T
-        for _ in range(ROUNDS):
+        for _ in range(20):  # φ is known to a thousandth much earlier
             a, r = slopes / inflation, residuals / inflation
             curvature = a.T @ a + prior.precision
             gradient = np.asarray(a.T @ r + prior.precision @ (z - prior.mean), dtype=np.float64)
@@ -227,75 +216,77 @@ class ForceTracker:
             used, inflation = inflation, inflation_of(residuals + slopes @ (found - z), freedom)
             if abs(inflation / used - 1) < 1e-3:
                 break
-        upper = (1 + LEVEL) / 2
-        quantile = float(norm.ppf(upper) if used == 1 else t.ppf(upper, freedom))
         left, away = (residuals + slopes @ (found - z)) / used, found - prior.mean
         misfit = float(left @ left + away @ prior.precision @ away)
         volume = np.linalg.slogdet(curvature)[1] - np.linalg.slogdet(prior.precision)[1]
         log_evidence = -len(left) * float(np.log(used)) - 0.5 * (misfit + float(volume))
-        return _Posterior(found, np.linalg.inv(curvature), used, quantile, log_evidence)
+        return _Posterior(found, np.linalg.inv(curvature), used, quantile_of(used, freedom), log_evidence)
 
     def _bounded(self, z: FloatArray, curvature: FloatArray, gradient: FloatArray) -> FloatArray:
-        """Minimum of a quadratic within the bounds: what leaves them is held there, and the rest follows."""
-        low, high = self._bounds
+        """Minimum of a quadratic within the bounds: an unknown that leaves them is held at its bound."""
         free = np.ones(len(z), dtype=bool)
         found = z.copy()
         for _ in z:
             held = np.where(free, 0.0, found - z)
             pulled = -gradient - curvature @ held
             found[free] = z[free] + np.linalg.solve(curvature[np.ix_(free, free)], pulled[free])
-            outside = (found < low) | (found > high)
+            outside = (found < self._bounds[0]) | (found > self._bounds[1])
             if not outside.any():
                 break
-            found = np.clip(found, low, high)
+            found = np.clip(found, *self._bounds)
             free &= ~outside
         return found
 
     def _linearised(self, z: FloatArray) -> _Linearised | None:
-        """The markers about the equilibrium at z; None if there is none."""
-        pairs = list(zip(self._parameters, z.tolist(), strict=True))
-        response = self._model.response(np.array([float(u.value(place)) for u, place in pairs]), TOLERANCE)
+        """The markers about the equilibrium at z; None if there is none.
+
+        The tolerance of the Newton step leaves about its square, no more than `NEAR` leaves; one step does
+        for a slow motion.
+        """
+        values, derivatives = self._values(z)
+        response = self._model.response(values, tolerance=0.02)
         if response is None:
             return None
         predicted, slopes = self._markers.predicted(response)
-        return _Linearised(z, predicted, slopes * [u.derivative(place) for u, place in pairs], response)
+        return _Linearised(z, predicted, slopes * derivatives)
+
+    def _values(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Values of the unknowns and their derivatives by z, both of shape (p,)."""
+        pairs = list(zip(self._parameters, z.tolist(), strict=True))
+        values = np.array([float(u.value(place)) for u, place in pairs])
+        return values, np.array([u.derivative(place) for u, place in pairs])
 
     def _learn(self, found: _Posterior, *, anew: bool) -> None:
         """Take the finger in a frame for the prior of other frames, or into the mean of such frames.
 
         The covariance stays that of one frame: the errors of a camera and of the model are common to all.
         """
-        finger = np.ix_(self._of_finger, self._of_finger)
         self._learnt = 1 if anew else self._learnt + 1
-        mean = np.where(self._of_finger, found.z, 0.0)
+        mean, precision = np.where(self._of_finger, found.z, 0.0), self._known.precision
         if anew:
+            finger = np.ix_(self._of_finger, self._of_finger)
             precision = self._drawn.precision.copy()
             precision[finger] = np.linalg.inv(found.covariance[finger])
-            self._known = _Prior(mean, precision)
         else:
-            step = (mean - self._known.mean) / self._learnt
-            self._known = _Prior(self._known.mean + step, self._known.precision)
+            mean = self._known.mean + (mean - self._known.mean) / self._learnt
+        self._known = _Prior(mean, precision)
 
-    def _reading(self, found: _Posterior, evaluations: int, started: float, status: str) -> ForceReading:
-        names, pairs = self._model.unknowns.names, list(zip(self._parameters, found.z.tolist(), strict=True))
-        values = np.array([float(u.value(place)) for u, place in pairs])
-        directions = self._model.unknowns.force_slopes()
-        derivatives = np.array([u.derivative(place) for u, place in pairs])
+    def _reading(self, found: _Posterior, status: str) -> ForceReading:
+        values, derivatives = self._values(found.z)
+        directions = self._unknowns.force_slopes()
         by_z = directions * derivatives[:, None]
         spread = by_z.T @ found.covariance @ by_z
         force = values @ directions
         size = float(np.linalg.norm(force))
-        along = force / size if size else self._model.unknowns.directions[0]
+        along = force / size if size else self._unknowns.directions[0]
         half = found.quantile * float(np.sqrt(along @ spread @ along))
         wider = found.quantile / float(norm.ppf((1 + LEVEL) / 2))
         may_be_none = force @ np.linalg.solve(spread, force) < wider**2 * chi2.ppf(LEVEL, len(force))
-        of_place = np.array([name in ("position", "eccentricity") for name in names], dtype=np.float64)
-        place = float(of_place @ values)
-        around = found.quantile * np.sqrt(
-            (of_place * derivatives) @ found.covariance @ (of_place * derivatives)
-        )
-        ends = np.clip(place + around * np.array([-1.0, 1.0]), *self._model.unknowns.traction.ends)
-        return ForceReading(
+        place, place_by_z = float(self._of_place @ values), self._of_place * derivatives
+        around = found.quantile * np.sqrt(place_by_z @ found.covariance @ place_by_z)
+        ends = np.clip(place + around * np.array([-1.0, 1.0]), *self._unknowns.traction.ends)
+        return replace(
+            self._unknown(status),
             force=force,
             size=size,
             low=0.0 if may_be_none else max(size - half, 0.0),
@@ -304,59 +295,43 @@ class ForceTracker:
             position_low=float(ends[0]),
             position_high=float(ends[1]),
             inflation=found.inflation,
-            evaluations=evaluations,
-            seconds=time.perf_counter() - started,
-            status=status,
         )
 
-    def _unknown(self, status: str, evaluations: int, started: float) -> ForceReading:
+    def _unknown(self, status: str) -> ForceReading:
         """A reading without an estimate."""
-        low, high = self._model.unknowns.traction.ends
-        return ForceReading(
-            force=np.full(2, np.nan),
-            size=np.nan,
-            low=0.0,
-            high=np.inf,
-            position=np.nan,
-            position_low=low,
-            position_high=high,
-            inflation=np.nan,
-            evaluations=evaluations,
-            seconds=time.perf_counter() - started,
-            status=status,
-        )
+        none, ends = np.nan, self._unknowns.traction.ends
+        return ForceReading(np.full(2, none), none, 0.0, np.inf, none, *ends, none, 0, 0.0, status)
 
 
 class LawTracker:
-    """Estimates the force in one frame after another by the law that the markers tell.
+    """Estimates the force in one frame after another by the law that is most probable by the markers.
 
-    All laws are compared whenever the markers have moved by `RECHECK` farther than before; in between only
-    the most probable one is followed. A law is dropped once its evidence is less than another's by `CLEAR`.
+    All laws are compared whenever the markers have moved by a quarter farther than at the last comparison; in
+    between only the most probable one is followed. A law is dropped once the logarithm of its evidence is
+    less than another's by 7: it is a thousand times less probable.
 
     Args:
         trackers: By the name of the law; the first is taken before there is a motion.
+
+    Attributes:
+        laws: The laws that are not excluded, the most probable first.
     """
 
     def __init__(self, trackers: Mapping[LawName, ForceTracker]) -> None:
         self._trackers = dict(trackers)
         self._compared = 0.0
         self.laws: tuple[LawName, ...] = tuple(trackers)
-        """Those that are not excluded, the most probable first."""
 
     def update(self, displacements: FloatArray, deviations: FloatArray, visible: BoolArray) -> ForceReading:
         """The force in a frame by the most probable law; see `ForceTracker.update`."""
-        started = time.perf_counter()
-        first = self._trackers[self.laws[0]].update(displacements, deviations, visible)
-        found = {self.laws[0]: first}
-        if (
-            len(self.laws) > 1
-            and (largest := self._trackers[self.laws[0]].largest) > self._compared * RECHECK
-        ):
-            self._compared = largest
+        started, first = time.perf_counter(), self._trackers[self.laws[0]]
+        found = {self.laws[0]: first.update(displacements, deviations, visible)}
+        if len(self.laws) > 1 and first.largest > self._compared * 1.25:
+            self._compared = first.largest
             for law in self.laws[1:]:
                 found[law] = self._trackers[law].update(displacements, deviations, visible)
             evidence = {law: self._trackers[law].log_evidence for law in self.laws}
             order = sorted(evidence, key=lambda law: -evidence[law])
-            self.laws = tuple(law for law in order if evidence[law] >= evidence[order[0]] - CLEAR)
+            self.laws = tuple(law for law in order if evidence[law] >= evidence[order[0]] - 7.0)
         evaluations = sum(reading.evaluations for reading in found.values())
         return replace(found[self.laws[0]], evaluations=evaluations, seconds=time.perf_counter() - started)

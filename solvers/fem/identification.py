@@ -1,8 +1,9 @@
-"""The finger at finite strain in finite elements, with moved walls, for the inverse problem."""
+"""`fem-id`: contact, walls and law from the markers, by finite elements at finite strain with moved walls."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Any
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 import ufl
@@ -12,13 +13,22 @@ from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.wall_motion import WallMotion
-from solvers.elasticity import Lame, deformation_jacobian, energy_density_of
+from geometry.observations import Observations
+from solvers.assimilation.misfit import radius_within
+from solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
 from solvers.fem.boundary_conditions import dirichlet_mask
 from solvers.fem.dolfinx_compat import DistributedSpace
 from solvers.fem.finite_strain.equilibrium import QUADRATURE_DEGREE
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear_solvers import Factorisation
+from solvers.identification.model import ResponseModel
+from solvers.identification.search import LAWS, Identifier, IdentifyingSolver
+from solvers.identification.tracker import ForceTracker, LawTracker
+from solvers.identification.unknowns import DEFAULT, Unknowns
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Problem
+from solvers.solution import Solution, Status
+from solvers.solver import Family, Progress, check_problem, silent
 
 
 class FemBody:
@@ -63,7 +73,7 @@ class FemBody:
         return self._clamped.shape
 
     def close(self) -> None:
-        """Free what PETSc holds."""
+        """Free the factors, which PETSc holds."""
         self._factors.destroy()
 
     def linearised(self, state: FloatArray, lame: Lame, changes: FloatArray) -> "_Linearised | None":
@@ -97,8 +107,7 @@ class FemBody:
 
     def displacement_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
         """From the shape functions; see `Body`."""
-        values = weights @ self.space.shape_functions(self._located(points))
-        return _both_components(values)
+        return _both_components(weights @ self.space.shape_functions(self._located(points)))
 
     def gradient_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
         """From the derivatives of the shape functions; see `Body`."""
@@ -146,21 +155,113 @@ class FemBody:
 
 @dataclass(frozen=True, eq=False)
 class _Linearised:
-    """See `solvers.identification.body.Linearised`."""
+    """The tangent, by the factors that the body holds; see `solvers.identification.body.Linearised`."""
 
     force: FloatArray
     factors: Factorisation
 
     @property
     def negative(self) -> int:
-        """By the factors that the body holds."""
+        """Number of negative eigenvalues."""
         return self.factors.negative
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """By the factors that the body holds."""
+        """K⁻¹ of generalised forces, shape (r, N, 2)."""
         return self.factors.solve_all(right)
 
 
 def _both_components(values: FloatArray) -> FloatArray:
     """Rows (r, 2, N, 2) of both components from those of one, shape (r, N)."""
     return np.asarray(np.einsum("rn,ab->ranb", np.asarray(values), np.eye(2)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FemIdSolver(IdentifyingSolver):
+    """Finite elements whose contact, walls and law are found from the markers.
+
+    Attributes:
+        model: "fem-nonlinear", the only one: finite strain under an unknown force.
+        degree: Degree of the elements, 1 or 2.
+    """
+
+    model: str = "fem-nonlinear"
+    degree: int = 2
+    name: ClassVar[str] = "fem-id"
+    family: ClassVar[Family] = "finite elements"
+    laws: ClassVar[tuple[str, ...]] = FemNonlinearSolver.laws
+    loads: ClassVar[tuple[str, ...]] = FemNonlinearSolver.loads  # only the drawn contact is taken from it
+
+    def __post_init__(self) -> None:
+        if self.model == "fem":
+            raise UserError(
+                "fem-id: the linear model is gone; leave out model for finite strain, or take fem-asm, which "
+                "corrects fem by the markers"
+            )
+        if self.model != "fem-nonlinear":
+            raise UserError(f"fem-id: model must be fem-nonlinear, got {self.model!r}; leave it out")
+        if self.degree not in (1, 2):
+            raise UserError(f"fem-id has elements of degree 1 and 2, not {self.degree}")
+        super().__post_init__()
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        """Find the unknowns and solve with them; see `Solver`. Without markers it is `fem-nonlinear`."""
+        check_problem(self, problem)
+        if problem.observations is None:
+            plain = FemNonlinearSolver(degree=self.degree).solve(problem, progress)
+            said = f"without markers, this is {self.model}: {plain.status.message}"
+            return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
+        return self.refitter(problem)(problem.observations, progress)
+
+    def refitter(self, problem: Problem) -> Callable[..., Solution]:
+        """A function that finds the unknowns for other observations; see `Refittable`.
+
+        Fits share the elements; each search starts from the last result. It takes a progress, too.
+        """
+        identifier = Identifier(self, problem, lambda unknowns: _body(unknowns, self.degree))
+
+        def fitted(observations: Observations, progress: Progress = silent) -> Solution:
+            started = time.perf_counter()
+            found = identifier.identify(observations, progress)
+            stats = {
+                "seconds": time.perf_counter() - started,
+                "unknowns": found.best.response.state.size,
+                "triangles": len(problem.mesh.triangles),
+                "degree": self.degree,
+            }
+            return found.solution(self.name, replace(problem, observations=observations), stats)
+
+        return fitted
+
+
+def fem_force_tracker(
+    problem: Problem, points: FloatArray, radius: float, *, degree: int = 2, prior: float = 1.0
+) -> ForceTracker:
+    """The force tracker of a finger in finite elements.
+
+    Args:
+        problem: The finger with a law of finite strain; its load only gives the drawn contact.
+        points: Markers at rest, shape (m, 2), mm, in the drawn body.
+        radius: Of the markers' discs, mm; less is taken where one is nearer to the boundary.
+        degree: Of the elements, 1 or 2.
+        prior: Factor of the standard deviations of the priors.
+    """
+    unknowns = Unknowns.of(replace(problem, observations=None), DEFAULT)
+    model = ResponseModel(_body(unknowns, degree), unknowns)
+    return ForceTracker(model, points, radius_within(problem.mesh, points, radius), prior=prior)
+
+
+def fem_law_tracker(
+    problem: Problem, points: FloatArray, radius: float, laws: Sequence[LawName] = LAWS
+) -> LawTracker:
+    """The force tracker by the most probable of some laws of finite strain, in elements of degree 2."""
+    trackers = {}
+    for law in laws:
+        own = replace(problem, material=problem.material.model_copy(update={"law": law}))
+        trackers[law] = fem_force_tracker(own, points, radius)
+    return LawTracker(trackers)
+
+
+def _body(unknowns: Unknowns, degree: int) -> FemBody:
+    """The discretised finger of a problem whose law is set."""
+    problem = unknowns.problem
+    return FemBody(problem, LagrangeSpace(problem.mesh, degree), unknowns.motion)

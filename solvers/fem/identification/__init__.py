@@ -1,4 +1,0 @@
-"""`fem-id`: parameters of the finger and its load from the markers.
-
-Imports `solvers.fem`, `solvers.fem.finite_strain`, `solvers.assimilation`.
-"""

@@ -1,0 +1,172 @@
+"""The two ends of the finger: the traction of a contact on the front face, and the clamp at the base.
+
+At the abscissa x the traction's density is the raised cosine 1 + cos(2 π (x - position) / width) within half
+a width, scaled to the integral one: smooth in both parameters, zero at both ends.
+
+The clamp is an elastic layer of compliance ℓ (mm), which answers a displacement u of the base by the
+traction E u / ℓ. With the base's length b, its middle x_b and the integral I of the squared distance from
+it, a base that stays straight under the force f at the point x shifts by ℓ f / (E b) and turns by
+ℓ (x - x_b) × f / (E I). The finger moves with it as a rigid body.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.mesh.quadrature import edge_quadrature
+from geometry.mesh.triangle_mesh import TriangleMesh
+
+QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
+"""Rotation by 90 degrees."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrontTraction:
+    """Quadrature points of the front face, where a contact may be.
+
+    Attributes:
+        points: Shape (q, 2), mm.
+        lengths: Their quadrature weights, shape (q,), mm.
+        extent: Along x, mm.
+        longest: Length of the longest edge, mm.
+    """
+
+    points: FloatArray
+    lengths: FloatArray
+    extent: float
+    longest: float
+
+    @classmethod
+    def of(cls, mesh: TriangleMesh) -> "FrontTraction":
+        """The front face of a mesh, with twelve points on an edge, which may hold the whole contact."""
+        edges = mesh.points[mesh.boundary("front")]
+        longest = float(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1).max())
+        return cls(*edge_quadrature(mesh, "front", 12), float(np.ptp(edges[..., 0])), longest)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Abscissae of the first and the last point, mm."""
+        return float(self.points[:, 0].min()), float(self.points[:, 0].max())
+
+    def weights(self, position: float, width: float) -> FloatArray:
+        """Weights (5, q) of the traction w, 1/mm, and of its derivatives by position x and width b.
+
+        The rows are w, which sums to one, dw/dx, dw/db, d²w/dx² and d²w/dx db.
+        """
+        offset = self.points[:, 0] - position
+        wave, stretch = 2 * np.pi / width, offset / width
+        cosine, sine = np.cos(wave * offset), np.sin(wave * offset)
+        rows = np.stack(
+            [
+                1 + cosine,
+                wave * sine,
+                wave * sine * stretch,
+                -(wave**2) * cosine,
+                -(wave**2) * cosine * stretch - wave * sine / width,
+            ]
+        )
+        rows = np.where(np.abs(offset) < 0.5 * width, rows, 0.0) * self.lengths
+        total, by_x, by_b, by_xx, by_xb = rows.sum(axis=1)
+        w = rows[0] / total
+        w_x, w_b = (rows[1] - by_x * w) / total, (rows[2] - by_b * w) / total
+        w_xx = (rows[3] - by_xx * w - 2 * by_x * w_x) / total
+        w_xb = (rows[4] - by_xb * w - by_x * w_b - by_b * w_x) / total
+        return np.stack([w, w_x, w_b, w_xx, w_xb])
+
+    def tangent(self, position: float) -> FloatArray:
+        """Unit vector along the front toward greater x at an abscissa, shape (2,), from 4 % of its extent."""
+        x, y = self.points[self.points[:, 0].argsort()].T
+        reach = 0.02 * self.extent
+        low, high = (np.interp(position + side * reach, x, y) for side in (-1, 1))
+        along = np.array([2 * reach, high - low])
+        return np.asarray(along / np.linalg.norm(along))
+
+
+@dataclass(frozen=True, eq=False)
+class RigidMotion:
+    """A rotation about a point, then a shift, with their derivatives by p unknowns.
+
+    Attributes:
+        centre: Shape (2,), mm.
+        shift: Shape (2,), mm.
+        turn: Angle, rad.
+        shift_slopes: Shape (p, 2).
+        turn_slopes: Shape (p,).
+    """
+
+    centre: FloatArray
+    shift: FloatArray
+    turn: float
+    shift_slopes: FloatArray
+    turn_slopes: FloatArray
+
+    @property
+    def rotation(self) -> FloatArray:
+        """The rotation's matrix, shape (2, 2)."""
+        return np.asarray(np.cos(self.turn) * np.eye(2) + np.sin(self.turn) * QUARTER)
+
+    def moved(self, places: FloatArray) -> FloatArray:
+        """New places of points, both of shape (n, 2), mm."""
+        return np.asarray(self.centre + self.shift + (places - self.centre) @ self.rotation.T)
+
+    def slopes(self, places: FloatArray, place_slopes: FloatArray) -> FloatArray:
+        """Derivatives (p, n, 2) of the new places of points (n, 2), mm, whose own are given."""
+        turned = (places - self.centre) @ (QUARTER @ self.rotation).T
+        by_turn = self.turn_slopes[:, None, None] * turned
+        return np.asarray(place_slopes @ self.rotation.T + self.shift_slopes[:, None] + by_turn)
+
+    def extrapolated(self, step: FloatArray) -> "RigidMotion":
+        """The motion after a step of the unknowns, shape (p,), to first order."""
+        turn = self.turn + float(step @ self.turn_slopes)
+        return replace(self, shift=self.shift + step @ self.shift_slopes, turn=turn)
+
+
+@dataclass(frozen=True, eq=False)
+class Clamp:
+    """The base on its elastic layer.
+
+    Attributes:
+        length: b, mm.
+        centre: x_b, shape (2,), mm.
+        inertia: I, mm³.
+    """
+
+    length: float
+    centre: FloatArray
+    inertia: float
+
+    @classmethod
+    def of(cls, mesh: TriangleMesh) -> "Clamp":
+        """The base of a mesh, in one piece or several."""
+        points, lengths = edge_quadrature(mesh, "base")
+        centre = lengths @ points / lengths.sum()
+        return cls(float(lengths.sum()), centre, float(lengths @ ((points - centre) ** 2).sum(axis=1)))
+
+    def motion(
+        self,
+        softness: tuple[float, FloatArray],
+        force: tuple[FloatArray, FloatArray],
+        place: tuple[FloatArray, FloatArray],
+    ) -> RigidMotion:
+        """The finger's motion under a force, each argument with its derivatives by p unknowns.
+
+        Args:
+            softness: ℓ / E, mm/MPa, and its derivatives (p,).
+            force: f, shape (2,), N/mm, and its derivatives (p, 2).
+            place: x, shape (2,), mm, and its derivatives (p, 2).
+        """
+        (soft, soft_slopes), (f, f_slopes), (x, x_slopes) = softness, force, place
+        lever = x - self.centre
+        moment, moment_slopes = _cross(lever, f), _cross(x_slopes, f) + _cross(lever, f_slopes)
+        return RigidMotion(
+            self.centre,
+            soft * f / self.length,
+            float(soft * moment / self.inertia),
+            (np.outer(soft_slopes, f) + soft * f_slopes) / self.length,
+            np.asarray((soft_slopes * moment + soft * moment_slopes) / self.inertia),
+        )
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])

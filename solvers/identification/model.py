@@ -1,0 +1,328 @@
+"""Equilibria of a finger under a hypothesis, the markers there, and exact derivatives by the unknowns.
+
+With the traction's rows b, the force f and the couple m, equilibrium is F(c, θ) = f · b + m · ∂b/∂x, where x
+is the place of the contact; with the tangent K there,
+
+    K c' = (f · b + m · ∂b/∂x)' - ∂F/∂θ
+
+A marker is at a fixed place P of the drawn body; where the walls have moved by W, the material there was
+drawn at P - W, so that it moves by u(P) - ∇u(P) W(P) to first order in W, and with the clamp on top.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from geometry.arrays import FloatArray, IntArray
+from geometry.errors import UserError
+from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.observations import Observations
+from solvers.assimilation.estimation import Prediction
+from solvers.assimilation.misfit import disc_quadrature, radius_within, standard_deviations
+from solvers.constrained_elimination import ConstrainedElimination
+from solvers.identification.body import Body, Linearised
+from solvers.identification.boundary import Clamp, RigidMotion
+from solvers.identification.unknowns import Hypothesis, Unknowns
+
+MAX_ITERATIONS, HALVINGS = 8, 4
+"""Newton iterations before a guess counts as too far away; times that the way there is then halved."""
+ROUGH, EXACT = 2e-3, 1e-6
+"""Relative size of the last Newton step, in the energy norm, while unknowns are sought and at the end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """An equilibrium with its derivatives by p unknowns.
+
+    Attributes:
+        values: Of the unknowns, shape (p,).
+        hypothesis: Finger and contact of the values.
+        state: c.
+        slopes: c', shape (p, *shape).
+        motion: Of the clamp.
+        contact: Mean displacement of the contact, shape (2,), mm.
+        contact_slopes: Shape (p, 2).
+    """
+
+    values: FloatArray
+    hypothesis: Hypothesis
+    state: FloatArray
+    slopes: FloatArray
+    motion: RigidMotion
+    contact: FloatArray
+    contact_slopes: FloatArray
+
+
+class ResponseModel:
+    """Responses of a body; each starts from the last one.
+
+    Args:
+        body: The discretised finger.
+        unknowns: The unknowns.
+    """
+
+    def __init__(self, body: Body, unknowns: Unknowns) -> None:
+        self.body, self.unknowns = body, unknowns
+        self._clamp = Clamp.of(unknowns.problem.mesh)
+        self._last: Response | None = None
+        self.evaluations = 0
+
+    def flexibility(self) -> float:
+        """Displacement of the drawn contact into the finger under a unit force, mm per N/mm."""
+        still = np.zeros(len(self.unknowns.motion.names))
+        rest = self.body.linearised(np.zeros(self.body.shape), self.unknowns.problem.material.lame, still)
+        if rest is None:
+            raise UserError("the finger is inside out before it is loaded")
+        rows = self._traction(*self.unknowns.place)[0]
+        pressed = np.tensordot(self.unknowns.directions[0], rows, axes=1)
+        return float((pressed * rest.solve(pressed[None])[0]).sum())
+
+    def response(
+        self,
+        values: FloatArray,
+        tolerance: float = ROUGH,
+        *,
+        iterations: int = MAX_ITERATIONS,
+        halvings: int = HALVINGS,
+    ) -> Response | None:
+        """The response at values of the unknowns, shape (p,); None if no equilibrium is found on the way.
+
+        Args:
+            values: Shape (p,).
+            tolerance: `ROUGH` or `EXACT`.
+            iterations: Newton iterations from one hypothesis to the next.
+            halvings: Times that the way is halved where no equilibrium is found.
+        """
+        self.evaluations += 1
+        found = self._reached(values, tolerance, iterations, halvings)
+        if found is not None:
+            self._last = found
+        return found
+
+    def unstable(self, response: Response) -> int:
+        """Number of directions in which the energy falls while the mean of the contact is held still."""
+        hypothesis = response.hypothesis
+        there = self.body.linearised(response.state, hypothesis.lame, hypothesis.changes)
+        if there is None:
+            raise UserError("the finger that was found is inside out")
+        rows = self._traction(hypothesis.position, hypothesis.width)[0]
+        held = ConstrainedElimination(rows, there.solve(rows))
+        return held.unstable(there.negative)
+
+    def restart(self, response: Response | None) -> None:
+        """Start the next response from this one, which may be that of another body; None: from rest."""
+        self._last = response
+
+    def extrapolated(self, about: Response, values: FloatArray) -> Response:
+        """The response at values of the unknowns, shape (p,), to first order about another one."""
+        step = values - about.values
+        return replace(
+            about,
+            values=values.copy(),
+            hypothesis=self.unknowns.hypothesis(values),
+            state=about.state + np.tensordot(step, about.slopes, axes=1),
+            motion=about.motion.extrapolated(step),
+            contact=about.contact + step @ about.contact_slopes,
+        )
+
+    def _reached(
+        self, values: FloatArray, tolerance: float, iterations: int, halvings: int
+    ) -> Response | None:
+        """The response, by way of those halfway where it is too far from the last one."""
+        found = self._near(values, tolerance, iterations)
+        if found is not None or not halvings:
+            return found
+        before = self._last
+        start = self._rest() if before is None else before.values
+        self._last = self._reached(0.5 * (start + values), ROUGH, iterations, halvings - 1)
+        if self._last is not None:
+            found = self._reached(values, tolerance, iterations, halvings - 1)
+        if found is None:
+            self._last = before
+        return found
+
+    def _rest(self) -> FloatArray:
+        """Values without a force, shape (p,), other unknowns as expected."""
+        return np.array([parameter.start for parameter in self.unknowns.parameters(1.0)])
+
+    def _near(self, values: FloatArray, tolerance: float, iterations: int) -> Response | None:
+        """The response by Newton's method from the last one, extrapolated along its derivatives."""
+        hypothesis = self.unknowns.hypothesis(values)
+        state = np.zeros(self.body.shape)
+        if self._last is not None:
+            state = self._last.state + np.tensordot(values - self._last.values, self._last.slopes, axes=1)
+        traction = self._traction(hypothesis.position, hypothesis.width)
+        load = np.tensordot(hypothesis.force, traction[0], axes=1)
+        load += np.tensordot(hypothesis.couple, traction[1], axes=1)
+        before, step = np.inf, np.zeros(self.body.shape)
+        for _ in range(iterations):
+            length = 1.0
+            while True:  # a shorter step where a whole one turns an element inside out
+                linearised = self.body.linearised(state + length * step, hypothesis.lame, hypothesis.changes)
+                if linearised is not None or length < 2.0**-6 or not step.any():
+                    break
+                length /= 2
+            if linearised is None:
+                return None
+            state = state + length * step
+            balance = load - linearised.force
+            step = linearised.solve(balance[None])[0]
+            # The least work, N mm/mm, is that of moving a finger by some ten nanometres.
+            work = max(abs(float((load * state).sum())), 1e-10)
+            size = float(np.sqrt(abs((step * balance).sum()) / work)) if balance.any() else 0.0
+            # Large steps must not grow: the guess is too far away.
+            if not np.isfinite(size) or size > max(before, 0.1):
+                return None
+            if size < tolerance:
+                return self._with_slopes(values, hypothesis, (state + step, state), linearised, traction)
+            before = size
+        return None
+
+    def _with_slopes(
+        self,
+        values: FloatArray,
+        hypothesis: Hypothesis,
+        states: tuple[FloatArray, FloatArray],
+        linearised: Linearised,
+        traction: FloatArray,
+    ) -> Response:
+        """The response at the first of two states or, where that turns a point inside out, at the second."""
+        force, couple, slope = hypothesis.force, hypothesis.couple, self.unknowns.slopes(values)
+        for state in states:
+            by_walls, by_moduli = self.body.force_slopes(state, hypothesis.lame, hypothesis.changes)
+            if np.isfinite(by_walls).all() and np.isfinite(by_moduli).all():
+                break
+        right = np.tensordot(slope.force, traction[0], axes=1)
+        right += np.tensordot(slope.couple, traction[1], axes=1)
+        for by, moved, turned in zip((slope.position, slope.width), traction[1:3], traction[3:], strict=True):
+            change = np.tensordot(force, moved, axes=1) + np.tensordot(couple, turned, axes=1)
+            right += np.multiply.outer(by, change)
+        right -= np.tensordot(slope.changes, by_walls, axes=1)
+        right -= np.tensordot(slope.moduli, by_moduli, axes=1)
+        slopes = linearised.solve(right)
+        inner = tuple(range(1, slopes.ndim))
+        contact, by_position, by_width = np.asarray(np.tensordot(traction[:3], state, axes=state.ndim))
+        contact_slopes: FloatArray = np.tensordot(slopes, traction[0], axes=(inner, inner))
+        contact_slopes += np.outer(slope.position, by_position) + np.outer(slope.width, by_width)
+        front = self.unknowns.traction
+        places = front.weights(hypothesis.position, hypothesis.width) @ front.points
+        place_slopes: FloatArray = contact_slopes + np.outer(slope.position, places[1])
+        place_slopes += np.outer(slope.width, places[2])
+        motion = self._clamp.motion(
+            (hypothesis.softness, slope.softness), (force, slope.force), (places[0] + contact, place_slopes)
+        )
+        return Response(values.copy(), hypothesis, state, slopes, motion, contact, contact_slopes)
+
+    def _traction(self, position: float, width: float) -> FloatArray:
+        """Rows (5, 2, *shape) of the traction and its derivatives; see `FrontTraction.weights`."""
+        front = self.unknowns.traction
+        return self.body.displacement_rows(front.points, front.weights(position, width))
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """Displacements of m markers and, if known, the force.
+
+    Attributes:
+        points: Markers at rest, shape (m, 2), mm.
+        displacements: Shape (m, 2), mm.
+        deviations: Their standard deviations, shape (m, 2), mm.
+        radius: Of the discs over which the displacement is averaged, mm.
+        kept: Numbers of the markers among those that were seen, ascending, shape (m,).
+        reaction: Force of the indenter along y per depth, with its standard deviation, N/mm.
+    """
+
+    points: FloatArray
+    displacements: FloatArray
+    deviations: FloatArray
+    radius: float
+    kept: IntArray
+    reaction: tuple[float, float] | None = None
+
+    @classmethod
+    def of(
+        cls,
+        mesh: TriangleMesh,
+        observations: Observations,
+        radius: float | None,
+        reaction: tuple[float, float] | None,
+    ) -> "Measurement":
+        """All markers that were seen; see `MarkerSettings.marker_radius` for the radius, mm."""
+        points = observations.points[observations.visible]
+        if not len(points):
+            raise UserError("there are no markers to find a force by")
+        return cls(
+            points,
+            observations.displacements[observations.visible],
+            standard_deviations(observations),
+            radius_within(mesh, points, observations.marker_radius if radius is None else radius),
+            np.arange(len(points)),
+            reaction,
+        )
+
+    def only(self, numbers: IntArray) -> "Measurement":
+        """The measurement of some of its markers, by their numbers among those that were seen."""
+        chosen = np.isin(self.kept, numbers)
+        return replace(
+            self,
+            points=self.points[chosen],
+            displacements=self.displacements[chosen],
+            deviations=self.deviations[chosen],
+            kept=self.kept[chosen],
+        )
+
+    @property
+    def observed(self) -> FloatArray:
+        """Displacements u v u v ..., then the reaction if there is one."""
+        return np.append(self.displacements.ravel(), self.reaction[:1] if self.reaction else [])
+
+    @property
+    def noise(self) -> FloatArray:
+        """Standard deviations of `observed`."""
+        return np.append(self.deviations.ravel(), self.reaction[1:] if self.reaction else [])
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerModel:
+    """The values of a measurement as a function of a response.
+
+    Attributes:
+        measurement: Markers and, if measured, the force.
+        rows: Of the markers' mean displacement in the drawn body, shape (m, 2, *shape).
+        wall_rows: Of its change by the motion of each wall, shape (k, m, 2, *shape), per mm.
+        unknowns: The unknowns.
+    """
+
+    measurement: Measurement
+    rows: FloatArray
+    wall_rows: FloatArray
+    unknowns: Unknowns
+
+    @classmethod
+    def of(cls, model: ResponseModel, measurement: Measurement) -> "MarkerModel":
+        """The measurement of a finger."""
+        unknowns = model.unknowns
+        points, means = disc_quadrature(measurement.points, measurement.radius)
+        location = unknowns.problem.mesh.locate(points)
+        count = len(unknowns.motion.names)
+        moved = [unknowns.motion.shifts(location, one) for one in np.eye(count)]
+        rows = model.body.displacement_rows(points, means)
+        wall_rows = [-model.body.gradient_rows(points, means[:, :, None] * shift) for shift in moved]
+        return cls(measurement, rows, np.array(wall_rows).reshape(count, *rows.shape), unknowns)
+
+    def predicted(self, response: Response) -> Prediction:
+        """Values in the order of `Measurement.observed`, shape (n,), and their derivatives (n, p)."""
+        hypothesis, state, slopes = response.hypothesis, response.state, response.slopes
+        by = self.unknowns.slopes(response.values)
+        rows = self.rows + np.tensordot(hypothesis.changes, self.wall_rows, axes=1)
+        drawn = np.tensordot(rows, state, axes=state.ndim)
+        axes = tuple(range(1, slopes.ndim)), tuple(range(2, rows.ndim))
+        drawn_slopes = np.tensordot(slopes, rows, axes=axes)
+        drawn_slopes += np.tensordot(by.changes, np.tensordot(self.wall_rows, state, axes=state.ndim), axes=1)
+        places = self.measurement.points + drawn
+        moved = response.motion.moved(places) - self.measurement.points
+        moved_slopes = response.motion.slopes(places, drawn_slopes)
+        values, derivatives = moved.ravel(), moved_slopes.reshape(len(moved_slopes), -1).T
+        if self.measurement.reaction is None:
+            return values, derivatives
+        return np.append(values, hypothesis.force[1]), np.vstack([derivatives, by.force[:, 1]])

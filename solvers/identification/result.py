@@ -1,0 +1,300 @@
+"""Fits of the unknowns, one a law, the evidence for each, and the solution with its numbers and sentence.
+
+The evidence of a law is Laplace's approximation of the integral of likelihood times prior: with the
+residuals r over φ σ, the sensitivities A and the standardised values z of `Estimate`, for n observations
+
+    log Z = -n log φ - (r . r + z . z) / 2 - log det(A^T A + 1) / 2
+
+Source: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415-447.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import norm
+
+from geometry.arrays import FloatArray
+from solvers.assimilation.estimation import LEVEL, Estimate
+from solvers.assimilation.misfit import leave_one_out_displacements
+from solvers.elasticity import LawName
+from solvers.identification.field import STEP, IdentifiedField, Member, Snapshot
+from solvers.identification.model import Measurement, Response, ResponseModel
+from solvers.problem import Problem
+from solvers.solution import Estimated, IdentifiedForce, Solution, Status, Uncertainty, unstable_phrase
+
+PROBABLE = 0.01
+"""Least probability of a law whose field is kept."""
+
+
+class Fit(NamedTuple):
+    """The best values of the unknowns under one law.
+
+    Attributes:
+        model: The finger of that law as a function of the unknowns.
+        estimate: Values, covariance, residuals.
+        response: The equilibrium there.
+        measurement: The markers that were believed.
+        exact: Whether the equilibrium was found to the last digit, and by the finest discretisation.
+        coarser: The fit by a coarser discretisation, whose difference estimates the error of this one.
+    """
+
+    model: ResponseModel
+    estimate: Estimate
+    response: Response
+    measurement: Measurement
+    exact: bool
+    coarser: "Fit | None" = None
+
+    @property
+    def law(self) -> LawName:
+        """The law."""
+        return self.model.unknowns.problem.material.law
+
+    @property
+    def log_evidence(self) -> float:
+        """Logarithm of the evidence, up to a constant that all laws share."""
+        found = self.estimate
+        a, r = found.sensitivities, found.residuals
+        _, volume = np.linalg.slogdet(a.T @ a + np.eye(a.shape[1]))
+        misfit = float(r @ r + found.z @ found.z)
+        return -len(r) * float(np.log(found.inflation)) - 0.5 * (misfit + float(volume))
+
+    @property
+    def standard_errors(self) -> FloatArray:
+        """Independent errors in the values, columns of shape (p, p), of one standard deviation each.
+
+        They are widened where Student's interval is wider than the normal one.
+        """
+        wider = self.estimate.quantile / float(norm.ppf((1 + LEVEL) / 2))
+        return np.asarray(
+            wider * self.estimate.slopes[:, None] * np.linalg.cholesky(self.estimate.covariance)
+        )
+
+    @property
+    def force(self) -> tuple[float, float]:
+        """Size of the indenter's force and its standard deviation, N/mm."""
+        unknowns, force = self.model.unknowns, self.response.hypothesis.force
+        size = float(np.linalg.norm(force))
+        along = force / size if size else unknowns.directions[0]
+        return size, float(np.linalg.norm((unknowns.force_slopes() @ along) @ self.standard_errors))
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """The fits of all laws to one measurement.
+
+    Attributes:
+        fits: The most probable law first.
+        probabilities: Of the laws, shape (number of fits,).
+        doubtful: Markers that contradict the others and were not used: number among those seen, and their
+            computed minus their observed displacement, shape (2,), mm.
+    """
+
+    fits: Sequence[Fit]
+    probabilities: FloatArray
+    doubtful: Mapping[int, FloatArray]
+
+    @classmethod
+    def ranked(cls, fits: Sequence[Fit], doubtful: Mapping[int, FloatArray]) -> "Identified":
+        """The fits, given in any order."""
+        ordered = sorted(fits, key=lambda fit: -fit.log_evidence)
+        logs = np.array([fit.log_evidence for fit in ordered])
+        weights = np.exp(logs - logs.max())
+        return cls(ordered, weights / weights.sum(), doubtful)
+
+    @property
+    def best(self) -> Fit:
+        """The fit of the most probable law."""
+        return self.fits[0]
+
+    def force(self) -> IdentifiedForce:
+        """The force and its place by the most probable law; the other laws widen the force's interval."""
+        size, _ = self.best.force
+        variance = 0.0
+        for fit, probability in zip(self.fits, self.probabilities, strict=True):
+            own, deviation = fit.force
+            variance += float(probability) * (deviation**2 + (own - size) ** 2)
+        half = float(norm.ppf((1 + LEVEL) / 2)) * float(np.sqrt(variance))
+        found = self.best.estimate
+        places = [
+            Estimated(float(value), float(low), float(high))
+            for parameter, value, (low, high) in zip(
+                found.parameters, found.values, found.intervals, strict=True
+            )
+            if parameter.name == "position"
+        ]
+        return IdentifiedForce(
+            Estimated(size, max(size - half, 0.0), size + half), places[0] if places else None
+        )
+
+    def solution(self, name: str, problem: Problem, stats: Mapping[str, float | int | str]) -> Solution:
+        """The solution by the most probable law, with deviations that the others widen.
+
+        Args:
+            name: The solver's name.
+            problem: As it was given, with its observations.
+            stats: Columns of the solution's `stats` beside those of the identification.
+        """
+        best = self.best
+        hypothesis = best.response.hypothesis
+        unstable = best.model.unstable(best.response)
+        missed, left_out = self._residuals()
+        field = IdentifiedField(
+            [
+                _member(fit, float(probability), problem)
+                for fit, probability in zip(self.fits, self.probabilities, strict=True)
+                if fit is best or probability >= PROBABLE
+            ]
+        )
+        sentence = self.sentence(missed)
+        return Solution(
+            solver=name,
+            problem=field.members[0].found.problem,
+            field=field,
+            energy=best.model.body.energy(best.response.state, hypothesis.lame, hypothesis.changes),
+            reaction=hypothesis.force,
+            status=Status(
+                best.estimate.converged and best.exact and not unstable,
+                f"{unstable_phrase(unstable)}; {sentence}" if unstable else sentence,
+            ),
+            stats={**stats, **self.stats(), "unstable_directions": unstable},
+            left_out=leave_one_out_displacements(problem, left_out),
+            uncertainty=Uncertainty(field.standard_deviation, field.von_mises_deviation),
+            identified=self.force(),
+        )
+
+    def _residuals(self) -> tuple[FloatArray, FloatArray]:
+        """Misfit of the markers that were believed, and left-out residuals of all that were seen, (m, 2), mm.
+
+        The first is computed minus observed; the second observed minus predicted without the marker, to first
+        order for those that were believed.
+        """
+        estimate, kept = self.best.estimate, self.best.measurement.kept
+        scale = estimate.inflation * self.best.measurement.noise
+        missed = (estimate.residuals * scale)[: 2 * len(kept)].reshape(-1, 2)
+        left_out = np.zeros((len(kept) + len(self.doubtful), 2))
+        for place, marker in enumerate(kept):
+            rows = np.array([2 * place, 2 * place + 1])
+            left_out[marker] = -estimate.residuals_without(rows) * scale[rows]
+        for marker, off in self.doubtful.items():
+            left_out[marker] = -off
+        return missed, left_out
+
+    def stats(self) -> dict[str, float | int | str]:
+        """All that was found, for tables: parameters, how well they are known, force and laws."""
+        found = self.best.estimate
+        numbers: dict[str, float | int | str] = {
+            "evaluations": found.evaluations,
+            "inflation": found.inflation,
+        }
+        columns = zip(
+            found.parameters, found.values, found.deviations, found.intervals, found.resolution, strict=True
+        )
+        for parameter, value, deviation, (low, high), resolution in columns:
+            numbers |= {
+                parameter.name: float(value),
+                f"{parameter.name}_deviation": float(deviation),
+                f"{parameter.name}_low": float(low),
+                f"{parameter.name}_high": float(high),
+                f"{parameter.name}_resolution": float(resolution),
+            }
+        numbers |= {f"singular_value_{n}": float(s) for n, s in enumerate(found.singular_values, 1)}
+        size, low, high = self.force().size
+        numbers |= {
+            "condition": found.condition,
+            "law": self.best.law,
+            "force": size,
+            "force_low": low,
+            "force_high": high,
+        }
+        for fit, probability in zip(self.fits, self.probabilities, strict=True):
+            numbers |= {
+                f"probability {fit.law}": float(probability),
+                f"log_evidence {fit.law}": fit.log_evidence,
+            }
+        return numbers | {"doubtful_markers": len(self.doubtful)}
+
+    def sentence(self, missed: FloatArray) -> str:
+        """Force, place and law, goodness of fit, doubtful markers, and parameters that are not determined.
+
+        Args:
+            missed: Displacements of the markers that were believed, computed minus observed, (m, 2), mm.
+        """
+        found, parts = self.best.estimate, []
+        if not found.converged:
+            parts.append("the minimum was not found: take fewer parameters or a smaller prior")
+        elif not self.best.exact:
+            parts.append(
+                "the equilibrium was not found to the last digit, or not by the finest discretisation: the "
+                "field is that of the search; take another mesh or fewer parameters"
+            )
+        size, low, high = self.force().size
+        parts.append(f"force {size:.4g} ({low:.4g} to {high:.4g}) N/mm, intervals of {LEVEL:.0%}")
+        columns = zip(found.parameters, found.values, found.intervals, strict=True)
+        parts.append(
+            ", ".join(
+                f"{u.name} {value:.4g} ({low:.4g} to {high:.4g}) {u.unit}".rstrip()
+                for u, value, (low, high) in columns
+            )
+        )
+        if len(self.fits) > 1:
+            shares = zip(self.fits, self.probabilities, strict=True)
+            parts.append("law " + ", ".join(f"{fit.law} {share:.1%}" for fit, share in shares) + " probable")
+        for number, off in self.doubtful.items():
+            far = np.linalg.norm(off)
+            parts.append(
+                f"MARKER {number + 1} of those seen CONTRADICTS the others by {far:.2g} mm: not used"
+            )
+        parts.append(f"markers missed by {np.sqrt((missed**2).mean()):.2g} mm (root mean square)")
+        if found.inflation > 1:
+            parts.append(
+                f"{found.inflation:.3g} times their standard deviations: no values of these parameters "
+                "explain them, so the model is wrong elsewhere and they make up for that; intervals are as "
+                "much wider"
+            )
+        if unresolved := [
+            f"{u.name} ({share:.0%})"
+            for u, share, known in zip(found.parameters, found.resolution, found.resolved, strict=True)
+            if not known
+        ]:
+            parts.append(f"NOT DETERMINED by the markers, but held by its prior: {', '.join(unresolved)}")
+        if len(found.parameters) > 1:
+            parts.append(f"least is known of {_least_determined(found)}")
+        return "; ".join(parts)
+
+
+def _least_determined(found: Estimate) -> str:
+    """The least determined combination of parameters, in standard deviations of their priors."""
+    direction = found.least_determined
+    direction = direction * np.sign(direction[np.abs(direction).argmax()])
+    order = [i for i in np.argsort(-np.abs(direction)) if abs(direction[i]) >= 0.2]
+    text = " ".join(f"{direction[i]:+.2f} {found.parameters[i].name}" for i in order)
+    return f"{text.removeprefix('+')}, singular value {found.singular_values[-1]:.2g}"
+
+
+def _member(fit: Fit, probability: float, problem: Problem) -> Member:
+    """The finger of a fit and its neighbours by a step of each independent standard error."""
+    return Member(
+        probability,
+        _snapshot(fit, problem),
+        [_snapshot(fit, problem, error) for error in (STEP * fit.standard_errors).T],
+        fit.response,
+        fit.model,
+        None if fit.coarser is None else _snapshot(fit.coarser, problem),
+    )
+
+
+def _snapshot(fit: Fit, problem: Problem, error: FloatArray | float = 0.0) -> Snapshot:
+    """The finger with values that differ from those of a fit by (p,), to first order."""
+    unknowns = fit.model.unknowns
+    there = fit.model.extrapolated(fit.response, fit.response.values + error)
+    return Snapshot(
+        problem=replace(problem, material=unknowns.material(there.values)),
+        walls=unknowns.motion,
+        changes=there.hypothesis.changes,
+        clamp=there.motion,
+        body=fit.model.body,
+        state=there.state,
+    )

@@ -1,0 +1,326 @@
+"""Contact, walls and law from the markers: the settings, the search, and doubtful markers.
+
+Source: R. D. Cook, S. Weisberg, Residuals and Influence in Regression, Chapman and Hall 1982, for the misfit
+without an observation.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import ClassVar, Literal, get_args
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.observations import Observations
+from solvers.assimilation.estimation import COST_CHANGE, MAX_ROUNDS, MAX_STEPS, Prediction, estimate
+from solvers.elasticity import LawName
+from solvers.identification.body import Body
+from solvers.identification.model import EXACT, MarkerModel, Measurement, Response, ResponseModel
+from solvers.identification.result import Fit, Identified
+from solvers.identification.transfer import transferred
+from solvers.identification.unknowns import DEFAULT, Unknowns, parse_unknowns
+from solvers.problem import Problem
+from solvers.solution import Solution
+from solvers.solver import Progress, silent
+
+LAWS: tuple[LawName, ...] = ("neo-hookean", "st-venant-kirchhoff")
+"""The laws of finite strain to choose from."""
+
+LawChoice = Literal["evidence", "given"]
+
+QUICK = 4
+"""Steps in which a law is judged first."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class IdentifyingSolver:
+    """A solver that identifies contact, walls and law.
+
+    Attributes:
+        parameters: Names of the unknowns, with commas between them, of `solvers.identification.unknowns`;
+            empty for all but `young`.
+        law: "evidence": the law with the largest evidence of those of finite strain; "given": the problem's.
+        prior: Factor of the parameters' prior standard deviations.
+        reaction: Measured force of the indenter on the finger along y per depth, N/mm; None if there is none.
+        reaction_error: Standard deviation of the reaction over its size.
+        marker_radius: Radius of the discs over which the displacement is averaged, mm; None: that of the
+            observations; zero: the markers' centres alone.
+    """
+
+    parameters: str = ""
+    law: LawChoice = "evidence"
+    prior: float = 1.0
+    reaction: float | None = None
+    reaction_error: float = 0.02
+    marker_radius: float | None = None
+    name: ClassVar[str]
+    assimilates: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        if self.law not in get_args(LawChoice):
+            raise UserError(f"{self.name}: law must be {' or '.join(get_args(LawChoice))}, got {self.law!r}")
+        if "young" in self.unknowns and self.reaction is None:
+            raise UserError(
+                f"{self.name} cannot find young from displacements alone: forces and stresses are in "
+                "proportion to it; give reaction=, N/mm"
+            )
+        for setting in ("prior", "reaction_error"):
+            if not (np.isfinite(value := getattr(self, setting)) and value > 0):
+                raise UserError(f"{self.name}: {setting} must be positive, got {value}")
+        if self.reaction is not None and not (np.isfinite(self.reaction) and self.reaction):
+            raise UserError(
+                f"{self.name}: the reaction must be a force other than zero, N/mm, got {self.reaction}"
+            )
+        if self.marker_radius is not None and not 0 <= self.marker_radius < np.inf:
+            raise UserError(f"{self.name}: marker_radius must be zero or more, got {self.marker_radius}")
+
+    def settings(self) -> dict[str, object]:
+        """Unknowns, law, priors and discretisation."""
+        return asdict(self)
+
+    def transferred(self, solution: Solution, problem: Problem, other: Problem) -> Solution:
+        """The solution at another load with the finger of a solution; see `transfer`."""
+        return transferred(solution, problem, other)
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """Names of the unknowns."""
+        return parse_unknowns(self.name, self.parameters) if self.parameters else DEFAULT
+
+
+class Identifier:
+    """Finds the unknowns of one finger for any observations; each search starts from the last result.
+
+    Args:
+        settings: Unknowns, priors, radius of the markers and reaction.
+        problem: The finger; of its load only the drawn contact counts, of its law nothing unless it is given.
+        body: Makes the discretised finger of a problem, whose law is set, and the unknowns.
+        laws: The laws to choose from; None: those of the settings.
+        cost_change: Relative change of the cost below which a search has converged.
+    """
+
+    def __init__(
+        self,
+        settings: IdentifyingSolver,
+        problem: Problem,
+        body: Callable[[Unknowns], Body],
+        *,
+        laws: Sequence[LawName] | None = None,
+        cost_change: float = COST_CHANGE,
+    ) -> None:
+        self._settings, self._mesh, self._cost_change = settings, problem.mesh, cost_change
+        self._progress: Progress = silent
+        self.models: dict[LawName, ResponseModel] = {}
+        for law in laws or (LAWS if settings.law == "evidence" else (problem.material.law,)):
+            own = replace(problem, material=problem.material.model_copy(update={"law": law}))
+            unknowns = Unknowns.of(own, settings.unknowns)
+            self.models[law] = ResponseModel(body(unknowns), unknowns)
+        first = next(iter(self.models.values()))
+        self._names = first.unknowns.names
+        self.parameters = first.unknowns.parameters(first.flexibility(), settings.prior)
+        self._known: dict[LawName, Fit] = {}
+
+    def measurement(self, observations: Observations) -> Measurement:
+        """The markers that were seen and, if the settings have one, the reaction."""
+        chosen, reaction = self._settings, None
+        if chosen.reaction is not None:
+            reaction = chosen.reaction, chosen.reaction_error * abs(chosen.reaction)
+        return Measurement.of(self._mesh, observations, chosen.marker_radius, reaction)
+
+    def identify(self, observations: Observations, progress: Progress = silent) -> Identified:
+        """The unknowns under every law, and the laws' probabilities.
+
+        Args:
+            observations: The markers.
+            progress: Called with the values that are tried.
+
+        Raises:
+            UserError: If there are no markers, or the finger has no equilibrium near rest.
+        """
+        self._progress = progress
+        rough = self._rough(self.measurement(observations))
+        best = max(rough, key=lambda fit: fit.log_evidence)
+        fit, doubtful = self._believed(self._settled(best))
+        fits = [fit]
+        for other in rough:
+            if other.law == fit.law:
+                continue
+            if doubtful:
+                other = self._fit(other.law, fit.measurement, fit, rounds=1, steps=QUICK)
+            if other.log_evidence > fit.log_evidence - 15.0:  # a law that is less probable is not fitted on
+                other = self._fit(other.law, fit.measurement, other)
+            if fit.estimate.inflation > 1:
+                again = self._fit(other.law, fit.measurement, fit)
+                other = max(other, again, key=lambda each: each.log_evidence)
+            fits.append(other)
+        for each in fits:
+            self._known.setdefault(each.law, each)
+        return Identified.ranked(fits, doubtful)
+
+    def start_from(self, fit: Fit) -> None:
+        """Start the next search from a fit, whose response has a state of this discretisation."""
+        self._known[fit.law] = fit
+
+    def refined(
+        self, fit: Fit, model: ResponseModel, state: FloatArray, observations: Observations
+    ) -> Fit | None:
+        """A fit by a finer discretisation: its equilibrium, and from there the unknowns to first order.
+
+        Args:
+            fit: By a coarser one.
+            model: The finger, of the same law, discretised more finely.
+            state: Of the finer discretisation, near equilibrium for the fit's values.
+            observations: Those of the fit, with the standard deviations for the finer discretisation.
+
+        Returns:
+            None if no equilibrium is found there, for which there is no other way than many iterations.
+        """
+        model.restart(carried(fit.response, state))
+        response = model.response(fit.response.values, iterations=20, halvings=0)
+        if response is None:
+            return None
+        about = fit._replace(model=model, response=response, coarser=None)
+        measurement = self.measurement(observations).only(fit.measurement.kept)
+        return self._shifted(about, measurement)._replace(coarser=fit)
+
+    def updated(self, found: Identified, observations: Observations) -> Identified:
+        """The unknowns for other observations, to first order about fits: no equilibrium is solved.
+
+        Args:
+            found: The fits.
+            observations: Near those of the fits, in noise or in which markers were seen.
+        """
+        measurement = self.measurement(observations)
+        return Identified.ranked([self._shifted(fit, measurement) for fit in found.fits], {})
+
+    def _shifted(self, fit: Fit, measurement: Measurement) -> Fit:
+        """The fit to a measurement, to first order about another fit."""
+        about = fit.response
+        predicted, slopes = MarkerModel.of(fit.model, measurement).predicted(about)
+        found = estimate(
+            lambda values: (predicted + slopes @ (values - about.values), slopes),
+            measurement.observed,
+            measurement.noise,
+            self.parameters,
+            fit.estimate.z,
+        )
+        response = fit.model.extrapolated(about, found.values)
+        coarser = None if fit.coarser is None else self._shifted(fit.coarser, measurement)
+        return Fit(fit.model, found, response, measurement, fit.exact, coarser)
+
+    def _rough(self, measurement: Measurement) -> list[Fit]:
+        """A fit of every law with φ = 1, but for the first one in a few steps from that."""
+        law, *others = self.models
+        fits = [self._fit(law, measurement, self._known.get(law), rounds=1)]
+        for law in others:
+            near = self._known.get(law, fits[0])
+            fits.append(self._fit(law, measurement, near, rounds=1, steps=QUICK))
+        return fits
+
+    def _settled(self, rough: Fit) -> Fit:
+        """The fit of a law; where it explains little, the best of several from other places of contact."""
+        if rough.estimate.converged:
+            return rough
+        best = self._fit(rough.law, rough.measurement, rough)
+        if best.estimate.inflation < 10 or "position" not in self._names or self._known:
+            return best
+        for away in (-2.0, 2.0):  # standard deviations of the prior
+            start = np.zeros(len(self._names))
+            start[self._names.index("position")] = away
+            other = self._fit(rough.law, rough.measurement, None, start)
+            best = max(best, other, key=lambda fit: fit.log_evidence)
+        return best
+
+    def _fit(
+        self,
+        law: LawName,
+        measurement: Measurement,
+        near: Fit | None,
+        start: FloatArray | None = None,
+        *,
+        rounds: int = MAX_ROUNDS,
+        steps: int = MAX_STEPS,
+    ) -> Fit:
+        """The fit of a law that starts from another fit, or else from standardised values (p,)."""
+        model = self.models[law]
+        markers = MarkerModel.of(model, measurement)
+        model.restart(None if near is None else near.response)
+
+        def predict(values: FloatArray) -> Prediction | None:
+            force = np.linalg.norm(model.unknowns.hypothesis(values).force)
+            self._progress(0.5, f"{law}: force {force:.4g} N/mm")
+            found = model.response(values)
+            if found is None and model.evaluations == first:  # the start is too far from that of another law
+                model.restart(None)
+                found = model.response(values)
+            return None if found is None else markers.predicted(found)
+
+        if near is not None:
+            start = near.estimate.z
+        elif start is None:
+            start = self._pressed(model, markers)
+        first = model.evaluations + 1
+        found = estimate(
+            predict,
+            measurement.observed,
+            measurement.noise,
+            self.parameters,
+            start,
+            rounds=rounds,
+            steps=steps,
+            cost_change=self._cost_change,
+        )
+        exact = model.response(found.values, EXACT)
+        response = exact or model.response(found.values)
+        if response is None:
+            raise UserError(
+                f"no equilibrium of the {law} law was found near the markers; take a smaller prior"
+            )
+        return Fit(model, found, response, measurement, exact is not None)
+
+    def _pressed(self, model: ResponseModel, markers: MarkerModel) -> FloatArray:
+        """Standardised values with the normal force that a linear finger would need, the rest as expected."""
+        z = np.zeros(len(self._names))
+        drawn = np.array([float(parameter.value(0.0)) for parameter in self.parameters])
+        at_rest = model.response(drawn)
+        if at_rest is not None:
+            which, noise = self._names.index("normal_force"), markers.measurement.noise
+            slope = markers.predicted(at_rest)[1][:, which] / noise
+            force = float(slope @ (markers.measurement.observed / noise) / (slope @ slope))
+            z[which] = force / self.parameters[which].scale
+        return z
+
+    def _believed(self, fit: Fit) -> tuple[Fit, dict[int, FloatArray]]:
+        """The fit without markers that contradict the others, and by how much they are off, mm.
+
+        To first order, the misfit without such a marker falls by more than 30 squared standard deviations:
+        noise alone drops it by more once in three million markers (χ² of two degrees of freedom). φ has to
+        fall by half as well, so that a model that is wrong everywhere loses no marker.
+        """
+        doubtful: dict[int, FloatArray] = {}
+        most = len(fit.measurement.kept) // 3
+        while fit.estimate.inflation > 1 and len(doubtful) < most:
+            found, measurement = fit.estimate, fit.measurement
+            pairs = np.arange(2 * len(measurement.kept)).reshape(-1, 2)
+            drops = [
+                float(found.residuals[rows] @ found.residuals_without(rows)) * found.inflation**2
+                for rows in pairs
+            ]
+            worst = int(np.argmax(drops))
+            if drops[worst] < 30:
+                break
+            number = int(measurement.kept[worst])
+            without = self._fit(fit.law, measurement.only(np.delete(measurement.kept, worst)), fit)
+            if 2 * without.estimate.inflation > found.inflation:
+                break
+            computed, _ = MarkerModel.of(without.model, measurement).predicted(without.response)
+            doubtful[number] = (computed - measurement.observed)[pairs[worst]]
+            fit = without
+        return fit, doubtful
+
+
+def carried(response: Response, state: FloatArray) -> Response:
+    """A response with the state of another discretisation, from which a search can start."""
+    slopes = np.zeros((len(response.values), *state.shape))
+    return replace(response, state=state, slopes=slopes)

@@ -1,0 +1,196 @@
+"""The unknowns of the inverse problem, their priors, and the finger and contact that they describe."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import log
+from typing import NamedTuple
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.mesh.wall_motion import WallMotion
+from solvers.assimilation.estimation import Parameter
+from solvers.elasticity import Lame, lame_derivatives
+from solvers.identification.boundary import FrontTraction
+from solvers.problem import Material, Problem, contact_ends
+
+CONTACT = ("position", "width", "normal_force", "tangential_force", "eccentricity")
+WALLS = ("front_thickness", "back_thickness", "rib_thickness", "base_thickness")
+DEFAULT = (*CONTACT, *WALLS, "base_compliance", "poisson")
+NAMES = (*DEFAULT, "young")
+"""Everything that can be found; the table of docs/how-to/force.md describes each."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A finger and a contact.
+
+    Attributes:
+        position: Abscissa of the contact's middle, mm.
+        width: Its length along x, mm.
+        force: Of the indenter per depth, shape (2,), N/mm.
+        couple: Normal force times its eccentricity, shape (2,), N: the dipole of the traction.
+        lame: Lamé constants, MPa.
+        changes: Of the walls' thickness, shape (k,), mm.
+        softness: Compliance of the base over Young's modulus, mm/MPa.
+    """
+
+    position: float
+    width: float
+    force: FloatArray
+    couple: FloatArray
+    lame: Lame
+    changes: FloatArray
+    softness: float
+
+
+class HypothesisSlopes(NamedTuple):
+    """Derivatives of a hypothesis by the p unknowns, each of shape (p,) before that of the quantity.
+
+    `moduli`, shape (p, 2), has those of λ and μ.
+    """
+
+    position: FloatArray
+    width: FloatArray
+    force: FloatArray
+    couple: FloatArray
+    moduli: FloatArray
+    changes: FloatArray
+    softness: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """The p unknowns of a problem, in order, and the hypothesis that their values describe.
+
+    Attributes:
+        names: Some of `NAMES`.
+        problem: Its values are those of all that is not unknown; without a force.
+        traction: The front face.
+        motion: The walls.
+    """
+
+    names: tuple[str, ...]
+    problem: Problem
+    traction: FrontTraction
+    motion: WallMotion
+
+    @classmethod
+    def of(cls, problem: Problem, names: Sequence[str]) -> "Unknowns":
+        """Those that the finger has; one without cavities has no walls to be found."""
+        traction, motion = FrontTraction.of(problem.mesh), WallMotion.of(problem.mesh)
+        kept = tuple(name for name in names if name not in WALLS or name in motion.names)
+        return cls(kept, problem, traction, motion)
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """Middle and length of the drawn contact, mm."""
+        left, right = contact_ends(self.problem)
+        return 0.5 * (left + right), max(right - left, self.traction.longest)
+
+    @property
+    def directions(self) -> FloatArray:
+        """Unit vectors into the front face and along it where the contact is drawn, shape (2, 2)."""
+        tx, ty = self.traction.tangent(self.place[0])
+        return np.array([[ty, -tx], [tx, ty]])
+
+    def parameters(self, flexibility: float, prior: float = 1.0) -> list[Parameter]:
+        """The unknowns with their priors.
+
+        Args:
+            flexibility: Displacement of the drawn contact into the finger under a unit force, mm per N/mm.
+            prior: Factor of the standard deviations of the priors.
+        """
+        front, material = self.traction, self.problem.material
+        middle, width = self.place
+        # The force that would press the contact in by half of the front's extent.
+        size = 0.5 * front.extent / flexibility
+        # A contact narrower than half of the longest edge has too few points of quadrature.
+        narrowest = 0.5 * front.longest
+        known = [
+            Parameter("position", "mm", middle, 0.05 * front.extent * prior, *front.ends),
+            Parameter("width", "mm", width, log(2.5) * prior, narrowest, logarithmic=True),
+            Parameter("normal_force", "N/mm", 0.0, size * prior),
+            Parameter("tangential_force", "N/mm", 0.0, size * prior),
+            Parameter("eccentricity", "mm", 0.0, 0.5 * width * prior),
+            Parameter("base_compliance", "mm", 0.02, log(10) * prior, logarithmic=True),
+            Parameter("poisson", "", material.poisson, 0.03 * prior, 0.0, 0.49),
+            Parameter("young", "MPa", material.young, 0.3 * prior, logarithmic=True),
+        ]
+        for name, drawn in zip(self.motion.names, self.motion.thickness.tolist(), strict=True):
+            # A printed wall is within 5 %; of the wall at the base the clamp may hold more or less.
+            share = 0.25 if name == "base_thickness" else 0.05
+            known.append(Parameter(name, "mm", drawn, share * drawn * prior, 0.5 * drawn, 2 * drawn))
+        by_name = {parameter.name: parameter for parameter in known}
+        return [by_name[name] for name in self.names]
+
+    def hypothesis(self, values: FloatArray) -> Hypothesis:
+        """The finger and the contact of values, shape (p,)."""
+        named, material = self._named(values), self.material(values)
+        middle, width = self.place
+        sizes = [named.get(name, 0.0) for name in ("normal_force", "tangential_force")]
+        return Hypothesis(
+            position=named.get("position", middle),
+            width=named.get("width", width),
+            force=np.array(sizes) @ self.directions,
+            couple=named.get("eccentricity", 0.0) * sizes[0] * self.directions[0],
+            lame=material.lame,
+            changes=self.motion.changes(named),
+            softness=named.get("base_compliance", 0.0) / material.young,
+        )
+
+    def slopes(self, values: FloatArray) -> HypothesisSlopes:
+        """Derivatives of the hypothesis of values, shape (p,)."""
+        named, material = self._named(values), self.material(values)
+        by = {name: np.zeros(len(self.names)) for name in (*NAMES, *self.motion.names)}
+        by |= dict(zip(self.names, np.eye(len(self.names)), strict=True))
+        young, (λ, μ, _) = material.young, material.lame
+        by_poisson = lame_derivatives(young, material.poisson, material.plane)
+        normal, eccentricity = named.get("normal_force", 0.0), named.get("eccentricity", 0.0)
+        compliance = named.get("base_compliance", 0.0)
+        return HypothesisSlopes(
+            position=by["position"],
+            width=by["width"],
+            force=self.force_slopes(),
+            couple=np.outer(
+                normal * by["eccentricity"] + eccentricity * by["normal_force"], self.directions[0]
+            ),
+            moduli=np.outer(by["young"], (λ / young, μ / young)) + np.outer(by["poisson"], by_poisson[:2]),
+            changes=np.array([by[name] for name in self.motion.names]).reshape(-1, len(self.names)).T,
+            softness=by["base_compliance"] / young - compliance / young**2 * by["young"],
+        )
+
+    def force_slopes(self) -> FloatArray:
+        """Derivatives of the force by the unknowns, which do not depend on their values, shape (p, 2)."""
+        found = np.zeros((len(self.names), 2))
+        for name, direction in zip(("normal_force", "tangential_force"), self.directions, strict=True):
+            if name in self.names:
+                found[self.names.index(name)] = direction
+        return found
+
+    def material(self, values: FloatArray) -> Material:
+        """The material of values, shape (p,)."""
+        named = self._named(values)
+        changed = {name: value for name, value in named.items() if name in ("young", "poisson")}
+        return self.problem.material.model_copy(update=changed)
+
+    def _named(self, values: FloatArray) -> dict[str, float]:
+        return dict(zip(self.names, map(float, values), strict=True))
+
+
+def parse_unknowns(solver: str, text: str) -> tuple[str, ...]:
+    """The names in a text such as `position,normal_force`.
+
+    Raises:
+        UserError: If one is not known or is there twice, or there is no force among them.
+    """
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    for name in names:
+        if name not in NAMES:
+            raise UserError(f"{solver} has no parameter {name!r}; it has {', '.join(NAMES)}")
+        if names.count(name) > 1:
+            raise UserError(f"{solver}: the parameter {name!r} is there twice")
+    if "normal_force" not in names:
+        raise UserError(f"{solver} finds a force: give normal_force among the parameters")
+    return names
