@@ -17,13 +17,15 @@ GROUP = "pinnray.solvers"
 
 PRESETS = {
     "pinn-std": {
-        "fast": "solvers.pinn.finite_basis.standard:PinnStdSolver",
+        "fast": "solvers.pinn.finite_basis.presets:PinnStdSolver",
+        "local": "solvers.pinn.finite_basis.presets:PinnLocalSolver",
         "paper": "solvers.pinn.paper.solver:PaperPinnSolver",
         "trained": "solvers.pinn.trained.solver:TrainedPinnSolver",
     },
     "pinn-asm": {
-        "fast": "solvers.pinn.assimilating:PinnAsmSolver",
-        "paper": "solvers.pinn.assimilating:PaperPinnAsmSolver",
+        "fast": "solvers.pinn.finite_basis.presets:PinnAsmSolver",
+        "local": "solvers.pinn.finite_basis.presets:PinnLocalAsmSolver",
+        "paper": "solvers.pinn.paper.solver:PaperPinnAsmSolver",
         "trained": "solvers.pinn.trained.solver:TrainedPinnAsmSolver",
     },
 }
@@ -31,6 +33,9 @@ PRESETS = {
 
 RENAMED = {"ridges": "neurons", "slope": "steepness"}
 """Former names of settings, and their present names."""
+
+FORMER = {"pinn-local": "pinn-std", "pinn-local-asm": "pinn-asm"}
+"""Former names of the preset `local`, and the solvers that have it."""
 
 BUILT_IN = {
     "fem": "solvers.fem.linear:FemSolver",
@@ -41,10 +46,8 @@ BUILT_IN = {
     "gp": "solvers.statistics.gaussian_process:GaussianProcessSolver",
     "statfem": "solvers.statistics.statistical_fem:StatFemSolver",
     "pinn-std": PRESETS["pinn-std"]["fast"],
-    "pinn-local": "solvers.pinn.finite_basis.local:PinnLocalSolver",
     "pinn-asm": PRESETS["pinn-asm"]["fast"],
     "pinn-id": "solvers.pinn.identification.solver:PinnIdSolver",
-    "pinn-local-asm": "solvers.pinn.assimilating:PinnLocalAsmSolver",
 }
 
 
@@ -66,6 +69,9 @@ def make_solver(name: str, **settings: Any) -> Solver:
         UserError: If there is no such solver or preset, or a package that offers it cannot be loaded.
         MissingLibraryError: If a library that it needs is missing.
     """
+    if name in FORMER:
+        warnings.warn(f"{name} is now the preset local of {FORMER[name]}", stacklevel=1)
+        name, settings = FORMER[name], {"preset": "local", **settings}
     if name in BUILT_IN:
         place = BUILT_IN[name]
         if name in PRESETS and "preset" in settings:

@@ -5,8 +5,9 @@ import sys
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
+from math import inf
 from pathlib import Path
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import Any, ClassVar, Literal, Protocol, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -93,6 +94,37 @@ class Solver(Protocol):
     def settings(self) -> dict[str, object]:
         """Every setting that changes the result, as JSON-ready values; recorded with the result."""
         ...
+
+
+class FieldSettings:
+    """Base of our solvers: frozen dataclasses whose fields are their settings."""
+
+    name: ClassVar[str]
+    preset: ClassVar[str | None] = None
+    """Of a solver that is one preset of several."""
+
+    def settings(self) -> dict[str, object]:
+        """The preset and the fields; see `Solver`."""
+        names = [entry.name for entry in fields(cast(Any, self)) if entry.init]
+        preset = {} if self.preset is None else {"preset": self.preset}
+        return preset | {name: getattr(self, name) for name in names}
+
+    def check_positive(self, *names: str) -> None:
+        """Raise a `UserError` unless settings are above zero."""
+        for name in names:
+            if not (value := getattr(self, name)) > 0:
+                raise UserError(f"{self.name}: {name} must be positive, got {value}")
+
+    def check_not_negative(self, *names: str) -> None:
+        """Raise a `UserError` unless settings are zero or more, or None."""
+        for name in names:
+            if (value := getattr(self, name)) is not None and not 0 <= value < inf:
+                raise UserError(f"{self.name}: {name} must be zero or more, got {value}")
+
+    def check_degree(self, degree: int) -> None:
+        """Raise a `UserError` unless there are elements of a degree."""
+        if degree not in (1, 2):
+            raise UserError(f"{self.name} has elements of degree 1 and 2, not {degree}")
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,8 @@ from tests.geometry.test_mesher import random_design
 
 DATA = DOCS.parent / "tests" / "data"
 DESIGNS = 12
-NETWORKS = ("pinn-std", "pinn-local")
+NETWORKS = {"pinn-std": {}, "pinn-std, preset local": {"preset": "local"}}
+"""Settings by name."""
 HEADER = (
     *("finger", "solver", "time, s", "L2, %", "von Mises, %", "markers, mm", "force, %", "energy, %"),
     *("own estimate, %", "converged"),
@@ -57,12 +58,12 @@ class Row(NamedTuple):
 
 def pinn() -> Table:
     """Spacings and seeds."""
-    spacings = {"pinn-std": (1.6, 1.1, 0.8), "pinn-local": (1.0, 0.7, 0.5)}
+    spacings = {"pinn-std": (1.6, 1.1, 0.8), "pinn-std, preset local": (1.0, 0.7, 0.5)}
     named = {
         f"{kind}, spacing {spacing}": [
-            make_solver(kind, wall_spacing=spacing, seed=seed) for seed in range(3)
+            make_solver("pinn-std", **own, wall_spacing=spacing, seed=seed) for seed in range(3)
         ]
-        for kind in NETWORKS
+        for kind, own in NETWORKS.items()
         for spacing in spacings[kind]
     }
     compared = Compared(Design(), MeshSettings(corner_size=0.002))
@@ -92,8 +93,9 @@ def contact() -> Table:
     for radius in (5.0, 10.0):
         fine = MeshSettings(corner_size=0.02, contact_size=0.1)
         compared = Compared(Design(), fine, "neo-hookean", kind="cylinder", radius=radius)
-        for name in ("fem-nonlinear", *NETWORKS):
-            rows.append((f"default, radius {radius:g} mm", name, *cells([compared.row(make_solver(name))])))
+        solvers = {"fem-nonlinear": make_solver("fem-nonlinear")} | _networks()
+        for name, solver in solvers.items():
+            rows.append((f"default, radius {radius:g} mm", name, *cells([compared.row(solver)])))
     return table("A rigid cylinder on the default finger", rows)
 
 
@@ -117,8 +119,12 @@ def default_settings(fingers: Mapping[str, Finger]) -> Iterator[Sequence[str]]:
     """Rows of `fem` and the networks on fingers."""
     for name, finger in fingers.items():
         compared = Compared(finger)
-        for solver in ("fem", *NETWORKS):
-            yield name, solver, *cells([compared.row(make_solver(solver))])
+        for label, solver in ({"fem": make_solver("fem")} | _networks()).items():
+            yield name, label, *cells([compared.row(solver)])
+
+
+def _networks() -> dict[str, Solver]:
+    return {name: make_solver("pinn-std", **own) for name, own in NETWORKS.items()}
 
 
 class Compared:

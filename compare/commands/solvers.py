@@ -4,6 +4,7 @@ from rich.console import Console
 
 PRESET_MEANINGS = {
     "fast": "random hidden weights, output layer solved exactly",
+    "local": "the same with small overlapping windows in place of gates",
     "paper": "the paper's training",
     "trained": "the paper's networks, all weights trained by Gauss-Newton steps",
 }
@@ -12,9 +13,9 @@ PRESET_MEANINGS = {
 def solvers() -> int:
     """List the solvers with their material laws, loads, presets and settings.
 
-    The networks pinn-std, pinn-local, pinn-asm and pinn-local-asm have random hidden weights and an output
-    layer that is solved exactly. The preset paper of pinn-std and pinn-asm is the paper's training; the
-    preset trained trains every weight of the paper's networks by Gauss-Newton steps.
+    The networks pinn-std and pinn-asm have random hidden weights and an output layer that is solved exactly,
+    in the preset fast with gates and in the preset local with windows. The preset paper is the paper's
+    training; the preset trained trains every weight of the paper's networks by Gauss-Newton steps.
     """
     from rich.table import Table
 

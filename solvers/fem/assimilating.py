@@ -5,7 +5,7 @@ This module has the linear law; `assimilated` has finite strain.
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -26,7 +26,7 @@ from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
-from solvers.solver import Family, Progress, check_problem, silent
+from solvers.solver import Family, FieldSettings, Progress, check_problem, silent
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +77,7 @@ class MarkerCompliance:
 
 
 @dataclass(frozen=True)
-class FemAsmSolver:
+class FemAsmSolver(FieldSettings):
     """`fem` with the markers' misfit: one factorisation, and one solve for each component of a marker.
 
     For a law of finite strain it is `fem-nonlinear` with the misfit, solved again without each marker.
@@ -102,13 +102,8 @@ class FemAsmSolver:
     assimilates: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        if self.degree not in (1, 2):
-            raise UserError(f"fem-asm has elements of degree 1 and 2, not {self.degree}")
+        self.check_degree(self.degree)
         _ = self.weighting
-
-    def settings(self) -> dict[str, object]:
-        """The element degree and the markers' weighting."""
-        return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve for the minimiser; see `Solver`. Without markers it is that of `fem` or `fem-nonlinear`.

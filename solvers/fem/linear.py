@@ -1,7 +1,7 @@
 """`fem`: linear elasticity with DOLFINx, the reference of every comparison."""
 
 import time
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar, get_args
 
@@ -13,11 +13,11 @@ from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Problem
 from solvers.solution import ErrorEstimate, Solution, Status
-from solvers.solver import Family, Progress, check_problem, silent
+from solvers.solver import Family, FieldSettings, Progress, check_problem, silent
 
 
 @dataclass(frozen=True)
-class FemSolver:
+class FemSolver(FieldSettings):
     """Lagrange elements of degree 1 or 2 on exactly the shared mesh.
 
     A `mean` or `point` load is one linear functional b_k per prescribed component: K x_k = b_k is solved once
@@ -40,15 +40,10 @@ class FemSolver:
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
 
     def __post_init__(self) -> None:
-        if self.degree not in (1, 2):
-            raise UserError(f"fem has elements of degree 1 and 2, not {self.degree}")
+        self.check_degree(self.degree)
         if self.linear_solver not in get_args(LinearSolver):
             known = ", ".join(get_args(LinearSolver))
             raise UserError(f"fem has the linear solvers {known}, not {self.linear_solver!r}")
-
-    def settings(self) -> dict[str, object]:
-        """The element degree, whether the error is estimated, and the linear solver."""
-        return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve the linear problem; see `Solver`."""

@@ -9,7 +9,7 @@ Source: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learn
 import time
 import warnings
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -29,7 +29,7 @@ from solvers.assimilation.misfit import (
 from solvers.energy_and_force import energy_and_force
 from solvers.problem import Problem
 from solvers.solution import Solution, Status, Uncertainty
-from solvers.solver import Family, Progress, UnsupportedProblemError, check_problem, silent
+from solvers.solver import Family, FieldSettings, Progress, UnsupportedProblemError, check_problem, silent
 from solvers.statistics.kernel_field import SMOOTHNESS, Kernel, KernelField
 
 MIN_MARKERS = 3
@@ -42,7 +42,7 @@ START_LENGTH, START_VARIANCE = 30.0, 10.0
 
 
 @dataclass(frozen=True)
-class GaussianProcessSolver:
+class GaussianProcessSolver(FieldSettings):
     """u and v as independent processes of mean zero with one of Matérn's kernels.
 
     Length and variance of each kernel maximise the marginal likelihood, also of the markers that remain when
@@ -60,10 +60,6 @@ class GaussianProcessSolver:
     laws: ClassVar[tuple[str, ...]] = ("linear",)
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
     assimilates: ClassVar[bool] = True
-
-    def settings(self) -> dict[str, object]:
-        """The condition at the base, and the kernel."""
-        return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Fit the processes to the problem's observations; see `Solver`.

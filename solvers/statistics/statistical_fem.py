@@ -22,7 +22,7 @@ secant from rest, the other is the tangent.
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -37,7 +37,7 @@ from solvers.fem.linear import FemSolver
 from solvers.lagrange import LagrangeField
 from solvers.problem import Problem
 from solvers.solution import Solution, Status, Uncertainty
-from solvers.solver import Family, Progress, check_problem, silent
+from solvers.solver import Family, FieldSettings, Progress, check_problem, silent
 from solvers.statistics.kernel_field import Kernel
 from solvers.statistics.statistical_posterior import Posterior, StatFemData, StatFemField
 
@@ -46,7 +46,7 @@ TANGENT_STEP = 0.1
 
 
 @dataclass(frozen=True)
-class StatFemSolver:
+class StatFemSolver(FieldSettings):
     """Finite elements with an uncertain load and a discrepancy, conditioned on the markers.
 
     Attributes:
@@ -65,16 +65,11 @@ class StatFemSolver:
     assimilates: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        if self.degree not in (1, 2):
-            raise UserError(f"statfem has elements of degree 1 and 2, not {self.degree}")
+        self.check_degree(self.degree)
         if not (np.isfinite(self.stroke_deviation) and self.stroke_deviation >= 0):
             raise UserError(
                 f"statfem: stroke_deviation must be zero or more, got {self.stroke_deviation} (mm)"
             )
-
-    def settings(self) -> dict[str, object]:
-        """The element degree, the spread of the load, and the kernel."""
-        return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Condition on the problem's observations; see `Solver`. Without any it is `fem`."""

@@ -230,7 +230,7 @@ BAD = [
     ("gridsearch --epochs 9 --solver-set pinn-std.epochs=8", "pinn-std.epochs is set twice"),
     ("gridsearch --preset fast", "--preset fast: the search is for the settings of the preset paper"),
     ("gridsearch --solver-set pinn-std.bc_weight=1", "is what is searched for; give its values with --bc-we"),
-    ("gridsearch --solver-set pinn-local.neurons=3", "'pinn-local', which is not among the solvers pinn-std"),
+    ("gridsearch --solver-set pinn-asm.neurons=3", "'pinn-asm', which is not among the solvers pinn-std"),
     ("gridsearch --load patch", "pinn-std takes the loads mean, point, not 'patch'"),
     ("gridsearch --out foreign", "foreign holds files that are not of a grid search"),
     ("gridsearch --out file", "file is a file; name a folder with --out"),
@@ -550,7 +550,7 @@ def test_a_full_disk_is_one_line_with_its_folders(folder, capsys, monkeypatch, w
 
 
 def test_a_missing_library_is_one_line(folder, capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "solvers.pinn.finite_basis.standard", None)
+    monkeypatch.setitem(sys.modules, "solvers.pinn.finite_basis.presets", None)
     assert main(["compare", "--solvers", "pinn-std"]) == BAD_INPUT
     assert capsys.readouterr().err.startswith("error: solver 'pinn-std' cannot be loaded: ")
 

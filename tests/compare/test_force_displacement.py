@@ -39,9 +39,9 @@ def test_a_free_component_does_not_travel(followed: Evaluation) -> None:
 def test_linear_solvers_are_straight_lines_beside_one_that_follows_the_load(
     followed: Evaluation, fem: Evaluation, evaluate: Callable[..., Evaluation]
 ) -> None:
-    end_only = replace(evaluate("pinn-local"), law="neo-hookean")
+    end_only = replace(evaluate("pinn-std"), law="neo-hookean")
     curves = force_curves([fem, followed, end_only], Load())
-    assert [curve.evaluation.solver for curve in curves] == ["fem", "fem-nonlinear", "pinn-local"]
+    assert [curve.evaluation.solver for curve in curves] == ["fem", "fem-nonlinear", "pinn-std"]
     np.testing.assert_allclose([curves[0].travel, curves[0].force], [[0, 10], [0, 0.5]])
     np.testing.assert_allclose([curves[2].travel, curves[2].force], [[10], [0.5]])
 

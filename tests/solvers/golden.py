@@ -45,7 +45,7 @@ JOBS: dict[str, tuple[dict[str, Any], Material, Load]] = {
     "statfem": ({}, Material(), Load()),
     "pinn-std": ({}, Material(), Load()),
     "pinn-asm": ({}, Material(), Load()),
-    "pinn-local": ({}, Material(), Load()),
+    "pinn-std local": ({"preset": "local"}, Material(), Load()),
 }
 """Settings of a solver, material and load; a name begins with that of its solver."""
 

@@ -171,7 +171,7 @@ def test_a_disc_does_not_reach_beyond_the_body(problem):
 
 
 @pytest.mark.parametrize("preset", ["default", "slender"])
-@pytest.mark.parametrize("name", ["fem-asm", "pinn-asm", "pinn-local-asm"])
+@pytest.mark.parametrize("name", ["fem-asm", "pinn-asm"])
 def test_the_disc_is_that_of_the_designs_markers(problem, preset, name):
     radius = load_design(preset).marker_diameter / 2
     observed = replace(problem, observations=replace(problem.observations, marker_radius=radius))

@@ -20,4 +20,4 @@ TIGHT = 5e-9
 @pytest.mark.parametrize("name", JOBS)
 def test_the_numbers_are_those_that_are_stored(name):
     stored = json.loads(NUMBERS.read_text(encoding="utf-8"))["jobs"][name]
-    assert golden(name) == pytest.approx(stored, rel=TOLERANCES.get(name.partition(" ")[0], TIGHT), abs=0)
+    assert golden(name) == pytest.approx(stored, rel=TOLERANCES.get(name, TIGHT), abs=0)

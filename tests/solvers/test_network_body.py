@@ -5,7 +5,7 @@ import pytest
 
 from geometry.mesh.wall_motion import WallMotion
 from solvers.elasticity import lame_constants
-from solvers.pinn.finite_basis.standard import PinnStdSolver
+from solvers.pinn.finite_basis.presets import PinnStdSolver
 from solvers.pinn.identification import network_body
 from solvers.pinn.identification.network_body import NetworkBody
 from solvers.problem import Material, Problem

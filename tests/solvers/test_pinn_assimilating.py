@@ -1,4 +1,4 @@
-"""`pinn-asm` and `pinn-local-asm`: the least of energy plus misfit, and what it is without markers."""
+"""`pinn-asm`, presets `fast` and `local`: the least of energy plus misfit, and what it is without markers."""
 
 from dataclasses import replace
 
@@ -13,12 +13,12 @@ from geometry.finger.design import Design
 from geometry.mesh.quadrature import body_quadrature
 from geometry.observations import Observations
 from solvers.fem.assimilating import FemAsmSolver
-from solvers.pinn.assimilating import PaperPinnAsmSolver, PinnAsmSolver, PinnLocalAsmSolver
 from solvers.pinn.finite_basis.newton import find_equilibrium
-from solvers.pinn.finite_basis.standard import PinnStdSolver
+from solvers.pinn.finite_basis.presets import PinnAsmSolver, PinnLocalAsmSolver, PinnStdSolver
+from solvers.pinn.paper.solver import PaperPinnAsmSolver
 from solvers.pinn.paper.trained_field import MlpField
 from solvers.problem import Load, Material, Problem, contact_functional
-from solvers.registry import make_solver
+from solvers.registry import PRESETS, make_solver
 from solvers.solver import TrainedSolver, Traits
 from tests.solvers.autograd_reference import PlainPinn
 from tests.solvers.conftest import bar_mesh
@@ -317,8 +317,9 @@ def test_the_papers_loss_is_energy_plus_misfit_over_the_area(problem, settings):
 
 
 def test_they_say_that_they_assimilate():
-    names = ("pinn-asm", "pinn-local-asm", "pinn-std", "pinn-local")
-    assert [Traits.of(make_solver(name)).assimilates for name in names] == [True, True, False, False]
+    for name, said in (("pinn-asm", True), ("pinn-std", False)):
+        presets = [make_solver(name, preset=preset) for preset in PRESETS[name]]
+        assert [Traits.of(each).assimilates for each in presets] == [said] * 4
 
 
 def test_the_papers_preset_is_trained_and_takes_the_centres():

@@ -19,7 +19,6 @@ from solvers.fem.linear import FemSolver
 from solvers.pinn.finite_basis import newton
 from solvers.pinn.finite_basis.energy import NetworkEnergy
 from solvers.pinn.finite_basis.hard_constraint import HardConstraint
-from solvers.pinn.finite_basis.local import PinnLocalSolver
 from solvers.pinn.finite_basis.network import FiniteBasis, FiniteBasisField
 from solvers.pinn.finite_basis.point_spacing import (
     PointSpacing,
@@ -27,6 +26,7 @@ from solvers.pinn.finite_basis.point_spacing import (
     graded_triangles,
     spread_points,
 )
+from solvers.pinn.finite_basis.presets import PinnLocalSolver
 from solvers.pinn.finite_basis.shepard_windows import ShepardWindows
 from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
 from solvers.pinn.threading import PATCH, boxes_around, cut_into_patches

@@ -13,8 +13,7 @@ from solvers.fem.linear import FemSolver
 from solvers.pinn.finite_basis import energy as network_energy
 from solvers.pinn.finite_basis import gate_tree
 from solvers.pinn.finite_basis.gate_tree import GateTree
-from solvers.pinn.finite_basis.local import PinnLocalSolver
-from solvers.pinn.finite_basis.standard import PinnStdSolver
+from solvers.pinn.finite_basis.presets import PinnLocalSolver, PinnStdSolver
 from solvers.pinn.threading import boxes_around
 from solvers.problem import Load, Problem
 from solvers.solution import Solution

@@ -9,7 +9,7 @@ from solvers.cylinder_contact import CylinderContact
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.lagrange import LagrangeSpace
 from solvers.pinn.finite_basis import pressed_network
-from solvers.pinn.finite_basis.local import PinnLocalSolver
+from solvers.pinn.finite_basis.presets import PinnLocalSolver
 from solvers.pinn.finite_basis.pressed_network import PENETRATION, PressedNetwork
 from solvers.problem import Load, Material, Problem
 

@@ -22,8 +22,14 @@ SOLVERS: dict[str, dict[str, object]] = {
     "gp": {},
     "statfem": {"degree": 1},
     "pinn-asm": QUICK,
-    "pinn-local-asm, weights chosen": {**QUICK, "weights": "precision", "choose": "left-out"},
-    "pinn-local-asm, a soft contact": {**QUICK, "weights": "precision", "contact_deviation": 1.0},
+    "pinn-asm, weights chosen": {
+        **QUICK,
+        **{"preset": "local", "weights": "precision", "choose": "left-out"},
+    },
+    "pinn-asm, a soft contact": {
+        **QUICK,
+        **{"preset": "local", "weights": "precision", "contact_deviation": 1.0},
+    },
 }
 
 

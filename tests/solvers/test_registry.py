@@ -5,7 +5,15 @@ import sys
 import pytest
 
 from geometry.errors import UserError
-from solvers.registry import BUILT_IN, PRESETS, MissingLibraryError, make_solver, solver_names, usable_solvers
+from solvers.registry import (
+    BUILT_IN,
+    FORMER,
+    PRESETS,
+    MissingLibraryError,
+    make_solver,
+    solver_names,
+    usable_solvers,
+)
 from solvers.solver import Traits
 
 
@@ -23,10 +31,10 @@ def test_settings_are_converted_from_text():
         ("skfem-p2", {"mesh": 2}, "solver 'skfem-p2' cannot be made with "),  # no dataclass
         ("fem", {"degree": "two"}, "fem: degree = 'two': input should be a valid integer"),
         ("pinn-std", {"ridges": 7}, "pinn-std: the setting 'ridges' is now called 'neurons'"),
-        ("pinn-local-asm", {"slope": 0.4}, "pinn-local-asm: the setting 'slope' is now called 'steepness'"),
+        ("pinn-asm", {"slope": 0.4}, "pinn-asm: the setting 'slope' is now called 'steepness'"),
         ("fem", {"slope": 0.4}, "fem has no setting 'slope'"),  # it never had one
         ("pinn-std", {"neurons": 1.5}, "pinn-std: neurons = 1.5: "),
-        ("pinn-std", {"preset": "quick"}, "pinn-std has no preset 'quick'; it has fast, paper"),
+        ("pinn-std", {"preset": "quick"}, "pinn-std has no preset 'quick'; it has fast, local, paper"),
         ("pinn-std", {"preset": "paper", "units": 9}, "pinn-std has no setting 'units'; it has epochs, "),
         ("fem", {"preset": "paper"}, "fem has no setting 'preset'; it has degree"),
     ],
@@ -43,6 +51,12 @@ def test_a_preset_keeps_the_name_and_can_be_made_from_its_own_settings(name, pre
     assert solver.name == name
     assert solver.settings()["preset"] == preset
     assert make_solver(name, **solver.settings()) == solver
+
+
+@pytest.mark.parametrize("name", FORMER)
+def test_a_former_name_answers_with_its_preset_and_one_line(name):
+    with pytest.warns(UserWarning, match=f"{name} is now the preset local of {FORMER[name]}"):
+        assert make_solver(name, seed="3") == make_solver(FORMER[name], preset="local", seed=3)
 
 
 def test_the_first_preset_is_the_usual_one():

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from geometry.observations import Observations
-from solvers.pinn.assimilating import PinnAsmSolver
-from solvers.pinn.finite_basis.local import PinnLocalSolver
+from solvers.pinn.finite_basis.presets import PinnAsmSolver, PinnLocalSolver, PinnStdSolver
 from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
-from solvers.pinn.finite_basis.standard import PinnStdSolver
 from solvers.problem import Load, Problem
 from solvers.shared_work import SharedWork, shared
 

@@ -159,9 +159,7 @@ def test_a_refit_is_checked_like_a_solution(coarse_mesh: TriangleMesh) -> None:
         refitter(beam, Problem(coarse_mesh))(seen)
 
 
-@pytest.mark.parametrize(
-    "name", ["fem-asm", "fem-id", "gp", "statfem", "pinn-asm", "pinn-local-asm", "pinn-id"]
-)
+@pytest.mark.parametrize("name", ["fem-asm", "fem-id", "gp", "statfem", "pinn-asm", "pinn-id"])
 def test_markers_of_which_none_was_seen_are_refused(name: str, coarse_mesh: TriangleMesh) -> None:
     unseen = observed_at(coarse_mesh.markers, np.zeros((9, 2)), 0.0, np.zeros(9, dtype=bool))
     solver = make_solver(name)

@@ -18,7 +18,7 @@ from solvers.identification.model import ResponseModel
 from solvers.identification.unknowns import Unknowns
 from solvers.lagrange import LagrangeSpace
 from solvers.pinn.finite_basis import newton
-from solvers.pinn.finite_basis.local import PinnLocalSolver
+from solvers.pinn.finite_basis.presets import PinnLocalSolver
 from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
 from solvers.problem import Load, Material, Problem
 from solvers.stability import Step, aside, descended

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -17,11 +17,11 @@ from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import ErrorEstimate, Solution, Status, unstable_phrase
-from solvers.solver import Family, Progress, check_problem, silent
+from solvers.solver import Family, FieldSettings, Progress, check_problem, silent
 
 
 @dataclass(frozen=True)
-class FemNonlinearSolver:
+class FemNonlinearSolver(FieldSettings):
     """Neo-Hookean or St Venant-Kirchhoff plane strain by Newton's method, the load applied in adaptive steps.
 
     Every step starts from the last three states extrapolated; the first from the linear solution. A step
@@ -49,15 +49,10 @@ class FemNonlinearSolver:
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch", "cylinder")
 
     def __post_init__(self) -> None:
-        if self.degree not in (1, 2):
-            raise UserError(f"fem-nonlinear has elements of degree 1 and 2, not {self.degree}")
+        self.check_degree(self.degree)
         if not 0 < self.min_step <= self.first_step <= self.max_step <= 1:
             raise UserError("fem-nonlinear needs 0 < min_step <= first_step <= max_step <= 1")
         check_tolerance(self.name, self.tolerance)
-
-    def settings(self) -> dict[str, object]:
-        """Element degree, load steps and Newton's criteria."""
-        return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve the finite-strain problem; see `Solver`. The material law must be one of finite strain."""

@@ -1,7 +1,7 @@
 """`fem-3d`: linear and finite-strain elasticity of the extruded finger with DOLFINx."""
 
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
@@ -17,14 +17,14 @@ from solvers.fem.solid.plane_guide import PlaneGuide
 from solvers.fem.solid.side_face import Face, FaceField
 from solvers.problem import Problem
 from solvers.solution import Solution, Status, unstable_phrase
-from solvers.solver import Family, Progress, check_problem, silent
+from solvers.solver import Family, FieldSettings, Progress, check_problem, silent
 
 PLANE_SHARE = 0.1
 """Share of the plane solution in the progress."""
 
 
 @dataclass(frozen=True)
-class Fem3dSolver:
+class Fem3dSolver(FieldSettings):
     """Quadratic tetrahedra on the shared mesh, extruded through half of the depth; symmetry gives the rest.
 
     The field is that of the side face, which a camera sees. Energy and reaction are means over the depth.
@@ -75,10 +75,6 @@ class Fem3dSolver:
         if not 0 < self.min_step <= self.max_step <= 1:
             raise UserError("fem-3d needs 0 < min_step <= max_step <= 1")
         check_tolerance(self.name, self.tolerance)
-
-    def settings(self) -> dict[str, object]:
-        """Layers, face and side faces, linear solver, load steps and Newton's criteria."""
-        return asdict(self)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve the problem in three dimensions; see `Solver`. The depth is that of the problem's mesh.

@@ -1,7 +1,7 @@
-"""Base of `pinn-std` and `pinn-local`: a network with random hidden weights and an exact output layer."""
+"""Base of the presets `fast` and `local`: a network with random hidden weights and an exact output layer."""
 
 import time
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields, replace
 from typing import ClassVar
@@ -12,8 +12,7 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
 from solvers.assimilation.marker_forces import MarkerFit
-from solvers.assimilation.marker_weighting import MarkerWeighting
-from solvers.assimilation.misfit import MarkerSettings, Misfit, leave_one_out_displacements
+from solvers.assimilation.misfit import MarkerSettings, leave_one_out_displacements
 from solvers.cylinder_contact import CONTACT_AT_END
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork
 from solvers.pinn.finite_basis.energy import NetworkEnergy
@@ -27,11 +26,12 @@ from solvers.pinn.finite_basis.point_spacing import (
     spread_points,
 )
 from solvers.pinn.finite_basis.pressed_network import PressedNetwork
+from solvers.pinn.network_solver import NetworkSolver
 from solvers.pinn.threading import pool
 from solvers.problem import Problem
 from solvers.shared_work import shared
 from solvers.solution import Solution, Status, unstable_phrase
-from solvers.solver import Family, Progress, check_problem, silent
+from solvers.solver import Progress, check_problem, silent
 
 Train = Callable[[float, FiniteBasisField | None, Progress], tuple[ConstrainedNetwork, LoadStep]]
 """Trains one refinement level, of a scale of the spacings, starting from the coarser level's field."""
@@ -44,7 +44,7 @@ FINEST = 0.75
 
 
 @dataclass(frozen=True, kw_only=True)
-class FiniteBasisSolver(ABC):
+class FiniteBasisSolver(NetworkSolver):
     """A network with random hidden weights, whose output layer alone is solved for, exactly.
 
     Its windows are spread over the body, denser at re-entrant corners, and have a few random tanh neurons
@@ -78,20 +78,20 @@ class FiniteBasisSolver(ABC):
     cell: float
     base_length: float = 5.0
     seed: int = 0
-    name: ClassVar[str]
-    family: ClassVar[Family] = "neural network"
-    assimilates: ClassVar[bool] = False
     laws: ClassVar[tuple[str, ...]] = ("linear", "neo-hookean", "st-venant-kirchhoff")
     loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch", "cylinder")
 
     def __post_init__(self) -> None:
-        of_markers = {entry.name for entry in fields(MarkerSettings)}
-        for setting, value in asdict(self).items():
-            if setting not in ("seed", "growth", *of_markers) and not value > 0:
-                raise UserError(f"{self.name}: {setting} must be positive, got {value}")
+        self.check_positive(*(name for name in self._of_network if name not in ("seed", "growth")))
         if self.seed < 0 or self.neurons < 2 or self.coarser <= 1 or self.growth < 0:
             raise UserError(f"{self.name} needs seed >= 0, neurons >= 2, coarser > 1 and growth >= 0")
         _ = self.weighting
+
+    @property
+    def _of_network(self) -> dict[str, object]:
+        """The settings but for those of the markers."""
+        of_markers = {entry.name for entry in fields(MarkerSettings)}
+        return {name: value for name, value in asdict(self).items() if name not in of_markers}
 
     @abstractmethod
     def windows(self, centres: FloatArray, spacing: FloatArray, rng: np.random.Generator) -> Windows:
@@ -102,19 +102,6 @@ class FiniteBasisSolver(ABC):
             spacing: Distance between neighbouring centres there, shape (c,), mm.
             rng: For whatever is drawn.
         """
-
-    def settings(self) -> dict[str, object]:
-        """All of them, see `Solver`."""
-        return asdict(self)
-
-    @property
-    def weighting(self) -> MarkerWeighting | None:
-        """The weights of the markers; None for a solver that does not assimilate them."""
-        return MarkerWeighting.of(self) if self.assimilates else None
-
-    def misfit(self, problem: Problem) -> Misfit | None:
-        """The misfit that is minimised together with the energy, if any; see `MarkerWeighting.misfit`."""
-        return None if self.weighting is None else self.weighting.misfit(problem)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Train the network; see `Solver`."""
@@ -201,10 +188,8 @@ class FiniteBasisSolver(ABC):
             scale: Of the spacings.
             single: Share of a quadrature cell below which an element of the mesh has one point.
         """
-        of_markers = {entry.name for entry in fields(MarkerSettings)}
-        settings = {name: value for name, value in asdict(self).items() if name not in of_markers}
         bare = replace(problem, observations=None)
-        key = (type(self).windows, *settings.items(), bare.digest, scale, single)
+        key = (type(self).windows, *self._of_network.items(), bare.digest, scale, single)
         energy = shared(key, lambda: self._energy(bare, scale, single))
         return ConstrainedNetwork.of(energy, problem, self.weighting)
 

@@ -15,7 +15,7 @@ from solvers.identification.model import ResponseModel
 from solvers.identification.result import Fit, Identified
 from solvers.identification.search import LAWS, Identifier, IdentifyingSolver, carried
 from solvers.identification.unknowns import Unknowns
-from solvers.pinn.finite_basis.local import PinnLocalSolver
+from solvers.pinn.finite_basis.presets import PinnLocalSolver
 from solvers.pinn.identification.network_body import NetworkBody
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
@@ -34,7 +34,7 @@ COARSE_ERROR, FINE_ERROR, FINAL_ERROR = 0.005, 0.001, 0.0003
 
 @dataclass(frozen=True, kw_only=True)
 class PinnIdSolver(IdentifyingSolver):
-    """The network of `pinn-local` at finite strain, whose contact, walls and law are found from the markers.
+    """A finite-basis network at finite strain, whose contact, walls and law are found from the markers.
 
     One law is fitted on a coarse level, from there all laws on a fine one; the network's error on each counts
     as the markers'. The equilibrium of the most probable law is then solved for by a final network, which is
@@ -42,8 +42,8 @@ class PinnIdSolver(IdentifyingSolver):
     other observations of the same markers are of first order.
 
     Attributes:
-        coarse: Spacing of the windows on the coarse level over that of `pinn-local`.
-        fine: Spacing on the fine level over that of `pinn-local`.
+        coarse: Spacing of the windows on the coarse level over that of the preset `local`.
+        fine: Spacing on the fine level over that of the preset `local`.
         seed: Of the random numbers.
     """
 
@@ -64,7 +64,7 @@ class PinnIdSolver(IdentifyingSolver):
         super().__post_init__()
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
-        """Find the unknowns and solve with them; see `Solver`. Without markers it is `pinn-local`."""
+        """Find the unknowns and solve with them; see `Solver`. Without markers it solves for the load."""
         check_problem(self, problem)
         if problem.observations is not None:
             return self._solved(problem, problem.observations, progress)[0]
@@ -77,7 +77,7 @@ class PinnIdSolver(IdentifyingSolver):
             tolerance=0.02,
         )
         plain = level.solve(problem, progress)
-        said = f"without markers, this is pinn-local: {plain.status.message}"
+        said = f"without markers, this is pinn-std with preset=local: {plain.status.message}"
         return replace(plain, solver=self.name, status=Status(plain.status.converged, said))
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
@@ -145,7 +145,7 @@ class PinnIdSolver(IdentifyingSolver):
 
     @property
     def _network(self) -> PinnLocalSolver:
-        """Fewer quadrature points and windows at corners than `pinn-local` has: four times as fast."""
+        """Fewer quadrature points and windows at corners than the preset `local` has: four times as fast."""
         return PinnLocalSolver(cell=SEARCHED, corner_spacing=0.02, seed=self.seed)
 
     def _identifier(

@@ -10,7 +10,8 @@ import torch
 from geometry.arrays import FloatArray
 from geometry.content_hash import content_hash
 from geometry.errors import UserError
-from solvers.assimilation.marker_weighting import MarkerWeighting
+from solvers.assimilation.misfit import Weighting
+from solvers.pinn.network_solver import NetworkSolver
 from solvers.pinn.paper.collocation import Collocation, base_points, collocation_points
 from solvers.pinn.paper.loss import (
     ONE_PROCESS,
@@ -32,7 +33,7 @@ from solvers.pinn.paper.training import (
 from solvers.pinn.threading import pool, torch_threads
 from solvers.problem import Problem, contact_functional
 from solvers.solution import Solution
-from solvers.solver import Family, Progress, TrainingContext, check_problem, silent
+from solvers.solver import Progress, TrainingContext, check_problem, silent
 
 PRECISIONS = {"single": torch.float32, "double": torch.float64}
 
@@ -41,7 +42,7 @@ FREE = ("epochs", "patience", "min_change", "checkpoint_every", "threads", "devi
 
 
 @dataclass(frozen=True)
-class PaperPinnSolver:
+class PaperPinnSolver(NetworkSolver):
     """Two modified MLPs, for u and v, all weights trained by Adam on energy plus penalty terms.
 
     Attributes:
@@ -83,20 +84,13 @@ class PaperPinnSolver:
     seed: int = 0
     _context: TrainingContext = field(default=TrainingContext(), init=False, repr=False, compare=False)
     name: ClassVar[str] = "pinn-std"
-    family: ClassVar[Family] = "neural network"
-    assimilates: ClassVar[bool] = False
-    laws: ClassVar[tuple[str, ...]] = ("linear",)
-    loads: ClassVar[tuple[str, ...]] = ("mean", "point")
+    preset: ClassVar[str] = "paper"
 
     def __post_init__(self) -> None:
-        for setting in ("epochs", "learning_rate", "bc_weight", "width", "layers"):
-            if not getattr(self, setting) > 0:
-                raise UserError(f"{self.name}: {setting} must be positive, got {getattr(self, setting)}")
+        self.check_positive("epochs", "learning_rate", "bc_weight", "width", "layers")
         if self.base_points < 2:
             raise UserError(f"{self.name}: base_points must be at least 2, got {self.base_points}")
-        for setting in ("patience", "checkpoint_every", "threads", "seed"):
-            if getattr(self, setting) < 0:
-                raise UserError(f"{self.name}: {setting} must be zero or more, got {getattr(self, setting)}")
+        self.check_not_negative("patience", "checkpoint_every", "threads", "seed")
         if self.optimiser not in OPTIMISERS:
             raise UserError(
                 f"{self.name}: optimiser must be {' or '.join(OPTIMISERS)}, got {self.optimiser!r}"
@@ -105,22 +99,11 @@ class PaperPinnSolver:
             raise UserError(f"{self.name}: device cuda needs a GPU and torch's CUDA build; take device=cpu")
         _ = self.weighting
 
-    def settings(self) -> dict[str, object]:
-        """Network, loss, optimiser and seed."""
-        return {"preset": "paper"} | {
-            entry.name: getattr(self, entry.name) for entry in fields(self) if entry.init
-        }
-
     def in_context(self, context: TrainingContext) -> "PaperPinnSolver":
         """The same solver that saves and resumes in `context`; see `TrainedSolver`."""
         solver = replace(self)
         object.__setattr__(solver, "_context", context)
         return solver
-
-    @property
-    def weighting(self) -> MarkerWeighting | None:
-        """The weights of the markers; None for a solver that does not assimilate them."""
-        return MarkerWeighting.of(self) if self.assimilates else None
 
     @property
     def network(self) -> ModifiedMlp:
@@ -202,8 +185,7 @@ class PaperPinnSolver:
             ),
         ]
         factors = {"PDE": 1.0, "BC": self.bc_weight}
-        misfit = None if self.weighting is None else self.weighting.misfit(problem)
-        if misfit is not None:
+        if (misfit := self.misfit(problem)) is not None:
             points, means = misfit.sampling()
             total = float(misfit.weights.sum())
             factors["ASM"] = total / (4 * float(problem.mesh.areas.sum()))
@@ -217,3 +199,20 @@ class PaperPinnSolver:
                 )
             )
         return Loss(self.network, terms, factors, processes)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperPinnAsmSolver(PaperPinnSolver):
+    """The networks and the training of `PaperPinnSolver`, with the paper's L_ASM in the loss.
+
+    Attributes:
+        marker_radius: As in `MarkerSettings`; the paper takes the displacement of the centre.
+    """
+
+    weights: Weighting = "paper"
+    asm_weight: float = 1000.0
+    scale: float = 1.0
+    marker_radius: float | None = 0.0
+    name: ClassVar[str] = "pinn-asm"
+    twin: ClassVar[str] = "fem-asm"
+    assimilates: ClassVar[bool] = True

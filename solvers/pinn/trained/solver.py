@@ -3,19 +3,18 @@
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 import torch
 
 from geometry.arrays import FloatArray
-from geometry.errors import UserError
 from geometry.mesh.boundary import mean_thickness
 from geometry.mesh.point_location import LocatedPoints
-from solvers.assimilation.marker_weighting import MarkerWeighting
-from solvers.assimilation.misfit import Misfit, Weighting
+from solvers.assimilation.misfit import Weighting
 from solvers.energy_and_force import energy_and_force
+from solvers.pinn.network_solver import NetworkSolver
 from solvers.pinn.paper.modified_mlp import ModifiedMlp
 from solvers.pinn.threading import map_in_threads, pool, slices
 from solvers.pinn.trained.gauss_newton import Step, sampled_steps, subset_steps
@@ -23,7 +22,7 @@ from solvers.pinn.trained.squares import PIECE, Squares
 from solvers.pinn.trained.streams import Streams
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
-from solvers.solver import Family, Progress, check_problem, silent
+from solvers.solver import Progress, check_problem, silent
 
 OUTPUT = 0.7
 """Standard deviation of the first outputs, in strokes: larger ones make the energy nearly quadratic in the
@@ -34,7 +33,7 @@ SETTLED = 0.01
 
 
 @dataclass(frozen=True)
-class TrainedPinnSolver:
+class TrainedPinnSolver(NetworkSolver):
     """The paper's two modified MLPs with hard conditions, every weight trained by Gauss-Newton's method.
 
     Attributes:
@@ -61,31 +60,13 @@ class TrainedPinnSolver:
     matrix_points: int = 5000
     seed: int = 0
     name: ClassVar[str] = "pinn-std"
-    family: ClassVar[Family] = "neural network"
-    assimilates: ClassVar[bool] = False
-    laws: ClassVar[tuple[str, ...]] = ("linear",)
-    loads: ClassVar[tuple[str, ...]] = ("mean", "point")
+    preset: ClassVar[str] = "trained"
 
     def __post_init__(self) -> None:
-        for setting in fields(self):
-            value, least = getattr(self, setting.name), 0 if setting.name in AT_LEAST_ZERO else None
-            if isinstance(value, (int, float)) and not (value > 0 or value == least):
-                wanted = "positive" if least is None else "zero or more"
-                raise UserError(f"{self.name}: {setting.name} must be {wanted}, got {value}")
+        self.check_positive("width", "layers", "steepness", "base_length")
+        self.check_positive("sample_points", "subset", "matrix_points")
+        self.check_not_negative("sampled_steps", "subset_steps", "seed")
         _ = self.weighting
-
-    def settings(self) -> dict[str, object]:
-        """The preset, network, steps and seed."""
-        return {"preset": "trained"} | {entry.name: getattr(self, entry.name) for entry in fields(self)}
-
-    @property
-    def weighting(self) -> MarkerWeighting | None:
-        """The weights of the markers; None for a solver that does not assimilate them."""
-        return MarkerWeighting.of(self) if self.assimilates else None
-
-    def misfit(self, problem: Problem) -> Misfit | None:
-        """The misfit that is minimised together with the energy, if any; see `MarkerWeighting.misfit`."""
-        return None if self.weighting is None else self.weighting.misfit(problem)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Train on the problem; see `Solver`."""
@@ -161,10 +142,6 @@ class TrainedPinnSolver:
         stroke = float(np.abs(problem.load.values).max())
         weights.output.mul_((OUTPUT * stroke / spread)[:, None, None])
         return parameters.to(squares.body.weights.dtype)
-
-
-AT_LEAST_ZERO = ("sampled_steps", "subset_steps", "seed", "asm_weight", "marker_radius")
-"""Settings that may be zero."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,103 @@
+"""Presets `fast` and `local` of `pinn-std` and `pinn-asm`: random hidden weights, exact output layer."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+import torch
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.observations import Observations
+from solvers.assimilation.misfit import MarkerSettings
+from solvers.pinn.finite_basis.gate_tree import GateTree
+from solvers.pinn.finite_basis.shepard_windows import ShepardWindows
+from solvers.pinn.finite_basis.solver import FiniteBasisSolver
+from solvers.problem import Problem
+from solvers.shared_work import SharedWork
+from solvers.solution import Solution
+
+
+@dataclass(frozen=True, kw_only=True)
+class PinnStdSolver(FiniteBasisSolver):
+    """Preset `fast`: a gated network.
+
+    A gated layer of the paper's network mixes two encoders; here the gate above mixes its result again, and
+    so on (`GateTree`), so that every encoder serves a part of the body. An encoder is a hidden layer of tanh
+    neurons with its own output weights. The rest is as in `FiniteBasisSolver`.
+
+    Attributes:
+        gate_width: Width of the gates in spacings.
+    """
+
+    wall_spacing: float = 0.8
+    corner_spacing: float = 0.02
+    growth: float = 0.55
+    gate_width: float = 1.0
+    steepness: float = 0.5
+    cell: float = 0.5
+    name: ClassVar[str] = "pinn-std"
+    preset: ClassVar[str] = "fast"
+
+    def windows(self, centres: FloatArray, spacing: FloatArray, rng: np.random.Generator) -> GateTree:
+        """Gates with an encoder for every centre; see `FiniteBasisSolver`."""
+        return GateTree.over(centres, spacing, width=self.gate_width, rng=rng)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PinnLocalSolver(FiniteBasisSolver):
+    """Preset `local`: a finite-basis network, whose windows are round and normalised to sum to one.
+
+    Attributes:
+        radius: Radius of a window in spacings.
+    """
+
+    wall_spacing: float = 0.5
+    corner_spacing: float = 0.006
+    growth: float = 0.5
+    radius: float = 1.8
+    steepness: float = 0.4
+    cell: float = 0.45
+    name: ClassVar[str] = "pinn-std"
+    preset: ClassVar[str] = "local"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.radius < 1.2:
+            raise UserError(f"{self.name}: windows overlap from a radius of 1.2 on, got {self.radius}")
+
+    def windows(self, centres: FloatArray, spacing: FloatArray, rng: np.random.Generator) -> ShepardWindows:
+        """A round window for every centre; see `FiniteBasisSolver`."""
+        return ShepardWindows(torch.from_numpy(centres), torch.from_numpy(self.radius * spacing))
+
+
+def _refitter(solver: FiniteBasisSolver, problem: Problem) -> Callable[[Observations], Solution]:
+    """See `Refittable`; one factorisation of each level for all observations if the law is linear."""
+    work = SharedWork()
+
+    def refit(observations: Observations) -> Solution:
+        with work.used():
+            return solver.solve(replace(problem, observations=observations))
+
+    return refit
+
+
+@dataclass(frozen=True, kw_only=True)
+class PinnAsmSolver(MarkerSettings, PinnStdSolver):
+    """The network of `PinnStdSolver` with the markers' misfit."""
+
+    name: ClassVar[str] = "pinn-asm"
+    twin: ClassVar[str] = "fem-asm"
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
+    refitter = _refitter
+
+
+@dataclass(frozen=True, kw_only=True)
+class PinnLocalAsmSolver(MarkerSettings, PinnLocalSolver):
+    """The network of `PinnLocalSolver` with the markers' misfit."""
+
+    name: ClassVar[str] = "pinn-asm"
+    twin: ClassVar[str] = "fem-asm"
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
+    refitter = _refitter
