@@ -21,6 +21,7 @@ from solvers.fem.dolfinx_compat import DistributedSpace
 from solvers.fem.finite_strain.equilibrium import QUADRATURE_DEGREE
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear_solvers import Factorisation
+from solvers.identification.body import Linearised
 from solvers.identification.model import ResponseModel
 from solvers.identification.search import LAWS, Identifier, IdentifyingSolver
 from solvers.identification.tracker import ForceTracker, LawTracker
@@ -76,7 +77,7 @@ class FemBody:
         """Free the factors, which PETSc holds."""
         self._factors.destroy()
 
-    def linearised(self, state: FloatArray, lame: Lame, changes: FloatArray) -> "_Linearised | None":
+    def linearised(self, state: FloatArray, lame: Lame, changes: FloatArray) -> Linearised | None:
         """Assemble and factorise at a state; see `Body`."""
         if not self._admissible(state, changes):
             return None
@@ -87,7 +88,7 @@ class FemBody:
             self._factors.update()
         except UserError:  # a singular tangent
             return None
-        return _Linearised(force, self._factors)
+        return Linearised(force, self._factors.solve_all, lambda: self._factors.negative)
 
     def force_slopes(
         self, state: FloatArray, lame: Lame, changes: FloatArray
@@ -151,23 +152,6 @@ class FemBody:
         if key not in self._sampled:
             self._sampled[key] = self.space.mesh.locate(points)
         return self._sampled[key]
-
-
-@dataclass(frozen=True, eq=False)
-class _Linearised:
-    """The tangent, by the factors that the body holds; see `solvers.identification.body.Linearised`."""
-
-    force: FloatArray
-    factors: Factorisation
-
-    @property
-    def negative(self) -> int:
-        """Number of negative eigenvalues."""
-        return self.factors.negative
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """K⁻¹ of generalised forces, shape (r, N, 2)."""
-        return self.factors.solve_all(right)
 
 
 def _both_components(values: FloatArray) -> FloatArray:

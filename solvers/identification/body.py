@@ -7,7 +7,8 @@ A state c is an array of degrees of freedom. The energy of a finger whose walls 
 over the drawn body, with the motion W of `WallMotion`; u = 0 holds at the base. F is its derivative by c.
 """
 
-from typing import Protocol
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
 
 from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
@@ -15,26 +16,25 @@ from solvers.elasticity import Lame
 from solvers.solution import DisplacementField
 
 
-class Linearised(Protocol):
-    """A body about a state."""
+class Linearised(NamedTuple):
+    """A body about a state; the functions are valid until the body is linearised again.
 
-    @property
-    def force(self) -> FloatArray:
-        """F there, of the shape of a state, N/mm."""
-        ...
+    Attributes:
+        force: F there, of the shape of a state, N/mm.
+        solve: K⁻¹ of generalised forces of shape (r, *shape), with the tangent K.
+        negative: Number of negative eigenvalues of K.
+    """
 
-    @property
-    def negative(self) -> int:
-        """Number of negative eigenvalues of the tangent K; valid as long as `solve` is."""
-        ...
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """K⁻¹ of generalised forces of shape (r, *shape); valid until the body is linearised again."""
-        ...
+    force: FloatArray
+    solve: Callable[[FloatArray], FloatArray]
+    negative: Callable[[], int]
 
 
 class Body(Protocol):
-    """A finger of one law, clamped at its base, discretised."""
+    """A finger of one law, clamped at its base, discretised.
+
+    Arguments are a state of shape `shape`, Lamé constants, MPa, and changes of the k walls' thickness, mm.
+    """
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -42,13 +42,7 @@ class Body(Protocol):
         ...
 
     def linearised(self, state: FloatArray, lame: Lame, changes: FloatArray) -> Linearised | None:
-        """The force at a state and the tangent K, factorised; None if a point is turned inside out.
-
-        Args:
-            state: Shape `shape`.
-            lame: Lamé constants, MPa.
-            changes: Of the walls' thickness, shape (k,), mm.
-        """
+        """The force at a state and the tangent, factorised; None if a point is turned inside out."""
         ...
 
     def force_slopes(
@@ -58,16 +52,11 @@ class Body(Protocol):
         ...
 
     def displacement_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
-        """Rows, shape (r, 2, *shape), whose product with a state is Σ_q w_rq u(P_q).
-
-        Args:
-            points: P, shape (q, 2), mm, in the drawn body.
-            weights: w, shape (r, q).
-        """
+        """Rows (r, 2, *shape) of Σ_q w_rq u(P_q), for points (q, 2), mm, and weights (r, q)."""
         ...
 
     def gradient_rows(self, points: FloatArray, weights: FloatArray) -> FloatArray:
-        """Rows, shape (r, 2, *shape), whose product with a state is Σ_q w_rqj ∂u/∂X_j(P_q)."""
+        """Rows (r, 2, *shape) of Σ_qj w_rqj ∂u/∂X_j(P_q), for points (q, 2), mm, and weights (r, q, 2)."""
         ...
 
     def energy(self, state: FloatArray, lame: Lame, changes: FloatArray) -> float:

@@ -107,7 +107,7 @@ class ResponseModel:
             raise UserError("the finger that was found is inside out")
         rows = self._traction(hypothesis.position, hypothesis.width)[0]
         held = ConstrainedElimination(rows, there.solve(rows))
-        return held.unstable(there.negative)
+        return held.unstable(there.negative())
 
     def restart(self, response: Response | None) -> None:
         """Start the next response from this one, which may be that of another body; None: from rest."""

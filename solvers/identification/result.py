@@ -78,7 +78,8 @@ class Fit(NamedTuple):
         unknowns, force = self.model.unknowns, self.response.hypothesis.force
         size = float(np.linalg.norm(force))
         along = force / size if size else unknowns.directions[0]
-        return size, float(np.linalg.norm((unknowns.force_slopes() @ along) @ self.standard_errors))
+        slopes = unknowns.slopes(self.response.values).force @ along
+        return size, float(np.linalg.norm(slopes @ self.standard_errors))
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,8 +28,6 @@ from solvers.elasticity import LawName
 from solvers.identification.model import MarkerModel, Measurement, ResponseModel
 from solvers.identification.unknowns import CONTACT
 
-FEWEST = 3
-"""Markers that a frame must show: six numbers for the four of the contact."""
 NEAR = 0.3
 """Motion of a marker, mm, over which the markers are linear: a curvature of one in some 30 mm, the thickness
 of a finger, leaves 0.002 mm."""
@@ -124,8 +122,7 @@ class ForceTracker:
         self._markers = MarkerModel.of(
             model, Measurement(points, still, still, radius, np.arange(len(points)))
         )
-        self._of_finger = np.array([name not in CONTACT for name in names])
-        self._of_place = np.array([name in ("position", "eccentricity") for name in names], dtype=np.float64)
+        self._of_finger = ~np.isin(names, CONTACT)
         self._drawn = _Prior(np.zeros(len(names)), np.eye(len(names)))
         self._known, self.largest, self._learnt = self._drawn, 0.0, 0
         self.log_evidence = 0.0
@@ -156,7 +153,7 @@ class ForceTracker:
         return replace(reading, evaluations=self._evaluations, seconds=time.perf_counter() - started)
 
     def _updated(self, displacements: FloatArray, deviations: FloatArray, visible: BoolArray) -> ForceReading:
-        if (seen := int(visible.sum())) < FEWEST:
+        if (seen := int(visible.sum())) < 3:  # six numbers for the four of the contact
             return self._unknown(f"{seen} of {len(visible)} markers are seen, too few for a force")
         rows = np.repeat(visible, 2)
         observed = displacements.ravel()[rows]
@@ -273,7 +270,7 @@ class ForceTracker:
 
     def _reading(self, found: _Posterior, status: str) -> ForceReading:
         values, derivatives = self._values(found.z)
-        directions = self._unknowns.force_slopes()
+        directions = self._unknowns.slopes(values).force
         by_z = directions * derivatives[:, None]
         spread = by_z.T @ found.covariance @ by_z
         force = values @ directions
@@ -282,7 +279,8 @@ class ForceTracker:
         half = found.quantile * float(np.sqrt(along @ spread @ along))
         wider = found.quantile / float(norm.ppf((1 + LEVEL) / 2))
         may_be_none = force @ np.linalg.solve(spread, force) < wider**2 * chi2.ppf(LEVEL, len(force))
-        place, place_by_z = float(self._of_place @ values), self._of_place * derivatives
+        of_place = np.isin(self._unknowns.names, ("position", "eccentricity")).astype(np.float64)
+        place, place_by_z = float(of_place @ values), of_place * derivatives
         around = found.quantile * np.sqrt(place_by_z @ found.covariance @ place_by_z)
         ends = np.clip(place + around * np.array([-1.0, 1.0]), *self._unknowns.traction.ends)
         return replace(

@@ -145,29 +145,19 @@ class Unknowns:
         named, material = self._named(values), self.material(values)
         by = {name: np.zeros(len(self.names)) for name in (*NAMES, *self.motion.names)}
         by |= dict(zip(self.names, np.eye(len(self.names)), strict=True))
-        young, (λ, μ, _) = material.young, material.lame
+        young, (λ, μ, _), (into, along) = material.young, material.lame, self.directions
         by_poisson = lame_derivatives(young, material.poisson, material.plane)
         normal, eccentricity = named.get("normal_force", 0.0), named.get("eccentricity", 0.0)
         compliance = named.get("base_compliance", 0.0)
         return HypothesisSlopes(
             position=by["position"],
             width=by["width"],
-            force=self.force_slopes(),
-            couple=np.outer(
-                normal * by["eccentricity"] + eccentricity * by["normal_force"], self.directions[0]
-            ),
+            force=np.outer(by["normal_force"], into) + np.outer(by["tangential_force"], along),
+            couple=np.outer(normal * by["eccentricity"] + eccentricity * by["normal_force"], into),
             moduli=np.outer(by["young"], (λ / young, μ / young)) + np.outer(by["poisson"], by_poisson[:2]),
             changes=np.array([by[name] for name in self.motion.names]).reshape(-1, len(self.names)).T,
             softness=by["base_compliance"] / young - compliance / young**2 * by["young"],
         )
-
-    def force_slopes(self) -> FloatArray:
-        """Derivatives of the force by the unknowns, which do not depend on their values, shape (p, 2)."""
-        found = np.zeros((len(self.names), 2))
-        for name, direction in zip(("normal_force", "tangential_force"), self.directions, strict=True):
-            if name in self.names:
-                found[self.names.index(name)] = direction
-        return found
 
     def material(self, values: FloatArray) -> Material:
         """The material of values, shape (p,)."""

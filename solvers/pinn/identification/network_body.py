@@ -10,6 +10,7 @@ for every derivative by X:
     P_ij = det(I + ∇W) P(G)_im M_jm        A_ijkl = det(I + ∇W) A(G)_imkn M_jm M_ln
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.wall_motion import WallMotion
 from solvers.elasticity import Lame, deformation_jacobian
+from solvers.identification.body import Linearised
 from solvers.pinn.finite_basis.energy import (
     REGULARISATION,
     NetworkEnergy,
@@ -35,47 +37,13 @@ TOLERANCE = 1e-4
 """Relative error of a solve in the energy norm, by which a Newton step shrinks what is left."""
 MOST_ITERATIONS = 8
 """Iterations of conjugate gradients that cost less than factors of the tangent at hand."""
-TRIAL = 2
-"""Iterations after which their number is foreseen."""
-ADJUGATE = torch.tensor([[1.0, -1.0], [-1.0, 1.0]], dtype=torch.float64)
-"""Signs of the cofactors of a 2 x 2 matrix turned by 180 degrees."""
-INDEPENDENT = (Lame(1.0, 0.0, 1.0), Lame(0.0, 1.0, 0.0))
-"""Both moduli, MPa, of which every law is a sum."""
 
 
 class WallMetric(NamedTuple):
-    """Change of the material's coordinates by moved walls, at the quadrature points.
-
-    Attributes:
-        inverse: M, shape (q, 2, 2).
-        volume: det(I + ∇W), shape (q,).
-    """
+    """Change of coordinates by moved walls at the quadrature points: M, (q, 2, 2), and det(I + ∇W), (q,)."""
 
     inverse: torch.Tensor
     volume: torch.Tensor
-
-
-class NetworkLinearisation:
-    """A network's body about a state; see `solvers.identification.body`.
-
-    Args:
-        body: The body.
-        force: F, of the shape of a state, N/mm.
-        tangent: A at the quadrature points, shape (q, 2, 2, 2, 2), MPa.
-    """
-
-    def __init__(self, body: "NetworkBody", force: FloatArray, tangent: torch.Tensor) -> None:
-        self.force = force
-        self._body, self._tangent = body, tangent
-
-    @property
-    def negative(self) -> int:
-        """Number of negative eigenvalues of the tangent, which is factorised for it."""
-        return self._body.negative(self._tangent)
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """K^-1 of generalised forces, shape (r, *shape)."""
-        return self._body.solved(self._tangent, right)
 
 
 class NetworkBody:
@@ -124,7 +92,7 @@ class NetworkBody:
         basis = self._energy.basis
         return basis.windows.count, 2, basis.per_window
 
-    def linearised(self, state: FloatArray, lame: Lame, changes: FloatArray) -> NetworkLinearisation | None:
+    def linearised(self, state: FloatArray, lame: Lame, changes: FloatArray) -> Linearised | None:
         """The force at a state and the tangent; None if a point is turned inside out."""
         metric = self._metric(changes)
         with pool():
@@ -133,22 +101,23 @@ class NetworkBody:
                 return None
             stress, tangent = piola_stress_and_tangent(gradient, lame, self._law)
             force = self._forces(_pulled_back(stress, metric)[None])[0]
-        return NetworkLinearisation(self, force.numpy(), _tangent_pulled_back(tangent, metric))
+        tangent = _tangent_pulled_back(tangent, metric)
+        return Linearised(force.numpy(), partial(self._solved, tangent), partial(self._negative, tangent))
 
-    def negative(self, tangent: torch.Tensor) -> int:
+    def _negative(self, tangent: torch.Tensor) -> int:
         """Number of negative eigenvalues of a tangent A at the quadrature points."""
         with pool():
             return self._factorised(tangent).negative
 
-    def solved(self, tangent: torch.Tensor, right: FloatArray) -> FloatArray:
+    def _solved(self, tangent: torch.Tensor, right: FloatArray) -> FloatArray:
         """Solutions for generalised forces (r, *shape) with the tangent A at the quadrature points."""
         given = torch.from_numpy(np.ascontiguousarray(right))
         with pool():
             found = None if self._factors is None else self._iterated(self._factors, tangent, given)
             if found is None:
                 factors = self._factorised(tangent)
-                found = _solved(factors, given)
-                found += _solved(factors, given - self._product(factors, tangent, found))
+                found = _back_substituted(factors, given)
+                found += _back_substituted(factors, given - self._product(factors, tangent, found))
         return np.asarray(found)
 
     def force_slopes(
@@ -170,7 +139,7 @@ class NetworkBody:
                 change = torch.einsum("nijkl,nkl->nij", tangent, of_gradient)
                 change += moved.diagonal(dim1=1, dim2=2).sum(dim=1)[:, None, None] * stress
                 slopes.append(_pulled_back(change - stress @ metric.inverse.mT @ wall.mT, metric))
-            for moduli in INDEPENDENT:
+            for moduli in (Lame(1.0, 0.0, 1.0), Lame(0.0, 1.0, 0.0)):  # every law is a sum of both
                 part, _ = piola_stress_and_tangent(gradient, moduli, self._law)
                 slopes.append(_pulled_back(part, metric))
             found = self._forces(torch.stack(slopes)).numpy()
@@ -220,7 +189,7 @@ class NetworkBody:
             tangent = _tangent_pulled_back(tangent, metric)
             stress = torch.einsum("nijkl,nkl->nij", tangent, gradient)
             self._factorised(tangent)
-            found: FloatArray = self.solved(tangent, self._forces(stress[None]).numpy())[0]
+            found: FloatArray = self._solved(tangent, self._forces(stress[None]).numpy())[0]
         return found
 
     def _both_components(self, rows: FloatArray) -> FloatArray:
@@ -249,7 +218,8 @@ class NetworkBody:
         by = torch.from_numpy(np.asarray(changes, dtype=np.float64))
         motion = torch.tensordot(by, self._walls, dims=1)
         volume = deformation_jacobian(motion)
-        turned = (torch.eye(2, dtype=torch.float64) + motion).flip(1, 2) * ADJUGATE
+        signs = torch.tensor([[1.0, -1.0], [-1.0, 1.0]], dtype=torch.float64)  # of the cofactors
+        turned = (torch.eye(2, dtype=torch.float64) + motion).flip(1, 2) * signs
         return WallMetric(turned.mT / volume[:, None, None], volume)
 
     def _factorised(self, tangent: torch.Tensor) -> Factors:
@@ -272,7 +242,7 @@ class NetworkBody:
             None if they need more than `MOST_ITERATIONS`, or the matrix is indefinite.
         """
         found, residual = torch.zeros_like(right), right.clone()
-        direction = steepest = _solved(factors, residual)
+        direction = steepest = _back_substituted(factors, residual)
         work = first = _dot(residual, steepest)
         for iteration in range(1, MOST_ITERATIONS + 1):
             if (work.abs() <= TOLERANCE**2 * first.abs()).all():
@@ -284,11 +254,11 @@ class NetworkBody:
             step = torch.where(stiffness > 0, work / stiffness, 0.0)
             found = found + step * direction
             residual = residual - step * product
-            steepest = _solved(factors, residual)
+            steepest = _back_substituted(factors, residual)
             before, work = work, _dot(residual, steepest)
             rest = float((work.abs() / first.abs()).nan_to_num().max()) ** 0.5
             foreseen = iteration * np.log(TOLERANCE) / np.log(rest) if 0 < rest < 1 else np.inf
-            if rest > 0 and iteration >= TRIAL and foreseen > MOST_ITERATIONS:
+            if rest > 0 and iteration >= 2 and foreseen > MOST_ITERATIONS:
                 return None
             direction = steepest + torch.where(before > 0, work / before, 0.0) * direction
         return None
@@ -310,5 +280,5 @@ def _dot(left: torch.Tensor, right: torch.Tensor) -> torch.Tensor:
     return (left * right).sum(dim=(1, 2, 3), keepdim=True)
 
 
-def _solved(factors: Factors, right: torch.Tensor) -> torch.Tensor:
+def _back_substituted(factors: Factors, right: torch.Tensor) -> torch.Tensor:
     return torch.from_numpy(factors.solve(right.flatten(1).numpy())).view_as(right)
