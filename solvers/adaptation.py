@@ -10,34 +10,21 @@ from solvers.problem import Load
 
 
 class RefinementRound(NamedTuple):
-    """One mesh of the sequence.
+    """One mesh of the sequence."""
 
-    Attributes:
-        triangles: Number of triangles.
-        nodes: Number of nodes.
-        at_markers: Largest estimated error of u or v at a marker, mm.
-        energy_norm: Estimated relative error in the energy norm.
-    """
-
-    triangles: int
-    nodes: int
-    at_markers: float
-    energy_norm: float
+    triangles: int  # Number of triangles
+    nodes: int  # Number of nodes
+    at_markers: float  # Largest estimated error of u or v at a marker, mm
+    energy_norm: float  # Estimated relative error in the energy norm
 
 
 @dataclass(frozen=True, eq=False)
 class Adaptation:
-    """A refined mesh and the rounds that led to it.
+    """A refined mesh and the rounds that led to it."""
 
-    Attributes:
-        tolerance: Tolerance of u and v at the markers, mm.
-        rounds: From the first mesh to the refined one.
-        mesh: The refined mesh.
-    """
-
-    tolerance: float
-    rounds: tuple[RefinementRound, ...]
-    mesh: TriangleMesh
+    tolerance: float  # Tolerance of u and v at the markers, mm
+    rounds: tuple[RefinementRound, ...]  # From the first mesh to the refined one
+    mesh: TriangleMesh  # The refined mesh
 
     @property
     def reached(self) -> bool:

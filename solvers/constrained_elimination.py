@@ -21,17 +21,11 @@ from geometry.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class ConstrainedElimination:
-    """k constraints on a solution x of any array shape.
+    """k constraints on a solution x of any array shape."""
 
-    Attributes:
-        rows: C, shape (k, *x.shape).
-        responses: K⁻¹ Cᵀ, of the same shape.
-        compliance: Diagonal of S, shape (k,), or one number for all.
-    """
-
-    rows: FloatArray
-    responses: FloatArray
-    compliance: FloatArray | float = 0.0
+    rows: FloatArray  # C, shape (k, *x.shape)
+    responses: FloatArray  # K⁻¹ Cᵀ, of the same shape
+    compliance: FloatArray | float = 0.0  # Diagonal of S, shape (k,), or one number for all
 
     @cached_property
     def flexibility(self) -> FloatArray:

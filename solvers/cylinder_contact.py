@@ -47,28 +47,19 @@ class ContactState(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class CylinderContact:
-    """The cylinder and the m nodes of the front at each of l levels, in the order of x; l = 1 in the plane.
+    """The cylinder and the m nodes of the front, by x, at each of l levels; l = 1 in the plane."""
 
-    Attributes:
-        nodes: Numbers of the nodes, level by level, shape (l m,).
-        positions: Their positions in the plane before the load, the same at every level, shape (m, 2), mm.
-        centre: Centre of the cylinder before the load, above the contact's middle, where it touches the front
-            from outside, shape (2,), mm.
-        travel: Displacement of the cylinder under the full load, shape (2,), mm.
-        radius: mm.
-        stiffness: k of a node, N/mm per mm, times its level's share.
-        edges: Rows of `positions` along every edge, shape (e, degree + 1).
-        shares: Weights of the levels in a mean over the depth, shape (l,).
-    """
-
-    nodes: IntArray
+    nodes: IntArray  # Numbers of the nodes, level by level, shape (l m,)
+    # Their positions in the plane before the load, the same at every level, shape (m, 2), mm
     positions: FloatArray
+    # Centre of the cylinder before the load, above the contact's middle, where it touches the front from
+    # outside, shape (2,), mm
     centre: FloatArray
-    travel: FloatArray
-    radius: float
-    stiffness: float
-    edges: IntArray
-    shares: FloatArray
+    travel: FloatArray  # Displacement of the cylinder under the full load, shape (2,), mm
+    radius: float  # mm
+    stiffness: float  # k of a node, N/mm per mm, times its level's share
+    edges: IntArray  # Rows of `positions` along every edge, shape (e, degree + 1)
+    shares: FloatArray  # Weights of the levels in a mean over the depth, shape (l,)
 
     @classmethod
     def of(cls, problem: Problem, space: NodalSpace) -> "CylinderContact":
@@ -157,29 +148,17 @@ def _touching_centre(problem: Problem) -> FloatArray:
 
 @dataclass(frozen=True)
 class ContactRegion:
-    """The contact region and its pressure.
+    """The contact region and its pressure."""
 
-    Attributes:
-        start: Abscissa of the end nearer to the base before the load, mm.
-        end: Abscissa of the other end, mm.
-        parts: Number of separate intervals between them.
-        width: Deformed length of front face in contact, mm.
-        spacing: Deformed length between neighbouring nodes there, mm: the resolution of the width.
-        pressure: Largest Cauchy pressure, MPa.
-        penetration: Largest depth of a node within the cylinder, mm.
-        force: Integral of the pressure, N/mm: sum of q n.
-        at_end: Whether the region reaches an end of the front face.
-    """
-
-    start: float
-    end: float
-    parts: int
-    width: float
-    spacing: float
-    pressure: float
-    penetration: float
-    force: tuple[float, float]
-    at_end: bool
+    start: float  # Abscissa of the end nearer to the base before the load, mm
+    end: float  # Abscissa of the other end, mm
+    parts: int  # Number of separate intervals between them
+    width: float  # Deformed length of front face in contact, mm
+    spacing: float  # Deformed length between neighbouring nodes there, mm: the resolution of the width
+    pressure: float  # Largest Cauchy pressure, MPa
+    penetration: float  # Largest depth of a node within the cylinder, mm
+    force: tuple[float, float]  # Integral of the pressure, N/mm: sum of q n
+    at_end: bool  # Whether the region reaches an end of the front face
 
     def stats(self) -> dict[str, float | int]:
         """Columns of a solution's `stats`."""

@@ -70,15 +70,11 @@ class NodalSpace(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class LagrangeSpace:
-    """Scalar Lagrange elements of degree 1 or 2 on a triangle mesh.
+    """Scalar Lagrange elements of degree 1 or 2 on a triangle mesh."""
 
-    Attributes:
-        mesh: The mesh; its nodes come first in `nodes`, the middles of `mesh.edges` follow for degree 2.
-        degree: 1 or 2.
-    """
-
+    # The mesh; its nodes come first in `nodes`, the middles of `mesh.edges` follow for degree 2
     mesh: TriangleMesh
-    degree: int
+    degree: int  # 1 or 2
 
     @cached_property
     def nodes(self) -> FloatArray:
@@ -188,15 +184,10 @@ class LagrangeSpace:
 
 @dataclass(frozen=True, eq=False)
 class LagrangeField:
-    """A finite-element displacement field.
+    """A finite-element displacement field."""
 
-    Attributes:
-        space: The elements.
-        values: Nodal displacements, shape (N, 2), mm.
-    """
-
-    space: LagrangeSpace
-    values: FloatArray
+    space: LagrangeSpace  # The elements
+    values: FloatArray  # Nodal displacements, shape (N, 2), mm
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""

@@ -23,15 +23,10 @@ SMALL = 1e-9
 
 
 class Step(NamedTuple):
-    """A Newton step that keeps the constraints.
+    """A Newton step that keeps the constraints."""
 
-    Attributes:
-        change: Of the state.
-        unstable: Number of directions in which the shifted tangent lets the energy fall.
-    """
-
-    change: FloatArray
-    unstable: int
+    change: FloatArray  # Of the state
+    unstable: int  # Number of directions in which the shifted tangent lets the energy fall
 
 
 def descended(

@@ -31,17 +31,12 @@ from solvers.solver import Family, FieldSettings, Progress, check_problem, silen
 
 @dataclass(frozen=True, eq=False)
 class MarkerCompliance:
-    """Finite-element displacements, free and under forces at m markers.
+    """Finite-element displacements, free and under forces at m markers."""
 
-    Attributes:
-        equilibrium: The factorised problem; its factors are to be destroyed after use.
-        undisturbed: Nodal displacements without forces at the markers, shape (N, 2), mm.
-        markers: The 2 m displacements of the markers as functionals, and the nodal displacements under their
-            unit forces, while base and load hold at zero.
-    """
-
-    equilibrium: LinearEquilibrium
-    undisturbed: FloatArray
+    equilibrium: LinearEquilibrium  # The factorised problem; its factors are to be destroyed after use
+    undisturbed: FloatArray  # Nodal displacements without forces at the markers, shape (N, 2), mm
+    # The 2 m displacements of the markers as functionals, and the nodal displacements under their unit
+    # forces, while base and load hold at zero
     markers: ConstrainedElimination
 
     @classmethod

@@ -241,15 +241,10 @@ class DistributedSpace(Generic[SpaceT]):
 
 @dataclass(frozen=True, eq=False)
 class NodeFunction:
-    """A vector field given at the nodes of the mesh.
+    """A vector field given at the nodes of the mesh."""
 
-    Attributes:
-        function: The DOLFINx function.
-        node_of_dof: Its degrees of freedom.
-    """
-
-    function: Any
-    node_of_dof: IntArray
+    function: Any  # The DOLFINx function
+    node_of_dof: IntArray  # Its degrees of freedom
 
     def set(self, values: FloatArray) -> None:
         """Give it values of shape (number of the mesh's nodes, 2)."""

@@ -55,15 +55,10 @@ MOST = 5.0
 
 @dataclass(frozen=True, eq=False)
 class ImprovedField(LagrangeField):
-    """A finite-element displacement with its estimated error added, and its smoothed gradient.
+    """A finite-element displacement with its estimated error added, and its smoothed gradient."""
 
-    Attributes:
-        gradients: Nodal values of the smoothed gradient, shape (N, 2, 2).
-        own: The field whose gradient replaces it where it would turn the material inside out; None at small
-            strain.
-    """
-
-    gradients: FloatArray
+    gradients: FloatArray  # Nodal values of the smoothed gradient, shape (N, 2, 2)
+    # The field whose gradient replaces it where it would turn the material inside out; None at small strain
     own: LagrangeField | None = None
 
     def gradient(self, location: LocatedPoints) -> FloatArray:

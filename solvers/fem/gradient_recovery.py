@@ -28,15 +28,11 @@ FEWEST = 4
 
 @dataclass(frozen=True, eq=False)
 class GradientRecovery:
-    """The linear map from nodal displacements to nodal values of their smoothed gradient.
+    """The linear map from nodal displacements to nodal values of their smoothed gradient."""
 
-    Attributes:
-        derivatives: Along x and y at the sample points, each a matrix (s, N), 1/mm.
-        smoothing: From values at the sample points to nodal values, a matrix (N, s).
-    """
-
+    # Along x and y at the sample points, each a matrix (s, N), 1/mm
     derivatives: tuple[csr_matrix, csr_matrix]
-    smoothing: csr_matrix
+    smoothing: csr_matrix  # From values at the sample points to nodal values, a matrix (N, s)
 
     @classmethod
     def of(cls, space: LagrangeSpace) -> "GradientRecovery":

@@ -33,21 +33,13 @@ the iterations (1.4 GB).
 
 @dataclass(frozen=True, eq=False)
 class LinearElasticity:
-    """The forms of the linear problem.
+    """The forms of the linear problem."""
 
-    Attributes:
-        problem: The problem.
-        distributed: The elements in DOLFINx.
-        force: The compiled internal force.
-        stiffness: The compiled stiffness.
-        iterative: Whether systems are solved by multigrid, not by factorisation.
-    """
-
-    problem: Problem
-    distributed: DistributedSpace[LagrangeSpace]
-    force: Any
-    stiffness: Any
-    iterative: bool
+    problem: Problem  # The problem
+    distributed: DistributedSpace[LagrangeSpace]  # The elements in DOLFINx
+    force: Any  # The compiled internal force
+    stiffness: Any  # The compiled stiffness
+    iterative: bool  # Whether systems are solved by multigrid, not by factorisation
 
     @classmethod
     def of(
@@ -81,19 +73,12 @@ class LinearElasticity:
 
 @dataclass(frozen=True, eq=False)
 class LinearEquilibrium:
-    """Displacements of least energy for any values at base and contact, from one factorisation.
+    """Displacements of least energy for any values at base and contact, from one factorisation."""
 
-    Attributes:
-        elasticity: The stiffness.
-        clamped: Components with a Dirichlet condition, mask of shape (N, 2).
-        factors: Solver of the stiffness with these components clamped.
-        load: Solves with the load's k functionals, of which a `patch` has none.
-    """
-
-    elasticity: LinearElasticity
-    clamped: BoolArray
-    factors: Factorisation | Multigrid
-    load: ConstrainedElimination
+    elasticity: LinearElasticity  # The stiffness
+    clamped: BoolArray  # Components with a Dirichlet condition, mask of shape (N, 2)
+    factors: Factorisation | Multigrid  # Solver of the stiffness with these components clamped
+    load: ConstrainedElimination  # Solves with the load's k functionals, of which a `patch` has none
 
     @classmethod
     def of(cls, elasticity: LinearElasticity, slack: float = 0.0) -> "LinearEquilibrium":

@@ -92,14 +92,10 @@ class Factorisation(StiffnessSolver):
     Args:
         positive_definite: False where a tangent may be indefinite, whose solutions only are steps of an
             iteration; others are checked. The others are those of `StiffnessSolver`.
-
-    Attributes:
-        message: The method in words.
-        stats: The same for a table.
     """
 
-    message: ClassVar[str] = "solved directly"
-    stats: ClassVar[dict[str, float | int | str]] = {"linear_solver": "direct"}
+    message: ClassVar[str] = "solved directly"  # The method in words
+    stats: ClassVar[dict[str, float | int | str]] = {"linear_solver": "direct"}  # The same for a table
 
     def __init__(
         self, space: DistributedSpace[Any], matrix: PETSc.Mat, clamped: BoolArray, *, positive_definite: bool

@@ -92,17 +92,11 @@ def lead(command: Callable[[], Any], guarded: Callable[[Callable[[], Any]], int]
 
 @dataclass
 class RankPool:
-    """The ranks that serve a command.
+    """The ranks that serve a command."""
 
-    Attributes:
-        comm: For messages between them.
-        busy: Whether this rank is in a collective task.
-        broken: Whether another rank may be waiting for this one in a task that this one has left.
-    """
-
-    comm: MPI.Comm
-    busy: bool = False
-    broken: bool = False
+    comm: MPI.Comm  # For messages between them
+    busy: bool = False  # Whether this rank is in a collective task
+    broken: bool = False  # Whether another rank may be waiting for this one in a task that this one has left
 
     def call(
         self, task: Callable[[Problem, Progress], Answer], problem: Problem, progress: Progress

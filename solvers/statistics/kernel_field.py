@@ -19,19 +19,12 @@ SMOOTHNESS: dict[Kernel, float] = {"matern32": 1.5, "matern52": 2.5, "gaussian":
 
 @dataclass(frozen=True, eq=False)
 class KernelField:
-    """Σ_i c_i k(|x - x_i|), with coefficients and a length for each component.
+    """Σ_i c_i k(|x - x_i|), with coefficients and a length for each component."""
 
-    Attributes:
-        centres: x_i, shape (m, 2), mm.
-        coefficients: c_i, shape (m, 2), mm.
-        lengths: Lengths of k for u and v, shape (2,), mm.
-        kernel: Covariance function k.
-    """
-
-    centres: FloatArray
-    coefficients: FloatArray
-    lengths: FloatArray
-    kernel: Kernel
+    centres: FloatArray  # x_i, shape (m, 2), mm
+    coefficients: FloatArray  # c_i, shape (m, 2), mm
+    lengths: FloatArray  # Lengths of k for u and v, shape (2,), mm
+    kernel: Kernel  # Covariance function k
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""

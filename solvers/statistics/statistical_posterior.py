@@ -24,26 +24,16 @@ START = [[1.0, 0.5, 0.5, length] for length in (10.0, 30.0, 100.0)]
 
 @dataclass(frozen=True, eq=False)
 class StatFemData:
-    """Observations at m markers, and finite elements for k prescribed components.
+    """Observations at m markers, and finite elements for k prescribed components."""
 
-    Attributes:
-        points: Shape (m, 2), mm.
-        observed: d, shape (m, 2), mm.
-        deviations: Standard deviations of e, shape (m, 2), mm.
-        shapes: Displacements of the finite elements at the points by unit displacements of the contact, shape
-            (k, m, 2).
-        load: Nominal displacements of the contact, shape (k,), mm.
-        load_deviation: Their standard deviation, mm.
-        kernel: Covariance function of δ.
-    """
-
-    points: FloatArray
-    observed: FloatArray
-    deviations: FloatArray
+    points: FloatArray  # Shape (m, 2), mm
+    observed: FloatArray  # d, shape (m, 2), mm
+    deviations: FloatArray  # Standard deviations of e, shape (m, 2), mm
+    # Displacements of the finite elements at the points by unit displacements of the contact, shape (k, m, 2)
     shapes: FloatArray
-    load: FloatArray
-    load_deviation: float
-    kernel: Kernel
+    load: FloatArray  # Nominal displacements of the contact, shape (k,), mm
+    load_deviation: float  # Their standard deviation, mm
+    kernel: Kernel  # Covariance function of δ
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,23 +53,14 @@ class Hyperparameters:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """ρ u + δ given some of the markers.
+    """ρ u + δ given some of the markers."""
 
-    Attributes:
-        data: All markers.
-        given: Numbers of the markers conditioned on, shape (g,).
-        constants: Hyperparameters of the largest marginal likelihood.
-        coefficients: Inverse covariance of d times (d minus the prior mean), shape (g, 2), 1/mm.
-        cholesky: Cholesky factor of that covariance, shape (2 g, 2 g).
-        log_evidence: Logarithm of the marginal likelihood of d.
-    """
-
-    data: StatFemData
-    given: IntArray
-    constants: Hyperparameters
-    coefficients: FloatArray
-    cholesky: FloatArray
-    log_evidence: float
+    data: StatFemData  # All markers
+    given: IntArray  # Numbers of the markers conditioned on, shape (g,)
+    constants: Hyperparameters  # Hyperparameters of the largest marginal likelihood
+    coefficients: FloatArray  # Inverse covariance of d times (d minus the prior mean), shape (g, 2), 1/mm
+    cholesky: FloatArray  # Cholesky factor of that covariance, shape (2 g, 2 g)
+    log_evidence: float  # Logarithm of the marginal likelihood of d
 
     @classmethod
     def of(cls, data: StatFemData, given: IntArray) -> "Posterior":
@@ -130,14 +111,10 @@ class Posterior:
 
 @dataclass(frozen=True, eq=False)
 class StatFemField:
-    """The posterior as a displacement field.
+    """The posterior as a displacement field."""
 
-    Attributes:
-        posterior: The posterior, conditioned on the markers.
-        shapes: The finite elements' displacements by unit displacements of the contact, k of them.
-    """
-
-    posterior: Posterior
+    posterior: Posterior  # The posterior, conditioned on the markers
+    # The finite elements' displacements by unit displacements of the contact, k of them
     shapes: tuple[DisplacementField, ...]
 
     def displacement(self, location: LocatedPoints) -> FloatArray:

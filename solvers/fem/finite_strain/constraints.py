@@ -13,34 +13,23 @@ from solvers.problem import Problem
 
 @dataclass(frozen=True, eq=False)
 class LoadState:
-    """A state of the finger, in equilibrium or a guess.
+    """A state of the finger, in equilibrium or a guess."""
 
-    Attributes:
-        fraction: Fraction of the load.
-        nodal: Displacements, shape (N, d), mm.
-        forces: Multipliers of the constraints, shape (k,), N/mm.
-        contact: Forces of the cylinder on the nodes of the front, shape (l m,), N/mm; empty without one.
-    """
-
-    fraction: float
-    nodal: FloatArray
-    forces: FloatArray
+    fraction: float  # Fraction of the load
+    nodal: FloatArray  # Displacements, shape (N, d), mm
+    forces: FloatArray  # Multipliers of the constraints, shape (k,), N/mm
+    # Forces of the cylinder on the nodes of the front, shape (l m,), N/mm; empty without one
     contact: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class DisplacementConstraints:
-    """Constraints b_k . c + s_k f_k = d_k on the displacements c, with forces f_k.
+    """Constraints b_k . c + s_k f_k = d_k on the displacements c, with forces f_k."""
 
-    Attributes:
-        functionals: b_k, shape (k, N, d).
-        targets: d_k under the full load, shape (k,), mm.
-        slacks: s_k, shape (k,), mm per N/mm: zero where the value is prescribed, else the compliance of a
-            spring between functional and value, whose energy is (d_k - b_k . c)^2 / (2 s_k).
-    """
-
-    functionals: FloatArray
-    targets: FloatArray
+    functionals: FloatArray  # b_k, shape (k, N, d)
+    targets: FloatArray  # d_k under the full load, shape (k,), mm
+    # s_k, shape (k,), mm per N/mm: zero where the value is prescribed, else the compliance of a spring
+    # between functional and value, whose energy is (d_k - b_k . c)^2 / (2 s_k)
     slacks: FloatArray
 
     @classmethod

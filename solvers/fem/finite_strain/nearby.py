@@ -17,17 +17,11 @@ ITERATIONS = 40
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """An equilibrium under the full load.
+    """An equilibrium under the full load."""
 
-    Attributes:
-        nodal: Displacements of the nodes of a `LagrangeSpace` of degree 2, shape (N, 2), mm.
-        energy: Elastic energy per depth, N mm / mm.
-        unstable: Number of directions in which the energy falls.
-    """
-
-    nodal: FloatArray
-    energy: float
-    unstable: int
+    nodal: FloatArray  # Displacements of the nodes of a `LagrangeSpace` of degree 2, shape (N, 2), mm
+    energy: float  # Elastic energy per depth, N mm / mm
+    unstable: int  # Number of directions in which the energy falls
 
 
 def equilibria_near(problem: Problem, starts: Sequence[FloatArray]) -> list[Equilibrium | None]:

@@ -20,19 +20,12 @@ SHORTEST = 2.0**-10
 
 @dataclass(frozen=True, eq=False)
 class NewtonResult:
-    """The end of a Newton iteration.
+    """The end of a Newton iteration."""
 
-    Attributes:
-        state: Displacements and forces.
-        converged: Whether they are in equilibrium.
-        reason: PETSc's word for the end, in lower case.
-        iterations: Newton steps taken.
-    """
-
-    state: LoadState
-    converged: bool
-    reason: str
-    iterations: int
+    state: LoadState  # Displacements and forces
+    converged: bool  # Whether they are in equilibrium
+    reason: str  # PETSc's word for the end, in lower case
+    iterations: int  # Newton steps taken
 
 
 class ConstrainedNewton:

@@ -21,17 +21,11 @@ USABLE = 0.7
 
 @dataclass(frozen=True)
 class Cost:
-    """The linear solver and its price.
+    """The linear solver and its price."""
 
-    Attributes:
-        unknowns: Number of unknowns.
-        levels: Number of nodes above each other.
-        iterative: Whether multigrid solves, not factors.
-    """
-
-    unknowns: int
-    levels: int
-    iterative: bool
+    unknowns: int  # Number of unknowns
+    levels: int  # Number of nodes above each other
+    iterative: bool  # Whether multigrid solves, not factors
 
     @property
     def entries(self) -> float:

@@ -25,16 +25,12 @@ class ExtrudedSpace:
     """Scalar quadratic elements on the half 0 <= z <= depth / 2 of a body, from its middle plane to a face.
 
     Node `level * P + k` is node k of the section's P quadratic nodes, at `levels[level]`.
-
-    Attributes:
-        section: Quadratic elements on the shared mesh.
-        faces: Places of the layers' faces, from 0 to half of the depth, rising, shape (layers + 1,), mm.
-        held: Whether the side faces cannot move along z, so that the body is in plane strain.
     """
 
-    section: LagrangeSpace
+    section: LagrangeSpace  # Quadratic elements on the shared mesh
+    # Places of the layers' faces, from 0 to half of the depth, rising, shape (layers + 1,), mm
     faces: FloatArray
-    held: bool = False
+    held: bool = False  # Whether the side faces cannot move along z, so that the body is in plane strain
 
     @classmethod
     def of(cls, mesh: TriangleMesh, layers: int, grading: float, held: bool = False) -> "ExtrudedSpace":

@@ -15,17 +15,11 @@ Face = Literal["side", "middle"]
 
 @dataclass(frozen=True, eq=False)
 class FaceField:
-    """A plane z = constant of a displacement in three dimensions; it is a `SolidField`.
+    """A plane z = constant of a displacement in three dimensions; it is a `SolidField`."""
 
-    Attributes:
-        space: Quadratic elements on half of the body.
-        nodal: Nodal displacements, shape (N, 3), mm.
-        face: The "side" face or the "middle" plane.
-    """
-
-    space: ExtrudedSpace
-    nodal: FloatArray
-    face: Face
+    space: ExtrudedSpace  # Quadratic elements on half of the body
+    nodal: FloatArray  # Nodal displacements, shape (N, 3), mm
+    face: Face  # The "side" face or the "middle" plane
 
     @cached_property
     def values(self) -> FloatArray:

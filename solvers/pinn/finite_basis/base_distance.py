@@ -23,15 +23,10 @@ TINY = 1e-13
 
 @dataclass(frozen=True)
 class LineDistance:
-    """Distance n . x - offset from the line of a straight base, with the body on one side.
+    """Distance n . x - offset from the line of a straight base, with the body on one side."""
 
-    Attributes:
-        normal: n, into the body, of unit length.
-        offset: Of the line, mm.
-    """
-
-    normal: tuple[float, float]
-    offset: float
+    normal: tuple[float, float]  # n, into the body, of unit length
+    offset: float  # Of the line, mm
 
     def at(self, points: Points) -> tuple[Points, Points, Points]:
         """The distance of points (n, 2), mm, and its derivatives by x and y, each (n, 1)."""
@@ -54,12 +49,9 @@ class CurveDistance:
 
     Source: A. Belyaev, P.-A. Fayolle, A. Pasko, Signed Lp-distance fields, Computer-Aided Design 45 (2013)
     523-528, here with p = 2 and without a sign.
-
-    Attributes:
-        segments: Shape (k, 2, 2), mm, with the body on their left.
     """
 
-    segments: FloatArray
+    segments: FloatArray  # Shape (k, 2, 2), mm, with the body on their left
 
     def at(self, points: Points) -> tuple[Points, Points, Points]:
         """The distance of points (n, 2), mm, and its derivatives by x and y, each (n, 1).

@@ -20,43 +20,27 @@ INVERSE_ITERATIONS = 3
 
 
 class NewtonIterate(NamedTuple):
-    """Result of a Newton step.
+    """Result of a Newton step."""
 
-    Attributes:
-        output: Output layer, shape (c, 2, m + 1), mm.
-        forces: Of the springs, shape (n,), N/mm.
-        change: Twice the energy of the step over the work of the load: small where Newton has converged.
-        markers: The forces at the markers for all factors of their weights; None at finite strain.
-        factor: The factor taken.
-        unstable: Number of directions in which the energy falls at the output layer before the step.
-        energy: Elastic energy per depth, N mm/mm, where it is quadratic and so half of the forces' work.
-    """
-
-    output: torch.Tensor
-    forces: FloatArray
-    change: float
+    output: torch.Tensor  # Output layer, shape (c, 2, m + 1), mm
+    forces: FloatArray  # Of the springs, shape (n,), N/mm
+    change: float  # Twice the energy of the step over the work of the load: small where Newton has converged
+    # The forces at the markers for all factors of their weights; None at finite strain
     markers: MarkerForces | None = None
-    factor: float = 1.0
-    unstable: int = 0
+    factor: float = 1.0  # The factor taken
+    unstable: int = 0  # Number of directions in which the energy falls at the output layer before the step
+    # Elastic energy per depth, N mm/mm, where it is quadratic and so half of the forces' work
     energy: float | None = None
 
 
 class LinearResponse(NamedTuple):
-    """Response of a network that is linearised at some output layer.
+    """Response of a network that is linearised at some output layer."""
 
-    Attributes:
-        residual: First derivative of the energy there, shape (U,), N/mm.
-        free: Newton's step without springs, shape (U,), mm.
-        unit: Steps by unit forces of the springs, shape (n, U), mm per N/mm.
-        damping: Diagonal that regularised the second derivative, shape (U,), N/mm^2.
-        negative: Number of negative eigenvalues of the second derivative.
-    """
-
-    residual: FloatArray
-    free: FloatArray
-    unit: FloatArray
-    damping: FloatArray
-    negative: int
+    residual: FloatArray  # First derivative of the energy there, shape (U,), N/mm
+    free: FloatArray  # Newton's step without springs, shape (U,), mm
+    unit: FloatArray  # Steps by unit forces of the springs, shape (n, U), mm per N/mm
+    damping: FloatArray  # Diagonal that regularised the second derivative, shape (U,), N/mm^2
+    negative: int  # Number of negative eigenvalues of the second derivative
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,22 +49,14 @@ class ConstrainedNetwork:
 
     Springs of the load are rigid, or nearly so; those of the markers have the compliance 1 / weight, which
     makes their energy the misfit.
-
-    Attributes:
-        energy: The elastic energy.
-        functionals: Of the output layer, shape (n, U): the load's, then the markers'.
-        targets: Their prescribed or observed values, shape (n,), mm.
-        compliance: Of the springs, shape (n,), mm per N/mm.
-        load_shape: Shape (a, k) of the load's functionals: k for each of a components.
-        weighting: Chooses a factor of the markers' weights; None without markers.
     """
 
-    energy: NetworkEnergy
-    functionals: FloatArray
-    targets: FloatArray
-    compliance: FloatArray
-    load_shape: tuple[int, ...]
-    weighting: MarkerWeighting | None
+    energy: NetworkEnergy  # The elastic energy
+    functionals: FloatArray  # Of the output layer, shape (n, U): the load's, then the markers'
+    targets: FloatArray  # Their prescribed or observed values, shape (n,), mm
+    compliance: FloatArray  # Of the springs, shape (n,), mm per N/mm
+    load_shape: tuple[int, ...]  # Shape (a, k) of the load's functionals: k for each of a components
+    weighting: MarkerWeighting | None  # Chooses a factor of the markers' weights; None without markers
 
     @classmethod
     def of(

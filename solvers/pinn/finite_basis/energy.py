@@ -36,19 +36,12 @@ STRIP = 8
 
 
 class QuadraturePatch(NamedTuple):
-    """A few neighbouring quadrature points.
+    """A few neighbouring quadrature points."""
 
-    Attributes:
-        points: Shape (p, 2), mm.
-        near: Numbers of the windows that reach them, ascending, (w,).
-        pairs: Numbers of the blocks of the pairs of these windows, (w, w); see `NetworkEnergy`.
-        rows: Of the points among those of all patches.
-    """
-
-    points: torch.Tensor
-    near: torch.Tensor
-    pairs: torch.Tensor
-    rows: slice
+    points: torch.Tensor  # Shape (p, 2), mm
+    near: torch.Tensor  # Numbers of the windows that reach them, ascending, (w,)
+    pairs: torch.Tensor  # Numbers of the blocks of the pairs of these windows, (w, w); see `NetworkEnergy`
+    rows: slice  # Of the points among those of all patches
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,25 +53,16 @@ class NetworkEnergy:
     of Z_j^T w A_ijkl Z_l. Where A is the same everywhere it follows from the sums of Z_j^T w Z_l, which take
     half of the products. Windows (a, b) with a <= b have the number of the pair's row and column; the others,
     whose blocks are the transposes, have a number beyond all of these.
-
-    Attributes:
-        basis: The basis functions.
-        material: The elastic law.
-        patches: The quadrature points; all arrays by points have the patches' order.
-        weights: Of the points, shape (q,), mm^2.
-        rows: First window of every pair that a patch has, shape (b,).
-        columns: Second window, not before the first, shape (b,).
-        origin: Displacement of zero energy; None for zero.
-        kept: Basis gradients of the patches met so far, by their numbers; None if they are not kept.
     """
 
-    basis: FiniteBasis
-    material: Material
-    patches: list[QuadraturePatch]
-    weights: torch.Tensor
-    rows: IntArray
-    columns: IntArray
-    origin: FiniteBasisField | None = None
+    basis: FiniteBasis  # The basis functions
+    material: Material  # The elastic law
+    patches: list[QuadraturePatch]  # The quadrature points; all arrays by points have the patches' order
+    weights: torch.Tensor  # Of the points, shape (q,), mm^2
+    rows: IntArray  # First window of every pair that a patch has, shape (b,)
+    columns: IntArray  # Second window, not before the first, shape (b,)
+    origin: FiniteBasisField | None = None  # Displacement of zero energy; None for zero
+    # Basis gradients of the patches met so far, by their numbers; None if they are not kept
     kept: dict[int, torch.Tensor] | None = dataclass_field(default=None, repr=False)
 
     @classmethod

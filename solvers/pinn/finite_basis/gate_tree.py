@@ -35,20 +35,14 @@ MIDDLE = (0.3, 0.7)
 
 @dataclass(frozen=True, eq=False)
 class GateTree:
-    """Gates over c encoders.
+    """Gates over c encoders."""
 
-    Attributes:
-        gates: Weights of x and y, 1/mm, and the bias of every gate, shape (c - 1, 3).
-        children: Number of the gate below that a closed and an open gate pass on, shape (c - 1, 2); below
-            zero it is the complement ~e of the number of an encoder.
-        paths: For every encoder the gates above it, padded with -1, shape (c, d).
-        opened: Whether the encoder is on their open sides, shape (c, d).
-    """
-
-    gates: torch.Tensor
+    gates: torch.Tensor  # Weights of x and y, 1/mm, and the bias of every gate, shape (c - 1, 3)
+    # Number of the gate below that a closed and an open gate pass on, shape (c - 1, 2); below zero it is the
+    # complement ~e of the number of an encoder
     children: torch.Tensor
-    paths: torch.Tensor
-    opened: torch.Tensor
+    paths: torch.Tensor  # For every encoder the gates above it, padded with -1, shape (c, d)
+    opened: torch.Tensor  # Whether the encoder is on their open sides, shape (c, d)
 
     @classmethod
     def over(

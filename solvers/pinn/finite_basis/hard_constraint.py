@@ -11,14 +11,10 @@ class HardConstraint:
     """A hard Dirichlet condition: the factor d / (d + length) of the distance d to the base.
 
     With it u = 0 holds on the base for all weights, and on the base only.
-
-    Attributes:
-        distance: d, mm.
-        length: Distance at which the factor is one half, mm.
     """
 
-    distance: BaseDistance
-    length: float
+    distance: BaseDistance  # d, mm
+    length: float  # Distance at which the factor is one half, mm
 
     @classmethod
     def of(cls, mesh: TriangleMesh, length: float) -> "HardConstraint":

@@ -12,17 +12,12 @@ MOMENTS = 12
 
 
 class LoadConditions(NamedTuple):
-    """Prescribed values of weighted sums of the displacement at points, for every prescribed component.
+    """Prescribed values of weighted sums of the displacement at points, for every prescribed component."""
 
-    Attributes:
-        points: Shape (q, 2), mm.
-        weights: Shape (k, q); the first functional's sum to one, so that its multiplier is the force.
-        values: Shape (a, k), mm, for each prescribed component.
-    """
-
-    points: FloatArray
+    points: FloatArray  # Shape (q, 2), mm
+    # Shape (k, q); the first functional's sum to one, so that its multiplier is the force
     weights: FloatArray
-    values: FloatArray
+    values: FloatArray  # Shape (a, k), mm, for each prescribed component
 
 
 def load_conditions(problem: Problem) -> LoadConditions:

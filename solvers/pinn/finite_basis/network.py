@@ -25,17 +25,11 @@ Windows = ShepardWindows | GateTree
 
 @dataclass(frozen=True, eq=False)
 class FiniteBasis:
-    """Basis functions of c windows.
+    """Basis functions of c windows."""
 
-    Attributes:
-        windows: The windows.
-        neurons: Weights of x and y, 1/mm, and bias of the neurons, shape (3, m, c).
-        constraint: The hard constraint on the base.
-    """
-
-    windows: Windows
-    neurons: torch.Tensor
-    constraint: HardConstraint
+    windows: Windows  # The windows
+    neurons: torch.Tensor  # Weights of x and y, 1/mm, and bias of the neurons, shape (3, m, c)
+    constraint: HardConstraint  # The hard constraint on the base
 
     @property
     def per_window(self) -> int:
@@ -147,14 +141,10 @@ class FiniteBasis:
 
 @dataclass(frozen=True, eq=False)
 class FiniteBasisField:
-    """Displacement field of a finite-basis network.
+    """Displacement field of a finite-basis network."""
 
-    Attributes:
-        basis: The basis functions.
-        output: Output layer, shape (c, 2, m + 1): for every window, component and basis function, mm.
-    """
-
-    basis: FiniteBasis
+    basis: FiniteBasis  # The basis functions
+    # Output layer, shape (c, 2, m + 1): for every window, component and basis function, mm
     output: torch.Tensor
 
     def displacement(self, location: LocatedPoints) -> FloatArray:

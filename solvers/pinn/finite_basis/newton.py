@@ -28,19 +28,12 @@ LEAP = 2.0
 
 
 class LoadStep(NamedTuple):
-    """Equilibrium under a fraction of the load.
+    """Equilibrium under a fraction of the load."""
 
-    Attributes:
-        fraction: Of the load.
-        state: Equilibrium there.
-        iterations: Newton iterations so far.
-        region: Where a cylinder touches; None without one, and where it does not.
-    """
-
-    fraction: float
-    state: NewtonIterate
-    iterations: int
-    region: ContactRegion | None = None
+    fraction: float  # Of the load
+    state: NewtonIterate  # Equilibrium there
+    iterations: int  # Newton iterations so far
+    region: ContactRegion | None = None  # Where a cylinder touches; None without one, and where it does not
 
 
 def find_equilibrium(

@@ -27,19 +27,14 @@ class PointSpacing:
     At distance d from a singularity with spacing s it is at most s + growth * d. Places of less than half the
     largest width count as singularities too, so that the spacing has no large jumps: a wide window over many
     narrow ones would overlap them all.
-
-    Attributes:
-        boundary: Points of the boundary, shape (b, 2), mm.
-        walls: The spacing there, shape (b,), mm.
-        singularities: Points, shape (s, 2), mm, where the strain is singular or nearly so, and the spacing
-            there, (s,), mm, one entry a kind.
-        growth: Growth of the spacing per distance from a singularity.
     """
 
-    boundary: FloatArray
-    walls: FloatArray
+    boundary: FloatArray  # Points of the boundary, shape (b, 2), mm
+    walls: FloatArray  # The spacing there, shape (b,), mm
+    # Points, shape (s, 2), mm, where the strain is singular or nearly so, and the spacing there, (s,), mm,
+    # one entry a kind
     singularities: tuple[tuple[FloatArray, FloatArray], ...]
-    growth: float
+    growth: float  # Growth of the spacing per distance from a singularity
 
     @classmethod
     def of(cls, problem: Problem, *, wall: float, corner: float, growth: float) -> "PointSpacing":

@@ -49,45 +49,27 @@ class Stage(NamedTuple):
 
 
 class Tangent(NamedTuple):
-    """The factorised second derivative of the elastic energy, kept while Newton's steps with it converge.
+    """The factorised second derivative of the elastic energy, kept while Newton's steps with it converge."""
 
-    Attributes:
-        factors: Of the network's tangent, without the cylinder.
-        output: The output layer at which it was formed.
-    """
-
-    factors: Factors
-    output: torch.Tensor
+    factors: Factors  # Of the network's tangent, without the cylinder
+    output: torch.Tensor  # The output layer at which it was formed
 
 
 class Step(NamedTuple):
-    """A Newton step.
+    """A Newton step."""
 
-    Attributes:
-        change: Of the output layer, of its shape, mm.
-        size: Work of the imbalance on the change over the energy: small where Newton has converged.
-        unstable: Number of directions in which the potential falls where the tangent was formed.
-    """
-
-    change: torch.Tensor
-    size: float
-    unstable: int
+    change: torch.Tensor  # Of the output layer, of its shape, mm
+    size: float  # Work of the imbalance on the change over the energy: small where Newton has converged
+    unstable: int  # Number of directions in which the potential falls where the tangent was formed
 
 
 class Taken(NamedTuple):
-    """A part of a step.
+    """A part of a step."""
 
-    Attributes:
-        step: The step.
-        output: The output layer after it.
-        potential: There.
-        length: The part, 0 if the potential does not fall.
-    """
-
-    step: Step
-    output: torch.Tensor
-    potential: float
-    length: float
+    step: Step  # The step
+    output: torch.Tensor  # The output layer after it
+    potential: float  # There
+    length: float  # The part, 0 if the potential does not fall
 
     @property
     def near(self) -> bool:
@@ -96,34 +78,21 @@ class Taken(NamedTuple):
 
 
 class Minimum(NamedTuple):
-    """The least potential with given multipliers.
+    """The least potential with given multipliers."""
 
-    Attributes:
-        output: Where it is found.
-        step: The last step.
-        tangent: The last one, for what comes next.
-    """
-
-    output: torch.Tensor
-    step: Step
-    tangent: Tangent
+    output: torch.Tensor  # Where it is found
+    step: Step  # The last step
+    tangent: Tangent  # The last one, for what comes next
 
 
 @dataclass(frozen=True, eq=False)
 class PressedNetwork:
-    """A network without other loads, and the cylinder.
+    """A network without other loads, and the cylinder."""
 
-    Attributes:
-        network: The network.
-        contact: The cylinder and the m nodes of the front.
-        values: The basis functions at these nodes, shape (m, c (m + 1)).
-        count: Number of nodes of the section's quadratic elements.
-    """
-
-    network: ConstrainedNetwork
-    contact: CylinderContact
-    values: csr_matrix
-    count: int
+    network: ConstrainedNetwork  # The network
+    contact: CylinderContact  # The cylinder and the m nodes of the front
+    values: csr_matrix  # The basis functions at these nodes, shape (m, c (m + 1))
+    count: int  # Number of nodes of the section's quadratic elements
 
     @classmethod
     def of(cls, network: ConstrainedNetwork, problem: Problem) -> "PressedNetwork":

@@ -13,14 +13,10 @@ class ShepardWindows:
 
     After D. Shepard, A two-dimensional interpolation function for irregularly-spaced data, Proc. 23rd ACM
     National Conference (1968) 517-524.
-
-    Attributes:
-        centres: Shape (c, 2), mm.
-        radii: Radii R, shape (c,), mm.
     """
 
-    centres: torch.Tensor
-    radii: torch.Tensor
+    centres: torch.Tensor  # Shape (c, 2), mm
+    radii: torch.Tensor  # Radii R, shape (c,), mm
 
     @property
     def count(self) -> int:

@@ -21,19 +21,12 @@ SPARE_WORKSPACE = 14, 200
 
 @dataclass(frozen=True, eq=False)
 class BlockMatrix:
-    """The upper half of a symmetric matrix of n x n blocks of b x b numbers.
+    """The upper half of a symmetric matrix of n x n blocks of b x b numbers."""
 
-    Attributes:
-        size: Blocks in a row, n.
-        rows: Row of every block, ascending, shape (k,).
-        columns: Its column, at least the row and ascending within it, shape (k,).
-        blocks: Shape (k, b, b).
-    """
-
-    size: int
-    rows: IntArray
-    columns: IntArray
-    blocks: FloatArray
+    size: int  # Blocks in a row, n
+    rows: IntArray  # Row of every block, ascending, shape (k,)
+    columns: IntArray  # Its column, at least the row and ascending within it, shape (k,)
+    blocks: FloatArray  # Shape (k, b, b)
 
     def diagonal(self) -> FloatArray:
         """The diagonal, shape (n, b)."""
@@ -86,17 +79,11 @@ class BlockMatrix:
 
 @dataclass(frozen=True, eq=False)
 class Factors:
-    """Factors of a matrix in MUMPS, freed by `close` or with this object: petsc4py would keep them for ever.
+    """Factors of a matrix in MUMPS, freed with this object: petsc4py would keep them for ever."""
 
-    Attributes:
-        scale: One over the roots of the diagonal, shape (n b,).
-        preconditioner: PETSc's object that holds them.
-        regularisation: That was added to the unit diagonal of the scaled matrix.
-    """
-
-    scale: FloatArray
-    preconditioner: Any
-    regularisation: float
+    scale: FloatArray  # One over the roots of the diagonal, shape (n b,)
+    preconditioner: Any  # PETSc's object that holds them
+    regularisation: float  # That was added to the unit diagonal of the scaled matrix
 
     def __post_init__(self) -> None:
         finalize(self, self.preconditioner.destroy)

@@ -23,21 +23,13 @@ from solvers.pinn.threading import map_in_threads, slices
 
 @dataclass(frozen=True, eq=False)
 class EnergyTerm:
-    """The mean strain energy density, MPa: the paper's L_PDE, with no external work.
+    """The mean strain energy density, MPa: the paper's L_PDE, with no external work."""
 
-    Attributes:
-        points: Shape (n, 2), mm.
-        weights: Of the points in the mean, shape (n,).
-        stiffness: Matrix from (du/dx, du/dy, dv/dx, dv/dy) to stress, shape (4, 4), MPa.
-        name: Of the term.
-        divisible: Points can be evaluated in chunks.
-    """
-
-    points: torch.Tensor
-    weights: torch.Tensor
-    stiffness: torch.Tensor
-    name: str = "PDE"
-    divisible: bool = True
+    points: torch.Tensor  # Shape (n, 2), mm
+    weights: torch.Tensor  # Of the points in the mean, shape (n,)
+    stiffness: torch.Tensor  # Matrix from (du/dx, du/dy, dv/dx, dv/dy) to stress, shape (4, 4), MPa
+    name: str = "PDE"  # Of the term
+    divisible: bool = True  # Points can be evaluated in chunks
 
     def add(self, networks: MlpPass, rows: slice, factor: float, sums: Weights) -> float:
         """Half of stress times displacement gradient; its derivative by that gradient is the stress."""
@@ -49,20 +41,13 @@ class EnergyTerm:
 
 @dataclass(frozen=True, eq=False)
 class DisplacementTerm:
-    """A weighted sum of squared differences from prescribed displacements, mm²: the paper's L_BC and L_ASM.
+    """The paper's L_BC or L_ASM: weighted squares of differences from given displacements, mm²."""
 
-    Attributes:
-        name: "BC" or "ASM".
-        points: Shape (n, 2), mm.
-        targets: Prescribed displacements, shape (2, m), mm; m = n without a functional.
-        weights: Shape (2, m); zero where a component is free.
-        functional: Linear functional of the displacement that is prescribed, shape (m, n).
-    """
-
-    name: str
-    points: torch.Tensor
-    targets: torch.Tensor
-    weights: torch.Tensor
+    name: str  # "BC" or "ASM"
+    points: torch.Tensor  # Shape (n, 2), mm
+    targets: torch.Tensor  # Prescribed displacements, shape (2, m), mm; m = n without a functional
+    weights: torch.Tensor  # Shape (2, m); zero where a component is free
+    # Linear functional of the displacement that is prescribed, shape (m, n)
     functional: torch.Tensor | None = None
 
     @property
@@ -96,15 +81,10 @@ def stiffness_matrix(lame: Lame) -> FloatArray:
 
 @dataclass(frozen=True)
 class ProcessGroup:
-    """One of several processes of torchrun, which share a training's points and sum their gradients.
+    """One of several processes of torchrun, which share a training's points and sum their gradients."""
 
-    Attributes:
-        rank: Its number; 0 reports and writes.
-        count: Number of processes.
-    """
-
-    rank: int
-    count: int
+    rank: int  # Its number; 0 reports and writes
+    count: int  # Number of processes
 
     @classmethod
     def from_environment(cls) -> "ProcessGroup":
@@ -135,34 +115,21 @@ Chunk = tuple[LossTerm, slice]
 
 
 class LossEvaluation(NamedTuple):
-    """The loss at some parameters.
+    """The loss at some parameters."""
 
-    Attributes:
-        terms: Value of every term, without its factor.
-        total: Sum of factor times term.
-        gradient: Of the total, shape (networks, parameters).
-    """
-
-    terms: dict[str, float]
-    total: float
-    gradient: torch.Tensor
+    terms: dict[str, float]  # Value of every term, without its factor
+    total: float  # Sum of factor times term
+    gradient: torch.Tensor  # Of the total, shape (networks, parameters)
 
 
 @dataclass(frozen=True, eq=False)
 class Loss:
-    """A weighted sum of terms.
+    """A weighted sum of terms."""
 
-    Attributes:
-        network: The networks.
-        terms: The terms.
-        factors: Weight of the terms by their names.
-        processes: Processes that share the chunks.
-    """
-
-    network: ModifiedMlp
-    terms: Sequence[LossTerm]
-    factors: Mapping[str, float]
-    processes: ProcessGroup = ONE_PROCESS
+    network: ModifiedMlp  # The networks
+    terms: Sequence[LossTerm]  # The terms
+    factors: Mapping[str, float]  # Weight of the terms by their names
+    processes: ProcessGroup = ONE_PROCESS  # Processes that share the chunks
 
     def __call__(self, parameters: torch.Tensor) -> LossEvaluation:
         """The loss and its gradient at parameters of shape (networks, parameters)."""

@@ -24,41 +24,25 @@ from solvers.pinn.paper.modified_mlp import ModifiedMlp, Weights
 
 
 class ForwardPass(NamedTuple):
-    """Layers from the points to the output, or their tangents along directions.
+    """Layers from the points to the output, or their tangents along directions."""
 
-    Attributes:
-        points: Points with a column of ones, shape (n, 3); or directions with zeros, (networks, 1, n, 3).
-        first: The input layers.
-        step: 4 (b - a).
-        gates: σ_k of the gates on hidden layers.
-        hidden: Inputs of these gates and, last, of the output layer.
-    """
-
+    # Points with a column of ones, shape (n, 3); or directions with zeros, (networks, 1, n, 3)
     points: torch.Tensor
-    first: torch.Tensor
-    step: torch.Tensor
-    gates: list[torch.Tensor]
-    hidden: list[torch.Tensor]
+    first: torch.Tensor  # The input layers
+    step: torch.Tensor  # 4 (b - a)
+    gates: list[torch.Tensor]  # σ_k of the gates on hidden layers
+    hidden: list[torch.Tensor]  # Inputs of these gates and, last, of the output layer
 
 
 class BackwardPass(NamedTuple):
-    """Derivatives of the output with respect to the layers, or their tangents.
+    """Derivatives of the output with respect to the layers, or their tangents."""
 
-    Attributes:
-        above: With respect to `ForwardPass.hidden`.
-        rates: Of σ_k with respect to its argument, in the order of `ForwardPass.gates`.
-        arguments: With respect to the gates' arguments.
-        outer: With respect to `ForwardPass.first`.
-        first_rates: Of `ForwardPass.first` with respect to its arguments.
-        first: With respect to those arguments.
-    """
-
-    above: list[torch.Tensor]
-    rates: list[torch.Tensor]
-    arguments: list[torch.Tensor]
-    outer: torch.Tensor
-    first_rates: torch.Tensor
-    first: torch.Tensor
+    above: list[torch.Tensor]  # With respect to `ForwardPass.hidden`
+    rates: list[torch.Tensor]  # Of σ_k with respect to its argument, in the order of `ForwardPass.gates`
+    arguments: list[torch.Tensor]  # With respect to the gates' arguments
+    outer: torch.Tensor  # With respect to `ForwardPass.first`
+    first_rates: torch.Tensor  # Of `ForwardPass.first` with respect to its arguments
+    first: torch.Tensor  # With respect to those arguments
 
 
 class MlpPass:

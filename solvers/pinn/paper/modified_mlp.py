@@ -19,39 +19,25 @@ import torch
 
 
 class Weights(NamedTuple):
-    """Parameters of the networks, as views of one tensor.
+    """Parameters of the networks, as views of one tensor."""
 
-    Attributes:
-        first: The input layers, those of A, B and Z_1 (or H_1): weights of x and y and the bias, shape
-            (networks, 3, 3, width).
-        gates: Matrices of the gates on hidden layers, each (networks, width, width).
-        biases: Their biases, each (networks, 1, width).
-        output: Shape (networks, width, 1).
-        output_bias: Shape (networks, 1).
-    """
-
+    # The input layers, those of A, B and Z_1 (or H_1): weights of x and y and the bias, shape (networks, 3,
+    # 3, width)
     first: torch.Tensor
-    gates: list[torch.Tensor]
-    biases: list[torch.Tensor]
-    output: torch.Tensor
-    output_bias: torch.Tensor
+    gates: list[torch.Tensor]  # Matrices of the gates on hidden layers, each (networks, width, width)
+    biases: list[torch.Tensor]  # Their biases, each (networks, 1, width)
+    output: torch.Tensor  # Shape (networks, width, 1)
+    output_bias: torch.Tensor  # Shape (networks, 1)
 
 
 @dataclass(frozen=True)
 class ModifiedMlp:
-    """Shape of modified MLPs of one output each, evaluated together.
+    """Shape of modified MLPs of one output each, evaluated together."""
 
-    Attributes:
-        networks: Number of networks.
-        width: Neurons in a layer.
-        layers: Number of gates L.
-        literal_gate: Whether the first gate has a layer of its own, as printed in the paper.
-    """
-
-    networks: int = 2
-    width: int = 64
-    layers: int = 4
-    literal_gate: bool = False
+    networks: int = 2  # Number of networks
+    width: int = 64  # Neurons in a layer
+    layers: int = 4  # Number of gates L
+    literal_gate: bool = False  # Whether the first gate has a layer of its own, as printed in the paper
 
     @property
     def gates(self) -> int:

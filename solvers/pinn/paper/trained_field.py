@@ -19,15 +19,10 @@ from solvers.solution import DisplacementField, Status
 
 @dataclass(frozen=True, eq=False)
 class MlpField:
-    """Two networks, one for each displacement component.
+    """Two networks, one for each displacement component."""
 
-    Attributes:
-        network: Their shape.
-        parameters: Shape (2, parameters); in double precision.
-    """
-
-    network: ModifiedMlp
-    parameters: torch.Tensor
+    network: ModifiedMlp  # Their shape
+    parameters: torch.Tensor  # Shape (2, parameters); in double precision
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""

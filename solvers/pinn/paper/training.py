@@ -35,19 +35,12 @@ class TrainingSettings:
 
 @dataclass(frozen=True)
 class CheckpointStore:
-    """Destination of a training's checkpoint and history.
+    """Destination of a training's checkpoint and history."""
 
-    Attributes:
-        folder: The folder of the checkpoint and the history.
-        digest: Of the problem and the settings that determine the result.
-        resume: Whether to continue from a checkpoint in the folder.
-        writes: Whether this process writes.
-    """
-
-    folder: Path
-    digest: str
-    resume: bool
-    writes: bool
+    folder: Path  # The folder of the checkpoint and the history
+    digest: str  # Of the problem and the settings that determine the result
+    resume: bool  # Whether to continue from a checkpoint in the folder
+    writes: bool  # Whether this process writes
 
 
 class Training:

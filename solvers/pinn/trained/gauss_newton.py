@@ -44,19 +44,12 @@ COLUMNS = 512
 
 
 class Step(NamedTuple):
-    """State after a step.
+    """State after a step."""
 
-    Attributes:
-        parameters: Shape (2, parameters).
-        value: Energy and misfit there, N mm/mm.
-        damping: As a share of the matrix' mean diagonal entry.
-        length: Of the step; zero if none was found.
-    """
-
-    parameters: torch.Tensor
-    value: float
-    damping: float
-    length: float
+    parameters: torch.Tensor  # Shape (2, parameters)
+    value: float  # Energy and misfit there, N mm/mm
+    damping: float  # As a share of the matrix' mean diagonal entry
+    length: float  # Of the step; zero if none was found
 
 
 def sampled_steps(

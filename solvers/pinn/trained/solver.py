@@ -166,15 +166,10 @@ class TrainedPinnAsmSolver(TrainedPinnSolver):
 
 @dataclass(frozen=True, eq=False)
 class TrainedField:
-    """Displacement of trained networks.
+    """Displacement of trained networks."""
 
-    Attributes:
-        squares: The networks' shape, frame and conditions, double precision.
-        parameters: Shape (2, parameters), double precision.
-    """
-
-    squares: Squares
-    parameters: torch.Tensor
+    squares: Squares  # The networks' shape, frame and conditions, double precision
+    parameters: torch.Tensor  # Shape (2, parameters), double precision
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement, shape (n, 2), mm."""

@@ -33,17 +33,11 @@ PIECE = 512
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """What the networks see of a point: its scaled position, and the factor of the clamped base.
+    """What the networks see of a point: its scaled position, and the factor of the clamped base."""
 
-    Attributes:
-        origin: Position that is scaled to zero, shape (2,), mm.
-        half: Length that is scaled to one, mm.
-        constraint: The factor f.
-    """
-
-    origin: torch.Tensor
-    half: float
-    constraint: HardConstraint
+    origin: torch.Tensor  # Position that is scaled to zero, shape (2,), mm
+    half: float  # Length that is scaled to one, mm
+    constraint: HardConstraint  # The factor f
 
     @classmethod
     def of(cls, mesh: TriangleMesh, base_length: float) -> Self:
@@ -64,17 +58,11 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Points with weights.
+    """Points with weights."""
 
-    Attributes:
-        inputs: Streams of the scaled position and of one, shape (3, n, 3).
-        factor: f and its derivatives by x and y, shape (n, 3).
-        weights: Shape (n,), mm² in the body.
-    """
-
-    inputs: torch.Tensor
-    factor: torch.Tensor
-    weights: torch.Tensor
+    inputs: torch.Tensor  # Streams of the scaled position and of one, shape (3, n, 3)
+    factor: torch.Tensor  # f and its derivatives by x and y, shape (n, 3)
+    weights: torch.Tensor  # Shape (n,), mm² in the body
 
     def __len__(self) -> int:
         return len(self.weights)
@@ -101,31 +89,19 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class Squares:
-    """Half the sum of squares, of parameters of shape (2, parameters).
+    """Half the sum of squares, of parameters of shape (2, parameters)."""
 
-    Attributes:
-        shape: Of the networks.
-        frame: What they see.
-        body: Quadrature points; their weights are areas.
-        contact: Points of the contact; their weights give its displacement.
-        prescribed: Displacement of the contact, shape (2,), mm; a component that is free has the value NaN.
-        stiffness: Of the displacement gradient (du/dx, du/dy, dv/dx, dv/dy), shape (4, 4), MPa.
-        markers: Points in the discs of the markers, without weights of their own.
-        means: Weights that give the markers' displacements from those there, shape (m, k).
-        observed: Observed displacements, shape (m, 2), mm.
-        springs: Square roots of the misfit's weights, shape (m, 2), MPa^1/2.
-    """
-
-    shape: ModifiedMlp
-    frame: Frame
-    body: Sample
-    contact: Sample
+    shape: ModifiedMlp  # Of the networks
+    frame: Frame  # What they see
+    body: Sample  # Quadrature points; their weights are areas
+    contact: Sample  # Points of the contact; their weights give its displacement
+    # Displacement of the contact, shape (2,), mm; a component that is free has the value NaN
     prescribed: torch.Tensor
-    stiffness: FloatArray
-    markers: Sample
-    means: torch.Tensor
-    observed: torch.Tensor
-    springs: torch.Tensor
+    stiffness: FloatArray  # Of the displacement gradient (du/dx, du/dy, dv/dx, dv/dy), shape (4, 4), MPa
+    markers: Sample  # Points in the discs of the markers, without weights of their own
+    means: torch.Tensor  # Weights that give the markers' displacements from those there, shape (m, k)
+    observed: torch.Tensor  # Observed displacements, shape (m, 2), mm
+    springs: torch.Tensor  # Square roots of the misfit's weights, shape (m, 2), MPa^1/2
 
     @classmethod
     def of(

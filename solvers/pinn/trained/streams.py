@@ -13,15 +13,10 @@ from solvers.pinn.paper.modified_mlp import ModifiedMlp, Weights
 
 
 class Layer(NamedTuple):
-    """A layer of tanh neurons.
+    """A layer of tanh neurons."""
 
-    Attributes:
-        before: Streams of the neurons' arguments, shape (..., 3, n, width).
-        after: Streams of tanh of them, the same shape.
-    """
-
-    before: torch.Tensor
-    after: torch.Tensor
+    before: torch.Tensor  # Streams of the neurons' arguments, shape (..., 3, n, width)
+    after: torch.Tensor  # Streams of tanh of them, the same shape
 
     @classmethod
     def of(cls, before: torch.Tensor) -> "Layer":
@@ -40,25 +35,15 @@ class Layer(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Streams:
-    """Networks evaluated at n points.
+    """Networks evaluated at n points."""
 
-    Attributes:
-        shape: Of the networks.
-        weights: Of the networks.
-        inputs: Streams of (x, y, 1), scaled, shape (3, n, 3).
-        first: The layers of A, B and Z_1 (see `ModifiedMlp`).
-        gates: Those of the other gates.
-        hidden: H_2, H_3, ..., each (networks, 3, n, width).
-        output: Streams of the outputs, shape (networks, 3, n).
-    """
-
-    shape: ModifiedMlp
-    weights: Weights
-    inputs: torch.Tensor
-    first: tuple[Layer, Layer, Layer]
-    gates: list[Layer]
-    hidden: list[torch.Tensor]
-    output: torch.Tensor
+    shape: ModifiedMlp  # Of the networks
+    weights: Weights  # Of the networks
+    inputs: torch.Tensor  # Streams of (x, y, 1), scaled, shape (3, n, 3)
+    first: tuple[Layer, Layer, Layer]  # The layers of A, B and Z_1 (see `ModifiedMlp`)
+    gates: list[Layer]  # Those of the other gates
+    hidden: list[torch.Tensor]  # H_2, H_3, ..., each (networks, 3, n, width)
+    output: torch.Tensor  # Streams of the outputs, shape (networks, 3, n)
 
     @classmethod
     def of(cls, shape: ModifiedMlp, parameters: torch.Tensor, inputs: torch.Tensor) -> "Streams":
