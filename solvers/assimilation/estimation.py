@@ -27,13 +27,10 @@ from geometry.arrays import BoolArray, FloatArray, IntArray
 
 LEVEL = 0.95
 """Of confidence intervals, and of the test whether noise explains the misfit."""
-
 MIN_RESOLUTION = 0.5
 """Minimum resolution for a parameter to count as determined by the data."""
-
 MAX_ROUNDS, INFLATION_CHANGE = 8, 0.01
 """Least-squares fits at most, and the relative change of φ below which it has converged."""
-
 MAX_STEPS, COST_CHANGE = 12, 1e-4
 """Steps of one fit at most, and the relative change of its cost below which it has converged.
 
@@ -51,12 +48,10 @@ class Parameter:
     """A parameter to be estimated.
 
     Attributes:
-        name: Name.
-        unit: Unit of the value; empty for a pure number.
+        unit: Empty for a pure number.
         start: Middle of the prior.
         scale: Standard deviation of the prior, of the value or, if `logarithmic`, of its logarithm.
-        low: Lower bound of the value.
-        high: Upper bound.
+        low, high: Bounds of the value.
         logarithmic: Whether the prior is normal in the logarithm, for positive values known to a factor.
     """
 
@@ -80,10 +75,18 @@ class Parameter:
     @property
     def bounds(self) -> tuple[float, float]:
         """Bounds of z."""
+        ends = self.low, self.high
         if self.logarithmic:
-            low, high = (log(end / self.start) if end > 0 else -np.inf for end in (self.low, self.high))
-            return low / self.scale, high / self.scale
-        return (self.low - self.start) / self.scale, (self.high - self.start) / self.scale
+            low, high = (log(end / self.start) if end > 0 else -np.inf for end in ends)
+        else:
+            low, high = (end - self.start for end in ends)
+        return low / self.scale, high / self.scale
+
+
+def values_of(parameters: Sequence[Parameter], z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Values of p parameters and their derivatives by z, each of shape (p,)."""
+    pairs = list(zip(parameters, z.tolist(), strict=True))
+    return np.array([float(u.value(at)) for u, at in pairs]), np.array([u.derivative(at) for u, at in pairs])
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,13 +94,11 @@ class Estimate:
     """Estimates of p parameters from n observations, with covariance and resolution.
 
     Attributes:
-        parameters: The parameters.
         z: Standardised values, shape (p,).
         sensitivities: A, shape (n, p).
         residuals: Predicted minus observed over φ σ, shape (n,).
         inflation: φ.
         evaluations: Evaluations of the model.
-        converged: Whether the minimum was found.
     """
 
     parameters: Sequence[Parameter]
@@ -134,12 +135,12 @@ class Estimate:
     @property
     def values(self) -> FloatArray:
         """Values of the parameters, shape (p,)."""
-        return np.array([float(u.value(z)) for u, z in zip(self.parameters, self.z, strict=True)])
+        return values_of(self.parameters, self.z)[0]
 
     @property
     def slopes(self) -> FloatArray:
         """Derivatives of the values by z, shape (p,)."""
-        return np.array([u.derivative(z) for u, z in zip(self.parameters, self.z, strict=True)])
+        return values_of(self.parameters, self.z)[1]
 
     @property
     def deviations(self) -> FloatArray:
@@ -207,20 +208,18 @@ def estimate(
 
     @cache  # least_squares asks for residuals and derivatives separately
     def evaluated(z: tuple[float, ...]) -> Prediction:
-        pairs = list(zip(parameters, z, strict=True))
-        found = model(np.array([float(u.value(place)) for u, place in pairs]))
-        if found is None:
-            return np.full(len(observed), np.inf), np.zeros((len(observed), len(pairs)))
+        values, scales = values_of(parameters, np.array(z))
+        if (found := model(values)) is None:
+            return np.full(len(observed), np.inf), np.zeros((len(observed), count))
         predicted, derivatives = found
-        derivatives = derivatives * [u.derivative(place) for u, place in pairs] / deviations[:, None]
-        return (predicted - observed) / deviations, derivatives
+        return (predicted - observed) / deviations, derivatives * scales / deviations[:, None]
 
     def whitened(z: FloatArray) -> Prediction:
         """Residuals over σ, shape (n,), and their derivatives by z, shape (n, p)."""
         return evaluated(tuple(z.tolist()))
 
-    count, one = len(parameters), np.eye(len(parameters))
-    expected, flat = np.sqrt(len(observed)), np.zeros(len(parameters))
+    count = len(parameters)
+    expected, one, flat = np.sqrt(len(observed)), np.eye(count), np.zeros(count)
     bounds = np.array([parameter.bounds for parameter in parameters]).T
     z = np.clip(np.zeros(count) if start is None else start, *bounds)
     if not np.isfinite(whitened(z)[0]).all():

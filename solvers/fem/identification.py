@@ -14,7 +14,6 @@ from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.wall_motion import WallMotion
 from geometry.observations import Observations
-from solvers.assimilation.misfit import radius_within
 from solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
 from solvers.fem.boundary_conditions import dirichlet_mask
 from solvers.fem.dolfinx_compat import DistributedSpace
@@ -217,31 +216,23 @@ class FemIdSolver(IdentifyingSolver):
         return fitted
 
 
-def fem_force_tracker(
-    problem: Problem, points: FloatArray, radius: float, *, degree: int = 2, prior: float = 1.0
-) -> ForceTracker:
-    """The force tracker of a finger in finite elements.
+def fem_law_tracker(
+    problem: Problem, points: FloatArray, radius: float, laws: Sequence[LawName] = LAWS, *, degree: int = 2
+) -> LawTracker:
+    """The force tracker of a finger by the most probable of some laws.
 
     Args:
-        problem: The finger with a law of finite strain; its load only gives the drawn contact.
+        problem: The finger; its load only gives the drawn contact.
         points: Markers at rest, shape (m, 2), mm, in the drawn body.
         radius: Of the markers' discs, mm; less is taken where one is nearer to the boundary.
+        laws: Laws of finite strain.
         degree: Of the elements, 1 or 2.
-        prior: Factor of the standard deviations of the priors.
     """
-    unknowns = Unknowns.of(replace(problem, observations=None), DEFAULT)
-    model = ResponseModel(_body(unknowns, degree), unknowns)
-    return ForceTracker(model, points, radius_within(problem.mesh, points, radius), prior=prior)
-
-
-def fem_law_tracker(
-    problem: Problem, points: FloatArray, radius: float, laws: Sequence[LawName] = LAWS
-) -> LawTracker:
-    """The force tracker by the most probable of some laws of finite strain, in elements of degree 2."""
     trackers = {}
     for law in laws:
-        own = replace(problem, material=problem.material.model_copy(update={"law": law}))
-        trackers[law] = fem_force_tracker(own, points, radius)
+        material = problem.material.model_copy(update={"law": law})
+        unknowns = Unknowns.of(replace(problem, material=material, observations=None), DEFAULT)
+        trackers[law] = ForceTracker(ResponseModel(_body(unknowns, degree), unknowns), points, radius)
     return LawTracker(trackers)
 
 

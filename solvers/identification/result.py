@@ -67,10 +67,9 @@ class Fit(NamedTuple):
 
         They are widened where Student's interval is wider than the normal one.
         """
-        wider = self.estimate.quantile / float(norm.ppf((1 + LEVEL) / 2))
-        return np.asarray(
-            wider * self.estimate.slopes[:, None] * np.linalg.cholesky(self.estimate.covariance)
-        )
+        found = self.estimate
+        wider = found.quantile / float(norm.ppf((1 + LEVEL) / 2))
+        return np.asarray(wider * found.slopes[:, None] * np.linalg.cholesky(found.covariance))
 
     @property
     def force(self) -> tuple[float, float]:

@@ -13,7 +13,7 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.assimilation.estimation import COST_CHANGE, MAX_ROUNDS, MAX_STEPS, Prediction, estimate
+from solvers.assimilation.estimation import COST_CHANGE, Prediction, estimate
 from solvers.elasticity import LawName
 from solvers.identification.body import Body
 from solvers.identification.model import EXACT, MarkerModel, Measurement, Response, ResponseModel
@@ -205,18 +205,21 @@ class Identifier:
             self.parameters,
             fit.estimate.z,
         )
-        response = fit.model.extrapolated(about, found.values)
-        coarser = None if fit.coarser is None else self._shifted(fit.coarser, measurement)
-        return Fit(fit.model, found, response, measurement, fit.exact, coarser)
+        return fit._replace(
+            estimate=found,
+            response=fit.model.extrapolated(about, found.values),
+            measurement=measurement,
+            coarser=fit.coarser and self._shifted(fit.coarser, measurement),
+        )
 
     def _rough(self, measurement: Measurement) -> list[Fit]:
         """A fit of every law with φ = 1, but for the first one in a few steps from that."""
         law, *others = self.models
-        fits = [self._fit(law, measurement, self._known.get(law), rounds=1)]
-        for law in others:
-            near = self._known.get(law, fits[0])
-            fits.append(self._fit(law, measurement, near, rounds=1, steps=QUICK))
-        return fits
+        first = self._fit(law, measurement, self._known.get(law), rounds=1)
+        return [first] + [
+            self._fit(each, measurement, self._known.get(each, first), rounds=1, steps=QUICK)
+            for each in others
+        ]
 
     def _settled(self, rough: Fit) -> Fit:
         """The fit of a law; where it explains little, the best of several from other places of contact."""
@@ -238,11 +241,12 @@ class Identifier:
         measurement: Measurement,
         near: Fit | None,
         start: FloatArray | None = None,
-        *,
-        rounds: int = MAX_ROUNDS,
-        steps: int = MAX_STEPS,
+        **limits: int,
     ) -> Fit:
-        """The fit of a law that starts from another fit, or else from standardised values (p,)."""
+        """The fit of a law that starts from another fit, or else from standardised values (p,).
+
+        `limits` are the `rounds` and `steps` of `estimate`.
+        """
         model = self.models[law]
         markers = MarkerModel.of(model, measurement)
         model.restart(None if near is None else near.response)
@@ -267,9 +271,8 @@ class Identifier:
             measurement.noise,
             self.parameters,
             start,
-            rounds=rounds,
-            steps=steps,
             cost_change=self._cost_change,
+            **limits,
         )
         exact = model.response(found.values, EXACT)
         response = exact or model.response(found.values)
@@ -282,8 +285,7 @@ class Identifier:
     def _pressed(self, model: ResponseModel, markers: MarkerModel) -> FloatArray:
         """Standardised values with the normal force that a linear finger would need, the rest as expected."""
         z = np.zeros(len(self._names))
-        drawn = np.array([float(parameter.value(0.0)) for parameter in self.parameters])
-        at_rest = model.response(drawn)
+        at_rest = model.response(np.array([parameter.start for parameter in self.parameters]))
         if at_rest is not None:
             which, noise = self._names.index("normal_force"), markers.measurement.noise
             slope = markers.predicted(at_rest)[1][:, which] / noise

@@ -22,8 +22,8 @@ from scipy.stats import chi2, norm
 
 from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import ShapeError, UserError
-from solvers.assimilation.estimation import LEVEL, degrees_of_freedom, inflation_of, quantile_of
-from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION
+from solvers.assimilation.estimation import LEVEL, degrees_of_freedom, inflation_of, quantile_of, values_of
+from solvers.assimilation.misfit import MIN_STANDARD_DEVIATION, radius_within
 from solvers.elasticity import LawName
 from solvers.identification.model import MarkerModel, Measurement, ResponseModel
 from solvers.identification.unknowns import CONTACT
@@ -98,8 +98,7 @@ class ForceTracker:
     Args:
         model: The finger, with `normal_force` and `position` among its unknowns.
         points: The m markers at rest, shape (m, 2), mm, in the drawn body.
-        radius: Of the discs over which their displacement is averaged, mm.
-        prior: Factor of the standard deviations of the priors.
+        radius: Of their discs, mm; less is taken where one is nearer to the boundary.
 
     Attributes:
         largest: Root mean square motion of the markers, mm, in the frame with the largest one so far.
@@ -109,19 +108,16 @@ class ForceTracker:
         UserError: If the unknowns lack the force or its place.
     """
 
-    def __init__(
-        self, model: ResponseModel, points: FloatArray, radius: float, *, prior: float = 1.0
-    ) -> None:
+    def __init__(self, model: ResponseModel, points: FloatArray, radius: float) -> None:
         self._unknowns, names = model.unknowns, model.unknowns.names
         if missing := {"normal_force", "position"} - set(names):
             raise UserError(f"a force is followed with {' and '.join(sorted(missing))} among the unknowns")
         self._model = model
-        self._parameters = model.unknowns.parameters(model.flexibility(), prior)
+        self._parameters = model.unknowns.parameters(model.flexibility())
         self._bounds = np.array([parameter.bounds for parameter in self._parameters]).T
-        still = np.zeros_like(points)
-        self._markers = MarkerModel.of(
-            model, Measurement(points, still, still, radius, np.arange(len(points)))
-        )
+        still, inside = np.zeros_like(points), radius_within(model.unknowns.problem.mesh, points, radius)
+        measurement = Measurement(points, still, still, inside, np.arange(len(points)))
+        self._markers = MarkerModel.of(model, measurement)
         self._of_finger = ~np.isin(names, CONTACT)
         self._drawn = _Prior(np.zeros(len(names)), np.eye(len(names)))
         self._known, self.largest, self._learnt = self._drawn, 0.0, 0
@@ -237,21 +233,13 @@ class ForceTracker:
     def _linearised(self, z: FloatArray) -> _Linearised | None:
         """The markers about the equilibrium at z; None if there is none.
 
-        The tolerance of the Newton step leaves about its square, no more than `NEAR` leaves; one step does
-        for a slow motion.
+        The tolerance of the Newton step leaves about its square, no more than `NEAR` leaves.
         """
-        values, derivatives = self._values(z)
-        response = self._model.response(values, tolerance=0.02)
-        if response is None:
+        values, derivatives = values_of(self._parameters, z)
+        if (response := self._model.response(values, tolerance=0.02)) is None:
             return None
         predicted, slopes = self._markers.predicted(response)
         return _Linearised(z, predicted, slopes * derivatives)
-
-    def _values(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Values of the unknowns and their derivatives by z, both of shape (p,)."""
-        pairs = list(zip(self._parameters, z.tolist(), strict=True))
-        values = np.array([float(u.value(place)) for u, place in pairs])
-        return values, np.array([u.derivative(place) for u, place in pairs])
 
     def _learn(self, found: _Posterior, *, anew: bool) -> None:
         """Take the finger in a frame for the prior of other frames, or into the mean of such frames.
@@ -269,7 +257,7 @@ class ForceTracker:
         self._known = _Prior(mean, precision)
 
     def _reading(self, found: _Posterior, status: str) -> ForceReading:
-        values, derivatives = self._values(found.z)
+        values, derivatives = values_of(self._parameters, found.z)
         directions = self._unknowns.slopes(values).force
         by_z = directions * derivatives[:, None]
         spread = by_z.T @ found.covariance @ by_z

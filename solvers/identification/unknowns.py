@@ -145,14 +145,14 @@ class Unknowns:
         named, material = self._named(values), self.material(values)
         by = {name: np.zeros(len(self.names)) for name in (*NAMES, *self.motion.names)}
         by |= dict(zip(self.names, np.eye(len(self.names)), strict=True))
-        young, (λ, μ, _), (into, along) = material.young, material.lame, self.directions
+        young, (λ, μ, _), into = material.young, material.lame, self.directions[0]
         by_poisson = lame_derivatives(young, material.poisson, material.plane)
         normal, eccentricity = named.get("normal_force", 0.0), named.get("eccentricity", 0.0)
         compliance = named.get("base_compliance", 0.0)
         return HypothesisSlopes(
             position=by["position"],
             width=by["width"],
-            force=np.outer(by["normal_force"], into) + np.outer(by["tangential_force"], along),
+            force=np.stack([by["normal_force"], by["tangential_force"]], axis=1) @ self.directions,
             couple=np.outer(normal * by["eccentricity"] + eccentricity * by["normal_force"], into),
             moduli=np.outer(by["young"], (λ / young, μ / young)) + np.outer(by["poisson"], by_poisson[:2]),
             changes=np.array([by[name] for name in self.motion.names]).reshape(-1, len(self.names)).T,

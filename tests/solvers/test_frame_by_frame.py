@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from geometry.errors import ShapeError, UserError
-from solvers.fem.identification import FemBody, fem_force_tracker
+from solvers.fem.identification import FemBody, fem_law_tracker
 from solvers.identification.model import EXACT, ResponseModel
-from solvers.identification.search import LAWS
-from solvers.identification.tracker import ForceTracker, LawTracker
+from solvers.identification.tracker import ForceTracker
 from solvers.identification.unknowns import DEFAULT, Unknowns
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
@@ -29,7 +28,7 @@ def problem(coarse_mesh):
 @pytest.fixture(scope="module")
 def tracker_of(problem):
     def made():
-        return fem_force_tracker(problem, problem.mesh.markers, RADIUS, degree=1)
+        return fem_law_tracker(problem, problem.mesh.markers, RADIUS, ["neo-hookean"], degree=1)
 
     return made
 
@@ -37,11 +36,7 @@ def tracker_of(problem):
 @pytest.fixture(scope="module")
 def tracker_of_laws(problem):
     def made():
-        trackers = {}
-        for law in LAWS:
-            own = replace(problem, material=Material(law=law))
-            trackers[law] = fem_force_tracker(own, problem.mesh.markers, RADIUS, degree=1)
-        return LawTracker(trackers)
+        return fem_law_tracker(problem, problem.mesh.markers, RADIUS, degree=1)
 
     return made
 
