@@ -18,19 +18,10 @@ from geometry.atomic import write_text
 
 KEPT = Path(__file__).with_name("audit.json")
 LOCKS = sorted((Path(__file__).parents[2] / "requirements").glob("debian*.txt"))
-ADDRESS = "https://pypi.org/pypi/{}/json"
-CONNECTIONS, PATIENCE_S = 6, 60.0
 
 
 class Package(NamedTuple):
-    """A locked package.
-
-    Attributes:
-        name: Its name on PyPI.
-        version: The locked version.
-        advisories: Their numbers; None if they cannot be known from here.
-        withdrawn: Whether its makers have withdrawn the release.
-    """
+    """A locked package with the numbers of its advisories; None if they cannot be known from here."""
 
     name: str
     version: str
@@ -67,15 +58,13 @@ def audited(packages: Sequence[tuple[str, str]]) -> Audit:
     Raises:
         OSError: If it does not answer.
     """
-    with ThreadPoolExecutor(CONNECTIONS) as pool:
+    with ThreadPoolExecutor(6) as pool:
         found = list(pool.map(_asked, packages))
     return Audit(datetime.now(UTC).date().isoformat(), found)
 
 
-def kept() -> Audit | None:
+def kept() -> Audit:
     """The audit as it was kept."""
-    if not KEPT.exists():
-        return None
     day, packages = json.loads(KEPT.read_text(encoding="utf-8"))
     return Audit(day, [Package(*each) for each in packages])
 
@@ -94,16 +83,11 @@ def _asked(package: tuple[str, str]) -> Package:
 
 
 def _page(project: str) -> Any:
-    with urlopen(ADDRESS.format(project), timeout=PATIENCE_S) as answer:
+    with urlopen(f"https://pypi.org/pypi/{project}/json", timeout=60.0) as answer:
         return json.load(answer)
 
 
-def main() -> None:
-    """Audit the lock files and keep what was found."""
+if __name__ == "__main__":
     found = audited(locked())
     write_text(KEPT, json.dumps(found) + "\n")
     print(f"{len(found.packages)} packages, {len(found.known)} known", *found.weak, sep="\n")
-
-
-if __name__ == "__main__":
-    main()

@@ -2,11 +2,10 @@
 
 import csv
 import hashlib
-import io
 import json
 import sqlite3
 from collections.abc import Callable, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,44 +15,38 @@ from PIL import Image
 
 TIMES = ("second", "started", "time", "rate_hz", "pace", "live")
 """Words in the names of entries that differ from run to run."""
-PAGES = (".html", ".png", ".mp4", ".mkv", ".pt", ".safetensors")
-"""Files of which only the presence is compared: pages tell times, and videos have marks of their own."""
-TRANSACTED = (".sqlite",)
-"""Files whose half-done changes are undone by the one who opens them next."""
-
-UNSURE = ("run.json",)
-"""Files that list digests of the pages."""
+PRESENT = (".html", ".png", ".mp4", ".mkv", ".pt", ".safetensors", "run.json")
+"""Ends of files of which only the presence is compared: they, or the files that they list, tell times."""
 
 
 def numbers(folder: Path) -> dict[str, str]:
     """A digest of the numbers in every file of a folder, by its path; empty for pages and pictures."""
-    files = sorted(path for path in folder.rglob("*") if path.is_file() and not path.name.startswith("."))
-    return {path.relative_to(folder).as_posix(): _digest(path) for path in files}
+    return {
+        path.relative_to(folder).as_posix(): "" if path.name.endswith(PRESENT) else _digest(_content(path))
+        for path in _visible(folder)
+    }
 
 
 def broken(folder: Path) -> list[str]:
     """Files under their final names that cannot be read to their end."""
     found = []
-    for path in sorted(folder.rglob("*")):
-        if path.is_file() and not path.name.startswith(".") and path.suffix not in TRANSACTED:
-            reader = READERS.get(path.suffix, Path.read_bytes)
-            try:
-                reader(path)
-            except Exception as error:  # whatever a reader says of half a file
-                found.append(f"{path.relative_to(folder)} ({type(error).__name__}: {error})")
+    for path in _visible(folder):
+        try:
+            if path.suffix != ".sqlite":  # what is half done there, the next to open it undoes
+                _content(path)
+        except Exception as error:  # whatever a reader says of half a file
+            found.append(f"{path.relative_to(folder)} ({type(error).__name__}: {error})")
     return found
 
 
 def incomplete(out: Path) -> list[str]:
     """Reasons why a folder under its final name is no whole result: files that `run.json` lists and lack."""
-    run = out / "run.json"
-    if not run.exists():
+    if not (out / "run.json").exists():
         return [f"{out.name} has no run.json"]
-    listed = json.loads(run.read_text())["files_sha256"]
     return [
         f"{out.name}/{name} is not what run.json says"
-        for name, digest in listed.items()
-        if not (out / name).is_file() or hashlib.sha256((out / name).read_bytes()).hexdigest() != digest
+        for name, digest in json.loads((out / "run.json").read_text())["files_sha256"].items()
+        if not (out / name).is_file() or _digest((out / name).read_bytes()) != digest
     ]
 
 
@@ -62,18 +55,20 @@ def leftovers(folder: Path) -> list[str]:
     return [path.relative_to(folder).as_posix() for path in folder.rglob("*") if ".partial" in path.name]
 
 
-def _digest(path: Path) -> str:
-    if path.suffix in PAGES or path.name in UNSURE:
-        return ""
-    content = READERS.get(path.suffix, Path.read_bytes)(path)
+def _visible(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.rglob("*") if path.is_file() and not path.name.startswith("."))
+
+
+def _content(path: Path) -> Any:
+    return READERS.get(path.suffix, Path.read_bytes)(path)
+
+
+def _digest(content: Any) -> str:
     return hashlib.sha256(content if isinstance(content, bytes) else repr(content).encode()).hexdigest()
 
 
-def _json(path: Path) -> Any:
-    return _timeless(json.loads(path.read_text(encoding="utf-8")))
-
-
 def _timeless(value: Any) -> Any:
+    """The value without entries that tell times."""
     if isinstance(value, Mapping):
         kept = {key: each for key, each in value.items() if not any(word in key for word in TIMES)}
         return {key: _timeless(each) for key, each in kept.items()}
@@ -94,24 +89,22 @@ def _csv(path: Path) -> Any:
 def _arrays(path: Path) -> Any:
     with np.load(path, allow_pickle=False) as archive:
         arrays = {name: archive[name] for name in archive.files}
-    header = [_header(array) for array in arrays.values() if array.dtype.kind == "U"]
-    return header, [
-        (name, each.shape, each.tobytes()) for name, each in arrays.items() if each.dtype.kind != "U"
+    return [
+        (name, _header(str(each)) if each.dtype.kind == "U" else (each.shape, each.tobytes()))
+        for name, each in arrays.items()
     ]
 
 
-def _header(array: Any) -> Any:
-    try:
-        return _timeless(json.loads(str(array)))
-    except ValueError:
-        return str(array)
+def _header(text: str) -> Any:
+    with suppress(ValueError):
+        return _timeless(json.loads(text))
+    return text
 
 
 def _journal(path: Path) -> Any:
     with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as connection:
-        return connection.execute(
-            "select number, state, message, quantities from samples order by number"
-        ).fetchall()
+        query = "select number, state, message, quantities from samples order by number"
+        return connection.execute(query).fetchall()
 
 
 def _ended(word: bytes) -> Callable[[Path], bytes]:
@@ -124,24 +117,13 @@ def _ended(word: bytes) -> Callable[[Path], bytes]:
     return read
 
 
-def _picture(path: Path) -> bytes:
-    with Image.open(path) as picture:
-        picture.load()
-        return picture.tobytes()
-
-
-def _parquet(path: Path) -> Any:
-    frame = pd.read_parquet(io.BytesIO(path.read_bytes()))
-    return frame.drop(columns=[name for name in frame if any(word in name for word in TIMES)]).to_csv()
-
-
 READERS: dict[str, Callable[[Path], Any]] = {
-    ".json": _json,
+    ".json": lambda path: _timeless(json.loads(path.read_text(encoding="utf-8"))),
     ".csv": _csv,
     ".npz": _arrays,
     ".sqlite": _journal,
-    ".parquet": _parquet,
-    ".png": _picture,
+    ".parquet": lambda path: _timeless(pd.read_parquet(path).to_dict("list")),
+    ".png": lambda path: Image.open(path).tobytes(),
     ".html": _ended(b"</html>"),
     ".vtu": _ended(b"</VTKFile>"),
     ".svg": _ended(b"</svg>"),

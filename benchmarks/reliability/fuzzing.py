@@ -1,146 +1,237 @@
-"""Coverage-guided fuzzing of one reader by Atheris, in a process of its own.
+"""Coverage-guided fuzzing of the readers of files that people give, by Atheris.
 
-`python -m benchmarks.reliability.fuzzing READER SECONDS FOLDER` writes what it found as JSON into the folder.
+`python -m benchmarks.reliability.fuzzing SECONDS [READER ...]` (`pip install atheris`) fuzzes the readers in
+turn and adds to the counts. It starts from the files in `seeds`, whose first gives the name of the file that
+is read, in a process that is started anew where a C library ended it. Files that reached new branches or were
+not handled are kept below `out`, and a later time goes on from them.
 """
 
 import json
 import logging
+import multiprocessing
 import os
-import random
+import pydoc
 import re
 import resource
+import shutil
 import sys
+import tempfile
 import time
 import traceback
 import warnings
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+from benchmarks.tables import keep_rows, kept_rows
 from geometry.atomic import write_text
+from geometry.errors import UserError
 
-MOST_MEMORY = 4 * 2**30
-"""Memory that a reader may take, bytes."""
+ROWS, SEEDS = Path(__file__).with_name("fuzzing.csv"), Path(__file__).with_name("seeds")
+KEPT = Path("out/reliability/fuzzing")
+LONGEST_S, GRACE_S = 10, 60.0
+"""Times that one file may take, and a process to start and to end, s."""
 
 
-def main(name: str, seconds: float, folder: Path) -> None:
-    """Fuzz a reader until the time is over."""
+class Row(NamedTuple):
+    """Counts of a reader over all times, in seconds and bytes; the last two are of the last time alone.
+
+    Attributes:
+        read: Number of the files that it took.
+        unhandled: Places of exceptions that are no refusal.
+        ended: How often a C library ended the process that read.
+    """
+
+    reader: str
+    runs: int = 0
+    read: int = 0
+    slowest: float = 0.0
+    peak: int = 0
+    seconds: float = 0.0
+    unhandled: int = 0
+    ended: int = 0
+
+
+class Reader(NamedTuple):
+    """A function that reads a file, the modules whose branches guide, and the largest file, bytes."""
+
+    function: str
+    guides: tuple[str, ...] = ()
+    longest: int = 4096
+    call: Callable[[Any, Path], object] = lambda read, path: read(path)
+
+
+TEXTS = "geometry.text_files"
+READERS = {
+    "design": Reader("geometry.finger.presets.load_design", ("geometry.finger", TEXTS)),
+    "study": Reader("compare.sweep.study.load_study", ("compare.sweep.study", TEXTS)),
+    "options": Reader(
+        "compare.commands.options_file.read_options_file", ("compare.commands.options_file", TEXTS)
+    ),
+    "description": Reader(
+        "geometry.drawing.description.load_description", ("geometry.drawing.description", TEXTS)
+    ),
+    "measurements": Reader(
+        "vision.measurements.read_measurements",
+        ("vision.measurements", "geometry.observations"),
+        call=lambda read, path: read(path, marker_radius=0.8),
+    ),
+    "camera": Reader("vision.calibration.camera_file.load_camera", ("vision.calibration",)),
+    "workspace": Reader("vision.tracking.workspace.load_workspace", ("vision.tracking.workspace", TEXTS)),
+    "svg": Reader("geometry.drawing.formats.svg.read_svg", ("geometry.drawing",)),
+    "dxf": Reader("geometry.drawing.formats.dxf.read_dxf", ("geometry.drawing",), longest=32768),
+    "msh": Reader("geometry.drawing.formats.msh.read_msh"),
+    "picture": Reader(
+        "vision.frames.pictures.images_of_files",
+        ("vision.frames",),
+        call=lambda read, path: list(read([path], 30.0)),
+    ),
+    "video": Reader(
+        "vision.frames.video.video_frames",
+        ("vision.frames",),
+        longest=16384,
+        call=lambda read, path: sum(1 for _ in read(path)),
+    ),
+    "mesh archive": Reader("geometry.mesh.triangle_mesh.TriangleMesh.load", ("geometry.mesh", "numpy.lib")),
+    "checkpoint": Reader(
+        "solvers.pinn.paper.checkpoint.load_checkpoint",
+        ("solvers.pinn.paper.checkpoint",),
+        call=lambda read, path: read(path.parent, "digest"),
+    ),
+}
+"""By the names of their folders of seeds."""
+
+
+def taken(reader: Reader, read: Any, path: Path) -> bool:
+    """Whether a file can be read; a refusal in one line is right, too.
+
+    Raises:
+        ValueError: If the refusal has several lines, or none.
+        Exception: If the reader has a fault.
+    """
+    try:
+        reader.call(read, path)
+    except UserError as error:
+        if not str(error).strip() or "\n" in str(error):
+            raise ValueError(f"no single line: {str(error)!r}") from error
+        return False
+    except Exception:
+        if "TriangleMesh" in reader.function:  # its callers make a damaged file of the cache again
+            return False
+        raise
+    return True
+
+
+def fuzz(name: str, seconds: float, folder: Path) -> None:
+    """Fuzz a reader in this process until the time is over; writes counts and files into a folder."""
     import atheris
 
-    from benchmarks.reliability.readers import LONGEST_S, READERS, EndedError
+    reader, seeds = READERS[name], sorted((SEEDS / name).iterdir())
+    guided = atheris.instrument_imports(include=list(reader.guides), enable_loader_override=False)
+    with guided if reader.guides else nullcontext():
+        read = pydoc.locate(reader.function)
+    if name == "design":  # a refusal tries a thousand others to propose ranges
+        from geometry.finger import validation
 
-    reader = READERS[name]
-    guides = atheris.instrument_imports(include=list(reader.modules), enable_loader_override=False)
-    with guides if reader.modules else nullcontext():
-        seeds = reader.seeds()
-        place = folder / f"input{reader.suffix}"
-        for seed in seeds:
-            place.write_bytes(seed)
-            reader.try_file(place)
+        validation._ranges = lambda *_: []
     warnings.simplefilter("ignore")
     logging.disable(logging.CRITICAL)
-    corpus = folder / "corpus"
+    place, corpus, words = folder / seeds[0].name, folder / "corpus", folder / "words"
     corpus.mkdir(exist_ok=True)
-    for number, seed in enumerate(seeds):
-        (corpus / f"seed-{number}").write_bytes(seed)
-    started = time.monotonic()
-    counts = {"runs": 0, "read": 0, "slowest": 0.0, "ended": 0}
-    wrong: dict[str, str] = {}
+    for seed in seeds:
+        shutil.copy(seed, corpus)
+    texts = [seed.read_bytes().decode("ascii", errors="ignore") for seed in seeds]
+    known = {word for text in texts if "\0" not in text for word in re.findall(r"[\w-]{1,29}", text)}
+    known |= {"nan", "inf", "1e999", "-1", "0", "[[", "{}"}
+    words.write_text("".join(f'"{word}"\n' for word in sorted(known)))
+    started, row, wrong = time.monotonic(), Row(name), dict[str, str]()
 
     def keep() -> None:
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-        found = {
-            **counts,
-            "seconds": time.monotonic() - started,
-            "peak": peak,
-            "wrong": wrong,
-            "seeds": len(seeds),
-        }
-        write_text(folder / "found.json", json.dumps(found))
+        counts = row._replace(seconds=time.monotonic() - started, peak=peak)
+        write_text(folder / "found.json", json.dumps({"row": counts, "wrong": wrong}))
 
     def one(data: bytes) -> None:
+        nonlocal row
+        begun, good = time.monotonic(), False
         if len(data) <= reader.longest:
             place.write_bytes(data)
-            begun = time.monotonic()
             try:
-                counts["read"] += reader.try_file(place)
-            except EndedError:
-                counts["ended"] += 1
-                (folder / f"crash-{counts['ended'] % 10}{reader.suffix}").write_bytes(data)
+                good = taken(reader, read, place)
             except Exception as error:
-                key = _key(error)
+                frames = traceback.extract_tb(error.__traceback__)
+                own = [frame for frame in frames if "site-packages" not in frame.filename][-1]
+                key = f"{type(error).__name__} at {Path(own.filename).name}:{own.name}"
                 if key not in wrong:
                     wrong[key] = f"{type(error).__name__}: {str(error)[:200]}"
-                    (folder / f"wrong-{len(wrong)}{reader.suffix}").write_bytes(data)
-                    keep()
-            counts["slowest"] = max(counts["slowest"], time.monotonic() - begun)
-        counts["runs"] += 1
-        if time.monotonic() - started > seconds:
+                    (folder / f"wrong-{len(wrong)}{place.suffix}").write_bytes(data)
+        slowest = max(row.slowest, time.monotonic() - begun)
+        row = row._replace(runs=row.runs + 1, read=row.read + good, slowest=slowest)
+        over = time.monotonic() - started > seconds
+        if over or row.runs % 200 == 0:
             keep()
+        if over:
             os._exit(0)
-        if counts["runs"] % 200 == 0:
-            keep()
 
-    words = folder / "words"
-    words.write_text("\n".join(f'"{word}"' for word in sorted(_words(seeds))) + "\n")
-    if not reader.modules:
-        generator = random.Random(time.time_ns())
-        while True:
-            one(_changed(generator.choice(seeds), generator))
+    limits = (f"-max_len={reader.longest}", f"-timeout={2 * LONGEST_S}", "-rss_limit_mb=4096")
     atheris.Setup(
         [
-            *(
-                sys.argv[0],
-                str(corpus),
-                f"-max_len={reader.longest}",
-                f"-timeout={2 * LONGEST_S}",
-                f"-dict={words}",
-            ),
-            *(
-                f"-artifact_prefix={folder}/crash-",
-                f"-rss_limit_mb={MOST_MEMORY // 2**20}",
-                "-print_final_stats=0",
-            ),
+            sys.argv[0],
+            str(corpus),
+            f"-dict={words}",
+            f"-artifact_prefix={folder}/crash-",
             "-verbosity=0",
+            *limits,
         ],
         one,
     )
     atheris.Fuzz()
 
 
-def _changed(content: bytes, generator: random.Random) -> bytes:
-    """A file with up to three bytes changed, parts taken out or parts said again elsewhere."""
-    changed = bytearray(content)
-    for _ in range(generator.randint(1, 3)):
-        at, kind = generator.randrange(len(changed)), generator.randrange(3)
-        if kind == 0:
-            changed[at] = generator.randrange(256)
-        elif kind == 1:
-            del changed[at : at + generator.randint(1, 8)]
-        else:
-            start = generator.randrange(len(changed))
-            changed[at:at] = changed[start : start + generator.randint(1, 40)]
-    return bytes(changed)
+def fuzzed(row: Row, seconds: float) -> Row:
+    """Fuzz the reader of a row, in as many processes as it takes, and add to its counts."""
+    kept, wrong, row = KEPT / row.reader, dict[str, str](), row._replace(ended=0)
+    end = time.monotonic() + seconds
+    while (left := end - time.monotonic()) > 1:
+        with tempfile.TemporaryDirectory() as place:
+            folder = Path(place)
+            if (kept / "corpus").is_dir():
+                shutil.copytree(kept / "corpus", folder / "corpus")
+            process = multiprocessing.get_context("spawn").Process(
+                target=fuzz, args=(row.reader, left, folder)
+            )
+            process.start()
+            process.join(left + GRACE_S)
+            process.kill()  # one that hangs where no alarm reaches it
+            process.join()
+            shutil.copytree(folder / "corpus", kept / "corpus", dirs_exist_ok=True)
+            for path in [*folder.glob("wrong-*"), *folder.glob("crash-*")]:
+                shutil.copy(path, kept)
+            found = json.loads((folder / "found.json").read_text())
+        counts, wrong = Row(*found["row"]), wrong | found["wrong"]
+        row = Row(
+            row.reader,
+            row.runs + counts.runs,
+            row.read + counts.read,
+            max(row.slowest, counts.slowest),
+            max(row.peak, counts.peak),
+            row.seconds + counts.seconds,
+            len(wrong),
+            row.ended + bool(process.exitcode),
+        )
+    print(*wrong.items(), sep="\n", flush=True)
+    return row
 
 
-def _key(error: Exception) -> str:
-    """Where in this project's code an exception began."""
-    own: Any = [
-        frame for frame in traceback.extract_tb(error.__traceback__) if "site-packages" not in frame.filename
-    ]
-    frame = own[-1]
-    return f"{type(error).__name__} at {Path(frame.filename).name}:{frame.name}"
-
-
-def _words(seeds: list[bytes]) -> set[str]:
-    """Words of the seeds that are texts."""
-    found: set[str] = set()
-    for seed in seeds:
-        if b"\0" not in seed:
-            text = seed.decode("ascii", errors="ignore")
-            found |= set(re.findall(r"[\w-]+", text))
-    return {word for word in found if len(word) < 30} | {"nan", "inf", "1e999", "-1", "0", "[[", "{}"}
+def main(seconds: float, names: Sequence[str]) -> None:
+    """Fuzz readers one after another."""
+    rows = {row.reader: row for row in kept_rows(ROWS, Row)}
+    for name in names or READERS:
+        rows[name] = fuzzed(rows.get(name, Row(name)), seconds)
+        print(*rows[name], flush=True)
+        keep_rows(ROWS, Row, [rows[name] for name in READERS if name in rows])
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], float(sys.argv[2]), Path(sys.argv[3]))
+    main(float(sys.argv[1]), sys.argv[2:])

@@ -17,106 +17,66 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import NamedTuple
 
 from geometry.errors import UserError
 
-Kind = Literal["kill", "torn", "ENOSPC", "EIO"]
-
-KINDS: tuple[Kind, ...] = ("kill", "torn", "ENOSPC", "EIO")
+KINDS = ("kill", "torn", "ENOSPC", "EIO")
 """Faults: killed before a call, killed within a write, disk full from a call on, one failed call."""
 
 BY_FILE = {
-    1: "write",
-    18: "pwrite64",
-    20: "writev",
-    296: "pwritev",
-    328: "pwritev2",
-    40: "sendfile",
-    74: "fsync",
-    75: "fdatasync",
-    77: "ftruncate",
-    285: "fallocate",
+    **{1: ("write", 0), 18: ("pwrite64", 0), 20: ("writev", 0), 296: ("pwritev", 0), 328: ("pwritev2", 0)},
+    **{40: ("sendfile", 0), 74: ("fsync", 0), 75: ("fdatasync", 0), 77: ("ftruncate", 0)},
+    **{285: ("fallocate", 0), 326: ("copy_file_range", 2)},
 }
-"""Calls whose first argument is the file's number."""
+"""Name, and argument with the number of the changed file."""
 BY_PATH = {
-    76: ("truncate", None, 0),
-    82: ("rename", None, 1),
-    264: ("renameat", 2, 3),
-    316: ("renameat2", 2, 3),
-    87: ("unlink", None, 0),
-    263: ("unlinkat", 0, 1),
-    84: ("rmdir", None, 0),
-    83: ("mkdir", None, 0),
-    258: ("mkdirat", 0, 1),
-    86: ("link", None, 1),
-    265: ("linkat", 2, 3),
-    88: ("symlink", None, 1),
-    266: ("symlinkat", 1, 2),
-    2: ("open", None, 0),
-    257: ("openat", 0, 1),
+    **{76: ("truncate", None, 0), 82: ("rename", None, 1), 264: ("renameat", 2, 3), 316: ("renameat2", 2, 3)},
+    **{87: ("unlink", None, 0), 263: ("unlinkat", 0, 1), 84: ("rmdir", None, 0), 83: ("mkdir", None, 0)},
+    **{258: ("mkdirat", 0, 1), 86: ("link", None, 1), 265: ("linkat", 2, 3), 88: ("symlink", None, 1)},
+    **{266: ("symlinkat", 1, 2), 2: ("open", None, 0), 257: ("openat", 0, 1)},
 }
-"""Name, argument with the folder's number, argument with the (new) path."""
-COPY = 326
-"""copy_file_range, whose third argument is the number of the changed file."""
-OPEN_FLAGS = {2: 1, 257: 2}
-"""Arguments with the flags of the calls that open a file."""
-MAKING = os.O_CREAT | os.O_TRUNC
-GROWING = {"write", "pwrite64", "writev", "pwritev", "pwritev2", "sendfile", "ftruncate", "fallocate"} | {
-    *("copy_file_range", "mkdir", "mkdirat", "open", "openat", "link", "linkat", "symlink", "symlinkat")
+"""Name, arguments with the folder's number and the (new) path; the flags of open and openat follow it."""
+GROWING = {
+    *("write", "pwrite64", "writev", "pwritev", "pwritev2", "sendfile", "ftruncate", "fallocate"),
+    *("copy_file_range", "mkdir", "mkdirat", "open", "openat", "link", "linkat", "symlink", "symlinkat"),
 }
 """Calls that a full disk refuses."""
 FUTILE = {"mkdir": True, "mkdirat": True, "unlink": False, "unlinkat": False, "rmdir": False}
 """Whether the path exists where a call changes nothing: a folder that is there, a file that is not."""
 
-_SECCOMP, _SET_FILTER, _LISTENER, _KILLABLE = 317, 1, 1 << 3, 1 << 5
-_NO_NEW_PRIVILEGES = 38
-_RECEIVE, _SEND, _CONTINUE = 0xC0502100, 0xC0182101, 1
-_ALLOW, _NOTIFY, _X86_64 = 0x7FFF0000, 0x7FC00000, 0xC000003E
-_HERE = -100
+PATIENCE_S = 15.0
+"""Time in which the children of a process have to end after it."""
+
 _NOTIFICATION, _ANSWER = struct.Struct("=QIIiIQ6Q"), struct.Struct("=QqiI")
+_RECEIVE, _SEND, _CONTINUE = 0xC0502100, 0xC0182101, 1
+_HERE = -100  # the working folder, in place of a folder's number
 
 
-@dataclass(frozen=True)
-class Point:
-    """A change of a file in a watched folder.
-
-    Attributes:
-        call: Name of the system call.
-        path: The file, after the call.
-    """
+class Point(NamedTuple):
+    """A change of a file in a watched folder: name of the system call, and the file after it."""
 
     call: str
     path: str
 
 
-@dataclass(frozen=True)
-class Fault:
-    """A fault at a point.
+class Fault(NamedTuple):
+    """One of `KINDS` at the point with a number, from 0."""
 
-    Attributes:
-        kind: One of `KINDS`.
-        at: Number of the point, from 0.
-    """
-
-    kind: Kind
+    kind: str
     at: int
 
 
-@dataclass(frozen=True)
-class Ending:
+class Ending(NamedTuple):
     """The end of a supervised process.
 
     Attributes:
         code: Its exit code; the negative number of the signal that ended it.
-        text: What it and its children wrote to their standard output and error.
+        text: Standard output and error, also of its children.
         points: The changes of files that it had begun.
         struck: Whether the fault's point was reached.
-        orphans: Processes that were still there `PATIENCE_S` after its end.
-        seconds: Processor time of the process, without its children, s.
-        peak: Largest memory in use, bytes.
+        orphans: Number of processes that were still there `PATIENCE_S` after its end.
     """
 
     code: int
@@ -124,12 +84,6 @@ class Ending:
     points: tuple[Point, ...]
     struck: bool
     orphans: int
-    seconds: float
-    peak: int
-
-
-PATIENCE_S = 15.0
-"""Time in which the children of a killed process have to end."""
 
 
 def supervised(
@@ -196,45 +150,30 @@ def _begin(work: Callable[[], int], parent: socket.socket, log: Path) -> None:
 def _install() -> int:
     """Install the filter and return the listener's file number; negative if the system refuses."""
     statement = struct.Struct("=HBBI")
-    load, equal, either, answer = 0x20, 0x15, 0x45, 0x06
-    numbers = [*BY_FILE, *(each for each in BY_PATH if each not in OPEN_FLAGS), COPY]
-    program = [statement.pack(load, 0, 0, 4), statement.pack(equal, 1, 0, _X86_64)]
-    program += [statement.pack(answer, 0, 0, _ALLOW), statement.pack(load, 0, 0, 0)]
-    for number in numbers:
-        program += [statement.pack(equal, 0, 1, number), statement.pack(answer, 0, 0, _NOTIFY)]
-    for number, place in OPEN_FLAGS.items():
-        program += [
-            statement.pack(equal, 0, 4, number),
-            statement.pack(load, 0, 0, 16 + 8 * place),
-            statement.pack(either, 0, 1, MAKING),
-            statement.pack(answer, 0, 0, _NOTIFY),
-            statement.pack(answer, 0, 0, _ALLOW),
-        ]
-    program.append(statement.pack(answer, 0, 0, _ALLOW))
+    load, equal, answer, allow, notify = 0x20, 0x15, 0x06, 0x7FFF0000, 0x7FC00000
+    program = [statement.pack(load, 0, 0, 4), statement.pack(equal, 1, 0, 0xC000003E)]  # x86-64
+    program += [statement.pack(answer, 0, 0, allow), statement.pack(load, 0, 0, 0)]
+    for number in (*BY_FILE, *BY_PATH):
+        program += [statement.pack(equal, 0, 1, number), statement.pack(answer, 0, 0, notify)]
+    program.append(statement.pack(answer, 0, 0, allow))
     code = ctypes.create_string_buffer(b"".join(program))
     header = ctypes.create_string_buffer(struct.pack("@HP", len(program), ctypes.addressof(code)))
     library = ctypes.CDLL(None, use_errno=True)
-    library.prctl(_NO_NEW_PRIVILEGES, 1, 0, 0, 0)
-    return int(library.syscall(_SECCOMP, _SET_FILTER, _LISTENER | _KILLABLE, header))
+    library.prctl(38, 1, 0, 0, 0)  # PR_SET_NO_NEW_PRIVS
+    return int(library.syscall(317, 1, 1 << 3 | 1 << 5, header))  # new listener, its waits killable
 
 
 class _CallerKilledError(Exception):
     """The process that waits for an answer is no more."""
 
 
-@dataclass
 class _Supervisor:
     """Answers the notifications of one process and its children."""
 
-    child: int
-    listener: int
-    watched: list[str]
-    fault: Fault | None
-
-    def __post_init__(self) -> None:
+    def __init__(self, child: int, listener: int, watched: list[str], fault: Fault | None) -> None:
+        self.child, self.listener, self.watched, self.fault = child, listener, watched, fault
         self.points: list[Point] = []
         self.struck = False
-        self.peak = 0
 
     def run(self, log: Path, limit_s: float) -> Ending:
         """Answer until all processes have ended, or those that are left over have had their time."""
@@ -242,29 +181,25 @@ class _Supervisor:
         poll = select.poll()
         poll.register(self.listener, select.POLLIN)
         code: int | None = None
-        seconds, left, timed_out = 0.0, 0, False
+        left, more = 0, ""
         while True:
             events = poll.poll(50)
             if events and events[0][1] & select.POLLIN:
                 self._serve()
             if code is None:
-                pid, status, usage = os.wait4(self.child, os.WNOHANG)
+                pid, status = os.waitpid(self.child, os.WNOHANG)
                 if pid:
-                    code, seconds = os.waitstatus_to_exitcode(status), usage.ru_utime + usage.ru_stime
-                    self.peak = usage.ru_maxrss * 1024
-                    limit = time.monotonic() + PATIENCE_S
+                    code, limit = os.waitstatus_to_exitcode(status), time.monotonic() + PATIENCE_S
             if code is not None and events and events[0][1] & select.POLLHUP:
                 break
-            if time.monotonic() > limit:
-                if code is None:
-                    timed_out = True
-                    os.kill(self.child, signal.SIGKILL)
-                    limit += PATIENCE_S
-                    continue
+            if time.monotonic() > limit and code is None:
+                more = "\nended by the time limit"
+                os.kill(self.child, signal.SIGKILL)
+                limit += PATIENCE_S
+            elif time.monotonic() > limit:
                 left = self._end_all()
                 break
-        text = log.read_text(errors="replace") + ("\nended by the time limit" if timed_out else "")
-        return Ending(code or 0, text, tuple(self.points), self.struck, left, seconds, self.peak)
+        return Ending(code, log.read_text(errors="replace") + more, tuple(self.points), self.struck, left)
 
     def _end_all(self) -> int:
         """Kill what is left of the child's session, and return the number of processes."""
@@ -293,13 +228,15 @@ class _Supervisor:
             fcntl.ioctl(self.listener, _SEND, ctypes.create_string_buffer(answer, len(answer)))
 
     def _point(self, task: int, number: int, arguments: Sequence[int]) -> Point | None:
-        """The point, if the file lies in a watched folder."""
+        """The point, if the call changes a file in a watched folder."""
         try:
-            if number in BY_FILE or number == COPY:
-                name = BY_FILE.get(number, "copy_file_range")
-                path = os.readlink(f"/proc/{task}/fd/{_signed(arguments[2 if number == COPY else 0])}")
+            if number in BY_FILE:
+                name, place = BY_FILE[number]
+                path = os.readlink(f"/proc/{task}/fd/{_signed(arguments[place])}")
             else:
                 name, folder, place = BY_PATH[number]
+                if name in ("open", "openat") and not arguments[place + 1] & (os.O_CREAT | os.O_TRUNC):
+                    return None
                 path = _text(task, arguments[place])
                 above = _HERE if folder is None else _signed(arguments[folder])
                 if not path.startswith("/"):
@@ -307,11 +244,8 @@ class _Supervisor:
                     path = os.path.normpath(f"{os.readlink(start)}/{path}")
         except OSError:
             return None
-        if not any(path.startswith(each) for each in self.watched) or os.path.lexists(path) == FUTILE.get(
-            name
-        ):
-            return None
-        return Point(name, path)
+        futile = os.path.lexists(path) == FUTILE.get(name)
+        return Point(name, path) if path.startswith(tuple(self.watched)) and not futile else None
 
     def _strike(self, point: Point, task: int, arguments: Sequence[int]) -> int:
         """Count a point and put the fault into it; the error number that the call ends with, or 0."""

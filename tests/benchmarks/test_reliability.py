@@ -1,6 +1,7 @@
 """Faults at changes of files: where they strike, and what a command makes of some of them."""
 
 import os
+import pydoc
 import subprocess
 import sys
 from collections.abc import Callable
@@ -9,16 +10,17 @@ from pathlib import Path
 import pytest
 
 from benchmarks.reliability.document import PAGE, page
-from benchmarks.reliability.faults import Row, kept_rows, known_trials
-from benchmarks.reliability.supervision import Fault, Kind, Point, supervised
-from benchmarks.reliability.trials import Expected, chosen, differences, plain
+from benchmarks.reliability.faults import ROWS, Expected, Row, chosen, differences, known_trials, plain
+from benchmarks.reliability.fuzzing import READERS, SEEDS, taken
+from benchmarks.reliability.supervision import Fault, Point, supervised
+from benchmarks.tables import kept_rows
 from geometry.atomic import write_text
 from geometry.errors import UserError
 
 ROOT = Path(__file__).parents[2]
 
 
-def run(work: Callable[[], int], folder: Path, kind: Kind | None = None, at: int = 0):
+def run(work: Callable[[], int], folder: Path, kind: str | None = None, at: int = 0):
     watched = folder / "watched"
     watched.mkdir(exist_ok=True)
     try:
@@ -62,7 +64,7 @@ def test_every_change_of_a_file_is_a_point_also_those_of_children(tmp_path: Path
     ],
 )
 def test_faults_leave_what_they_say(
-    tmp_path: Path, kind: Kind, at: int, code: int, left: dict[str, str]
+    tmp_path: Path, kind: str, at: int, code: int, left: dict[str, str]
 ) -> None:
     def work() -> int:
         write_text(tmp_path / "watched" / "a.txt", "hallo!")
@@ -121,7 +123,15 @@ def test_kept_trials_are_those_of_the_same_file_by_whatever_number(tmp_path: Pat
 
 
 def test_the_page_is_that_of_the_kept_trials() -> None:
-    assert PAGE.read_text(encoding="utf-8").splitlines()[8:] == page(kept_rows()).splitlines()[8:]
+    assert PAGE.read_text(encoding="utf-8").splitlines()[8:] == page(kept_rows(ROWS, Row)).splitlines()[8:]
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_fuzzing_starts_from_a_file_that_its_reader_takes(name: str, tmp_path: Path) -> None:
+    reader, seeds = READERS[name], sorted((SEEDS / name).iterdir())
+    path = tmp_path / seeds[0].name
+    path.write_bytes(seeds[0].read_bytes())
+    assert taken(reader, pydoc.locate(reader.function), path)
 
 
 @pytest.mark.slow
@@ -130,17 +140,16 @@ def test_a_command_that_is_killed_goes_on_to_the_same_numbers(tmp_path: Path) ->
     code = (
         "from pathlib import Path\n"
         "import sys\n"
-        "from benchmarks.reliability.faults import filled\n"
+        "from benchmarks.reliability.faults import copied, filled, trial, undisturbed\n"
         "from benchmarks.reliability.jobs import JOBS\n"
         "from benchmarks.reliability.supervision import Fault\n"
-        "from benchmarks.reliability.trials import trials, undisturbed\n"
         "job, folder = JOBS[1], Path(sys.argv[1])\n"
         "with filled(folder) as cache:\n"
         "    expected = undisturbed(job, folder / 'job', cache)\n"
         "    renames = [at for at, each in enumerate(expected.points) if each.call.startswith('rename')]\n"
-        "    which = [Fault('kill', renames[-2])]\n"
-        "    found = list(trials(job, expected, which, folder / 'job'))\n"
-        "assert not any(each.faults for each in found), found\n"
+        "    place = copied(expected, folder / 'job')\n"
+        "    found = trial(job, expected, Fault('kill', renames[-2]), place)\n"
+        "assert not found.faults, found\n"
     )
     environment = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
