@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.verification import calculix
+from benchmarks.verification.cases import calculix
 from benchmarks.verification.document import PAGE, page
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from benchmarks.verification.cantilever import end_loaded
+from benchmarks.verification.cases.cantilever import end_loaded
+from benchmarks.verification.cases.manufactured import waves
+from benchmarks.verification.cases.plate_with_hole import kirsch
 from benchmarks.verification.hooke import PlaneLaw
 from benchmarks.verification.hyperelastic import Hyperelastic
-from benchmarks.verification.manufactured import waves
-from benchmarks.verification.plate_with_hole import kirsch
 from solvers.problem import Material
 
 CLOSED_FORMS = {

@@ -3,11 +3,11 @@
 import pytest
 import ufl
 
-from benchmarks.verification.cantilever import CANTILEVER
-from benchmarks.verification.cook import COOK
-from benchmarks.verification.finite_strain import FINITE_STRAIN
-from benchmarks.verification.manufactured import MANUFACTURED
-from benchmarks.verification.plate_with_hole import KIRSCH
+from benchmarks.verification.cases.cantilever import CANTILEVER
+from benchmarks.verification.cases.cook import COOK
+from benchmarks.verification.cases.finite_strain import FINITE_STRAIN
+from benchmarks.verification.cases.manufactured import MANUFACTURED
+from benchmarks.verification.cases.plate_with_hole import KIRSCH
 from geometry.errors import UserError
 from solvers import elasticity
 from solvers.fem import linear_equilibrium

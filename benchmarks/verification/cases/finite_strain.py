@@ -3,7 +3,7 @@
 import numpy as np
 import skfem
 
-from benchmarks.verification.another_program import basis_of, components, factorised
+from benchmarks.verification.cases.another_program import basis_of, components, factorised
 from benchmarks.verification.hyperelastic import Hyperelastic
 from benchmarks.verification.meshes import mapped_mesh, quadrilateral
 from benchmarks.verification.record import Case, Row, at_most

@@ -5,9 +5,9 @@ from itertools import product
 import numpy as np
 
 from benchmarks.verification.boundary_value import BoundaryValue, Exact
+from benchmarks.verification.cases.patch import BODY
 from benchmarks.verification.hooke import PlaneLaw
 from benchmarks.verification.meshes import mapped_mesh
-from benchmarks.verification.patch import BODY
 from benchmarks.verification.record import Case, Row, about, slope_rows
 from geometry.arrays import FloatArray
 from solvers.problem import Material

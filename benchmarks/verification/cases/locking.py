@@ -1,6 +1,6 @@
 """Nearly incompressible material in plane strain: linear triangles lock, quadratic ones do not."""
 
-from benchmarks.verification.cantilever import TIP, cantilever_problem, deflection, end_loaded
+from benchmarks.verification.cases.cantilever import TIP, cantilever_problem, deflection, end_loaded
 from benchmarks.verification.record import Case, Row, about, at_most, between, slope_rows
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design
