@@ -35,7 +35,7 @@ def sweep_weights(task: SolverTask, progress: Progress = silent) -> dict[str, li
         fit = forces.fit(factor)
         weighted = replace(solution, field=LagrangeField(space, finger.under(fit.forces)))
         distances = runner.distances(runner.sampler.of_solution(weighted, problem.mesh), 0)
-        errors = [root_mean_square(fit.residual), root_mean_square(fit.left_out)]
+        errors = [root_mean_square(fit.residual), root_mean_square(fit.residual_without)]
         rows.append([factor, *errors, *(distances[name] for name in FIELDS)])
     finger.equilibrium.factors.destroy()
     names = ("factor", "in_sample_mm", "left_out_mm", *FIELDS)

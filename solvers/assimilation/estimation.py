@@ -26,7 +26,7 @@ from scipy.stats import chi2, norm, t
 from geometry.arrays import BoolArray, FloatArray, IntArray
 
 LEVEL = 0.95
-"""Of confidence intervals, and of the test whether noise explains the misfit."""
+"""Level of confidence intervals, and of the test whether noise explains the misfit."""
 MIN_RESOLUTION = 0.5
 """Minimum resolution for a parameter to count as determined by the data."""
 MAX_ROUNDS, INFLATION_CHANGE = 8, 0.01

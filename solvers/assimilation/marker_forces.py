@@ -29,19 +29,19 @@ class MarkerFit(NamedTuple):
     Attributes:
         forces: p, shape (m, 2), N/mm.
         residual: d - B u, shape (m, 2), mm.
-        left_out: Leave-one-out residuals, the other weights as they are, shape (m, 2), mm.
+        residual_without: Residual of each marker in the fit without it, by unchanged weights, (m, 2), mm.
         energy: E(u) - E(u_0), N mm / mm.
     """
 
     forces: FloatArray
     residual: FloatArray
-    left_out: FloatArray
+    residual_without: FloatArray
     energy: float
 
     @property
     def phrase(self) -> str:
         """The root mean square residuals in words."""
-        return residual_phrase(self.residual, self.left_out)
+        return residual_phrase(self.residual, self.residual_without)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ class MarkerForces:
         return MarkerFit(
             forces=forces,
             residual=scaled / root,
-            left_out=np.linalg.solve(blocks, scaled[..., None])[..., 0] / root,
+            residual_without=np.linalg.solve(blocks, scaled[..., None])[..., 0] / root,
             energy=0.5 * float(forces.ravel() @ self.compliance @ forces.ravel()),
         )
 
@@ -94,12 +94,12 @@ class MarkerForces:
         return -0.5 * float((self._in_modes**2 / spread).sum() / scale + np.log(spread).sum())
 
 
-def residual_phrase(residual: FloatArray, left_out: FloatArray) -> str:
+def residual_phrase(residual: FloatArray, residual_without: FloatArray) -> str:
     """Root mean square residuals in words, mm, in the fit and with each marker left out."""
     return (
         "root mean square residual at the markers: "
         f"{root_mean_square(residual):.2g} mm in the fit, "
-        f"{root_mean_square(left_out):.2g} mm when they are left out"
+        f"{root_mean_square(residual_without):.2g} mm when they are left out"
     )
 
 

@@ -74,7 +74,7 @@ class MarkerWeighting(MarkerSettings):
             "weight_factor": FACTORS,
             "curve_energy": np.array([fit.energy for fit in fits]),
             "curve_in_sample_mm": np.array([root_mean_square(fit.residual) for fit in fits]),
-            "curve_left_out_mm": np.array([root_mean_square(fit.left_out) for fit in fits]),
+            "curve_left_out_mm": np.array([root_mean_square(fit.residual_without) for fit in fits]),
         }
         if self.weights == "precision":
             evidence = [forces.log_evidence(self.scale, factor) for factor in FACTORS]

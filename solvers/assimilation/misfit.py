@@ -31,10 +31,7 @@ Weighting = Literal["paper", "precision"]
 Choice = Literal["given", "left-out", "evidence"]
 
 MIN_STANDARD_DEVIATION = 0.005
-"""Minimum standard deviation of an observation, mm: about that of a well-calibrated camera.
-
-Simulated displacements have none.
-"""
+"""Minimum standard deviation of an observation, mm: a well-calibrated camera's; simulated ones have none."""
 
 RINGS, ANGLES = 4, 12
 """Quadrature of a disc: Gauss points in the squared radius, equidistant angles."""
@@ -57,8 +54,8 @@ class MarkerSettings:
         contact_deviation: Standard deviation of the contact's displacement about the prescribed one, mm,
             where the prior is exp(-E / scale): a spring of stiffness scale / contact_deviation² between
             contact and indenter. Zero: the contact moves as prescribed.
-        choose: Factor of the weights. "given": one; "left-out": that of `FACTORS` with the least error at
-            markers left out one at a time; "evidence": that of the largest evidence, for "precision".
+        choose: Factor of the weights. "given": one; "left-out": of `FACTORS`, the one with the least error at
+            markers left out one at a time; "evidence": with the largest evidence, for "precision".
     """
 
     weights: Weighting = "paper"

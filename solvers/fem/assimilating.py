@@ -190,5 +190,5 @@ class FemAsmSolver(FieldSettings):
                 "marker_force": float(np.linalg.norm(fit.forces, axis=1).max()),
             },
             history=self.weighting.curve(forces),
-            left_out=leave_one_out_displacements(problem, fit.left_out),
+            left_out=leave_one_out_displacements(problem, fit.residual_without),
         )

@@ -72,10 +72,6 @@ class FemBody:
         """(N, 2)."""
         return self._clamped.shape
 
-    def close(self) -> None:
-        """Free the factors, which PETSc holds."""
-        self._factors.destroy()
-
     def linearised(self, state: FloatArray, lame: Lame, changes: FloatArray) -> Linearised | None:
         """Assemble and factorise at a state; see `Body`."""
         if not self._admissible(state, changes):
@@ -154,7 +150,7 @@ class FemBody:
 
 
 def _both_components(values: FloatArray) -> FloatArray:
-    """Rows (r, 2, N, 2) of both components from those of one, shape (r, N)."""
+    """Rows (r, 2, N, 2) of both components from rows (r, N) of one."""
     return np.asarray(np.einsum("rn,ab->ranb", np.asarray(values), np.eye(2)))
 
 

@@ -22,7 +22,7 @@ STEP = 1e-3
 class Snapshot:
     """The finger for one set of values of the unknowns, a displacement field.
 
-    Positions are those of the drawing: the material drawn at X is at X + W(X) before the load.
+    Positions are drawn ones: the material drawn at X is at X + W(X) before the load.
 
     Attributes:
         problem: With the law and the moduli.
@@ -62,7 +62,7 @@ class Snapshot:
         return self._gradient(self.drawn.gradient(location), location)
 
     def _gradient(self, drawn: FloatArray, location: LocatedPoints) -> FloatArray:
-        """`gradient` from that by the drawn position without the clamp, both of shape (n, 2, 2)."""
+        """`gradient` from the gradient by the drawn position without the clamp, both of shape (n, 2, 2)."""
         walls = np.einsum("k,ktij->tij", self.changes, self.walls.gradients())[location.cells]
         gradient = drawn @ np.linalg.inv(np.eye(2) + walls)
         return np.asarray(self.clamp.rotation @ (np.eye(2) + gradient) - np.eye(2))
@@ -88,8 +88,6 @@ class Member:
         probability: Of the law.
         found: The finger that was found.
         steps: The finger `STEP` times each of p independent standard errors away.
-        response: The equilibrium.
-        model: The finger as a function of the unknowns.
         coarser: The finger that a coarser discretisation finds, if there is one.
     """
 
@@ -105,7 +103,7 @@ class Member:
 class IdentifiedField:
     """The displacement by the most probable law; see `Snapshot` for its methods.
 
-    Its deviations include those of the other laws from it, and of a coarser discretisation.
+    Its deviations include the distances of the other laws, and of a coarser discretisation, from it.
 
     Attributes:
         members: The most probable law first.

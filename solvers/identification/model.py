@@ -54,12 +54,7 @@ class Response:
 
 
 class ResponseModel:
-    """Responses of a body; each starts from the last one.
-
-    Args:
-        body: The discretised finger.
-        unknowns: The unknowns.
-    """
+    """Responses of a discretised finger to the unknowns; each starts from the last one."""
 
     def __init__(self, body: Body, unknowns: Unknowns) -> None:
         self.body, self.unknowns = body, unknowns
@@ -88,7 +83,7 @@ class ResponseModel:
         """The response at values of the unknowns, shape (p,); None if no equilibrium is found on the way.
 
         Args:
-            values: Shape (p,).
+            values: Of the unknowns, shape (p,).
             tolerance: `ROUGH` or `EXACT`.
             iterations: Newton iterations from one hypothesis to the next.
             halvings: Times that the way is halved where no equilibrium is found.
@@ -110,7 +105,7 @@ class ResponseModel:
         return held.unstable(there.negative())
 
     def restart(self, response: Response | None) -> None:
-        """Start the next response from this one, which may be that of another body; None: from rest."""
+        """Start the next response from this one, also by another body; None: from rest."""
         self._last = response
 
     def extrapolated(self, about: Response, values: FloatArray) -> Response:
@@ -167,7 +162,7 @@ class ResponseModel:
             state = state + length * step
             balance = load - linearised.force
             step = linearised.solve(balance[None])[0]
-            # The least work, N mm/mm, is that of moving a finger by some ten nanometres.
+            # The least work, N mm/mm, moves a finger by some ten nanometres.
             work = max(abs(float((load * state).sum())), 1e-10)
             size = float(np.sqrt(abs((step * balance).sum()) / work)) if balance.any() else 0.0
             # Large steps must not grow: the guess is too far away.
@@ -290,7 +285,6 @@ class MarkerModel:
         measurement: Markers and, if measured, the force.
         rows: Of the markers' mean displacement in the drawn body, shape (m, 2, *shape).
         wall_rows: Of its change by the motion of each wall, shape (k, m, 2, *shape), per mm.
-        unknowns: The unknowns.
     """
 
     measurement: Measurement

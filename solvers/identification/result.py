@@ -49,7 +49,7 @@ class Fit(NamedTuple):
 
     @property
     def law(self) -> LawName:
-        """The law."""
+        """Name of the law."""
         return self.model.unknowns.problem.material.law
 
     @property
@@ -135,7 +135,7 @@ class Identified:
         Args:
             name: The solver's name.
             problem: As it was given, with its observations.
-            stats: Columns of the solution's `stats` beside those of the identification.
+            stats: Further columns of the solution's `stats`.
         """
         best = self.best
         hypothesis = best.response.hypothesis
@@ -287,7 +287,7 @@ def _member(fit: Fit, probability: float, problem: Problem) -> Member:
 
 
 def _snapshot(fit: Fit, problem: Problem, error: FloatArray | float = 0.0) -> Snapshot:
-    """The finger with values that differ from those of a fit by (p,), to first order."""
+    """The finger with the values of a fit plus an error, shape (p,), to first order."""
     unknowns = fit.model.unknowns
     there = fit.model.extrapolated(fit.response, fit.response.values + error)
     return Snapshot(

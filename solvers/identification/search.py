@@ -40,12 +40,12 @@ class IdentifyingSolver:
     Attributes:
         parameters: Names of the unknowns, with commas between them, of `solvers.identification.unknowns`;
             empty for all but `young`.
-        law: "evidence": the law with the largest evidence of those of finite strain; "given": the problem's.
+        law: "evidence": the law of finite strain with the largest evidence; "given": the problem's.
         prior: Factor of the parameters' prior standard deviations.
         reaction: Measured force of the indenter on the finger along y per depth, N/mm; None if there is none.
         reaction_error: Standard deviation of the reaction over its size.
-        marker_radius: Radius of the discs over which the displacement is averaged, mm; None: that of the
-            observations; zero: the markers' centres alone.
+        marker_radius: Radius of the discs over which the displacement is averaged, mm; None: the
+            observations' own; zero: the markers' centres alone.
     """
 
     parameters: str = ""
@@ -96,7 +96,7 @@ class Identifier:
         settings: Unknowns, priors, radius of the markers and reaction.
         problem: The finger; of its load only the drawn contact counts, of its law nothing unless it is given.
         body: Makes the discretised finger of a problem, whose law is set, and the unknowns.
-        laws: The laws to choose from; None: those of the settings.
+        laws: The laws to choose from; None: by the settings.
         cost_change: Relative change of the cost below which a search has converged.
     """
 
@@ -169,9 +169,9 @@ class Identifier:
 
         Args:
             fit: By a coarser one.
-            model: The finger, of the same law, discretised more finely.
+            model: The finger by the fit's law, discretised more finely.
             state: Of the finer discretisation, near equilibrium for the fit's values.
-            observations: Those of the fit, with the standard deviations for the finer discretisation.
+            observations: The fit's, with the standard deviations for the finer discretisation.
 
         Returns:
             None if no equilibrium is found there, for which there is no other way than many iterations.
@@ -189,7 +189,7 @@ class Identifier:
 
         Args:
             found: The fits.
-            observations: Near those of the fits, in noise or in which markers were seen.
+            observations: They differ from the fits' in noise or in the markers that were seen.
         """
         measurement = self.measurement(observations)
         return Identified.ranked([self._shifted(fit, measurement) for fit in found.fits], {})
@@ -213,7 +213,7 @@ class Identifier:
         )
 
     def _rough(self, measurement: Measurement) -> list[Fit]:
-        """A fit of every law with φ = 1, but for the first one in a few steps from that."""
+        """A fit of every law with φ = 1: the first one to its end, the others in a few steps from it."""
         law, *others = self.models
         first = self._fit(law, measurement, self._known.get(law), rounds=1)
         return [first] + [
@@ -255,7 +255,7 @@ class Identifier:
             force = np.linalg.norm(model.unknowns.hypothesis(values).force)
             self._progress(0.5, f"{law}: force {force:.4g} N/mm")
             found = model.response(values)
-            if found is None and model.evaluations == first:  # the start is too far from that of another law
+            if found is None and model.evaluations == first:  # another law's start was too far away
                 model.restart(None)
                 found = model.response(values)
             return None if found is None else markers.predicted(found)

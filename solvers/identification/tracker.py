@@ -1,15 +1,15 @@
 """The force of the indenter in one frame of a video after another, from the tracked markers.
 
-A frame's unknowns are those of the whole inverse problem: the contact's place, width and force, and the
-finger's walls, clamp and Poisson's ratio. With the markers linearised about an equilibrium, y + A (z - z0)
-over the standard deviations, the estimate is that of `solvers.assimilation.estimation`,
+Every frame has all unknowns of the inverse problem: the contact's place, width and force, and the finger's
+walls, clamp and Poisson's ratio. With the markers linearised about an equilibrium, y + A (z - z0) over the
+standard deviations, the estimate of `solvers.assimilation.estimation` is
 
     (A^T A / φ² + P) (z - m) = A^T (d - y + A (z0 - m)) / φ²
 
 The equilibrium is kept until the markers have moved away from it, so that most frames of a slow motion cost
-no factorisation. The finger does not change, and the frames with the largest motion tell most about it: in
-frames with less motion, m is the mean of the finger in those and P its precision in one of them. The contact
-has its own prior in every frame, because it may move.
+no factorisation. The finger does not change, and the frames with the largest motion determine it best: for
+frames with less motion, they give the prior of the finger, their mean m and the precision P of one of them.
+The contact has its drawn prior in every frame, because it may move.
 """
 
 import time
@@ -47,7 +47,7 @@ class ForceReading:
         size: Its norm.
         low, high: The interval of the size; from zero where the force may be none, open without an estimate.
         position: Abscissa on the drawn front at which the force acts, mm: contact's middle plus eccentricity.
-        position_low, position_high: Its interval; without a force that of the prior.
+        position_low, position_high: Its interval; without a force the whole front.
         inflation: φ; above one, neither the finger nor noise explains the markers.
         evaluations: Equilibria that were computed.
         seconds: Time that the estimate took.
@@ -136,7 +136,7 @@ class ForceTracker:
             visible: Mask of the markers that were seen, shape (m,).
 
         Raises:
-            ShapeError: If the arrays are not those of m markers.
+            ShapeError: If the arrays have other numbers of markers.
         """
         started, shape = time.perf_counter(), self._markers.measurement.points.shape
         if displacements.shape != shape or deviations.shape != shape or visible.shape != shape[:1]:
@@ -242,9 +242,9 @@ class ForceTracker:
         return _Linearised(z, predicted, slopes * derivatives)
 
     def _learn(self, found: _Posterior, *, anew: bool) -> None:
-        """Take the finger in a frame for the prior of other frames, or into the mean of such frames.
+        """Make the finger in a frame the prior of other frames, or average it with the prior.
 
-        The covariance stays that of one frame: the errors of a camera and of the model are common to all.
+        The covariance stays one frame's: the errors of a camera and of the model are common to all.
         """
         self._learnt = 1 if anew else self._learnt + 1
         mean, precision = np.where(self._of_finger, found.z, 0.0), self._known.precision

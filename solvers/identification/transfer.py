@@ -1,8 +1,8 @@
 """The identified finger at another load.
 
 Walls, law and clamp stay. The contact keeps its distance from the drawn place, its width and the direction of
-its force. The stroke is not trusted, but its share is: the contact's displacement into the finger is that of
-the fit times the ratio of the two loads' displacements.
+its force. The stroke is not trusted, but its share is: the contact moves into the finger by the fit's
+displacement times the ratio of the two loads' displacements.
 """
 
 from dataclasses import replace

@@ -46,10 +46,7 @@ class Hypothesis:
 
 
 class HypothesisSlopes(NamedTuple):
-    """Derivatives of a hypothesis by the p unknowns, each of shape (p,) before that of the quantity.
-
-    `moduli`, shape (p, 2), has those of λ and μ.
-    """
+    """Derivatives of a hypothesis by the p unknowns, along the first axis; `moduli`, (p, 2), are λ and μ."""
 
     position: FloatArray
     width: FloatArray
@@ -66,7 +63,7 @@ class Unknowns:
 
     Attributes:
         names: Some of `NAMES`.
-        problem: Its values are those of all that is not unknown; without a force.
+        problem: It has the values of everything else; its load only gives the drawn contact.
         traction: The front face.
         motion: The walls.
     """

@@ -55,7 +55,6 @@ def marker_path(problem, shares, finger):
         assert response is not None
         places.append(twin._markers.predicted(response)[0].reshape(-1, 2))
         forces.append(response.hypothesis.force)
-    model.body.close()
     return np.array(places), np.array(forces)
 
 

@@ -46,9 +46,7 @@ def model_of(problem, names=NAMES):
 
 @pytest.fixture(scope="module")
 def model(problem):
-    made = model_of(problem)
-    yield made
-    made.body.close()
+    return model_of(problem)
 
 
 @pytest.fixture(scope="module")
@@ -105,8 +103,6 @@ def test_a_last_step_that_turns_a_point_inside_out_is_not_taken(problem, monkeyp
     size = np.linalg.norm(taken.state)
     assert 0 < np.linalg.norm(left.state - taken.state) < 2e-3 * size
     np.testing.assert_allclose(left.slopes, taken.slopes, atol=2e-3 * np.abs(taken.slopes).max())
-    for model in (fresh, again):
-        model.body.close()
 
 
 def test_a_force_holds_the_finger_where_a_prescribed_displacement_does(problem):

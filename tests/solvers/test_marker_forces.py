@@ -55,7 +55,7 @@ def test_the_fit_is_the_minimiser_of_energy_plus_misfit(springs: Springs, factor
     np.testing.assert_allclose(fit.residual.ravel(), residual, rtol=1e-10)
     np.testing.assert_allclose(fit.forces.ravel(), factor * springs.weights * residual, rtol=1e-10)
     assert fit.energy == pytest.approx(0.5 * away @ springs.stiffness @ away, rel=1e-10)
-    assert fit.forces.shape == fit.residual.shape == fit.left_out.shape == (MARKERS, 2)
+    assert fit.forces.shape == fit.residual.shape == fit.residual_without.shape == (MARKERS, 2)
 
 
 def test_the_weights_count_once_if_no_factor_is_given(springs: Springs) -> None:
@@ -66,7 +66,7 @@ def test_the_weights_count_once_if_no_factor_is_given(springs: Springs) -> None:
 
 @pytest.mark.parametrize("factor", [0.2, 30.0])
 def test_what_is_left_out_is_what_a_fit_to_the_others_misses(springs: Springs, factor: float) -> None:
-    left_out = springs.forces().fit(factor).left_out
+    left_out = springs.forces().fit(factor).residual_without
     for marker in range(MARKERS):
         rows = [2 * marker, 2 * marker + 1]
         kept = np.ones(2 * MARKERS)
@@ -101,4 +101,4 @@ def test_the_residuals_in_words(springs: Springs) -> None:
     three = np.array([[3.0, 4.0], [0.0, 0.0]])
     assert residual_phrase(three, np.full((3, 2), 0.0123)) == said
     fit = springs.forces().fit()
-    assert fit.phrase == residual_phrase(fit.residual, fit.left_out)
+    assert fit.phrase == residual_phrase(fit.residual, fit.residual_without)

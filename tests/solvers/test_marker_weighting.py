@@ -95,7 +95,7 @@ def test_the_curve_has_every_factors_fit(forces):
     assert list(curve) == ["weight_factor", "curve_energy", "curve_in_sample_mm", "curve_left_out_mm"]
     fit = forces.fit(FACTORS[30])
     found = [curve[name][30] for name in ("curve_energy", "curve_in_sample_mm", "curve_left_out_mm")]
-    means = [np.sqrt((values**2).mean()) for values in (fit.residual, fit.left_out)]
+    means = [np.sqrt((values**2).mean()) for values in (fit.residual, fit.residual_without)]
     np.testing.assert_allclose(found, [fit.energy, *means], rtol=1e-14)
     likely = PRECISE.curve(forces)["curve_log_evidence"]
     assert likely[30] == forces.log_evidence(0.3, FACTORS[30])
@@ -103,7 +103,7 @@ def test_the_curve_has_every_factors_fit(forces):
 
 def test_the_factor_is_the_best_on_the_curve(forces):
     assert PAPER.factor(forces) == 1
-    left_out = [np.linalg.norm(forces.fit(factor).left_out) for factor in FACTORS]
+    left_out = [np.linalg.norm(forces.fit(factor).residual_without) for factor in FACTORS]
     likely = [forces.log_evidence(0.3, factor) for factor in FACTORS]
     best, likeliest = FACTORS[np.argmin(left_out)], FACTORS[np.argmax(likely)]
     assert len({1.0, best, likeliest}) == 3, "else one could stand for another"

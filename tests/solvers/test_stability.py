@@ -96,7 +96,6 @@ def test_an_identified_finger_is_checked_with_its_contact_held(problem, monkeypa
     monkeypatch.setattr(LoadPath, "_stable", lambda path, point: point)
     straight = FemNonlinearSolver().solve(problem).field.values
     assert model.unstable(replace(rest, state=straight)) > 0
-    body.close()
 
 
 def test_a_finger_that_bends_leaves_nothing(coarse_mesh):

@@ -177,7 +177,7 @@ class FiniteBasisSolver(NetworkSolver):
             history=dict(
                 zip(("units", "energy", "estimated_error", "seconds"), np.array(history).T, strict=True)
             ),
-            left_out=None if fit is None else leave_one_out_displacements(problem, fit.left_out),
+            left_out=None if fit is None else leave_one_out_displacements(problem, fit.residual_without),
         )
 
     def level(self, problem: Problem, scale: float, single: float = 0.25) -> ConstrainedNetwork:

@@ -4,7 +4,7 @@ The body is drawn at X; its walls moved by W put the material at X + W(X). With 
 
     E = ∫ ψ(H M) det(I + ∇W) dX        H = ∇u by the drawn X
 
-so that the stress and the tangent conjugate to H are those of the law at G = H M, times det(I + ∇W) and an M
+so that the stress and the tangent conjugate to H follow from the law's at G = H M, by det(I + ∇W) and an M
 for every derivative by X:
 
     P_ij = det(I + ∇W) P(G)_im M_jm        A_ijkl = det(I + ∇W) A(G)_imkn M_jm M_ln
@@ -34,7 +34,7 @@ from solvers.pinn.threading import pool
 from solvers.problem import Problem
 
 TOLERANCE = 1e-4
-"""Relative error of a solve in the energy norm, by which a Newton step shrinks what is left."""
+"""Relative error of a solve in the energy norm, and so of a Newton step."""
 MOST_ITERATIONS = 8
 """Iterations of conjugate gradients that cost less than factors of the tangent at hand."""
 

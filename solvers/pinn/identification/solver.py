@@ -24,9 +24,9 @@ from solvers.solver import Family, Progress, check_problem, silent
 SEARCHED, SOLVED = 0.6, 0.45
 """Cell of the quadrature, in window spacings, where the unknowns are sought and of the final network.
 
-On the default finger the von Mises stress of the final network is 3.2 % from that of `fem-id`, with the cell
-of the search 3.6 %; `fem` is itself 2.6 % from converged elements. With windows of `pinn-std` it is 2.9 %,
-but Newton's method then found no equilibrium for three of eight truths.
+On the default finger the von Mises stress of the final network is 3.2 % from `fem-id`, with the search's cell
+3.6 %; `fem` is itself 2.6 % from converged elements. With the windows of `pinn-std` it is 2.9 %, but Newton's
+method then found no equilibrium for three of eight truths.
 """
 COARSE_ERROR, FINE_ERROR, FINAL_ERROR = 0.005, 0.001, 0.0003
 """Error of the network on each level over the largest displacement of a marker: it adds to the markers'."""
@@ -42,8 +42,8 @@ class PinnIdSolver(IdentifyingSolver):
     other observations of the same markers are of first order.
 
     Attributes:
-        coarse: Spacing of the windows on the coarse level over that of the preset `local`.
-        fine: Spacing on the fine level over that of the preset `local`.
+        coarse: Spacing of the windows on the coarse level over the spacing of the preset `local`.
+        fine: Spacing on the fine level over the spacing of the preset `local`.
         seed: Of the random numbers.
     """
 
@@ -83,7 +83,7 @@ class PinnIdSolver(IdentifyingSolver):
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
         """A function that finds the unknowns for other observations; see `Refittable`.
 
-        It is of first order about the first fit where the same markers have moved by 0.2 mm less or more.
+        Where no marker has moved by 0.2 mm more or less than in the first fit, it is of first order.
         """
         kept: list[tuple[Observations, Identifier, Identified]] = []
 
@@ -178,7 +178,7 @@ def _with_error(observations: Observations, share: float) -> Observations:
 
 
 def _near(observations: Observations, first: Observations) -> bool:
-    """True if the markers are those of the first observations and none has moved by 0.2 mm more or less."""
+    """True if no marker has moved by 0.2 mm more or less than in the first observations."""
     if not np.array_equal(observations.points, first.points):
         return False
     seen = observations.visible
