@@ -45,23 +45,15 @@ Prediction = tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter to be estimated.
-
-    Attributes:
-        unit: Empty for a pure number.
-        start: Middle of the prior.
-        scale: Standard deviation of the prior, of the value or, if `logarithmic`, of its logarithm.
-        low, high: Bounds of the value.
-        logarithmic: Whether the prior is normal in the logarithm, for positive values known to a factor.
-    """
+    """A parameter to be estimated."""
 
     name: str
-    unit: str
-    start: float
-    scale: float
-    low: float = -np.inf
+    unit: str  # Empty for a pure number
+    start: float  # Middle of the prior
+    scale: float  # Standard deviation of the prior, of the value or, if `logarithmic`, of its logarithm
+    low: float = -np.inf  # Bounds of the value
     high: float = np.inf
-    logarithmic: bool = False
+    logarithmic: bool = False  # Prior normal in the logarithm, for positive values known to a factor
 
     def value(self, z: float | FloatArray) -> FloatArray:
         """The value z standard deviations from the middle of the prior."""
@@ -91,22 +83,14 @@ def values_of(parameters: Sequence[Parameter], z: FloatArray) -> tuple[FloatArra
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Estimates of p parameters from n observations, with covariance and resolution.
-
-    Attributes:
-        z: Standardised values, shape (p,).
-        sensitivities: A, shape (n, p).
-        residuals: Predicted minus observed over φ σ, shape (n,).
-        inflation: φ.
-        evaluations: Evaluations of the model.
-    """
+    """Estimates of p parameters from n observations, with covariance and resolution."""
 
     parameters: Sequence[Parameter]
-    z: FloatArray
-    sensitivities: FloatArray
-    residuals: FloatArray
-    inflation: float
-    evaluations: int
+    z: FloatArray  # Standardised values, shape (p,)
+    sensitivities: FloatArray  # A, shape (n, p)
+    residuals: FloatArray  # Predicted minus observed over φ σ, shape (n,)
+    inflation: float  # φ
+    evaluations: int  # Evaluations of the model
     converged: bool
 
     @cached_property

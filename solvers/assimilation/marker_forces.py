@@ -24,19 +24,13 @@ from geometry.arrays import FloatArray
 
 
 class MarkerFit(NamedTuple):
-    """The minimiser for one factor of the weights.
+    """The minimiser for one factor of the weights."""
 
-    Attributes:
-        forces: p, shape (m, 2), N/mm.
-        residual: d - B u, shape (m, 2), mm.
-        residual_without: Residual of each marker in the fit without it, by unchanged weights, (m, 2), mm.
-        energy: E(u) - E(u_0), N mm / mm.
-    """
-
-    forces: FloatArray
-    residual: FloatArray
+    forces: FloatArray  # p, shape (m, 2), N/mm
+    residual: FloatArray  # d - B u, shape (m, 2), mm
+    # Residual of each marker in the fit without it, by unchanged weights, (m, 2), mm
     residual_without: FloatArray
-    energy: float
+    energy: float  # E(u) - E(u_0), N mm / mm
 
     @property
     def phrase(self) -> str:
@@ -46,17 +40,12 @@ class MarkerFit(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MarkerForces:
-    """The minimisers for all factors of the weights.
+    """The minimisers for all factors of the weights."""
 
-    Attributes:
-        compliance: C, shape (2 m, 2 m), mm per N/mm, the two components of a marker one after the other.
-        weights: The diagonal of W, positive, shape (m, 2), MPa.
-        prior_residual: d - B u_0, shape (m, 2), mm.
-    """
-
+    # C, shape (2 m, 2 m), mm per N/mm, the two components of a marker one after the other
     compliance: FloatArray
-    weights: FloatArray
-    prior_residual: FloatArray
+    weights: FloatArray  # The diagonal of W, positive, shape (m, 2), MPa
+    prior_residual: FloatArray  # d - B u_0, shape (m, 2), mm
 
     @cached_property
     def _modes(self) -> tuple[FloatArray, FloatArray]:

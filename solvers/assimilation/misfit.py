@@ -72,18 +72,12 @@ DEFAULTS = MarkerSettings()
 
 @dataclass(frozen=True, eq=False)
 class Misfit:
-    """1/2 (B u - d)^T W (B u - d) at the m markers that were seen, per depth.
+    """1/2 (B u - d)^T W (B u - d) at the m markers that were seen, per depth."""
 
-    Attributes:
-        points: Positions of the markers at rest, shape (m, 2), mm.
-        observed: Displacements d, shape (m, 2), mm.
-        weights: The diagonal of W, shape (m, 2), MPa: N/mm of force per depth for 1 mm of misfit.
-        radius: Radius of the discs over which the displacement is averaged, mm; zero: the centres alone.
-    """
-
-    points: FloatArray
-    observed: FloatArray
-    weights: FloatArray
+    points: FloatArray  # Positions of the markers at rest, shape (m, 2), mm
+    observed: FloatArray  # Displacements d, shape (m, 2), mm
+    weights: FloatArray  # The diagonal of W, shape (m, 2), MPa: N/mm of force per depth for 1 mm of misfit
+    # Radius of the discs over which the displacement is averaged, mm; zero: the centres alone
     radius: float = 0.0
 
     def sampling(self) -> tuple[FloatArray, FloatArray]:

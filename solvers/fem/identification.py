@@ -227,7 +227,7 @@ def fem_law_tracker(
     trackers = {}
     for law in laws:
         material = problem.material.model_copy(update={"law": law})
-        unknowns = Unknowns.of(replace(problem, material=material, observations=None), DEFAULT)
+        unknowns = Unknowns(replace(problem, material=material, observations=None), DEFAULT)
         trackers[law] = ForceTracker(ResponseModel(_body(unknowns, degree), unknowns), points, radius)
     return LawTracker(trackers)
 

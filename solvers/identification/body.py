@@ -17,17 +17,12 @@ from solvers.solution import DisplacementField
 
 
 class Linearised(NamedTuple):
-    """A body about a state; the functions are valid until the body is linearised again.
+    """A body about a state; the functions are valid until the body is linearised again."""
 
-    Attributes:
-        force: F there, of the shape of a state, N/mm.
-        solve: K⁻¹ of generalised forces of shape (r, *shape), with the tangent K.
-        negative: Number of negative eigenvalues of K.
-    """
-
-    force: FloatArray
+    force: FloatArray  # F there, of the shape of a state, N/mm
+    # K⁻¹ of generalised forces of shape (r, *shape), with the tangent K
     solve: Callable[[FloatArray], FloatArray]
-    negative: Callable[[], int]
+    negative: Callable[[], int]  # Number of negative eigenvalues of K
 
 
 class Body(Protocol):

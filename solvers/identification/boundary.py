@@ -21,33 +21,15 @@ QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 """Rotation by 90 degrees."""
 
 
-@dataclass(frozen=True, eq=False)
 class FrontTraction:
-    """Quadrature points of the front face, where a contact may be.
+    """Quadrature points (q, 2), mm, of a mesh's front face, where a contact may be, and their weights, mm."""
 
-    Attributes:
-        points: Shape (q, 2), mm.
-        lengths: Their quadrature weights, shape (q,), mm.
-        extent: Along x, mm.
-        longest: Length of the longest edge, mm.
-    """
-
-    points: FloatArray
-    lengths: FloatArray
-    extent: float
-    longest: float
-
-    @classmethod
-    def of(cls, mesh: TriangleMesh) -> "FrontTraction":
-        """The front face of a mesh, with twelve points on an edge, which may hold the whole contact."""
+    def __init__(self, mesh: TriangleMesh) -> None:
+        self.points, self.lengths = edge_quadrature(mesh, "front", 12)  # an edge may hold the whole contact
         edges = mesh.points[mesh.boundary("front")]
-        longest = float(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1).max())
-        return cls(*edge_quadrature(mesh, "front", 12), float(np.ptp(edges[..., 0])), longest)
-
-    @property
-    def ends(self) -> tuple[float, float]:
-        """Abscissae of the first and the last point, mm."""
-        return float(self.points[:, 0].min()), float(self.points[:, 0].max())
+        self.extent = float(np.ptp(edges[..., 0]))
+        self.longest = float(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1).max())
+        self.ends = float(self.points[:, 0].min()), float(self.points[:, 0].max())
 
     def weights(self, position: float, width: float) -> FloatArray:
         """Weights (5, q) of the traction w, 1/mm, and of its derivatives by position x and width b.
@@ -85,21 +67,13 @@ class FrontTraction:
 
 @dataclass(frozen=True, eq=False)
 class RigidMotion:
-    """A rotation about a point, then a shift, with their derivatives by p unknowns.
+    """A rotation about a point, then a shift, with their derivatives by p unknowns."""
 
-    Attributes:
-        centre: Shape (2,), mm.
-        shift: Shape (2,), mm.
-        turn: Angle, rad.
-        shift_slopes: Shape (p, 2).
-        turn_slopes: Shape (p,).
-    """
-
-    centre: FloatArray
-    shift: FloatArray
-    turn: float
-    shift_slopes: FloatArray
-    turn_slopes: FloatArray
+    centre: FloatArray  # Shape (2,), mm
+    shift: FloatArray  # Shape (2,), mm
+    turn: float  # Angle, rad
+    shift_slopes: FloatArray  # Shape (p, 2)
+    turn_slopes: FloatArray  # Shape (p,)
 
     @property
     def rotation(self) -> FloatArray:
@@ -122,26 +96,14 @@ class RigidMotion:
         return replace(self, shift=self.shift + step @ self.shift_slopes, turn=turn)
 
 
-@dataclass(frozen=True, eq=False)
 class Clamp:
-    """The base on its elastic layer.
+    """The base of a mesh, in one piece or several, on its elastic layer."""
 
-    Attributes:
-        length: b, mm.
-        centre: x_b, shape (2,), mm.
-        inertia: I, mm³.
-    """
-
-    length: float
-    centre: FloatArray
-    inertia: float
-
-    @classmethod
-    def of(cls, mesh: TriangleMesh) -> "Clamp":
-        """The base of a mesh, in one piece or several."""
+    def __init__(self, mesh: TriangleMesh) -> None:
         points, lengths = edge_quadrature(mesh, "base")
-        centre = lengths @ points / lengths.sum()
-        return cls(float(lengths.sum()), centre, float(lengths @ ((points - centre) ** 2).sum(axis=1)))
+        self.length = float(lengths.sum())
+        self.centre = lengths @ points / lengths.sum()
+        self.inertia = float(lengths @ ((points - self.centre) ** 2).sum(axis=1))
 
     def motion(
         self,
@@ -149,12 +111,9 @@ class Clamp:
         force: tuple[FloatArray, FloatArray],
         place: tuple[FloatArray, FloatArray],
     ) -> RigidMotion:
-        """The finger's motion under a force, each argument with its derivatives by p unknowns.
+        """The finger's motion for ℓ / E, mm/MPa, f, (2,), N/mm, and x, (2,), mm.
 
-        Args:
-            softness: ℓ / E, mm/MPa, and its derivatives (p,).
-            force: f, shape (2,), N/mm, and its derivatives (p, 2).
-            place: x, shape (2,), mm, and its derivatives (p, 2).
+        Each argument comes with its derivatives by p unknowns, shapes (p,), (p, 2) and (p, 2).
         """
         (soft, soft_slopes), (f, f_slopes), (x, x_slopes) = softness, force, place
         lever = x - self.centre

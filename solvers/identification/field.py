@@ -23,22 +23,14 @@ class Snapshot:
     """The finger for one set of values of the unknowns, a displacement field.
 
     Positions are drawn ones: the material drawn at X is at X + W(X) before the load.
-
-    Attributes:
-        problem: With the law and the moduli.
-        walls: The motions by the walls' thickness.
-        changes: Of the walls' thickness, shape (k,), mm.
-        clamp: Motion of the clamp.
-        body: The discretised finger.
-        state: Its displacement without the clamp's.
     """
 
-    problem: Problem
-    walls: WallMotion
-    changes: FloatArray
-    clamp: RigidMotion
-    body: Body
-    state: FloatArray
+    problem: Problem  # With the law and the moduli
+    walls: WallMotion  # The motions by the walls' thickness
+    changes: FloatArray  # Of the walls' thickness, shape (k,), mm
+    clamp: RigidMotion  # Motion of the clamp
+    body: Body  # The discretised finger
+    state: FloatArray  # Its displacement without the clamp's
 
     @property
     def drawn(self) -> DisplacementField:
@@ -82,21 +74,14 @@ def von_mises_stresses(snapshots: Sequence[Snapshot], location: LocatedPoints) -
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """The finger by one law.
+    """The finger by one law."""
 
-    Attributes:
-        probability: Of the law.
-        found: The finger that was found.
-        steps: The finger `STEP` times each of p independent standard errors away.
-        coarser: The finger that a coarser discretisation finds, if there is one.
-    """
-
-    probability: float
-    found: Snapshot
-    steps: Sequence[Snapshot]
+    probability: float  # Of the law
+    found: Snapshot  # The finger that was found
+    steps: Sequence[Snapshot]  # The finger `STEP` times each of p independent standard errors away
     response: Response
     model: ResponseModel
-    coarser: Snapshot | None = None
+    coarser: Snapshot | None = None  # The finger that a coarser discretisation finds, if there is one
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,12 +89,9 @@ class IdentifiedField:
     """The displacement by the most probable law; see `Snapshot` for its methods.
 
     Its deviations include the distances of the other laws, and of a coarser discretisation, from it.
-
-    Attributes:
-        members: The most probable law first.
     """
 
-    members: Sequence[Member]
+    members: Sequence[Member]  # The most probable law first
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement of the material drawn at points, shape (n, 2), mm."""

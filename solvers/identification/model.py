@@ -32,25 +32,15 @@ ROUGH, EXACT = 2e-3, 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """An equilibrium with its derivatives by p unknowns.
+    """An equilibrium with its derivatives by p unknowns."""
 
-    Attributes:
-        values: Of the unknowns, shape (p,).
-        hypothesis: Finger and contact of the values.
-        state: c.
-        slopes: c', shape (p, *shape).
-        motion: Of the clamp.
-        contact: Mean displacement of the contact, shape (2,), mm.
-        contact_slopes: Shape (p, 2).
-    """
-
-    values: FloatArray
-    hypothesis: Hypothesis
-    state: FloatArray
-    slopes: FloatArray
-    motion: RigidMotion
-    contact: FloatArray
-    contact_slopes: FloatArray
+    values: FloatArray  # Of the unknowns, shape (p,)
+    hypothesis: Hypothesis  # Finger and contact of the values
+    state: FloatArray  # c
+    slopes: FloatArray  # c', shape (p, *shape)
+    motion: RigidMotion  # Of the clamp
+    contact: FloatArray  # Mean displacement of the contact, shape (2,), mm
+    contact_slopes: FloatArray  # Shape (p, 2)
 
 
 class ResponseModel:
@@ -58,7 +48,7 @@ class ResponseModel:
 
     def __init__(self, body: Body, unknowns: Unknowns) -> None:
         self.body, self.unknowns = body, unknowns
-        self._clamp = Clamp.of(unknowns.problem.mesh)
+        self._clamp = Clamp(unknowns.problem.mesh)
         self._last: Response | None = None
         self.evaluations = 0
 
@@ -128,17 +118,15 @@ class ResponseModel:
         if found is not None or not halvings:
             return found
         before = self._last
-        start = self._rest() if before is None else before.values
+        # At rest there is no force, and the other unknowns are as expected.
+        rest = np.array([parameter.start for parameter in self.unknowns.parameters(1.0)])
+        start = rest if before is None else before.values
         self._last = self._reached(0.5 * (start + values), ROUGH, iterations, halvings - 1)
         if self._last is not None:
             found = self._reached(values, tolerance, iterations, halvings - 1)
         if found is None:
             self._last = before
         return found
-
-    def _rest(self) -> FloatArray:
-        """Values without a force, shape (p,), other unknowns as expected."""
-        return np.array([parameter.start for parameter in self.unknowns.parameters(1.0)])
 
     def _near(self, values: FloatArray, tolerance: float, iterations: int) -> Response | None:
         """The response by Newton's method from the last one, extrapolated along its derivatives."""
@@ -216,22 +204,14 @@ class ResponseModel:
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """Displacements of m markers and, if known, the force.
+    """Displacements of m markers and, if known, the force."""
 
-    Attributes:
-        points: Markers at rest, shape (m, 2), mm.
-        displacements: Shape (m, 2), mm.
-        deviations: Their standard deviations, shape (m, 2), mm.
-        radius: Of the discs over which the displacement is averaged, mm.
-        kept: Numbers of the markers among those that were seen, ascending, shape (m,).
-        reaction: Force of the indenter along y per depth, with its standard deviation, N/mm.
-    """
-
-    points: FloatArray
-    displacements: FloatArray
-    deviations: FloatArray
-    radius: float
-    kept: IntArray
+    points: FloatArray  # Markers at rest, shape (m, 2), mm
+    displacements: FloatArray  # Shape (m, 2), mm
+    deviations: FloatArray  # Their standard deviations, shape (m, 2), mm
+    radius: float  # Of the discs over which the displacement is averaged, mm
+    kept: IntArray  # Numbers of the markers among those that were seen, ascending, shape (m,)
+    # Force of the indenter along y per depth, with its standard deviation, N/mm
     reaction: tuple[float, float] | None = None
 
     @classmethod
@@ -277,32 +257,22 @@ class Measurement:
         return np.append(self.deviations.ravel(), self.reaction[1:] if self.reaction else [])
 
 
-@dataclass(frozen=True, eq=False)
 class MarkerModel:
-    """The values of a measurement as a function of a response.
+    """The values of a measurement as a function of a response of a finger.
 
     Attributes:
-        measurement: Markers and, if measured, the force.
         rows: Of the markers' mean displacement in the drawn body, shape (m, 2, *shape).
         wall_rows: Of its change by the motion of each wall, shape (k, m, 2, *shape), per mm.
     """
 
-    measurement: Measurement
-    rows: FloatArray
-    wall_rows: FloatArray
-    unknowns: Unknowns
-
-    @classmethod
-    def of(cls, model: ResponseModel, measurement: Measurement) -> "MarkerModel":
-        """The measurement of a finger."""
-        unknowns = model.unknowns
+    def __init__(self, model: ResponseModel, measurement: Measurement) -> None:
+        self.measurement, self.unknowns, body = measurement, model.unknowns, model.body
         points, means = disc_quadrature(measurement.points, measurement.radius)
-        location = unknowns.problem.mesh.locate(points)
-        count = len(unknowns.motion.names)
-        moved = [unknowns.motion.shifts(location, one) for one in np.eye(count)]
-        rows = model.body.displacement_rows(points, means)
-        wall_rows = [-model.body.gradient_rows(points, means[:, :, None] * shift) for shift in moved]
-        return cls(measurement, rows, np.array(wall_rows).reshape(count, *rows.shape), unknowns)
+        location, motion = self.unknowns.problem.mesh.locate(points), self.unknowns.motion
+        shifts = [motion.shifts(location, one) for one in np.eye(len(motion.names))]
+        self.rows = body.displacement_rows(points, means)
+        wall_rows = [-body.gradient_rows(points, means[:, :, None] * shift) for shift in shifts]
+        self.wall_rows = np.array(wall_rows).reshape(-1, *self.rows.shape)
 
     def predicted(self, response: Response) -> Prediction:
         """Values in the order of `Measurement.observed`, shape (n,), and their derivatives (n, p)."""

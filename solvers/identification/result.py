@@ -29,22 +29,14 @@ PROBABLE = 0.01
 
 
 class Fit(NamedTuple):
-    """The best values of the unknowns under one law.
+    """The best values of the unknowns under one law."""
 
-    Attributes:
-        model: The finger of that law as a function of the unknowns.
-        estimate: Values, covariance, residuals.
-        response: The equilibrium there.
-        measurement: The markers that were believed.
-        exact: Whether the equilibrium was found to the last digit, and by the finest discretisation.
-        coarser: The fit by a coarser discretisation, whose difference estimates the error of this one.
-    """
-
-    model: ResponseModel
-    estimate: Estimate
-    response: Response
-    measurement: Measurement
-    exact: bool
+    model: ResponseModel  # The finger of that law as a function of the unknowns
+    estimate: Estimate  # Values, covariance, residuals
+    response: Response  # The equilibrium there
+    measurement: Measurement  # The markers that were believed
+    exact: bool  # Whether the equilibrium was found to the last digit, and by the finest discretisation
+    # The fit by a coarser discretisation, whose difference estimates the error of this one
     coarser: "Fit | None" = None
 
     @property
@@ -83,17 +75,12 @@ class Fit(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """The fits of all laws to one measurement.
+    """The fits of all laws to one measurement."""
 
-    Attributes:
-        fits: The most probable law first.
-        probabilities: Of the laws, shape (number of fits,).
-        doubtful: Markers that contradict the others and were not used: number among those seen, and their
-            computed minus their observed displacement, shape (2,), mm.
-    """
-
-    fits: Sequence[Fit]
-    probabilities: FloatArray
+    fits: Sequence[Fit]  # The most probable law first
+    probabilities: FloatArray  # Of the laws, shape (number of fits,)
+    # Markers that contradict the others and were not used: number among those seen, and their computed
+    # minus their observed displacement, shape (2,), mm
     doubtful: Mapping[int, FloatArray]
 
     @classmethod
@@ -117,25 +104,19 @@ class Identified:
             own, deviation = fit.force
             variance += float(probability) * (deviation**2 + (own - size) ** 2)
         half = float(norm.ppf((1 + LEVEL) / 2)) * float(np.sqrt(variance))
-        found = self.best.estimate
-        places = [
-            Estimated(float(value), float(low), float(high))
-            for parameter, value, (low, high) in zip(
-                found.parameters, found.values, found.intervals, strict=True
-            )
-            if parameter.name == "position"
-        ]
-        return IdentifiedForce(
-            Estimated(size, max(size - half, 0.0), size + half), places[0] if places else None
-        )
+        found, names, place = self.best.estimate, self.best.model.unknowns.names, None
+        if "position" in names:
+            which = names.index("position")
+            place = Estimated(float(found.values[which]), *map(float, found.intervals[which]))
+        return IdentifiedForce(Estimated(size, max(size - half, 0.0), size + half), place)
 
     def solution(self, name: str, problem: Problem, stats: Mapping[str, float | int | str]) -> Solution:
         """The solution by the most probable law, with deviations that the others widen.
 
         Args:
-            name: The solver's name.
+            name: The solver's.
             problem: As it was given, with its observations.
-            stats: Further columns of the solution's `stats`.
+            stats: Further columns of `Solution.stats`.
         """
         best = self.best
         hypothesis = best.response.hypothesis
@@ -166,10 +147,9 @@ class Identified:
         )
 
     def _residuals(self) -> tuple[FloatArray, FloatArray]:
-        """Misfit of the markers that were believed, and left-out residuals of all that were seen, (m, 2), mm.
+        """Misfit of the markers that were believed, computed minus observed, shape (m, 2), mm.
 
-        The first is computed minus observed; the second observed minus predicted without the marker, to first
-        order for those that were believed.
+        And for all markers that were seen: observed minus predicted without the marker.
         """
         estimate, kept = self.best.estimate, self.best.measurement.kept
         scale = estimate.inflation * self.best.measurement.noise
@@ -217,10 +197,9 @@ class Identified:
         return numbers | {"doubtful_markers": len(self.doubtful)}
 
     def sentence(self, missed: FloatArray) -> str:
-        """Force, place and law, goodness of fit, doubtful markers, and parameters that are not determined.
+        """The status: force, parameters, law, goodness of fit, doubtful markers, undetermined parameters.
 
-        Args:
-            missed: Displacements of the markers that were believed, computed minus observed, (m, 2), mm.
+        `missed` are displacements of the markers that were believed, computed minus observed, (m, 2), mm.
         """
         found, parts = self.best.estimate, []
         if not found.converged:

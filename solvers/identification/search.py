@@ -114,7 +114,7 @@ class Identifier:
         self.models: dict[LawName, ResponseModel] = {}
         for law in laws or (LAWS if settings.law == "evidence" else (problem.material.law,)):
             own = replace(problem, material=problem.material.model_copy(update={"law": law}))
-            unknowns = Unknowns.of(own, settings.unknowns)
+            unknowns = Unknowns(own, settings.unknowns)
             self.models[law] = ResponseModel(body(unknowns), unknowns)
         first = next(iter(self.models.values()))
         self._names = first.unknowns.names
@@ -130,10 +130,6 @@ class Identifier:
 
     def identify(self, observations: Observations, progress: Progress = silent) -> Identified:
         """The unknowns under every law, and the laws' probabilities.
-
-        Args:
-            observations: The markers.
-            progress: Called with the values that are tried.
 
         Raises:
             UserError: If there are no markers, or the finger has no equilibrium near rest.
@@ -168,13 +164,13 @@ class Identifier:
         """A fit by a finer discretisation: its equilibrium, and from there the unknowns to first order.
 
         Args:
-            fit: By a coarser one.
+            fit: By a coarser discretisation.
             model: The finger by the fit's law, discretised more finely.
             state: Of the finer discretisation, near equilibrium for the fit's values.
             observations: The fit's, with the standard deviations for the finer discretisation.
 
         Returns:
-            None if no equilibrium is found there, for which there is no other way than many iterations.
+            None if no equilibrium is found in many iterations.
         """
         model.restart(carried(fit.response, state))
         response = model.response(fit.response.values, iterations=20, halvings=0)
@@ -185,19 +181,14 @@ class Identifier:
         return self._shifted(about, measurement)._replace(coarser=fit)
 
     def updated(self, found: Identified, observations: Observations) -> Identified:
-        """The unknowns for other observations, to first order about fits: no equilibrium is solved.
-
-        Args:
-            found: The fits.
-            observations: They differ from the fits' in noise or in the markers that were seen.
-        """
+        """The unknowns for observations near those of fits, to first order: no equilibrium is solved."""
         measurement = self.measurement(observations)
         return Identified.ranked([self._shifted(fit, measurement) for fit in found.fits], {})
 
     def _shifted(self, fit: Fit, measurement: Measurement) -> Fit:
         """The fit to a measurement, to first order about another fit."""
         about = fit.response
-        predicted, slopes = MarkerModel.of(fit.model, measurement).predicted(about)
+        predicted, slopes = MarkerModel(fit.model, measurement).predicted(about)
         found = estimate(
             lambda values: (predicted + slopes @ (values - about.values), slopes),
             measurement.observed,
@@ -243,12 +234,9 @@ class Identifier:
         start: FloatArray | None = None,
         **limits: int,
     ) -> Fit:
-        """The fit of a law that starts from another fit, or else from standardised values (p,).
-
-        `limits` are the `rounds` and `steps` of `estimate`.
-        """
+        """The fit of a law from another fit or from standardised values (p,), with limits of `estimate`."""
         model = self.models[law]
-        markers = MarkerModel.of(model, measurement)
+        markers = MarkerModel(model, measurement)
         model.restart(None if near is None else near.response)
 
         def predict(values: FloatArray) -> Prediction | None:
@@ -316,7 +304,7 @@ class Identifier:
             without = self._fit(fit.law, measurement.only(np.delete(measurement.kept, worst)), fit)
             if 2 * without.estimate.inflation > found.inflation:
                 break
-            computed, _ = MarkerModel.of(without.model, measurement).predicted(without.response)
+            computed, _ = MarkerModel(without.model, measurement).predicted(without.response)
             doubtful[number] = (computed - measurement.observed)[pairs[worst]]
             fit = without
         return fit, doubtful

@@ -40,31 +40,19 @@ Frames with less, down to the inverse of this, join the mean.
 
 @dataclass(frozen=True, eq=False)
 class ForceReading:
-    """The force in a frame, with intervals of `LEVEL`.
+    """The force in a frame, with intervals of `LEVEL`."""
 
-    Attributes:
-        force: Of the indenter on the finger per depth, shape (2,), N/mm; nan without an estimate.
-        size: Its norm.
-        low, high: The interval of the size; from zero where the force may be none, open without an estimate.
-        position: Abscissa on the drawn front at which the force acts, mm: contact's middle plus eccentricity.
-        position_low, position_high: Its interval; without a force the whole front.
-        inflation: φ; above one, neither the finger nor noise explains the markers.
-        evaluations: Equilibria that were computed.
-        seconds: Time that the estimate took.
-        status: Remarks in words; empty if there are none.
-    """
-
-    force: FloatArray
-    size: float
-    low: float
-    high: float
-    position: float
-    position_low: float
+    force: FloatArray  # Of the indenter on the finger per depth, shape (2,), N/mm; nan without an estimate
+    size: float  # Norm of the force
+    low: float  # Interval of the size: zero where the force may be none
+    high: float  # Infinite without an estimate
+    position: float  # Abscissa on the drawn front at which the force acts, eccentricity included, mm
+    position_low: float  # Interval of the position; without an estimate the whole front
     position_high: float
-    inflation: float
-    evaluations: int
+    inflation: float  # φ; above one, neither the finger nor noise explains the markers
+    evaluations: int  # Equilibria that were computed
     seconds: float
-    status: str
+    status: str  # Remarks in words; empty if there are none
 
 
 class _Linearised(NamedTuple):
@@ -117,7 +105,7 @@ class ForceTracker:
         self._bounds = np.array([parameter.bounds for parameter in self._parameters]).T
         still, inside = np.zeros_like(points), radius_within(model.unknowns.problem.mesh, points, radius)
         measurement = Measurement(points, still, still, inside, np.arange(len(points)))
-        self._markers = MarkerModel.of(model, measurement)
+        self._markers = MarkerModel(model, measurement)
         self._of_finger = ~np.isin(names, CONTACT)
         self._drawn = _Prior(np.zeros(len(names)), np.eye(len(names)))
         self._known, self.largest, self._learnt = self._drawn, 0.0, 0

@@ -24,25 +24,15 @@ NAMES = (*DEFAULT, "young")
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """A finger and a contact.
+    """A finger and a contact."""
 
-    Attributes:
-        position: Abscissa of the contact's middle, mm.
-        width: Its length along x, mm.
-        force: Of the indenter per depth, shape (2,), N/mm.
-        couple: Normal force times its eccentricity, shape (2,), N: the dipole of the traction.
-        lame: Lamé constants, MPa.
-        changes: Of the walls' thickness, shape (k,), mm.
-        softness: Compliance of the base over Young's modulus, mm/MPa.
-    """
-
-    position: float
-    width: float
-    force: FloatArray
-    couple: FloatArray
-    lame: Lame
-    changes: FloatArray
-    softness: float
+    position: float  # Abscissa of the contact's middle, mm
+    width: float  # Its length along x, mm
+    force: FloatArray  # Of the indenter per depth, shape (2,), N/mm
+    couple: FloatArray  # Normal force times its eccentricity, shape (2,), N: the dipole of the traction
+    lame: Lame  # Lamé constants, MPa
+    changes: FloatArray  # Of the walls' thickness, shape (k,), mm
+    softness: float  # Compliance of the base over Young's modulus, mm/MPa
 
 
 class HypothesisSlopes(NamedTuple):
@@ -57,28 +47,18 @@ class HypothesisSlopes(NamedTuple):
     softness: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
 class Unknowns:
     """The p unknowns of a problem, in order, and the hypothesis that their values describe.
 
-    Attributes:
-        names: Some of `NAMES`.
+    Args:
         problem: It has the values of everything else; its load only gives the drawn contact.
-        traction: The front face.
-        motion: The walls.
+        names: Some of `NAMES`; a finger without cavities has no walls to be found.
     """
 
-    names: tuple[str, ...]
-    problem: Problem
-    traction: FrontTraction
-    motion: WallMotion
-
-    @classmethod
-    def of(cls, problem: Problem, names: Sequence[str]) -> "Unknowns":
-        """Those that the finger has; one without cavities has no walls to be found."""
-        traction, motion = FrontTraction.of(problem.mesh), WallMotion.of(problem.mesh)
-        kept = tuple(name for name in names if name not in WALLS or name in motion.names)
-        return cls(kept, problem, traction, motion)
+    def __init__(self, problem: Problem, names: Sequence[str]) -> None:
+        self.problem = problem
+        self.traction, self.motion = FrontTraction(problem.mesh), WallMotion.of(problem.mesh)
+        self.names = tuple(name for name in names if name not in WALLS or name in self.motion.names)
 
     @property
     def place(self) -> tuple[float, float]:

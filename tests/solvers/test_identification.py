@@ -39,7 +39,7 @@ def problem(coarse_mesh):
 
 
 def model_of(problem, names=NAMES):
-    unknowns = Unknowns.of(problem, names)
+    unknowns = Unknowns(problem, names)
     body = FemBody(unknowns.problem, LagrangeSpace(problem.mesh, 1), unknowns.motion)
     return ResponseModel(body, unknowns)
 
@@ -57,7 +57,7 @@ def markers(problem, model):
 def marked(model):
     """The default finger's markers in a model."""
     observed = observed_at(model.unknowns.problem.mesh.markers, np.zeros((9, 2)), NOISE)
-    return MarkerModel.of(model, Measurement.of(model.unknowns.problem.mesh, observed, None, None))
+    return MarkerModel(model, Measurement.of(model.unknowns.problem.mesh, observed, None, None))
 
 
 def values_of(unknowns, changed=VALUES):

@@ -87,7 +87,7 @@ def test_three_dimensions_tell_of_stability(monkeypatch):
 
 def test_an_identified_finger_is_checked_with_its_contact_held(problem, monkeypatch):
     """The column at rest is stable; straight under fifty times Euler's load it is not."""
-    unknowns = Unknowns.of(problem, ("normal_force",))
+    unknowns = Unknowns(problem, ("normal_force",))
     space = LagrangeSpace(problem.mesh, 2)
     body = FemBody(unknowns.problem, space, unknowns.motion)
     model = ResponseModel(body, unknowns)

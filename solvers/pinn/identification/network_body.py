@@ -73,10 +73,10 @@ class NetworkBody:
         scale: float = 1.0,
         single: float = 0.25,
     ) -> "NetworkBody":
-        """The body by a refinement level of a solver.
+        """The body by a solver's windows, their spacings times a scale.
 
         Args:
-            solver: Its spacings and its windows are taken.
+            solver: With spacings and windows.
             problem: The body, its law, and the load at whose place the windows are denser.
             motion: Of the walls.
             scale: Of the spacings.
