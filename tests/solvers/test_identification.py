@@ -342,6 +342,17 @@ def test_a_finger_is_carried_to_another_load(identified, problem):
     assert response.contact @ into == pytest.approx(0.5 * member.response.contact @ into, abs=1e-4)
 
 
+def test_only_an_identified_finger_is_carried_and_only_to_where_it_has_an_equilibrium(identified, problem):
+    observed, _, solution = identified
+    solver, given = FemIdSolver(degree=1), replace(problem, observations=observed)
+    far = replace(problem, load=Load(displacement=(None, -500.0)))
+    with pytest.raises(UserError, match="no equilibrium of the identified finger"):
+        solver.transferred(solution, given, far)
+    plain = replace(solution, field=solution.field.members[0].found.drawn)
+    carried = solver.transferred(plain, given, far)
+    assert (carried.problem, carried.field) == (far, plain.field)
+
+
 def test_without_markers_it_is_fem_nonlinear(problem):
     small = replace(problem, load=Load(displacement=(0.0, -1.0)))
     plain = FemIdSolver(degree=1).solve(small)
