@@ -12,7 +12,6 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
-from geometry.mesh.wall_motion import WallMotion
 from geometry.observations import Observations
 from solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
 from solvers.fem.boundary_conditions import dirichlet_mask
@@ -32,17 +31,14 @@ from solvers.solver import Family, Progress, check_problem, silent
 
 
 class FemBody:
-    """Lagrange elements on the drawn mesh; see `solvers.identification.body.Body`.
+    """Lagrange elements of degree 1 or 2 on the drawn mesh; see `solvers.identification.body.Body`.
 
     A state is the array of nodal displacements, shape (N, 2), mm.
-
-    Args:
-        problem: With a law of finite strain; its load is ignored.
-        space: The elements.
-        motion: The walls' motion on the same mesh.
     """
 
-    def __init__(self, problem: Problem, space: LagrangeSpace, motion: WallMotion) -> None:
+    def __init__(self, unknowns: Unknowns, degree: int) -> None:
+        problem, motion = unknowns.problem, unknowns.motion
+        space = LagrangeSpace(problem.mesh, degree)
         self.space, self._motion = space, motion
         self._distributed = DistributedSpace(space)
         self._clamped = dirichlet_mask(Problem(problem.mesh, problem.material, Load()), space)
@@ -196,7 +192,7 @@ class FemIdSolver(IdentifyingSolver):
 
         Fits share the elements; each search starts from the last result. It takes a progress, too.
         """
-        identifier = Identifier(self, problem, lambda unknowns: _body(unknowns, self.degree))
+        identifier = Identifier(self, problem, lambda unknowns: FemBody(unknowns, self.degree))
 
         def fitted(observations: Observations, progress: Progress = silent) -> Solution:
             started = time.perf_counter()
@@ -228,11 +224,5 @@ def fem_law_tracker(
     for law in laws:
         material = problem.material.model_copy(update={"law": law})
         unknowns = Unknowns(replace(problem, material=material, observations=None), DEFAULT)
-        trackers[law] = ForceTracker(ResponseModel(_body(unknowns, degree), unknowns), points, radius)
+        trackers[law] = ForceTracker(ResponseModel(FemBody(unknowns, degree), unknowns), points, radius)
     return LawTracker(trackers)
-
-
-def _body(unknowns: Unknowns, degree: int) -> FemBody:
-    """The discretised finger of a problem whose law is set."""
-    problem = unknowns.problem
-    return FemBody(problem, LagrangeSpace(problem.mesh, degree), unknowns.motion)

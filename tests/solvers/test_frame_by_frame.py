@@ -10,7 +10,6 @@ from solvers.fem.identification import FemBody, fem_law_tracker
 from solvers.identification.model import EXACT, ResponseModel
 from solvers.identification.tracker import ForceTracker
 from solvers.identification.unknowns import DEFAULT, Unknowns
-from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
 
 NOISE, RADIUS = 0.005, 0.8
@@ -44,7 +43,7 @@ def tracker_of_laws(problem):
 def marker_path(problem, shares, finger):
     """Displacements of the markers, (f, 9, 2), mm, and forces, (f, 2), N/mm, of a finger under shares."""
     unknowns = Unknowns(problem, DEFAULT)
-    model = ResponseModel(FemBody(problem, LagrangeSpace(problem.mesh, 1), unknowns.motion), unknowns)
+    model = ResponseModel(FemBody(unknowns, 1), unknowns)
     twin = ForceTracker(model, problem.mesh.markers, RADIUS)
     drawn = {parameter.name: parameter.start for parameter in unknowns.parameters(1.0)}
     places, forces = [], []
@@ -178,6 +177,6 @@ def test_arrays_of_another_finger_are_refused(tracker_of):
 
 def test_a_force_without_its_place_cannot_be_followed(problem):
     unknowns = Unknowns(replace(problem), ("normal_force",))
-    model = ResponseModel(FemBody(problem, LagrangeSpace(problem.mesh, 1), unknowns.motion), unknowns)
+    model = ResponseModel(FemBody(unknowns, 1), unknowns)
     with pytest.raises(UserError, match="followed with position among the unknowns"):
         ForceTracker(model, problem.mesh.markers, RADIUS)

@@ -40,8 +40,7 @@ def problem(coarse_mesh):
 
 def model_of(problem, names=NAMES):
     unknowns = Unknowns(problem, names)
-    body = FemBody(unknowns.problem, LagrangeSpace(problem.mesh, 1), unknowns.motion)
-    return ResponseModel(body, unknowns)
+    return ResponseModel(FemBody(unknowns, 1), unknowns)
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,6 @@ from solvers.fem.identification import FemBody
 from solvers.fem.solid.solver import Fem3dSolver
 from solvers.identification.model import ResponseModel
 from solvers.identification.unknowns import Unknowns
-from solvers.lagrange import LagrangeSpace
 from solvers.pinn.finite_basis import newton
 from solvers.pinn.finite_basis.presets import PinnLocalSolver
 from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
@@ -88,9 +87,7 @@ def test_three_dimensions_tell_of_stability(monkeypatch):
 def test_an_identified_finger_is_checked_with_its_contact_held(problem, monkeypatch):
     """The column at rest is stable; straight under fifty times Euler's load it is not."""
     unknowns = Unknowns(problem, ("normal_force",))
-    space = LagrangeSpace(problem.mesh, 2)
-    body = FemBody(unknowns.problem, space, unknowns.motion)
-    model = ResponseModel(body, unknowns)
+    model = ResponseModel(FemBody(unknowns, 2), unknowns)
     rest = model.response(np.zeros(1))
     assert model.unstable(rest) == 0
     monkeypatch.setattr(LoadPath, "_stable", lambda path, point: point)
