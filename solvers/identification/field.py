@@ -85,25 +85,13 @@ class Member:
 
 
 @dataclass(frozen=True, eq=False)
-class IdentifiedField:
-    """The displacement by the most probable law; see `Snapshot` for its methods.
+class IdentifiedField(Snapshot):
+    """The displacement by the most probable law, with deviations.
 
-    Its deviations include the distances of the other laws, and of a coarser discretisation, from it.
+    They include the distances of the other laws, and of a coarser discretisation, from it.
     """
 
     members: Sequence[Member]  # The most probable law first
-
-    def displacement(self, location: LocatedPoints) -> FloatArray:
-        """Displacement of the material drawn at points, shape (n, 2), mm."""
-        return self.members[0].found.displacement(location)
-
-    def displacement_in_space(self, location: LocatedPoints) -> FloatArray:
-        """Displacement of the material that is at points before the load, shape (n, 2), mm."""
-        return self.members[0].found.displacement_in_space(location)
-
-    def gradient(self, location: LocatedPoints) -> FloatArray:
-        """Gradient of the displacement by the place before the load, shape (n, 2, 2)."""
-        return self.members[0].found.gradient(location)
 
     def standard_deviation(self, location: LocatedPoints) -> FloatArray:
         """Standard deviation of `displacement_in_space`, shape (n, 2), mm."""

@@ -122,17 +122,16 @@ class Identified:
         hypothesis = best.response.hypothesis
         unstable = best.model.unstable(best.response)
         missed, left_out = self._residuals()
-        field = IdentifiedField(
-            [
-                _member(fit, float(probability), problem)
-                for fit, probability in zip(self.fits, self.probabilities, strict=True)
-                if fit is best or probability >= PROBABLE
-            ]
-        )
+        members = [
+            _member(fit, float(probability), problem)
+            for fit, probability in zip(self.fits, self.probabilities, strict=True)
+            if fit is best or probability >= PROBABLE
+        ]
+        field = IdentifiedField(**vars(members[0].found), members=members)
         sentence = self.sentence(missed)
         return Solution(
             solver=name,
-            problem=field.members[0].found.problem,
+            problem=field.problem,
             field=field,
             energy=best.model.body.energy(best.response.state, hypothesis.lame, hypothesis.changes),
             reaction=hypothesis.force,
