@@ -21,7 +21,7 @@ LOCKS = sorted((Path(__file__).parents[2] / "requirements").glob("debian*.txt"))
 
 
 class Package(NamedTuple):
-    """A locked package with the numbers of its advisories; None if they cannot be known from here."""
+    """A locked package and its advisories; None if they cannot be known from here."""
 
     name: str
     version: str
@@ -77,9 +77,9 @@ def _asked(package: tuple[str, str]) -> Package:
     except HTTPError:
         page = _page(name)
         files, newest = page["releases"].get(version, []), page["info"]["version"]
-    advisories = [each["id"] for each in page["vulnerabilities"] if not each.get("withdrawn")]
+    known = [each["id"] for each in page["vulnerabilities"] if not each.get("withdrawn")]
     withdrawn = bool(files) and all(file["yanked"] for file in files)
-    return Package(name, version, advisories if newest == version else None, withdrawn)
+    return Package(name, version, known if newest == version else None, withdrawn)
 
 
 def _page(project: str) -> Any:

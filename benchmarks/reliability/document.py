@@ -7,6 +7,7 @@ Linux only. Trials that are kept are not run again; `--rows compare` makes those
 their names. All take some five hours of one core. The page's words are in `page.md`.
 """
 
+import csv
 import json
 import os
 import platform
@@ -20,7 +21,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # one thread: numbers are to agre
 
 from rich.table import Table
 
-from benchmarks.reliability import audit, fuzzing, inputs, memory, mutants
+from benchmarks.reliability import audit, fuzzing, inputs, mutants
 from benchmarks.reliability.faults import Row, run_faults
 from benchmarks.reliability.jobs import JOBS
 from benchmarks.tables import DOCS, kept_rows, markdown
@@ -59,10 +60,11 @@ def page(rows: Sequence[Row]) -> str:
         )
         for each in kept_rows(fuzzing.ROWS, fuzzing.Row)
     ]
-    repeated = [
-        (each.job, f"{each.count:,}", *(f"{value:.1f}" for value in each[2:]))
-        for each in kept_rows(memory.ROWS, memory.Row)
-    ]
+    with (HERE / "memory.csv").open(encoding="utf-8", newline="") as file:
+        memory = [
+            (job, f"{int(count):,}", *(f"{float(number):.1f}" for number in numbers))
+            for job, count, *numbers in list(csv.reader(file))[1:]
+        ]
     return Template((HERE / "page.md").read_text(encoding="utf-8")).substitute(
         machine=f"{platform.machine()}, Python {platform.python_version()}, numpy {version('numpy')}",
         faults=markdown(FAULTS, fault_rows(rows)),
@@ -71,7 +73,7 @@ def page(rows: Sequence[Row]) -> str:
         else "",
         inputs=markdown(INPUTS, tried),
         fuzzing=markdown(FUZZING, fuzzed),
-        memory=markdown(MEMORY, repeated),
+        memory=markdown(MEMORY, memory),
         **same_answer(),
         **audited(),
         **mutant_tables(),

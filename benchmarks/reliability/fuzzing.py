@@ -35,12 +35,9 @@ LONGEST_S, GRACE_S = 10, 60.0
 
 
 class Row(NamedTuple):
-    """Counts of a reader over all times, in seconds and bytes; the last two are of the last time alone.
+    """Counts of a reader over all times, in seconds and bytes: files, and those that it took.
 
-    Attributes:
-        read: Number of the files that it took.
-        unhandled: Places of exceptions that are no refusal.
-        ended: How often a C library ended the process that read.
+    Of the last time alone: places of exceptions that are no refusal, ends by a C library.
     """
 
     reader: str

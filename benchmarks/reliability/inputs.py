@@ -11,8 +11,7 @@ import tempfile
 import time
 import warnings
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 from unittest.mock import patch
@@ -46,20 +45,13 @@ class Row(NamedTuple):
     peak: int
 
 
-@dataclass
-class Outcomes:
-    """Number of inputs by state, the longest time, s, the memory, bytes, and faults with an input each."""
+class Outcomes(NamedTuple):
+    """Number of inputs by state, times, s, largest memory, bytes, and faults with an input each."""
 
-    states: Counter[str] = field(default_factory=Counter)
-    slowest: float = 0.0
-    peak: int = 0
-    wrong: dict[str, str] = field(default_factory=dict)
-
-    def add(self, other: "Outcomes") -> None:
-        """Count others with these."""
-        self.states += other.states
-        self.slowest, self.peak = max(self.slowest, other.slowest), max(self.peak, other.peak)
-        self.wrong |= other.wrong
+    states: Counter[str]
+    slowest: float
+    peak: int
+    wrong: dict[str, str]
 
 
 def _one_line(error: UserError) -> str:
@@ -110,7 +102,7 @@ def tried(count: int, solver: str = "fem", seed: int = 0) -> Outcomes:
 
     from benchmarks.reliability.strategies import Given, inputs
 
-    found = Outcomes()
+    states, wrong, times = Counter[str](), dict[str, str](), [0.0]
     quick = {"database": None, "deadline": None, "phases": [Phase.generate]}
     with tempfile.TemporaryDirectory() as folder:
 
@@ -120,34 +112,37 @@ def tried(count: int, solver: str = "fem", seed: int = 0) -> Outcomes:
         def one(each: Given) -> None:
             started = time.perf_counter()
             answer = answer_to(each, Path(folder))
-            seconds = time.perf_counter() - started
-            found.states[answer.state] += 1
-            found.slowest = max(found.slowest, seconds)
-            if (fault := fault_of(answer, seconds)) and fault not in found.wrong:
-                found.wrong[fault] = repr(each)
+            times.append(time.perf_counter() - started)
+            states[answer.state] += 1
+            if (fault := fault_of(answer, times[-1])) and fault not in wrong:
+                wrong[fault] = repr(each)
                 print(fault, each, sep="\n  ", flush=True)
 
         one()
-    found.peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    return found
+    return Outcomes(states, max(times), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, wrong)
+
+
+def block(solver: str, seed: int) -> Outcomes:
+    """The outcomes of a block of inputs, without the warnings of libraries."""
+    warnings.simplefilter("ignore")
+    return tried(BLOCK, solver, seed)
 
 
 def main(count: int, solver: str = "fem") -> None:
     """Try random inputs of a solver in blocks, each in a process of its own, and keep the counts."""
-    found = Outcomes()
     others = [each for each in kept_rows(ROWS, Row) if each.solver != solver]
-    for seed in range(-(-count // BLOCK)):
-        with ProcessPoolExecutor(
-            1,
-            mp_context=multiprocessing.get_context("spawn"),
-            initializer=warnings.simplefilter,
-            initargs=("ignore",),
-        ) as pool:
-            found.add(pool.submit(tried, BLOCK, solver, seed).result())
-        ends = [found.states[state] for state in ("done", "not converged", "refused")]
-        row = Row(solver, found.states.total(), *ends, len(found.wrong), found.slowest, found.peak)
-        keep_rows(ROWS, Row, [row, *others])
-        print(*row, flush=True)
+    blocks = range(-(-count // BLOCK))
+    with multiprocessing.get_context("spawn").Pool(1, maxtasksperchild=1) as pool:
+        found = pool.starmap(block, [(solver, seed) for seed in blocks], chunksize=1)
+    states, wrong = Counter[str](), dict[str, str]()
+    for each in found:
+        states += each.states
+        wrong |= each.wrong
+    ends = [states[state] for state in ("done", "not converged", "refused")]
+    slowest, peak = (max(getattr(each, name) for each in found) for name in ("slowest", "peak"))
+    row = Row(solver, states.total(), *ends, len(wrong), slowest, peak)
+    keep_rows(ROWS, Row, [row, *others])
+    print(*row, flush=True)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,11 +13,9 @@ CACHE, OUT, TEMPORARY = "cache", "out", "tmp"
 
 
 class Job(NamedTuple):
-    """A command with its inputs.
+    """A command with its inputs; `FOLDER` stands for the folder that it runs in.
 
     Attributes:
-        name: Of the row in the table.
-        arguments: Of `pinnray`; `FOLDER` stands for the folder that it runs in.
         again: Further arguments of the run that goes on.
         earlier: Arguments of a run that is finished before, if any.
         warm: Whether meshes and virtual experiments are in the cache before.
@@ -34,44 +32,33 @@ class Job(NamedTuple):
     watched: tuple[str, ...] = (OUT, f".{OUT}", CACHE)
 
 
-def _words(line: str) -> tuple[str, ...]:
-    return tuple(f"{line} --out FOLDER/out --quiet".split())
+def _words(line: str, out: str = "out") -> tuple[str, ...]:
+    return tuple(f"{line} --out FOLDER/{out} --quiet".split())
 
 
-RESUME = ("--resume",)
 FEM, THREE, TWO = (
     _words(f"compare --design default --mesh-size 4 --solvers {solvers}")
     for solvers in ("fem", "fem,gp,statfem", "fem,fem-nonlinear")
 )
-RIG = _words("rig --mesh-size 4 --size 320x240 --rest 4 --moving 2 --held 4 --codec png")
+RIG = "rig --mesh-size 4 --size 320x240 --rest 4 --moving 2 --held 4 --codec png"
+TRACK = _words("track FOLDER/film/frames --camera FOLDER/film/camera.json")
+CROSSVAL = _words("crossval --solvers fem --schemes one-out --seeds 1 --mesh-size 4 --processes 1")
+GRIDSEARCH = _words(
+    "gridsearch --mesh-size 4 --epochs 4 --learning-rates 1e-3,1e-2 --bc-weights 1 --processes 1 "
+    "--solver-set pinn-std.checkpoint_every=2"
+)
 STUDY = "mesh_size = 4.0\nsamples = 3\n[varied]\nrib_angle = {from = -10, to = 20}\n"
-
 JOBS = (
-    Job("compare", FEM, again=RESUME),
-    Job("compare over an older result", FEM, again=RESUME, earlier=FEM),
-    Job("compare of three solvers", THREE, again=RESUME),
-    Job("compare in two processes", TWO, again=RESUME),
-    Job("cache", FEM, again=RESUME, warm=False, watched=(CACHE, TEMPORARY)),
+    Job("compare", FEM, again=("--resume",)),
+    Job("compare over an older result", FEM, again=("--resume",), earlier=FEM),
+    Job("compare of three solvers", THREE, again=("--resume",)),
+    Job("compare in two processes", TWO, again=("--resume",)),
+    Job("cache", FEM, again=("--resume",), warm=False, watched=(CACHE, TEMPORARY)),
     Job("sweep", _words("sweep FOLDER/study.toml --processes 1"), whole=False),
-    Job("rig", RIG),
-    Job(
-        "track",
-        _words("track FOLDER/film/frames --camera FOLDER/film/camera.json"),
-        earlier=tuple(each.replace("FOLDER/out", "FOLDER/film") for each in RIG),
-    ),
-    Job(
-        "crossval",
-        _words("crossval --solvers fem --schemes one-out --seeds 1 --mesh-size 4 --processes 1"),
-        whole=False,
-    ),
-    Job(
-        "gridsearch",
-        _words(
-            "gridsearch --mesh-size 4 --epochs 4 --learning-rates 1e-3,1e-2 --bc-weights 1 --processes 1 "
-            "--solver-set pinn-std.checkpoint_every=2"
-        ),
-        whole=False,
-    ),
+    Job("rig", _words(RIG)),
+    Job("track", TRACK, earlier=_words(RIG, "film")),
+    Job("crossval", CROSSVAL, whole=False),
+    Job("gridsearch", GRIDSEARCH, whole=False),
 )
 
 
@@ -80,7 +67,14 @@ def started(
 ) -> Ending:
     """Run a command in a forked process with cache and temporary files in a folder."""
     (folder / TEMPORARY).mkdir(exist_ok=True)
-    work = _work([each.replace("FOLDER", str(folder)) for each in arguments], folder)
+
+    def work() -> int:
+        os.environ.update(PINNRAY_CACHE=str(folder / CACHE), TMPDIR=str(folder / TEMPORARY))
+        tempfile.tempdir = None
+        from compare.cli import main
+
+        return main([each.replace("FOLDER", str(folder)) for each in arguments])
+
     log = folder.parent / f"{folder.name}.log"
     return supervised(work, [folder / each for each in watched], log, fault=fault)
 
@@ -94,14 +88,3 @@ def prepared(job: Job, folder: Path, cache: Path) -> None:
         raise RuntimeError(ending.text)
     if not job.warm:
         shutil.rmtree(folder / CACHE)
-
-
-def _work(arguments: list[str], folder: Path) -> Callable[[], int]:
-    def work() -> int:
-        os.environ.update(PINNRAY_CACHE=str(folder / CACHE), TMPDIR=str(folder / TEMPORARY))
-        tempfile.tempdir = None
-        from compare.cli import main
-
-        return main(arguments)
-
-    return work

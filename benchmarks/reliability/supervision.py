@@ -55,7 +55,7 @@ _HERE = -100  # the working folder, in place of a folder's number
 
 
 class Point(NamedTuple):
-    """A change of a file in a watched folder: name of the system call, and the file after it."""
+    """A change of a file in a watched folder: the system call, and the file after it."""
 
     call: str
     path: str
@@ -94,7 +94,7 @@ def supervised(
     fault: Fault | None = None,
     limit_s: float = 300.0,
 ) -> Ending:
-    """Run a function in a forked process and put a fault into one of its changes of files.
+    """Run a function in a forked process and put a fault, if any, into one of its changes of files.
 
     Args:
         work: Returns an exit code.
@@ -163,10 +163,6 @@ def _install() -> int:
     return int(library.syscall(317, 1, 1 << 3 | 1 << 5, header))  # new listener, its waits killable
 
 
-class _CallerKilledError(Exception):
-    """The process that waits for an answer is no more."""
-
-
 class _Supervisor:
     """Answers the notifications of one process and its children."""
 
@@ -219,9 +215,8 @@ class _Supervisor:
             return
         identity, task, _, number, _, _, *arguments = _NOTIFICATION.unpack(received.raw)
         point = self._point(task, number, arguments)
-        try:
-            error = self._strike(point, task, arguments) if point else 0
-        except _CallerKilledError:  # an answer would let its call begin before it ends
+        error = self._strike(point, task, arguments) if point else 0
+        if error is None:  # the caller was killed; an answer would let its call begin before it ends
             return
         answer = _ANSWER.pack(identity, 0, -error, 0 if error else _CONTINUE)
         with suppress(OSError):  # the caller was killed
@@ -247,8 +242,11 @@ class _Supervisor:
         futile = os.path.lexists(path) == FUTILE.get(name)
         return Point(name, path) if path.startswith(tuple(self.watched)) and not futile else None
 
-    def _strike(self, point: Point, task: int, arguments: Sequence[int]) -> int:
-        """Count a point and put the fault into it; the error number that the call ends with, or 0."""
+    def _strike(self, point: Point, task: int, arguments: Sequence[int]) -> int | None:
+        """Count a point and put the fault into it; the error number that the call ends with, or 0.
+
+        None if the process that waits for the answer was killed.
+        """
         number = len(self.points)
         self.points.append(point)
         fault = self.fault
@@ -263,20 +261,14 @@ class _Supervisor:
             _write_half(task, *arguments[:3])
         own = os.path.exists(f"/proc/{self.child}/task/{task}")
         os.kill(self.child, signal.SIGKILL)
-        if own:
-            raise _CallerKilledError
-        return 0
+        return None if own else 0
 
 
 def _write_half(task: int, file: int, address: int, length: int) -> None:
     """Do the first half of a write for a process that is about to be killed."""
-    data = _memory(task, address, length // 2)
-    info = Path(f"/proc/{task}/fdinfo/{file}").read_text().split()
-    place = os.open(f"/proc/{task}/fd/{file}", os.O_WRONLY)
-    try:
-        os.pwrite(place, data, int(info[1]))
-    finally:
-        os.close(place)
+    position = int(Path(f"/proc/{task}/fdinfo/{file}").read_text().split()[1])
+    with open(f"/proc/{task}/fd/{file}", "r+b", buffering=0) as place:
+        os.pwrite(place.fileno(), _memory(task, address, length // 2), position)
 
 
 def _memory(task: int, address: int, length: int) -> bytes:

@@ -1,8 +1,9 @@
 """Films of the virtual rig in memory, tracked and compared with their truth."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from compare.evaluation.virtual_experiment import simulate
@@ -15,9 +16,6 @@ from solvers.problem import Problem
 from vision.frames.frame import CapturedImage, Frames, Image
 from vision.rig.recording import FrameTruth
 from vision.tracking.trajectories import Tracking
-
-ELEMENT = 1.0
-"""Element size of the filmed solution, mm; 0.5 changes the markers by 0.0003 mm."""
 
 HIDDEN = 0.02
 """Visible share of a marker below which it counts as hidden."""
@@ -34,7 +32,7 @@ class Finger:
     @classmethod
     def pressed(cls, design: Design) -> "Finger":
         """The finger under the default indenter, at finite strain."""
-        mesh = finger_mesh(design, settings=MeshSettings(size=ELEMENT))
+        mesh = finger_mesh(design, settings=MeshSettings(size=1.0))  # 0.5 changes the markers by 0.0003 mm
         solution = simulate(Problem(mesh))
         return cls(design, mesh, solution.displacement(mesh.at_nodes()))
 
@@ -50,8 +48,7 @@ class Score:
         covariances: The tracker's covariance of every displacement, shape (m, 2, 2), mm².
         swapped: Number of markers that were, in some frame, nearer to another one's place than to their own.
         invented: Number of markers reported in a frame in which they were hidden.
-        overall: Mean of the squares over all displacements, weighted by the inverse of their covariance; 1 if
-            that is right.
+        overall: Mean square of all displacements' errors by their covariance; 1 if that is right.
     """
 
     true: FloatArray
@@ -66,27 +63,25 @@ class Score:
     def of(cls, tracking: Tracking, truths: Sequence[FrameTruth]) -> "Score":
         """Compare the tracking of a film with the truth of its frames."""
         first, last = truths[0], truths[-1]
-        seen = tracking.visible
-        covariance = tracking.displacement_covariance
+        seen, covariance = tracking.visible, tracking.displacement_covariance
         count = int(seen.sum())
-        blocks = covariance.reshape(count, 2, count, 2)
         covariances = np.full((len(seen), 2, 2), np.nan)
-        covariances[seen] = blocks[np.arange(count), :, np.arange(count)]
+        covariances[seen] = covariance.reshape(count, 2, count, 2)[np.arange(count), :, np.arange(count)]
         observations = tracking.observations("the virtual rig")
         measured = np.where(seen[:, None], observations.displacements, np.nan)
         true = last.discs - first.discs
         missed = (measured - true)[seen].ravel()
         positions, places = tracking.positions, np.stack([truth.discs for truth in truths])
-        found = np.isfinite(positions[..., 0])
+        found, own = np.isfinite(positions[..., 0]), np.arange(len(seen))
         away = np.linalg.norm(positions[:, :, None] - places[:, None], axis=3)
-        nearest = np.where(found, np.where(found[..., None], away, 0.0).argmin(axis=2), np.arange(len(seen)))
+        nearest = np.where(found, np.where(found[..., None], away, 0.0).argmin(axis=2), own)
         hidden = np.stack([truth.seen for truth in truths]) < HIDDEN
         return cls(
             true=true,
             centres=(last.world - first.world)[:, :2],
             measured=measured,
             covariances=covariances,
-            swapped=int((nearest != np.arange(len(seen))).any(axis=0).sum()),
+            swapped=int((nearest != own).any(axis=0).sum()),
             invented=int((found & hidden).any(axis=0).sum()),
             overall=float(missed @ np.linalg.solve(covariance, missed)) / len(missed),
         )
@@ -98,13 +93,13 @@ class Score:
 
     @property
     def missed(self) -> FloatArray:
-        """Measured minus true, shape (m, 2), mm."""
-        return self.measured - self.true
+        """Errors of the seen markers, shape (s, 2), mm."""
+        return (self.measured - self.true)[self.seen]
 
     @property
     def lengths(self) -> FloatArray:
         """|du| + |dv| of the seen markers, mm, as in the paper."""
-        return np.asarray(np.abs(self.missed)[self.seen].sum(axis=1))
+        return np.asarray(np.abs(self.missed).sum(axis=1))
 
     @property
     def deviations(self) -> FloatArray:
@@ -114,27 +109,27 @@ class Score:
     @property
     def ratios(self) -> FloatArray:
         """Errors of the seen markers over their standard deviations, shape (s, 2)."""
-        return np.asarray(self.missed[self.seen] / self.deviations)
+        return np.asarray(self.missed / self.deviations)
 
     @property
     def squares(self) -> FloatArray:
         """Squared error of every seen marker by its covariance; 2 on the average if that is right."""
-        missed = self.missed[self.seen]
-        solved = np.linalg.solve(self.covariances[self.seen], missed[:, :, None])[:, :, 0]
-        return np.asarray((missed * solved).sum(axis=1))
+        solved = np.linalg.solve(self.covariances[self.seen], self.missed[:, :, None])[:, :, 0]
+        return np.asarray((self.missed * solved).sum(axis=1))
 
 
-def coverage(ratios: FloatArray) -> tuple[float, float]:
+def coverage(scores: Sequence[Score]) -> tuple[float, float]:
     """Shares of the errors below 1 and below 1.96 standard deviations: 0.683 and 0.950 if those are right."""
-    below = np.abs(ratios)
+    below = np.abs(np.concatenate([score.ratios for score in scores]))
     return float((below < 1).mean()), float((below < 1.96).mean())
 
 
-def film_of(pictures: Sequence[Image], *, rate: float = 30.0) -> Frames:
-    """Images as a film with a frame rate, 1/s."""
+def film_of(pictures: Sequence[Image]) -> Frames:
+    """Images as a film of 30 frames a second."""
+    shots = (CapturedImage(each, number / 30.0, f"picture {number}") for number, each in enumerate(pictures))
+    return Frames("the virtual rig", shots, rate=30.0, count=len(pictures))
 
-    def shots() -> Iterator[CapturedImage]:
-        for number, picture in enumerate(pictures):
-            yield CapturedImage(picture, number / rate, f"picture {number}")
 
-    return Frames("the virtual rig", shots(), rate=rate, count=len(pictures))
+def one_thread() -> None:
+    """Let OpenCV use one core, in a process of a pool."""
+    cv2.setNumThreads(1)

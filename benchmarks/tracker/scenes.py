@@ -7,21 +7,18 @@ up to 30 %, and 20 to 120 % of the stroke. Five frames at rest and five that are
 cores.
 
 Errors are those of the discs' centroids, which a camera sees; in a bent wall they differ slightly from the
-printed centres. Environment: SCENES, their number instead of 200.
+printed centres.
 """
 
-import os
 import time
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
-from typing import NamedTuple
 
-import cv2
 import numpy as np
 from rich.table import Table
 
-from benchmarks.tracker.films import Finger, Score, coverage, film_of
+from benchmarks.tracker.films import Finger, Score, coverage, film_of, one_thread
 from compare.runtime.tables import terminal_table
 from geometry.finger.design import Design
 from vision.calibration.camera import Camera
@@ -44,22 +41,30 @@ BOARD = Board(9, 6, 8.0)
 MOTION = Motion(rest=5, moving=0, held=5)
 
 
-class Scored(NamedTuple):
-    """A tracked scene: its number, description and score."""
-
-    number: int
-    description: str
-    score: Score
-
-
-def main(scenes: int | None = None) -> Table:
+def main(scenes: int = SCENES) -> Table:
     """Film, track and score."""
-    scenes = scenes or int(os.environ.get("SCENES", SCENES))
     started = time.perf_counter()
     work = partial(_seen, Finger.pressed(Design()), scenes)
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn"), initializer=_alone) as pool:
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn"), initializer=one_thread) as pool:
         results = list(pool.map(work, range(CAMERAS)))
-    return _table(results, time.perf_counter() - started)
+    seconds = time.perf_counter() - started
+    every = [score for camera in results for score in camera]
+    markers = int(sum(score.seen.sum() for score in every))
+    missed = sum(len(score.seen) for score in every) - markers
+    centres = np.concatenate([(score.measured - score.centres)[score.seen] for score in every])
+    rows = [(str(number + 1), *_row(scores)) for number, scores in enumerate(results) if scores]
+    return terminal_table(
+        f"{len(every)} random scenes, {markers} markers, {missed} more missed, "
+        f"{sum(score.swapped for score in every)} swapped; {seconds:.0f} s",
+        (
+            *("camera", "error, mm", "worst scene", "worst marker", "std, mm", "below 1, %"),
+            *("below 1.96, %", "chi² of a marker / 2", "of a scene / n"),
+        ),
+        [*rows, ("all", *_row(every))],
+        caption="error: mean |du| + |dv|, asked for: 0.02 mm; to the discs' centres "
+        f"{np.abs(centres).sum(axis=1).mean():.4f} mm. Below 1 and 1.96 standard deviations: asked for 68 "
+        "and 95 within 5.",
+    )
 
 
 def random_camera(rng: np.random.Generator) -> Camera:
@@ -130,59 +135,25 @@ def scored(recording: Recording, camera: Camera) -> Score:
     return Score.of(track(film_of(pictures), scene), truths)
 
 
-def _alone() -> None:
-    cv2.setNumThreads(1)
-
-
-def _seen(finger: Finger, scenes: int, number: int) -> list[Scored]:
+def _seen(finger: Finger, scenes: int, number: int) -> list[Score]:
     """Film and track one camera's share of the scenes."""
     rng = np.random.default_rng([5, number])
     camera = random_camera(rng)
     known = calibrated(camera, random_exposure(rng), 1000 + number)
-    results = []
-    for scene in range(number, scenes, CAMERAS):
-        recording = random_recording(finger, camera, np.random.default_rng([6, scene]), scene)
-        exposure = recording.exposure
-        description = (
-            f"blur {exposure.blur:.2f} px, noise {exposure.noise:.1f}, gradient {exposure.gradient:.0%}, "
-            f"white {exposure.white:.0f}, markers at {recording.bench.workspace.marker_plane:.1f} mm"
-        )
-        results.append(Scored(scene, description, scored(recording, known)))
-    return results
+    return [
+        scored(random_recording(finger, camera, np.random.default_rng([6, scene]), scene), known)
+        for scene in range(number, scenes, CAMERAS)
+    ]
 
 
-def _table(results: list[list[Scored]], seconds: float) -> Table:
-    every = [scene for camera in results for scene in camera]
-    errors = np.array([scene.score.lengths.mean() for scene in every])
-    worst = every[int(errors.argmax())]
-    markers = int(sum(scene.score.seen.sum() for scene in every))
-    missed = sum(len(scene.score.seen) for scene in every) - markers
-    centres = np.concatenate([(s.score.measured - s.score.centres)[s.score.seen] for s in every])
-    rows = [(str(number + 1), *_row(scenes)) for number, scenes in enumerate(results) if scenes]
-    return terminal_table(
-        f"{len(every)} random scenes, {markers} markers, {missed} more missed, "
-        f"{sum(scene.score.swapped for scene in every)} swapped; {seconds:.0f} s",
-        (
-            *("camera", "error, mm", "worst scene", "worst marker", "std, mm", "below 1, %"),
-            *("below 1.96, %", "chi² of a marker / 2", "of a scene / n"),
-        ),
-        [*rows, ("all", *_row(every))],
-        caption="error: mean |du| + |dv|, asked for: 0.02 mm; to the discs' centres "
-        f"{np.abs(centres).sum(axis=1).mean():.4f} mm. Below 1 and 1.96 standard deviations: asked for 68 "
-        f"and 95 within 5. Worst scene: {worst.number}, {worst.description}.",
-    )
-
-
-def _row(scenes: list[Scored]) -> list[str]:
-    scores = [scene.score for scene in scenes]
+def _row(scores: list[Score]) -> list[str]:
     lengths = [score.lengths for score in scores]
-    deviations = np.concatenate([score.deviations for score in scores])
-    one, two = coverage(np.concatenate([score.ratios for score in scores]))
+    one, two = coverage(scores)
     return [
         f"{np.concatenate(lengths).mean():.4f}",
         f"{max(length.mean() for length in lengths):.4f}",
         f"{max(length.max() for length in lengths):.4f}",
-        f"{np.median(deviations):.4f}",
+        f"{np.median(np.concatenate([score.deviations for score in scores])):.4f}",
         f"{100 * one:.1f}",
         f"{100 * two:.1f}",
         f"{np.concatenate([score.squares for score in scores]).mean() / 2:.2f}",

@@ -18,12 +18,11 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 from rich.table import Table
 
 from benchmarks.tables import DOCS, fill, markdown, table_of
-from benchmarks.tracker.films import HIDDEN, Finger, Score, coverage, film_of
+from benchmarks.tracker.films import HIDDEN, Finger, Score, coverage, film_of, one_thread
 from compare.runtime.tables import terminal_table
 from geometry.errors import UserError
 from geometry.finger.design import Design
@@ -178,7 +177,7 @@ def main(rows: str = "") -> Table:
         raise UserError(f"no row holds {rows!r}; there are {', '.join(' '.join(name) for name in CASES)}")
     lines = reported()
     fingers = {layout: Finger.pressed(Design(marker_layout=layout)) for layout in ("front", "joints")}
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn"), initializer=_alone) as pool:
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn"), initializer=one_thread) as pool:
         outcomes = pool.map(partial(_outcome, fingers), product(chosen, range(FILMS)))
         for name in chosen:
             row = _row([next(outcomes) for _ in range(FILMS)])
@@ -252,10 +251,6 @@ def _film(case: Case, recording: Recording) -> Iterator[tuple[Callable[[], Frame
         yield partial(open_frames, Path(folder) / FILES[case.codec]), truths
 
 
-def _alone() -> None:
-    cv2.setNumThreads(1)
-
-
 def _outcome(fingers: Mapping[str, Finger], job: tuple[tuple[str, str], int]) -> Outcome:
     name, number = job
     case = CASES[name]
@@ -276,7 +271,7 @@ def _summary(outcomes: Sequence[Outcome], method: DetectionMethod) -> list[str]:
     if not known:
         return ["refused", "", str(refused), *5 * [""]]
     lengths = np.concatenate([score.lengths for score in known])
-    one, two = coverage(np.concatenate([score.ratios for score in known]))
+    one, two = coverage(known)
     deviations = np.concatenate([score.deviations for score in known])
     return [
         f"{lengths.mean():.4f}",

@@ -63,7 +63,7 @@ def test_random_scenes_are_measured_to_thousandths_of_a_millimetre(scores):
 def test_their_standard_deviations_are_those_of_the_errors(scores):
     ratios = np.concatenate([score.ratios for score in scores])  # 54 numbers
     assert 0.6 < np.sqrt((ratios**2).mean()) < 1.3
-    one, two = coverage(ratios)
+    one, two = coverage(scores)
     assert 0.5 < one < 0.9
     assert two > 0.85
     for score in scores:
