@@ -13,14 +13,12 @@ BENCHMARKS = {
     "default": "results.default_time:main",
     "readings": "results.readings:main",
     "fem": "elements.scikit_fem:main",
-    "million": "elements.million_triangles:main",
     "plane_strain": "elements.plane_strain:main",
     "pinn": "networks.graded:pinn",
     "designs": "networks.graded:designs",
     "drawings": "networks.graded:drawings",
     "contact": "networks.graded:contact",
     "trained": "networks.graded:trained",
-    "paper": "networks.paper_run:main",
     "scenes": "tracker.scenes:main",
     "stress": "tracker.stress:main",
     "live": "tracker.live:main",
@@ -33,11 +31,22 @@ BENCHMARKS = {
 }
 """Names, and functions that return a table; the modules' docstrings have descriptions and times."""
 
-SETTLED = ("recipes", "deepxde", "epochs", "sizes", "inference", "kernels", "meshing", "predict")
+SETTLED = (
+    "recipes",
+    "deepxde",
+    "epochs",
+    "sizes",
+    "inference",
+    "kernels",
+    "meshing",
+    "predict",
+    "paper",
+    "million",
+)
 """Benchmarks whose question is settled: their figures and the commit with their code are on a page."""
 
 SHORT = ("fem", "pinn")
-TIMED, ROWED = ("paper",), ("stress", "reliability")
+ROWED = ("stress", "reliability")
 
 
 def show(table: RenderableType, console: Console | None = None) -> None:
@@ -49,12 +58,11 @@ def show(table: RenderableType, console: Console | None = None) -> None:
 
 
 def main() -> int:
-    """Entry of `python -m benchmarks [NAME ...] [--seconds S] [--rows WORDS]`."""
+    """Entry of `python -m benchmarks [NAME ...] [--rows WORDS]`."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument(
         "names", nargs="*", metavar="NAME", help=f"{', '.join(BENCHMARKS)}; default: fem pinn"
     )
-    parser.add_argument("--seconds", type=float, help=f"budget of each training in {' and '.join(TIMED)}")
     parser.add_argument("--rows", default="", help=f"words in the names of the rows of {' and '.join(ROWED)}")
     arguments = parser.parse_args()
     for name in arguments.names:
@@ -65,8 +73,7 @@ def main() -> int:
         if name not in BENCHMARKS:
             parser.error(f"no benchmark {name!r}; there are {', '.join(BENCHMARKS)}")
     for name in arguments.names or SHORT:
-        options = {"seconds": arguments.seconds} if arguments.seconds and name in TIMED else {}
-        options |= {"rows": arguments.rows} if arguments.rows and name in ROWED else {}
+        options = {"rows": arguments.rows} if arguments.rows and name in ROWED else {}
         module, _, function = BENCHMARKS[name].partition(":")
         try:
             show(getattr(importlib.import_module(f"benchmarks.{module}"), function)(**options))
