@@ -63,24 +63,15 @@ class Case(NamedTuple):
 class Row(NamedTuple):
     """A plane model against three dimensions, on the side face and in the middle plane.
 
-    Attributes:
-        design: Preset, or a name of `DRAWN`.
-        law: Material law.
-        depth: mm.
-        size: Elements, mm.
-        model: Plane "strain" or "stress".
-        side_markers: Mean of |du| + |dv| at the markers, mm.
-        side_worst: Largest |(du, dv)| there, mm.
-        side_displacement: Relative L2 difference over the body.
-        side_von_mises: Relative L2 difference of the von Mises stress.
-        force: Force per depth over that in three dimensions, less one.
+    Depth and element size, mm; at the markers the mean of |du| + |dv| and the largest |(du, dv)|, mm; the
+    other differences are relative, in L2 over the body.
     """
 
     design: str
     law: str
     depth: float
     size: float
-    model: str
+    model: str  # plane "strain" or "stress"
     side_markers: float
     side_worst: float
     side_displacement: float
@@ -89,7 +80,7 @@ class Row(NamedTuple):
     middle_worst: float
     middle_displacement: float
     middle_von_mises: float
-    force: float
+    force: float  # per depth, over the one in three dimensions, less one
 
     @property
     def key(self) -> tuple[str | float, ...]:

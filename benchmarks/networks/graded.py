@@ -13,7 +13,7 @@ displacement by 0.0005 %. `fem` on the shared mesh stands beside the networks. "
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from rich.table import Table
@@ -30,6 +30,7 @@ from geometry.finger.presets import load_design
 from geometry.mesh.settings import MeshSettings
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
+from solvers.solution import Solution
 from solvers.solver import Solver
 from tests.geometry.test_mesher import random_design
 
@@ -41,19 +42,6 @@ HEADER = (
     *("finger", "solver", "time, s", "L2, %", "von Mises, %", "markers, mm", "force, %", "energy, %"),
     *("own estimate, %", "converged"),
 )
-
-
-class Row(NamedTuple):
-    """Time, s, differences from the reference in % and mm, the solver's own estimate, %."""
-
-    seconds: float
-    displacement: float
-    von_mises: float
-    markers: float
-    force: float
-    energy: float
-    estimate: float
-    converged: bool
 
 
 def pinn() -> Table:
@@ -68,7 +56,7 @@ def pinn() -> Table:
     }
     compared = Compared(Design(), MeshSettings(corner_size=0.002))
     rows = [
-        ("default", name, *cells([compared.row(solver) for solver in solvers]))
+        ("default", name, *compared.cells(*solvers))
         for name, solvers in {"fem": [make_solver("fem")], **named}.items()
     ]
     return table("Networks on the default finger, mean (range)", rows)
@@ -93,9 +81,7 @@ def contact() -> Table:
     for radius in (5.0, 10.0):
         fine = MeshSettings(corner_size=0.02, contact_size=0.1)
         compared = Compared(Design(), fine, "neo-hookean", kind="cylinder", radius=radius)
-        solvers = {"fem-nonlinear": make_solver("fem-nonlinear")} | _networks()
-        for name, solver in solvers.items():
-            rows.append((f"default, radius {radius:g} mm", name, *cells([compared.row(solver)])))
+        rows += beside("fem-nonlinear", compared, f"default, radius {radius:g} mm")
     return table("A rigid cylinder on the default finger", rows)
 
 
@@ -106,7 +92,7 @@ def trained() -> Table:
         compared = Compared(finger)
         for seed in range(3 if name == "default" else 1):
             solver = make_solver("pinn-std", preset="trained", seed=seed)
-            rows.append((name, f"trained, seed {seed}", *cells([compared.row(solver)])))
+            rows.append((name, f"trained, seed {seed}", *compared.cells(solver)))
     return table("pinn-std --preset trained", rows)
 
 
@@ -118,13 +104,14 @@ def random_fingers() -> dict[str, Finger]:
 def default_settings(fingers: Mapping[str, Finger]) -> Iterator[Sequence[str]]:
     """Rows of `fem` and the networks on fingers."""
     for name, finger in fingers.items():
-        compared = Compared(finger)
-        for label, solver in ({"fem": make_solver("fem")} | _networks()).items():
-            yield name, label, *cells([compared.row(solver)])
+        yield from beside("fem", Compared(finger), name)
 
 
-def _networks() -> dict[str, Solver]:
-    return {name: make_solver("pinn-std", **own) for name, own in NETWORKS.items()}
+def beside(fem: str, compared: "Compared", name: str) -> Iterator[Sequence[str]]:
+    """Rows of finite elements on the shared mesh and of the networks on a finger."""
+    yield name, fem, *compared.cells(make_solver(fem))
+    for label, own in NETWORKS.items():
+        yield name, label, *compared.cells(make_solver("pinn-std", **own))
 
 
 class Compared:
@@ -140,31 +127,27 @@ class Compared:
         exact = make_solver("fem" if law == "linear" else "fem-nonlinear").solve(graded)
         self.reference = Evaluation.of(exact, self.problem.mesh)
 
-    def row(self, solver: Solver) -> Row:
-        """Solve, and compare."""
-        solution = solver.solve(self.problem)
+    def cells(self, *solvers: Solver) -> list[str]:
+        """Solve, and compare: the figures of one solver, or mean and range of several."""
+        solutions = [solver.solve(self.problem) for solver in solvers]
+        columns = np.transpose([self.figures(solution) for solution in solutions])
+        texts = [f"{column.mean():.2g}" if np.isfinite(column).all() else "" for column in columns]
+        if len(solvers) > 1:
+            ranges = [f" ({column.min():.2g} to {column.max():.2g})" for column in columns]
+            texts = [text and text + spread for text, spread in zip(texts, ranges, strict=True)]
+        return [*texts, "yes" if all(solution.status.converged for solution in solutions) else "no"]
+
+    def figures(self, solution: Solution) -> tuple[float, ...]:
+        """Time, s, and differences from the reference, % and mm, as `HEADER` has them."""
         own = Evaluation.of(solution, self.problem.mesh)
         to = reference_differences(own, self.reference)
-        estimated = solution.history.get("estimated_error", [np.nan])
-        force = force_error(own, self.reference)
+        estimated = solution.history.get("estimated_error", [np.nan])[-1]
         energy = own.energy / self.reference.energy - 1
-        relative = (to.displacement.rel_l2, to.von_mises.rel_l2)
-        return Row(
-            float(solution.stats["seconds"]),
-            *(100 * value for value in relative),
-            to.mae_markers,
-            *(100 * value for value in (force, energy, float(estimated[-1]))),
-            solution.status.converged,
+        shares = (force_error(own, self.reference), energy, float(estimated))
+        return (
+            *(float(solution.stats["seconds"]), 100 * to.displacement.rel_l2, 100 * to.von_mises.rel_l2),
+            *(to.mae_markers, *(100 * share for share in shares)),
         )
-
-
-def cells(rows: Sequence[Row]) -> list[str]:
-    """Cells of a row: the figures of one run, or mean and range of several."""
-    texts = []
-    for values in np.array([row[:-1] for row in rows], dtype=float).T:
-        mean = f"{values.mean():.2g}" if np.isfinite(values).all() else ""
-        texts.append(mean if len(rows) == 1 else f"{mean} ({values.min():.2g} to {values.max():.2g})")
-    return [*texts, "yes" if all(row.converged for row in rows) else "no"]
 
 
 def table(title: str, rows: Iterator[Sequence[str]] | Sequence[Sequence[str]]) -> Table:

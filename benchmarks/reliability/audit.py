@@ -28,6 +28,11 @@ class Package(NamedTuple):
     advisories: list[str] | None
     withdrawn: bool
 
+    @property
+    def reason(self) -> str:
+        """Its advisories, or its withdrawal."""
+        return ", ".join(self.advisories or ["withdrawn"])
+
 
 class Audit(NamedTuple):
     """The packages of all lock files, and the day on which PyPI was asked."""

@@ -103,15 +103,13 @@ def same_answer() -> dict[str, str]:
     files = (NUMBERS, *sorted(HERE.glob("golden/*.json")))
     stored, *others = (json.loads(path.read_text(encoding="utf-8")) for path in files)
 
-    def difference(job: str, other: dict[str, dict[str, float]]) -> float:
-        return max(abs(other[job][key] / value - 1) for key, value in stored["jobs"][job].items())
+    def difference(job: str, other: dict[str, dict[str, float]]) -> str:
+        return f"{max(abs(other[job][key] / value - 1) for key, value in stored['jobs'][job].items()):.1e}"
 
     own = [f"{name} {number}" for name, number in stored["system"].items()]
     systems = [[f"{name} {number}" for name, number in each["system"].items()] for each in others]
     header = ("job", *(", ".join(each for each in system if each not in own) for system in systems))
-    rows = [
-        (f"`{job}`", *(f"{difference(job, each['jobs']):.1e}" for each in others)) for job in stored["jobs"]
-    ]
+    rows = [(f"`{job}`", *(difference(job, each["jobs"]) for each in others)) for job in stored["jobs"]]
     return {"stored": ", ".join(own), "same": markdown(header, rows)}
 
 
@@ -119,10 +117,7 @@ def audited() -> dict[str, str]:
     """Advisories of the locked packages."""
     found = audit.kept()
     unknown = [f"{each.name} {each.version}" for each in found.packages if each.advisories is None]
-    weak = [
-        f"{each.name} {each.version} ({', '.join(each.advisories or []) or 'withdrawn'})"
-        for each in found.weak
-    ]
+    weak = [f"{each.name} {each.version} ({each.reason})" for each in found.weak]
     names = {"weak": ", ".join(weak) or "none", "unknown": ", ".join(unknown) or "none"}
     return {"day": found.day, "locked": str(len(found.packages)), "known": str(len(found.known)), **names}
 
@@ -132,10 +127,8 @@ def mutant_tables() -> dict[str, str]:
     rows = kept_rows(mutants.ROWS, mutants.Row)
     names = dict.fromkeys(row.module for row in rows)
     counted = []
-    for name, group in {
-        **{name: [row for row in rows if row.module == name] for name in names},
-        "all": rows,
-    }.items():
+    for name in (*names, "all"):
+        group = [row for row in rows if name in (row.module, "all")]
         killed = sum(row.end == "killed" for row in group)
         equal = sum(row.judgement.startswith("equal") for row in group)
         share = f"{100 * killed / len(group):.0f} %"

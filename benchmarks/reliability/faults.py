@@ -39,26 +39,18 @@ class Row(NamedTuple):
 
 
 class Expected(NamedTuple):
-    """A job's run without any fault.
+    """A job's run without any fault."""
 
-    Attributes:
-        points: Its changes of files.
-        numbers: Digests of its numbers.
-        cached: Digests of the numbers in its cache, by file name.
-        folder: The folder before the run, to be copied.
-    """
-
-    points: tuple[Point, ...]
-    numbers: dict[str, str]
-    cached: dict[str, str]
-    folder: Path
+    points: tuple[Point, ...]  # its changes of files
+    numbers: dict[str, str]  # digests of its numbers
+    cached: dict[str, str]  # digests of the numbers in its cache, by file name
+    folder: Path  # as it was before the run, to be copied
 
 
 def run_faults(words: Collection[str] = ()) -> list[Row]:
     """Run the trials that are not kept yet, or were not as promised, and keep their rows.
 
-    Args:
-        words: Only those of the jobs with one of these in their names; none means all.
+    Only those of the jobs with one of the words in their names; none means all.
     """
     rows = kept_rows(ROWS, Row)
     order = {job.name: number for number, job in enumerate(JOBS)}

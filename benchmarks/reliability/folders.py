@@ -5,7 +5,7 @@ import hashlib
 import json
 import sqlite3
 from collections.abc import Callable, Mapping
-from contextlib import closing, suppress
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -89,16 +89,11 @@ def _csv(path: Path) -> Any:
 def _arrays(path: Path) -> Any:
     with np.load(path, allow_pickle=False) as archive:
         arrays = {name: archive[name] for name in archive.files}
-    return [
-        (name, _header(str(each)) if each.dtype.kind == "U" else (each.shape, each.tobytes()))
-        for name, each in arrays.items()
-    ]
-
-
-def _header(text: str) -> Any:
-    with suppress(ValueError):
-        return _timeless(json.loads(text))
-    return text
+    texts = {name: str(each) for name, each in arrays.items() if each.dtype.kind == "U"}
+    headers = {
+        name: _timeless(json.loads(text)) if text[:1] in "{[" else text for name, text in texts.items()
+    }
+    return headers, [(name, each.shape, each.tobytes()) for name, each in arrays.items() if name not in texts]
 
 
 def _journal(path: Path) -> Any:

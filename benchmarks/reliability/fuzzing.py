@@ -20,7 +20,6 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -51,62 +50,42 @@ class Row(NamedTuple):
 
 
 class Reader(NamedTuple):
-    """A function that reads a file, the modules whose branches guide, and the largest file, bytes."""
+    """A function that reads a file, and the largest file that is tried, bytes."""
 
     function: str
-    guides: tuple[str, ...] = ()
-    longest: int = 4096
     call: Callable[[Any, Path], object] = lambda read, path: read(path)
+    longest: int = 4096
 
 
-TEXTS = "geometry.text_files"
+def _counted(read: Any, path: Path) -> int:
+    return sum(1 for _ in read(path))
+
+
 READERS = {
-    "design": Reader("geometry.finger.presets.load_design", ("geometry.finger", TEXTS)),
-    "study": Reader("compare.sweep.study.load_study", ("compare.sweep.study", TEXTS)),
-    "options": Reader(
-        "compare.commands.options_file.read_options_file", ("compare.commands.options_file", TEXTS)
-    ),
-    "description": Reader(
-        "geometry.drawing.description.load_description", ("geometry.drawing.description", TEXTS)
-    ),
+    "design": Reader("geometry.finger.presets.load_design"),
+    "study": Reader("compare.sweep.study.load_study"),
+    "options": Reader("compare.commands.options_file.read_options_file"),
+    "description": Reader("geometry.drawing.description.load_description"),
     "measurements": Reader(
-        "vision.measurements.read_measurements",
-        ("vision.measurements", "geometry.observations"),
-        call=lambda read, path: read(path, marker_radius=0.8),
+        "vision.measurements.read_measurements", lambda read, path: read(path, marker_radius=0.8)
     ),
-    "camera": Reader("vision.calibration.camera_file.load_camera", ("vision.calibration",)),
-    "workspace": Reader("vision.tracking.workspace.load_workspace", ("vision.tracking.workspace", TEXTS)),
-    "svg": Reader("geometry.drawing.formats.svg.read_svg", ("geometry.drawing",)),
-    "dxf": Reader("geometry.drawing.formats.dxf.read_dxf", ("geometry.drawing",), longest=32768),
+    "camera": Reader("vision.calibration.camera_file.load_camera"),
+    "workspace": Reader("vision.tracking.workspace.load_workspace"),
+    "svg": Reader("geometry.drawing.formats.svg.read_svg"),
+    "dxf": Reader("geometry.drawing.formats.dxf.read_dxf", longest=32768),
     "msh": Reader("geometry.drawing.formats.msh.read_msh"),
-    "picture": Reader(
-        "vision.frames.pictures.images_of_files",
-        ("vision.frames",),
-        call=lambda read, path: list(read([path], 30.0)),
-    ),
-    "video": Reader(
-        "vision.frames.video.video_frames",
-        ("vision.frames",),
-        longest=16384,
-        call=lambda read, path: sum(1 for _ in read(path)),
-    ),
-    "mesh archive": Reader("geometry.mesh.triangle_mesh.TriangleMesh.load", ("geometry.mesh", "numpy.lib")),
+    "picture": Reader("vision.frames.pictures.images_of_files", lambda read, path: list(read([path], 30.0))),
+    "video": Reader("vision.frames.video.video_frames", _counted, longest=16384),
+    "mesh archive": Reader("geometry.mesh.triangle_mesh.TriangleMesh.load"),
     "checkpoint": Reader(
-        "solvers.pinn.paper.checkpoint.load_checkpoint",
-        ("solvers.pinn.paper.checkpoint",),
-        call=lambda read, path: read(path.parent, "digest"),
+        "solvers.pinn.paper.checkpoint.load_checkpoint", lambda read, path: read(path.parent, "digest")
     ),
 }
 """By the names of their folders of seeds."""
 
 
 def taken(reader: Reader, read: Any, path: Path) -> bool:
-    """Whether a file can be read; a refusal in one line is right, too.
-
-    Raises:
-        ValueError: If the refusal has several lines, or none.
-        Exception: If the reader has a fault.
-    """
+    """Whether a file can be read; a refusal in one line is right, other exceptions are faults."""
     try:
         reader.call(read, path)
     except UserError as error:
@@ -125,8 +104,8 @@ def fuzz(name: str, seconds: float, folder: Path) -> None:
     import atheris
 
     reader, seeds = READERS[name], sorted((SEEDS / name).iterdir())
-    guided = atheris.instrument_imports(include=list(reader.guides), enable_loader_override=False)
-    with guided if reader.guides else nullcontext():
+    guides = [reader.function.rsplit(".", 2)[0], "geometry.drawing", "geometry.text_files", "numpy.lib"]
+    with atheris.instrument_imports(include=guides, enable_loader_override=False):
         read = pydoc.locate(reader.function)
     if name == "design":  # a refusal tries a thousand others to propose ranges
         from geometry.finger import validation
@@ -171,18 +150,9 @@ def fuzz(name: str, seconds: float, folder: Path) -> None:
         if over:
             os._exit(0)
 
-    limits = (f"-max_len={reader.longest}", f"-timeout={2 * LONGEST_S}", "-rss_limit_mb=4096")
-    atheris.Setup(
-        [
-            sys.argv[0],
-            str(corpus),
-            f"-dict={words}",
-            f"-artifact_prefix={folder}/crash-",
-            "-verbosity=0",
-            *limits,
-        ],
-        one,
-    )
+    options = f"-dict={words} -artifact_prefix={folder}/crash- -max_len={reader.longest} -verbosity=0"
+    options += f" -timeout={2 * LONGEST_S} -rss_limit_mb=4096"
+    atheris.Setup([sys.argv[0], str(corpus), *options.split()], one)
     atheris.Fuzz()
 
 
@@ -195,9 +165,8 @@ def fuzzed(row: Row, seconds: float) -> Row:
             folder = Path(place)
             if (kept / "corpus").is_dir():
                 shutil.copytree(kept / "corpus", folder / "corpus")
-            process = multiprocessing.get_context("spawn").Process(
-                target=fuzz, args=(row.reader, left, folder)
-            )
+            spawn = multiprocessing.get_context("spawn")
+            process = spawn.Process(target=fuzz, args=(row.reader, left, folder))
             process.start()
             process.join(left + GRACE_S)
             process.kill()  # one that hangs where no alarm reaches it
@@ -208,14 +177,9 @@ def fuzzed(row: Row, seconds: float) -> Row:
             found = json.loads((folder / "found.json").read_text())
         counts, wrong = Row(*found["row"]), wrong | found["wrong"]
         row = Row(
-            row.reader,
-            row.runs + counts.runs,
-            row.read + counts.read,
-            max(row.slowest, counts.slowest),
-            max(row.peak, counts.peak),
-            row.seconds + counts.seconds,
-            len(wrong),
-            row.ended + bool(process.exitcode),
+            *(row.reader, row.runs + counts.runs, row.read + counts.read),
+            *(max(row.slowest, counts.slowest), max(row.peak, counts.peak), row.seconds + counts.seconds),
+            *(len(wrong), row.ended + bool(process.exitcode)),
         )
     print(*wrong.items(), sep="\n", flush=True)
     return row

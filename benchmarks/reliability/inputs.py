@@ -134,13 +134,11 @@ def main(count: int, solver: str = "fem") -> None:
     blocks = range(-(-count // BLOCK))
     with multiprocessing.get_context("spawn").Pool(1, maxtasksperchild=1) as pool:
         found = pool.starmap(block, [(solver, seed) for seed in blocks], chunksize=1)
-    states, wrong = Counter[str](), dict[str, str]()
-    for each in found:
-        states += each.states
-        wrong |= each.wrong
+    states = sum((each.states for each in found), Counter[str]())
+    wrong = {said for each in found for said in each.wrong}
     ends = [states[state] for state in ("done", "not converged", "refused")]
-    slowest, peak = (max(getattr(each, name) for each in found) for name in ("slowest", "peak"))
-    row = Row(solver, states.total(), *ends, len(wrong), slowest, peak)
+    worst = (max(each.slowest for each in found), max(each.peak for each in found))
+    row = Row(solver, states.total(), *ends, len(wrong), *worst)
     keep_rows(ROWS, Row, [row, *others])
     print(*row, flush=True)
 

@@ -13,23 +13,15 @@ CACHE, OUT, TEMPORARY = "cache", "out", "tmp"
 
 
 class Job(NamedTuple):
-    """A command with its inputs; `FOLDER` stands for the folder that it runs in.
-
-    Attributes:
-        again: Further arguments of the run that goes on.
-        earlier: Arguments of a run that is finished before, if any.
-        warm: Whether meshes and virtual experiments are in the cache before.
-        whole: Whether the output folder is replaced as a whole.
-        watched: Folders whose changes count.
-    """
+    """A command with its inputs; `FOLDER` stands for the folder that it runs in."""
 
     name: str
     arguments: tuple[str, ...]
-    again: tuple[str, ...] = ()
-    earlier: tuple[str, ...] = ()
-    warm: bool = True
-    whole: bool = True
-    watched: tuple[str, ...] = (OUT, f".{OUT}", CACHE)
+    again: tuple[str, ...] = ()  # further arguments of the run that goes on
+    earlier: tuple[str, ...] = ()  # arguments of a run that is finished before, if any
+    warm: bool = True  # whether meshes and virtual experiments are in the cache before
+    whole: bool = True  # whether the output folder is replaced as a whole
+    watched: tuple[str, ...] = (OUT, f".{OUT}", CACHE)  # folders whose changes count
 
 
 def _words(line: str, out: str = "out") -> tuple[str, ...]:

@@ -31,14 +31,7 @@ class Row(NamedTuple):
     judgement: str
 
 
-class Found(NamedTuple):
-    """Numbers of a module's mutants by their end, and the changed lines of those that survived."""
-
-    ends: Counter[str]
-    survivors: dict[str, str]
-
-
-def judged(module: str, tests: Sequence[str]) -> Found:
+def main(module: str, tests: Sequence[str]) -> None:
     """Run tests on each mutant of a module.
 
     Raises:
@@ -52,12 +45,11 @@ def judged(module: str, tests: Sequence[str]) -> Found:
         (folder / "pyproject.toml").write_text(text + settings(module, tests), encoding="utf-8")
         mutmut(folder, "run")
         ends = dict(re.findall(r"^\s*(\S+): (.+)$", mutmut(folder, "results", "--all", "true"), re.MULTILINE))
-        survived = [mutant for mutant, end in ends.items() if end == "survived"]
-        shown = {mutant: mutmut(folder, "show", mutant) for mutant in survived}
-    changed = {
-        mutant: "\n".join(re.findall(r"^[-+] .*", text, re.MULTILINE)) for mutant, text in shown.items()
-    }
-    return Found(Counter(ends.values()), changed)
+        for mutant in (mutant for mutant, end in ends.items() if end == "survived"):
+            print(mutant, *re.findall(r"^[-+] .*", mutmut(folder, "show", mutant), re.MULTILINE), sep="\n")
+    counts = Counter(ends.values())
+    print(*(f"{number} {end}" for end, number in counts.items()), sep=", ")
+    print(f"{module}: {100 * counts['killed'] / len(ends):.0f} % of {len(ends)} killed")
 
 
 def settings(module: str, tests: Sequence[str]) -> str:
@@ -81,9 +73,4 @@ def mutmut(folder: Path, *arguments: str) -> str:
 
 
 if __name__ == "__main__":
-    found = judged(sys.argv[1], sys.argv[2:])
-    for mutant, lines in found.survivors.items():
-        print(mutant, lines, sep="\n")
-    count = found.ends.total()
-    print(*(f"{number} {end}" for end, number in found.ends.items()), sep=", ")
-    print(f"{sys.argv[1]}: {100 * found.ends['killed'] / count:.0f} % of {count} killed")
+    main(sys.argv[1], sys.argv[2:])

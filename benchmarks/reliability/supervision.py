@@ -38,9 +38,8 @@ BY_PATH = {
     **{266: ("symlinkat", 1, 2), 2: ("open", None, 0), 257: ("openat", 0, 1)},
 }
 """Name, arguments with the folder's number and the (new) path; the flags of open and openat follow it."""
-GROWING = {
-    *("write", "pwrite64", "writev", "pwritev", "pwritev2", "sendfile", "ftruncate", "fallocate"),
-    *("copy_file_range", "mkdir", "mkdirat", "open", "openat", "link", "linkat", "symlink", "symlinkat"),
+GROWING = {name for name, *_ in (*BY_FILE.values(), *BY_PATH.values())} - {
+    *("fsync", "fdatasync", "truncate", "rename", "renameat", "renameat2", "unlink", "unlinkat", "rmdir")
 }
 """Calls that a full disk refuses."""
 FUTILE = {"mkdir": True, "mkdirat": True, "unlink": False, "unlinkat": False, "rmdir": False}
@@ -69,21 +68,13 @@ class Fault(NamedTuple):
 
 
 class Ending(NamedTuple):
-    """The end of a supervised process.
+    """The end of a supervised process."""
 
-    Attributes:
-        code: Its exit code; the negative number of the signal that ended it.
-        text: Standard output and error, also of its children.
-        points: The changes of files that it had begun.
-        struck: Whether the fault's point was reached.
-        orphans: Number of processes that were still there `PATIENCE_S` after its end.
-    """
-
-    code: int
-    text: str
-    points: tuple[Point, ...]
-    struck: bool
-    orphans: int
+    code: int  # of its exit; the negative number of the signal that ended it
+    text: str  # standard output and error, also of its children
+    points: tuple[Point, ...]  # the changes of files that it had begun
+    struck: bool  # whether the fault's point was reached
+    orphans: int  # processes that were still there `PATIENCE_S` after its end
 
 
 def supervised(
@@ -94,13 +85,13 @@ def supervised(
     fault: Fault | None = None,
     limit_s: float = 300.0,
 ) -> Ending:
-    """Run a function in a forked process and put a fault, if any, into one of its changes of files.
+    """Run a function in a forked process and put a fault into one of its changes of files.
 
     Args:
         work: Returns an exit code.
         watched: Folders; what lies in them, or would, counts.
         log: File for the output, outside of the folders.
-        fault: The fault; None only counts.
+        fault: None only counts.
         limit_s: Time limit, s.
 
     Raises:
@@ -202,7 +193,7 @@ class _Supervisor:
         left = 0
         for entry in Path("/proc").glob("[0-9]*"):
             with suppress(OSError, ValueError):
-                if int((entry / "stat").read_text().rpartition(")")[2].split()[3]) == self.child:
+                if os.getsid(int(entry.name)) == self.child:
                     os.kill(int(entry.name), signal.SIGKILL)
                     left += 1
         return left

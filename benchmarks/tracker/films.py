@@ -39,25 +39,15 @@ class Finger:
 
 @dataclass(frozen=True)
 class Score:
-    """Measured and true displacements of the m markers of a film.
+    """Measured and true displacements of the m markers of a film, shape (m, 2), mm."""
 
-    Attributes:
-        true: Displacements of the centroids of their discs, shape (m, 2), mm.
-        centres: Displacements of the material points at their centres, shape (m, 2), mm.
-        measured: The tracker's displacements, shape (m, 2), mm; nan for missing markers.
-        covariances: The tracker's covariance of every displacement, shape (m, 2, 2), mm².
-        swapped: Number of markers that were, in some frame, nearer to another one's place than to their own.
-        invented: Number of markers reported in a frame in which they were hidden.
-        overall: Mean square of all displacements' errors by their covariance; 1 if that is right.
-    """
-
-    true: FloatArray
-    centres: FloatArray
-    measured: FloatArray
-    covariances: FloatArray
-    swapped: int
-    invented: int
-    overall: float
+    true: FloatArray  # of the centroids of their discs
+    centres: FloatArray  # of the material points at their centres
+    measured: FloatArray  # nan for missing markers
+    covariances: FloatArray  # the tracker's, of every displacement, shape (m, 2, 2), mm²
+    swapped: int  # markers that were, in some frame, nearer to another one's place than to their own
+    invented: int  # markers reported in a frame in which they were hidden
+    overall: float  # mean square of all displacements' errors by their covariance; 1 if that is right
 
     @classmethod
     def of(cls, tracking: Tracking, truths: Sequence[FrameTruth]) -> "Score":

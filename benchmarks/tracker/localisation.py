@@ -8,6 +8,7 @@ light, straight edges. One minute; writes `docs/evidence/localisation.md`.
 import time
 from dataclasses import dataclass, replace
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import cv2
 import numpy as np
@@ -81,9 +82,9 @@ def main() -> Table:
         f"16 discs ({name}) in {_milliseconds(image):.1f} ms"
         for name, image in {"clean": DiscImage(), "wall": _wall(20.0)}.items()
     )
-    made = f"{made_by('localisation')}, OpenCV {cv2.__version__}, seed {SEED}; on one core "
-    made += f"{speeds} of processor time, the best of twenty."
-    fill(REPORT, "figures", f"{made}\n\n{markdown(HEADER, rows)}")
+    made = f"{made_by('localisation')}, OpenCV {cv2.__version__}, seed {SEED}"
+    said = f"{made}; on one core {speeds} of processor time, the best of twenty."
+    fill(REPORT, "figures", f"{said}\n\n{markdown(HEADER, rows)}")
     return terminal_table(f"{PLACES} places each; {speeds}", HEADER, rows, left=["case"])
 
 
@@ -130,9 +131,8 @@ def _coded(picture: GreyImage, codec: str) -> GreyImage:
         return cv2.imdecode(content, cv2.IMREAD_GRAYSCALE)
     if codec:
         height, width = (16 * -(-side // 16) for side in picture.shape)
-        padded = cv2.copyMakeBorder(
-            picture, 0, height - picture.shape[0], 0, width - picture.shape[1], cv2.BORDER_REPLICATE
-        )
+        rest = [(0, height - picture.shape[0]), (0, width - picture.shape[1])]
+        padded = np.pad(picture, rest, mode="edge")
         with TemporaryDirectory() as folder:
             path = f"{folder}/one.mp4"
             writer = cv2.VideoWriter(path, cv2.VideoWriter_fourcc(*codec), 30, (width, height))
@@ -145,39 +145,35 @@ def _coded(picture: GreyImage, codec: str) -> GreyImage:
 
 def _bound(case: Case) -> float:
     """Least root mean square distance of an unbiased estimate, pixels."""
-    image = case.image
-    (x, y), (gx, gy) = image.centre, image.gradient
-    elliptical = image.stretch > 1  # of a circle, both ways of stretching it are unknown
-    varied = [
-        lambda h: {"centre": (x + h, y)},
-        lambda h: {"centre": (x, y + h)},
-        *(lambda h, name=name: {name: getattr(image, name) + h} for name in ("light", "dark", "blur")),
-        lambda h: {"gradient": (gx + h, gy)},
-        lambda h: {"gradient": (gx, gy + h)},
-        *(lambda h, name=name: {name: getattr(image, name) + h} for name in ("radius", "stretch")),
-        lambda h: {"turn": image.turn + h} if elliptical else {"stretch": 1 + h, "turn": np.pi / 4},
-    ]
-    for number, edge in enumerate(image.edges):
-        for name in ("angle", "offset", "level"):
-            varied.append(lambda h, n=number, e=edge, of=name: {"edges": _other_edge(image, n, e, of, h)})
-    step = 1e-4  # of central differences, pixels, or relative
+    image, step = case.image, 1e-4  # of central differences, pixels, or relative
+    names = [(name, place) for name in ("centre", "gradient") for place in (0, 1)]
+    names += [(name,) for name in ("light", "dark", "blur", "radius", "stretch", "turn")]
+    names += [("edges", n, at) for n in range(len(image.edges)) for at in ("angle", "offset", "level")]
     slopes = np.array(
-        [
-            np.ravel(replace(image, **vary(step)).exact() - replace(image, **vary(-step)).exact())
-            / (2 * step)
-            for vary in varied
-        ]
+        [np.ravel(_moved(image, *name, step) - _moved(image, *name, -step)) / (2 * step) for name in names]
     )
     information = slopes @ slopes.T / (case.noise**2 + 1 / 12)
     if case.known:
-        information[7, 7] += (KNOWN_RADIUS * image.radius) ** -2
+        radius = names.index(("radius",))
+        information[radius, radius] += (KNOWN_RADIUS * image.radius) ** -2
     return float(np.sqrt(np.trace(np.linalg.inv(information)[:2, :2])))
 
 
-def _other_edge(image: DiscImage, number: int, edge: Edge, name: str, change: float) -> tuple[Edge, ...]:
-    edges = list(image.edges)
-    edges[number] = replace(edge, **{name: getattr(edge, name) + change})
-    return tuple(edges)
+def _moved(image: DiscImage, name: str, *rest: Any) -> FloatArray:
+    """The exact picture with one of its unknowns changed; of a circle, a turned stretch is one of them."""
+    *place, change = rest
+    value = getattr(image, name)
+    if name == "turn" and image.stretch == 1:
+        return replace(image, stretch=1 + change, turn=np.pi / 4).exact()
+    if name == "edges":
+        number, of = place
+        changed = replace(value[number], **{of: getattr(value[number], of) + change})
+        new = (*value[:number], changed, *value[number + 1 :])
+    elif place:
+        new = tuple(each + change * (at == place[0]) for at, each in enumerate(value))
+    else:
+        new = value + change
+    return replace(image, **{name: new}).exact()
 
 
 def _milliseconds(image: DiscImage, count: int = 16) -> float:

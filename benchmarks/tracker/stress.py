@@ -48,13 +48,9 @@ REPORT = DOCS / "evidence" / "tracker_stress.md"
 FILMS = 2
 MOTION = Motion(rest=5, moving=3, held=5)
 JUMP = Motion(rest=5, moving=0, held=5)
+ROLLING = Motion(rest=5, moving=6, held=5, rolling=0.5)
 
 Hide = Callable[[Recording], Callable[[int], Sequence[Shape]]]
-
-
-def nothing(recording: Recording) -> Callable[[int], Sequence[Shape]]:
-    """No occluder."""
-    return lambda frame: ()
 
 
 def covered(shares: Mapping[int, float], paint: str = "dark") -> Hide:
@@ -90,7 +86,7 @@ class Case:
     tilt: float = 2.0
     turn: float = 0.0
     motion: Motion = MOTION
-    hide: Hide = nothing
+    hide: Hide = lambda film: lambda frame: ()
     codec: str = ""
     paint: str = "dark"
     printed: Mapping[str, float] = field(default_factory=dict)
@@ -99,6 +95,8 @@ class Case:
     fiducials: bool = True
 
 
+FIVE = {"irregular": 0.05}
+CORNER = Case(exposure={"noise": 6, "blur": 1.5, "gradient": 0.3}, tilt=5)
 CASES: dict[tuple[str, str], Case] = {
     ("base", ""): Case(),
     **{("noise", f"{noise}"): Case(exposure={"noise": noise}) for noise in (1, 3, 6, 10)},
@@ -119,32 +117,19 @@ CASES: dict[tuple[str, str], Case] = {
     ("markers", "red, called dark"): Case(paint="red"),
     **{("markers", f"{paint}, picked"): Case(paint=paint, picked=True) for paint in ("red", "blue")},
     ("markers", "at the joints"): Case(layout="joints"),
-    **{
-        ("print, irregular", f"{share:.0%}"): Case(printed={"irregular": share})
-        for share in (0.03, 0.05, 0.08)
-    },
-    ("print", "specks on 10 %, irregular 5 %"): Case(printed={"irregular": 0.05, "mottle": 0.1}),
-    ("print", "irregular 5 %, sharpened by 1.5"): Case(
-        printed={"irregular": 0.05}, exposure={"sharpen": 1.5}
-    ),
-    ("print", "irregular 5 %, glare of 60"): Case(printed={"irregular": 0.05}, exposure={"glare": 60}),
+    **{("print, irregular", f"{x:.0%}"): Case(printed={"irregular": x}) for x in (0.03, 0.05, 0.08)},
+    ("print", "specks on 10 %, irregular 5 %"): Case(printed=FIVE | {"mottle": 0.1}),
+    ("print", "irregular 5 %, sharpened by 1.5"): Case(printed=FIVE, exposure={"sharpen": 1.5}),
+    ("print", "irregular 5 %, glare of 60"): Case(printed=FIVE, exposure={"glare": 60}),
     ("print", "layers of 10 %, irregular 3 %"): Case(printed={"irregular": 0.03, "layers": 0.1}),
-    ("print", "irregular 5 %, white clipped"): Case(printed={"irregular": 0.05}, exposure={"white": 400}),
-    ("camera", "rolling shutter, half of a frame"): Case(
-        motion=Motion(rest=5, moving=6, held=5, rolling=0.5)
-    ),
+    ("print", "irregular 5 %, white clipped"): Case(printed=FIVE, exposure={"white": 400}),
+    ("camera", "rolling shutter, half of a frame"): Case(motion=ROLLING),
     ("camera", "monochrome"): Case(exposure={"monochrome": True}),
     ("camera", "upside down"): Case(turn=180),
     ("no fiducials", ""): Case(hide=fiducials(*range(7)), fiducials=False, tilt=0),
-    ("corner", "noise 6, blur 1.5, shading 30 %, tilt 5"): Case(
-        exposure={"noise": 6, "blur": 1.5, "gradient": 0.3}, tilt=5
-    ),
-    ("corner", "the same, mjpg, jump, 2 half hidden"): Case(
-        exposure={"noise": 6, "blur": 1.5, "gradient": 0.3},
-        tilt=5,
-        codec="mjpg",
-        motion=JUMP,
-        hide=covered({3: 0.5, 7: 0.5}),
+    ("corner", "noise 6, blur 1.5, shading 30 %, tilt 5"): CORNER,
+    ("corner", "the same, mjpg, jump, 2 half hidden"): replace(
+        CORNER, codec="mjpg", motion=JUMP, hide=covered({3: 0.5, 7: 0.5})
     ),
     ("corner", "noise 10, blur 2.5, shading 60 %, tilt 15"): Case(
         exposure={"noise": 10, "blur": 2.5, "gradient": 0.6}, tilt=15

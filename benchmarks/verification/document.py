@@ -1,42 +1,19 @@
-"""docs/verification.md, from the measured cases."""
+"""docs/verification.md, from the measured cases and the words of `page.md`."""
 
 from collections.abc import Sequence
 from pathlib import Path
+from string import Template
 
 from benchmarks.verification.record import Case, Row
 
 PAGE = Path(__file__).parents[2] / "docs" / "verification.md"
 
-HEAD = """\
-# Verification of the finite elements
-
-All other results of this project are compared with `fem`. This page verifies `fem`, and for finite strain
-`fem-nonlinear` and in space `fem-3d`, on problems with known solutions, solved by their own code.
-[Theory](theory/index.md) has the equations. Whether they describe a real body is a question of
-[validation](validation.md).
-
-`make verification` repeats all of it in less than a minute and rewrites this page; `make test-all
-ARGS=tests/verification` fails if a number leaves its bounds or if the page is out of date. `Problem` has only
-a clamp and an indenter, so body forces and tractions are applied below it: the stiffness matrix is assembled
-and factorised as for every finger, the nodal forces are integrated in NumPy by a separate rule of degree 7,
-and Hooke's law is implemented independently, from E and ν alone. P1 and P2 are linear and quadratic
-triangles. Slopes are orders of convergence in the element size, with the error on the finest mesh; errors are
-relative; "plane" is the plane state, or "space".
-"""
-
-TAIL = """\
-## Would a mistake be seen?
-
-The tests make mistakes on purpose and require that rows above fail: λ too large by 1 % (the slope of P2 in L2
-falls from 3 to 0), half the shear energy, plane strain instead of plane stress, one integration point a
-triangle (`tests/verification/test_mistakes.py`).
-"""
-
 
 def page(cases: Sequence[Case], before: str) -> str:
     """The whole page; a case whose program is not installed stays as it was on the page before."""
     sections = (section(case) if case.available else kept_section(case, before) for case in cases)
-    return "\n".join([HEAD, overview(cases, before), *sections, TAIL])
+    words = Template(Path(__file__).with_name("page.md").read_text(encoding="utf-8"))
+    return words.substitute(overview=overview(cases, before), sections="\n".join(sections))
 
 
 def kept_section(case: Case, before: str) -> str:
