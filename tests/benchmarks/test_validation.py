@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from benchmarks.validation import comsol
 from benchmarks.tables import DOCS
+from benchmarks.validation import comsol
 from benchmarks.validation.document import PAGE
 from benchmarks.validation.half_beam import HEIGHT, POISSON, WIDTH, Deformation, HalfBeam, loaded_nodes
 from benchmarks.validation.markers import (
