@@ -21,7 +21,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # one thread: numbers are to agre
 
 from rich.table import Table
 
-from benchmarks.reliability import audit, fuzzing, inputs, mutants
+from benchmarks.reliability import fuzzing, inputs, mutants
 from benchmarks.reliability.faults import Row, run_faults
 from benchmarks.reliability.jobs import JOBS
 from benchmarks.tables import DOCS, kept_rows, markdown
@@ -75,7 +75,6 @@ def page(rows: Sequence[Row]) -> str:
         fuzzing=markdown(FUZZING, fuzzed),
         memory=markdown(MEMORY, memory),
         **same_answer(),
-        **audited(),
         **mutant_tables(),
     )
 
@@ -111,15 +110,6 @@ def same_answer() -> dict[str, str]:
     header = ("job", *(", ".join(each for each in system if each not in own) for system in systems))
     rows = [(f"`{job}`", *(difference(job, each["jobs"]) for each in others)) for job in stored["jobs"]]
     return {"stored": ", ".join(own), "same": markdown(header, rows)}
-
-
-def audited() -> dict[str, str]:
-    """Advisories of the locked packages."""
-    found = audit.kept()
-    unknown = [f"{each.name} {each.version}" for each in found.packages if each.advisories is None]
-    weak = [f"{each.name} {each.version} ({each.reason})" for each in found.weak]
-    names = {"weak": ", ".join(weak) or "none", "unknown": ", ".join(unknown) or "none"}
-    return {"day": found.day, "locked": str(len(found.packages)), "known": str(len(found.known)), **names}
 
 
 def mutant_tables() -> dict[str, str]:
