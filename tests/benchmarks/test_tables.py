@@ -27,6 +27,8 @@ def test_a_table_takes_the_place_between_its_marks(tmp_path: Path) -> None:
     fill(page, "one", markdown(("a", "b"), [("x", "1")]))
     assert table_of(page, "one") == "| a | b |\n| --- | ---: |\n| x | 1 |\n"
     assert table_of(page, "two") == "other\n"
-    assert page.read_text().endswith("after\n")
+    text = page.read_text()
+    assert text.endswith("after\n")
+    assert "old" not in text
     with pytest.raises(ValueError, match="has no mark <!-- three -->"):
         fill(page, "three", "")
