@@ -97,7 +97,7 @@ def test_a_frame_from_the_clamp_alone_lifts_the_held_tip():
 
 
 def test_coarse_tetrahedra_have_the_figures_of_comsol():
-    """0.2 mm is what issue and page promise; the other law, or the load 6 mm lower, is further away."""
+    """The page promises 0.2 mm; the other law, or the load 6 mm lower, is further away."""
     found = all_cases(HalfBeam(cell="tetrahedron", strip=0.0), comsol.MODULUS)
     for case, places in comsol.PLACES.items():
         np.testing.assert_allclose(moved_feet(found[case]), places, rtol=0, atol=0.2)
