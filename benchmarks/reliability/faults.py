@@ -74,16 +74,17 @@ def run_faults(words: Collection[str] = ()) -> list[Row]:
 def known_trials(rows: Sequence[Row], expected: Expected, place: Path) -> tuple[list[Row], list[Fault]]:
     """Rows of a job that hold for its points of today, numbered as these are, and the faults without one.
 
-    Two processes change their files in another order each time, so that a row is found by its file.
+    Two processes change their files in another order each time, so that a row is found by its file, whose
+    name in the cache has a digest that changes with the code.
     """
     stock: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
         if not row.faults:
-            stock.setdefault((row.kind, row.call, row.path), []).append(row)
+            stock.setdefault((row.kind, row.call, undated(row.path)), []).append(row)
     known, left = [], []
     for fault in faults(expected):
         point = shown(expected.points[fault.at], place / TRIAL)
-        if found := stock.get((fault.kind, *point)):
+        if found := stock.get((fault.kind, point.call, undated(point.path))):
             known.append(found.pop(0)._replace(at=fault.at))
         else:
             left.append(fault)
@@ -114,6 +115,11 @@ def chosen(points: Sequence[Point]) -> list[int]:
 def plain(path: str) -> str:
     """A path without the number that makes a temporary file unique."""
     return re.sub(r"\.[0-9a-f]{8}\.partial", ".partial", path)
+
+
+def undated(path: str) -> str:
+    """A path without the digest in the name of a file of the cache."""
+    return re.sub(r"[0-9a-f]{64}", "", path)
 
 
 def shown(point: Point, folder: Path) -> Point:

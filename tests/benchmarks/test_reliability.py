@@ -110,15 +110,21 @@ def test_of_equal_calls_on_a_file_the_first_the_middle_and_the_last_are_chosen()
 
 
 def test_kept_trials_are_those_of_the_same_file_by_whatever_number(tmp_path: Path) -> None:
-    points = (Point("write", f"{tmp_path}/trial/a"), Point("rename", f"{tmp_path}/trial/b"))
+    mesh = f"{tmp_path}/trial/mesh-{'0f' * 32}.npz"
+    points = (
+        Point("write", f"{tmp_path}/trial/a"),
+        Point("rename", f"{tmp_path}/trial/b"),
+        Point("fsync", mesh),
+    )
     rows = [
         Row("compare", "kill", 9, "rename", "b", -9, "", ""),  # the second point of today
         Row("compare", "kill", 1, "rename", "gone", -9, "", ""),  # a file that is no more
         Row("compare", "EIO", 0, "write", "a", 2, "other numbers", ""),  # not as promised
+        Row("compare", "kill", 3, "fsync", f"mesh-{'1e' * 32}.npz", -9, "", ""),  # of another code
     ]
     known, left = known_trials(rows, Expected(points, {}, {}, tmp_path), tmp_path)
-    assert known == [rows[0]._replace(at=1)]
-    faults = [Fault("kill", 0), Fault("torn", 0), Fault("ENOSPC", 0), Fault("EIO", 0), Fault("EIO", 1)]
+    assert known == [rows[0]._replace(at=1), rows[3]._replace(at=2)]
+    faults = [Fault("kill", 0), Fault("torn", 0), Fault("ENOSPC", 0), *(Fault("EIO", at) for at in range(3))]
     assert left == faults
 
 
