@@ -74,8 +74,8 @@ def run_faults(words: Collection[str] = ()) -> list[Row]:
 def known_trials(rows: Sequence[Row], expected: Expected, place: Path) -> tuple[list[Row], list[Fault]]:
     """Rows of a job that hold for its points of today, numbered as these are, and the faults without one.
 
-    Two processes change their files in another order each time, so that a row is found by its file, whose
-    name in the cache has a digest that changes with the code.
+    Two processes change their files in another order each time, so that a row is found by its file. The
+    name of one in the cache has a digest that changes with the code.
     """
     stock: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
@@ -118,8 +118,8 @@ def plain(path: str) -> str:
 
 
 def undated(path: str) -> str:
-    """A path without the digest in the name of a file of the cache."""
-    return re.sub(r"[0-9a-f]{64}", "", path)
+    """A path without the digests of files of the cache and the random names of temporary files."""
+    return re.sub(r"[0-9a-f]{64}|(?<=[-/])(tmp)?[a-z0-9_]{8}(?=/|$)", "", path)
 
 
 def shown(point: Point, folder: Path) -> Point:
