@@ -1,6 +1,6 @@
 """Plane strain and plane stress against the finger in three dimensions, on its side face and in its middle.
 
-What a plane model leaves out, for the presets, for twelve fingers drawn at random, and over the depth of the
+Errors of the plane models for the presets, for twelve fingers drawn at random, and over the depth of the
 default finger. Writes `docs/plane-strain.csv`, the tables of `docs/plane-strain.md` and their picture.
 """
 
@@ -112,7 +112,7 @@ def cases() -> Iterator[Case]:
 
 @cache
 def finger(name: str) -> Design:
-    """A preset, or a finger drawn at random from what one prints; draws that break a rule are drawn again."""
+    """A preset, or a finger drawn from printable ranges; draws that break a rule are drawn again."""
     if name not in DRAWN:
         return load_design(name)
     rng = np.random.default_rng(DRAWN.index(name))

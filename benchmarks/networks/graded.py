@@ -6,7 +6,7 @@ displacement by 0.0005 %. `fem` on the shared mesh stands beside the networks. "
 
 - `pinn`: the default finger, several spacings, three seeds: mean and range.
 - `designs`: default settings, twelve random admissible fingers; ten minutes.
-- `drawings`: the same on the drawings of the tests and the preset csiro; fifteen minutes.
+- `drawings`: default settings, the drawings of the tests and the preset csiro; fifteen minutes.
 - `contact`: a rigid cylinder, neo-Hookean, stroke 10 mm, finite elements at finite strain; twenty minutes.
 - `trained`: the preset `trained`, three seeds and the random fingers, ten minutes each on two quiet cores.
 """

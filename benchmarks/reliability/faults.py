@@ -20,13 +20,13 @@ from benchmarks.tables import keep_rows, kept_rows
 ROWS = Path(__file__).with_name("faults.csv")
 REFUSED, NOT_CONVERGED = 2, 3
 WHOLE = "the complete result is in"
-"""What a command says that cannot replace its output folder; one that cannot resume has it moved first."""
+"""Said by a command that cannot replace its output folder; one that cannot resume has it moved first."""
 TRACE = "Traceback (most recent call last)"
 TRIAL = "trial"
 
 
 class Row(NamedTuple):
-    """A trial: where which fault struck, the exit code, what went wrong and what was left over."""
+    """A trial: the fault and its place, the exit code, the promises broken and the files left over."""
 
     job: str
     kind: str
@@ -92,7 +92,7 @@ def known_trials(rows: Sequence[Row], expected: Expected, place: Path) -> tuple[
 
 
 def undisturbed(job: Job, folder: Path, cache: Path) -> Expected:
-    """Prepare a job, run it without a fault and keep what it gives."""
+    """Prepare a job, run it without a fault and keep its points and numbers."""
     prepared(job, folder / "before", cache)
     run = folder / TRIAL  # as later: files name the folder that they come from
     shutil.copytree(folder / "before", run)
@@ -188,7 +188,7 @@ def differences(expected: Expected, found: dict[str, str]) -> list[str]:
 
 
 def _ended_badly(expected: Expected, hit: Ending, folder: Path) -> list[str]:
-    """What is wrong with the end of a run that met an error."""
+    """Broken promises in the end of a run that met an error."""
     said = hit.text.strip()[-300:]
     if hit.code < 0 or hit.code == 1 or TRACE in hit.text:
         return [f"it ended with {hit.code}: {said}"]
@@ -198,7 +198,7 @@ def _ended_badly(expected: Expected, hit: Ending, folder: Path) -> list[str]:
 
 
 def _half_replaced(expected: Expected, before: dict[str, str], out: Path) -> list[str]:
-    """What is wrong with an output folder that is the last result or the new one, if there is any."""
+    """Broken promises of an output folder, which has to be the last result or the new one."""
     if not out.exists():
         return ["the last result is no longer under its name"] if before else []
     whole = numbers(out) in (before, expected.numbers)

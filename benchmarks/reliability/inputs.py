@@ -80,7 +80,7 @@ def answer_to(given: "Given", folder: Path) -> Measurement:
 
 
 def fault_of(answer: Measurement, seconds: float) -> str:
-    """What is wrong with the end of an input; empty if nothing is."""
+    """The broken promise in the end of an input; empty if there is none."""
     # Of a section without cavities these quantities are infinite.
     free = [name for name in ("thinnest_wall", "narrowest_gap") if answer.values.get(name) == math.inf]
     bad = [name for name, value in answer.values.items() if not math.isfinite(value) and name not in free]
@@ -96,7 +96,7 @@ def fault_of(answer: Measurement, seconds: float) -> str:
 
 
 def tried(count: int, solver: str = "fem", seed: int = 0) -> Outcomes:
-    """Try random inputs, without stopping at what is wrong."""
+    """Try random inputs to the end, also after a fault."""
     from hypothesis import HealthCheck, Phase, given, settings
     from hypothesis import seed as seeded
 

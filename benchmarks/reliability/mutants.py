@@ -67,7 +67,7 @@ process_isolation = "forkserver"
 
 
 def mutmut(folder: Path, *arguments: str) -> str:
-    """What a command of mutmut prints."""
+    """The output of a command of mutmut."""
     command = [sys.executable, "-m", "mutmut", *arguments]
     return subprocess.run(command, cwd=folder, check=True, stdout=subprocess.PIPE, text=True).stdout
 

@@ -1,4 +1,4 @@
-"""Random fingers, drawings and settings: good values, limits, and what people and broken programs give."""
+"""Random fingers, drawings and settings: good values, limits, and mistakes of people and programs."""
 
 from math import inf, nan
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""Readings of what the paper leaves open: the error of linear `fem` in each, beside the paper's.
+"""Readings of the choices that the paper leaves open: the error of linear `fem` in each, beside the paper's.
 
 The paper gives neither the tilt of the base, nor the line from which the ribs' slope is measured, nor the
 places of the markers, and it speaks of the load at one point. For each combination of choices `fem` is

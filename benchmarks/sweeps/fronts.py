@@ -1,7 +1,7 @@
 """`pinnray optimise` against NSGA-II with as many runs of the solver, and no emulator.
 
 NSGA-II with 120 finite-element runs, here six generations of 20, is a published practice for Fin Ray fingers.
-The question is that of `docs/examples/wrap.toml`, with all walls and the tip varied. Three seeds; the
+The question is `docs/examples/wrap.toml`, with all walls and the tip varied. Three seeds; the
 hypervolume counts from one point for all. Allow ten minutes on two cores.
 """
 
