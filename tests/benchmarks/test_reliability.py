@@ -4,6 +4,7 @@ import os
 import pydoc
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 from benchmarks.reliability.document import PAGE, page
 from benchmarks.reliability.faults import ROWS, Expected, Row, chosen, differences, known_trials, plain
 from benchmarks.reliability.fuzzing import READERS, SEEDS, taken
+from benchmarks.reliability.mutants import settings
 from benchmarks.reliability.supervision import Fault, Point, supervised
 from benchmarks.tables import kept_rows
 from geometry.atomic import write_text
@@ -138,6 +140,15 @@ def test_fuzzing_starts_from_a_file_that_its_reader_takes(name: str, tmp_path: P
     path = tmp_path / seeds[0].name
     path.write_bytes(seeds[0].read_bytes())
     assert taken(reader, pydoc.locate(reader.function), path)
+
+
+def test_mutmut_is_told_one_module_and_its_tests() -> None:
+    table = tomllib.loads(settings("compare.evaluation.metrics", ["tests/compare/test_metrics.py"]))
+    told = table["tool"]["mutmut"]
+    assert told["only_mutate"] == ["compare/evaluation/metrics.py"]
+    assert told["pytest_add_cli_args_test_selection"] == ["tests/compare/test_metrics.py"]
+    assert {"geometry/", "solvers/", "compare/"} <= set(told["source_paths"])
+    assert not {"tests/", "benchmarks/"} & set(told["source_paths"])
 
 
 @pytest.mark.slow
