@@ -1,1 +1,1 @@
-"""Compare the solvers: metrics, pictures, report and the command line."""
+"""One finger, many solvers: measurements or truth, metrics, pictures, report, cross-validation."""

@@ -15,7 +15,7 @@ from geometry.errors import UserError
 if TYPE_CHECKING:
     import pandas as pd
 
-    from compare.optimum.search import Optimum
+    from studies.optimum.search import Optimum
 
 
 def sweep(study: str | Path, *, out: str | Path, processes: int | None = None) -> "pd.DataFrame":
@@ -33,9 +33,9 @@ def sweep(study: str | Path, *, out: str | Path, processes: int | None = None) -
     Raises:
         UserError: If the study cannot be run, or the folder holds another one.
     """
-    from compare.sweep.study import load_study
-    from compare.sweep.sweep import SweepJob, run_sweep
-    from compare.sweep.tables import table
+    from studies.sweep.study import load_study
+    from studies.sweep.sweep import SweepJob, run_sweep
+    from studies.sweep.tables import table
 
     file = Path(study)
     done = run_sweep(SweepJob(load_study(file), file.parent, Path(out), processes or cores()))
@@ -58,8 +58,8 @@ def predict(sweep: str | Path, fingers: Sequence[Mapping[str, object]]) -> "pd.D
     Raises:
         UserError: If the sweep has too few samples, or a finger is outside its ranges.
     """
-    from compare.emulator.emulator import emulator_of
-    from compare.emulator.tables import table
+    from studies.emulator.emulator import emulator_of
+    from studies.emulator.tables import table
 
     emulator = emulator_of(Path(sweep))
     read = [emulator.read({name: str(value) for name, value in each.items()}) for each in fingers]
@@ -80,8 +80,8 @@ def optimise(question: str | Path, *, out: str | Path, processes: int | None = N
     Raises:
         UserError: If the question cannot be asked, the folder holds another one, or nothing is allowed.
     """
-    from compare.optimum.question import load_question
-    from compare.optimum.search import OptimumJob, search_front
+    from studies.optimum.question import load_question
+    from studies.optimum.search import OptimumJob, search_front
 
     file = Path(question)
     return search_front(OptimumJob(load_question(file), file.parent, Path(out), processes or cores()))

@@ -159,10 +159,10 @@ def compare(
     Raises:
         UserError: If the comparison cannot be made.
     """
-    from compare.commands.preset_jobs import job_defaults
     from compare.pipeline.job import Job, checked
     from compare.pipeline.pipeline import compute, run
     from compare.runtime.stages import Stages
+    from pinnray.options.preset_jobs import job_defaults
 
     finger = _design(design)
     names = job_defaults(None).solvers.split(",") if solvers is None else solvers

@@ -12,7 +12,7 @@ PAGE = DOCS / "designers.md"
 
 
 def test_the_page_has_every_quantity_with_its_unit_and_meaning() -> None:
-    from compare.sweep.quantities import QUANTITIES
+    from studies.sweep.quantities import QUANTITIES
 
     rows = table(PAGE, "quantity")
     assert names(rows) == list(QUANTITIES)
@@ -22,8 +22,8 @@ def test_the_page_has_every_quantity_with_its_unit_and_meaning() -> None:
 
 
 def test_the_page_has_every_key_of_a_study_and_of_a_question() -> None:
-    from compare.optimum.question import Question
-    from compare.sweep.study import Study
+    from studies.optimum.question import Question
+    from studies.sweep.study import Study
 
     assert names(table(PAGE, "key of a study")) == list(Study.model_fields)
     own = [name for name in Question.model_fields if name != "study"]
@@ -32,14 +32,14 @@ def test_the_page_has_every_key_of_a_study_and_of_a_question() -> None:
 
 @pytest.mark.parametrize("name", ["ribs.toml"])
 def test_the_example_study_can_be_read(name: str) -> None:
-    from compare.sweep.study import load_study
+    from studies.sweep.study import load_study
 
     load_study(DOCS / "examples" / name)
 
 
 @pytest.mark.parametrize("name", ["wrap.toml", "wrap-cylinder.toml"])
 def test_the_example_questions_can_be_read(name: str) -> None:
-    from compare.optimum.question import load_question
+    from studies.optimum.question import load_question
 
     load_question(DOCS / "examples" / name)
 
@@ -48,10 +48,10 @@ def test_the_example_questions_can_be_read(name: str) -> None:
 def test_the_tutorial_runs_from_the_parameters_to_the_printed_finger(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from compare.cli import compare_main, main
+    from pinnray.cli import compare_main, main
 
-    monkeypatch.setattr("compare.optimum.proposals.POPULATION", 32)  # a quick search for the front
-    monkeypatch.setattr("compare.optimum.proposals.GENERATIONS", 8)
+    monkeypatch.setattr("studies.optimum.proposals.POPULATION", 32)  # a quick search for the front
+    monkeypatch.setattr("studies.optimum.proposals.GENERATIONS", 8)
     shutil.copytree(DOCS / "examples", tmp_path / "docs" / "examples")
     monkeypatch.chdir(tmp_path)
     for line in blocks(PAGE)[0].text.splitlines():

@@ -117,7 +117,7 @@ def assert_same(documented: list[str], actual: list[str]) -> None:
 @pytest.fixture(scope="module")
 def run_folder(tmp_path_factory) -> Path:
     """The output of a small comparison, of a solver that follows the load and one that is trained too."""
-    from compare.cli import compare_main
+    from pinnray.cli import compare_main
 
     out = tmp_path_factory.mktemp("docs") / "run"
     options = (
@@ -184,7 +184,7 @@ def command_lines() -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize(("page", "line"), command_lines())
 def test_command_lines_parse(page, line):
-    from compare.commands.app import pinnray
+    from pinnray.commands.app import pinnray
 
     tokens = shlex.split(line, comments=True)
     tokens = tokens[1:] if tokens[0] == "pinnray" else tokens
@@ -289,7 +289,7 @@ def test_the_docs_have_every_setting_of_the_virtual_rig_as_it_is():
 
 
 def test_the_docs_have_every_file_of_a_film(tmp_path):
-    from compare.cli import main
+    from pinnray.cli import main
 
     film = "--mesh-size 1 --size 320x180 --rest 1 --moving 0 --held 1 --boards 1 --square 20"
     assert main(["rig", *film.split(), "--out", str(tmp_path / "film")]) == 0
@@ -422,7 +422,7 @@ def test_the_docs_have_every_exit_code():
 
 
 def test_the_docs_have_every_command():
-    from compare.commands.app import pinnray
+    from pinnray.commands.app import pinnray
 
     commands = {name for name in pinnray if not name.startswith("-")}
     said = {
@@ -433,7 +433,7 @@ def test_the_docs_have_every_command():
 
 
 def test_the_docs_have_every_cad_file(tmp_path):
-    from compare.cli import main
+    from pinnray.cli import main
 
     assert main(["design", "--out", str(tmp_path), "--formats", ",".join(CAD_FORMATS)]) == 0
     assert_same(
@@ -443,7 +443,7 @@ def test_the_docs_have_every_cad_file(tmp_path):
 
 @pytest.mark.slow
 def test_the_docs_have_every_file_of_a_grid_search(tmp_path):
-    from compare.cli import main
+    from pinnray.cli import main
 
     grid = "--learning-rates 1e-3 --bc-weights 10 --epochs 2 --mesh-size 1 --solver-set pinn-std.width=4"
     assert main(["gridsearch", *grid.split(), "--out", str(tmp_path / "search")]) == 0
@@ -458,7 +458,7 @@ def test_the_docs_have_every_file_of_a_grid_search(tmp_path):
 
 @pytest.mark.slow
 def test_the_docs_have_every_file_of_a_cross_validation(tmp_path):
-    from compare.cli import main
+    from pinnray.cli import main
 
     study = "--solvers fem,fem-asm --schemes one-out --seeds 1 --mesh-size 1"
     assert main(["crossval", *study.split(), "--out", str(tmp_path / "out")]) == 0

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from compare.runtime.processes import in_processes
-from compare.sweep.workers import Workers
 from geometry.worker import Worker, child_environment
+from studies.sweep.workers import Workers
 
 
 def sum_of(number: int, progress: Callable[..., None]) -> int:

@@ -32,7 +32,7 @@ from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
 from solvers.solution import Solution
 from solvers.solver import Solver
-from tests.geometry.test_mesher import random_design
+from tests.geometry.mesh.test_mesher import random_design
 
 DATA = DOCS.parent / "tests" / "data"
 DESIGNS = 12

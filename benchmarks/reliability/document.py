@@ -27,7 +27,7 @@ from benchmarks.reliability.jobs import JOBS
 from benchmarks.tables import DOCS, kept_rows, markdown
 from compare.runtime.tables import terminal_table
 from geometry.atomic import write_text
-from tests.solvers.golden import NUMBERS
+from tests.solvers.contract.golden import NUMBERS
 
 HERE = Path(__file__).parent
 PAGE = DOCS / "reliability.md"
@@ -96,8 +96,9 @@ def _counted(name: str, rows: Sequence[Row]) -> tuple[str, ...]:
 def same_answer() -> dict[str, str]:
     """Largest relative differences of the stored numbers on other systems, `golden/*.json`.
 
-    Such a file is what `python -m tests.solvers.golden` prints there; in the container: `buildah run -v
-    $PWD:/src:ro CONTAINER -- sh -c "cd /src; PYTHONPATH=/src python -m tests.solvers.golden"`.
+    Such a file is what `python -m tests.solvers.contract.golden` prints there; in the container:
+    `buildah run -v $PWD:/src:ro -e PYTHONPATH=/src --workingdir /src CONTAINER
+    python -m tests.solvers.contract.golden`.
     """
     files = (NUMBERS, *sorted(HERE.glob("golden/*.json")))
     stored, *others = (json.loads(path.read_text(encoding="utf-8")) for path in files)

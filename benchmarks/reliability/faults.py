@@ -212,9 +212,9 @@ def filled(folder: Path) -> Iterator[Path]:
     """A filled cache in a folder; in the block this process has imported what its forks need."""
     if (ending := started(FEM, folder)).code:
         raise RuntimeError(ending.text)
-    from compare.cli import main
     from compare.figures import gallery
     from geometry.figure import Figure
+    from pinnray.cli import main
 
     blank = gallery.Drawing(Figure(1.0), "Blank", "Blank.", "Blank.")
     drawings = {name: (what, lambda _: blank) for name, (what, _) in gallery.DRAWINGS.items()}

@@ -63,8 +63,8 @@ def _counted(read: Any, path: Path) -> int:
 
 READERS = {
     "design": Reader("geometry.finger.presets.load_design"),
-    "study": Reader("compare.sweep.study.load_study"),
-    "options": Reader("compare.commands.options_file.read_options_file"),
+    "study": Reader("studies.sweep.study.load_study"),
+    "options": Reader("pinnray.options.file.read_options_file"),
     "description": Reader("geometry.drawing.description.load_description"),
     "measurements": Reader(
         "vision.measurements.read_measurements", lambda read, path: read(path, marker_radius=0.8)

@@ -63,7 +63,7 @@ def started(
     def work() -> int:
         os.environ.update(PINNRAY_CACHE=str(folder / CACHE), TMPDIR=str(folder / TEMPORARY))
         tempfile.tempdir = None
-        from compare.cli import main
+        from pinnray.cli import main
 
         return main([each.replace("FOLDER", str(folder)) for each in arguments])
 

@@ -1,7 +1,8 @@
 """Mutants of a module by mutmut: small changes, each of which a test should notice.
 
 `python -m benchmarks.reliability.mutants MODULE TEST ...`, such as `compare.evaluation.metrics
-tests/compare/test_metrics.py`; `pip install 'pinn-ray[bench]'` brings mutmut. It works on a copy of the tree,
+tests/compare/evaluation/test_metrics.py`; `pip install 'pinn-ray[bench]'` brings mutmut. It
+works on a copy of the tree,
 and forks a process that has loaded the tests for each mutant. Prints the share that tests kill, and the
 survivors. The rows of `mutants.csv` are of a tool of commit 2d22adb, judged by a person.
 """

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from compare.sweep.study import LOAD, MATERIAL, PHYSICS, Task, parameter_limits
 from geometry.finger.parameters import Parameters, parameter_info
 from geometry.finger.presets import load_design, preset_names
 from solvers.registry import make_solver
+from studies.sweep.study import LOAD, MATERIAL, PHYSICS, Task, parameter_limits
 
 WILD: tuple[Any, ...] = (
     *(nan, inf, -inf, -1.0, 0, -0.0, 1e-300, 5e-324, 1e300, 2**63, 10**400, True, None, "", "2 mm", "nan"),

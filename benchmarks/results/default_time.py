@@ -40,7 +40,7 @@ def _timed(folder: Path, count: int) -> dict[str, float]:
     """Times of the stages and of the whole command on some cores, s."""
     allowed = sorted(os.sched_getaffinity(0))[:count]
     started = time.perf_counter()
-    run = [sys.executable, "-m", "compare.cli", "compare", "--quiet", "--out", str(folder / "out")]
+    run = [sys.executable, "-m", "pinnray.cli", "compare", "--quiet", "--out", str(folder / "out")]
     if subprocess.run(run, cwd=ROOT, preexec_fn=lambda: os.sched_setaffinity(0, allowed)).returncode:
         raise UserError("the default run failed; run `compare` to see why")
     stages = json.loads((folder / "out" / "run.json").read_text(encoding="utf-8"))["seconds"]

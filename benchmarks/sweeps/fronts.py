@@ -15,14 +15,14 @@ from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 from rich.table import Table
 
-from compare.optimum.front import hypervolume, reference_point
-from compare.optimum.question import Limit, Question
-from compare.optimum.search import OptimumJob, search_front
 from compare.runtime.tables import terminal_table
-from compare.sweep.measurement import Measurement, measured
-from compare.sweep.sampling import value_at
-from compare.sweep.study import Study, TaskMaker
 from geometry.arrays import FloatArray
+from studies.optimum.front import hypervolume, reference_point
+from studies.optimum.question import Limit, Question
+from studies.optimum.search import OptimumJob, search_front
+from studies.sweep.measurement import Measurement, measured
+from studies.sweep.sampling import value_at
+from studies.sweep.study import Study, TaskMaker
 
 RUNS, GENERATION = 120, 20
 SEEDS = (0, 1, 2)

@@ -12,8 +12,8 @@ from pathlib import Path
 from rich.table import Table
 
 from compare.runtime.tables import terminal_table
-from compare.sweep.study import Study
-from compare.sweep.sweep import SweepJob, run_sweep
+from studies.sweep.study import Study
+from studies.sweep.sweep import SweepJob, run_sweep
 
 VARIED = {
     "height": {"from": 80, "to": 110},

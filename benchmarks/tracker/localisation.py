@@ -17,7 +17,7 @@ from rich.table import Table
 from benchmarks.tables import DOCS, fill, made_by, markdown
 from compare.runtime.tables import terminal_table
 from geometry.arrays import FloatArray
-from tests.vision.disc_images import DiscImage, Edge
+from tests.vision.discs.disc_images import DiscImage, Edge
 from vision.discs.circle_proposals import propose_circles
 from vision.discs.disc_fit import KNOWN_RADIUS, fit_discs
 from vision.frames.frame import GreyImage

@@ -15,7 +15,7 @@ from rich.table import Table
 from benchmarks.tables import DOCS, fill, made_by, markdown
 from compare.runtime.tables import terminal_table
 from geometry.arrays import BoolArray, FloatArray
-from tests.vision.printed_dots import PrintedDots, darkness_centroids
+from tests.vision.discs.printed_dots import PrintedDots, darkness_centroids
 from vision.discs import irregular_outlines
 from vision.discs.disc_fit import FittedDiscs, fit_discs
 from vision.rig.exposure import Exposure

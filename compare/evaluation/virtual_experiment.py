@@ -21,7 +21,7 @@ from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Problem
-from solvers.registry import make_solver
+from solvers.registry import MissingLibraryError, make_solver
 from solvers.solution import Solution
 from solvers.solver import Progress, Solver, silent
 
@@ -147,7 +147,10 @@ def _richer(
             "the virtual experiment presses where the mesh has its contact: mesh the finger with its "
             "contact_position there"
         )
-    solver = make_solver(truth.solver, **settings)
+    try:
+        solver = make_solver(truth.solver, **settings)
+    except MissingLibraryError as error:
+        raise UserError(f"the virtual experiment: {error}; or give measurements") from None
     richer = Problem(
         mesh=problem.mesh,
         material=truth.material(problem.material),

@@ -143,10 +143,12 @@ def test_fuzzing_starts_from_a_file_that_its_reader_takes(name: str, tmp_path: P
 
 
 def test_mutmut_is_told_one_module_and_its_tests() -> None:
-    table = tomllib.loads(settings("compare.evaluation.metrics", ["tests/compare/test_metrics.py"]))
+    table = tomllib.loads(
+        settings("compare.evaluation.metrics", ["tests/compare/evaluation/test_metrics.py"])
+    )
     told = table["tool"]["mutmut"]
     assert told["only_mutate"] == ["compare/evaluation/metrics.py"]
-    assert told["pytest_add_cli_args_test_selection"] == ["tests/compare/test_metrics.py"]
+    assert told["pytest_add_cli_args_test_selection"] == ["tests/compare/evaluation/test_metrics.py"]
     assert {"geometry/", "solvers/", "compare/"} <= set(told["source_paths"])
     assert not {"tests/", "benchmarks/"} & set(told["source_paths"])
 

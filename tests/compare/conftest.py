@@ -172,7 +172,7 @@ def compared(mesh: TriangleMesh, observations: Observations) -> Callable[..., Co
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The output of a whole comparison of the default finger on a coarse mesh: not to be changed."""
-    from compare.cli import main
+    from pinnray.cli import main
 
     out = tmp_path_factory.mktemp("finished") / "run"
     options = ["--solvers", "fem,fem-nonlinear", "--mesh-size", "1.0", "--quiet"]

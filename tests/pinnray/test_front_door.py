@@ -189,7 +189,7 @@ def test_impossible_measurements_are_refused_by_solve():
 
 
 def test_a_sweep_is_a_data_frame_and_predicts(tmp_path: Path):
-    from tests.compare.emulator.sweeps import solved_sweep
+    from tests.studies.emulator.sweeps import solved_sweep
 
     folder = solved_sweep(tmp_path / "ref", count=100)
     finger = {"height": 95, "base_width": 30, "rib_angle": 5, "tip_length": 20, "rib_count": 4}

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.vision.listed_discs import ListedDiscs
+from tests.vision.tracking.listed_discs import ListedDiscs
 
 
 @pytest.fixture

@@ -1,4 +1,0 @@
-"""Emulator of a sweep: its quantities at once for fingers that it did not solve, with intervals.
-
-Imports `compare.sweep`.
-"""

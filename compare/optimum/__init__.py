@@ -1,4 +1,0 @@
-"""Pareto fronts of designs: an emulator proposes fingers, and a solver judges each of them.
-
-Imports `compare.emulator`, `compare.sweep`.
-"""

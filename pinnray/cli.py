@@ -1,0 +1,34 @@
+"""The command line: `compare`, the main job, and `pinnray` with every command.
+
+The commands, which take most of a second to import, are imported when Ctrl-C no longer gives a traceback.
+"""
+
+import os
+import sys
+
+from compare.runtime.interruption import ending_at_once, interruptible
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+"""The matrices are small: more threads of the linear algebra only cost a core, waiting for one another.
+
+And so the sums have one order, whatever the number of cores. Read when NumPy and PETSc are loaded.
+"""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Entry of `pinnray`."""
+    with ending_at_once():
+        from pinnray.commands.app import pinnray
+        from pinnray.commands.launch import launched
+    with interruptible():
+        return launched(lambda: pinnray(arguments, exit_on_error=False, print_error=False))
+
+
+def compare_main(arguments: list[str] | None = None) -> int:
+    """Entry of `compare`: the same as `pinnray compare`."""
+    given = sys.argv[1:] if arguments is None else arguments
+    return main(["compare", *given])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,75 @@
+"""Pick the colour of the markers."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from compare.runtime.exits import say
+from geometry.errors import UserError
+from pinnray.options.shared import OutputPath
+
+AMBIGUOUS = 0.05
+"""Share of the image above which the colour may not tell markers from the rest."""
+
+
+def pick(
+    source: Annotated[str, Parameter(allow_leading_hyphen=True)],
+    *,
+    at: str | None = None,
+    colour: str | None = None,
+    radii: str | None = None,
+    frame: int = 0,
+    out: OutputPath = Path("out/pick.png"),
+) -> int:
+    """Measure the colour of the markers at a point in one of them.
+
+    Prints the colour as --colour takes it, and writes a picture with all pixels of this colour in magenta.
+
+    Args:
+        source: Picture, video, folder or glob of pictures, number of a camera, or - for a pipe.
+        at: Point X,Y in a marker, or rectangle X0,Y0,X1,Y1 inside it, pixels.
+        colour: Colour to show instead: dark, or L*,L*:a*,a*:b*,b* as printed.
+        radii: Radii LEAST,LARGEST, pixels: draw the circles found between them.
+        frame: Number of the frame, from 0.
+        out: Output picture.
+    """
+    from vision.discs.circle_proposals import highlight_colour, propose_circles
+    from vision.discs.colour import read_colour
+    from vision.discs.colour_picker import pick_colour
+    from vision.frames.pictures import SUFFIXES, write_picture
+    from vision.frames.sources import open_frames
+
+    if out.suffix.lower() not in SUFFIXES:
+        raise UserError(f"--out {out}: give the name of a picture, such as pick.png")
+    if (at is None) == (colour is None):
+        raise UserError("give either --at X,Y or --colour")
+    place = [] if at is None else read_numbers("--at", at, counts=(2, 4))
+    limits = [] if radii is None else read_numbers("--radii", radii, counts=(2,))
+    with open_frames(source) as frames:
+        image = next((found.image for found in frames if found.number == frame), None)
+        if image is None:
+            raise UserError(f"{source} has no frame {frame}")
+    chosen = read_colour(colour) if colour is not None else pick_colour(image, place)
+    circles = propose_circles(image, chosen, radii=(limits[0], limits[1])) if limits else None
+    picture, share = highlight_colour(image, chosen, circles, radius=limits[1] if limits else 25.0)
+    write_picture(out, picture)
+    print(f"--colour {chosen}")
+    print(f"{share:.2%} of the image" + ("" if circles is None else f", {len(circles)} circles"))
+    print(out)
+    if share > AMBIGUOUS:
+        say(f"warning: {share:.0%} of the image has this colour, so it may not tell markers from the rest")
+    return 0
+
+
+def read_numbers(option: str, text: str, *, counts: tuple[int, ...]) -> list[float]:
+    """Numbers with commas between them; `counts` are the allowed numbers of numbers."""
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in counts:
+        raise UserError(
+            f"{option} {text!r}: give {' or '.join(map(str, counts))} numbers with commas between"
+        )
+    return numbers

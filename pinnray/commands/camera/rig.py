@@ -1,0 +1,121 @@
+"""Render a film of the finger with a virtual camera."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from geometry.errors import UserError
+from pinnray.options.camera import EXPOSURE, MOTION, BoardOptions, CameraOptions, SceneOptions
+from pinnray.options.shared import OUTPUT, FingerOptions, OutputPath, PhysicsOptions, SolverOptions
+from vision.rig.exposure import Exposure
+from vision.rig.motion import Motion
+
+
+def rig(
+    finger: FingerOptions = FingerOptions(),
+    physics: PhysicsOptions = PhysicsOptions(),
+    options: SolverOptions = SolverOptions(),
+    *,
+    solver: str | None = None,
+    lens: CameraOptions = CameraOptions(),
+    exposure: Annotated[Exposure, Parameter(name="*", group=EXPOSURE)] = Exposure(),
+    motion: Annotated[Motion, Parameter(name="*", group=MOTION)] = Motion(),
+    scene: SceneOptions = SceneOptions(),
+    boards: BoardOptions = BoardOptions(),
+    codec: Annotated[str, Parameter(group=OUTPUT, show_default=True)] = "ffv1",
+    out: OutputPath = Path("out/rig"),
+) -> int:
+    """Render a film of a pressed finger, and write the true marker positions beside it.
+
+    Writes a video, the true marker positions and indenter's force in every frame, camera, workspace, and
+    photographs of a calibration board with --boards: everything needed to track the markers and to score the
+    tracking. Every frame is an equilibrium of the solver. --seed also seeds the noise. Examples:
+
+    - pinnray rig --tilt 3 --noise 2 --blur 0.8 --seed 1
+    - pinnray rig --boards 20 --board 9x6 --square 8
+    - pinnray rig --moving 0 --cover 5=0.4 --codec mjpg --size 640x480
+
+    Args:
+        solver: Solver of the filmed displacements; default: the finite-strain simulation of `compare`.
+        codec: ffv1 or png (lossless), mjpg or mp4v.
+        out: Output folder.
+    """
+    from compare.camera.filmed_force import LONGEST_STEP, filmed_course, true_forces
+    from compare.evaluation.shared_mesh import shared_mesh
+    from compare.evaluation.virtual_experiment import experiment_source, simulate
+    from compare.runtime.output_folder import check_output, replaced_folder, write_run
+    from compare.runtime.provenance import machine, package_versions
+    from compare.runtime.stages import Stages
+    from compare.runtime.tables import write_csv
+    from pinnray.options.cost import EXPERIMENT
+    from solvers.problem import Problem
+    from solvers.solver import solved, with_law
+    from vision.rig.boards import board_poses, board_scene
+    from vision.rig.occluders import cables, check_covers
+    from vision.rig.recording import Recording
+    from vision.rig.recording_files import check_codec, photograph, record
+    from vision.tracking.workspace import default_workspace
+
+    design, mesh_settings = finger.read(options.preset)
+    material, load = physics.read(options.preset)
+    workspace = default_workspace(design).model_copy(update={"marker_plane": scene.marker_plane})
+    camera, pose = lens.read(workspace)
+    board, covered = boards.read(), scene.covered()
+    check_codec(codec)
+    check_output(out)
+    solvers = options.read(solver or "")
+    if len(solvers) > 1:
+        raise UserError("the rig films one finger; name one --solver")
+    filmed = solvers[0] if solvers else None
+    finger.check_cost(design, mesh_settings, [filmed.name if filmed else EXPERIMENT])
+    with Stages() as stages:
+        mesh, _ = shared_mesh(design, mesh_settings, stages)
+        bench = scene.bench(mesh, design, workspace)
+        check_covers(covered, len(mesh.marker_nodes))
+        if filmed is None:
+            problem = Problem(mesh, material, load)
+            with stages.stage("virtual experiment") as progress:
+                solution = simulate(problem, progress, max_step=LONGEST_STEP)
+            source = experiment_source(problem)
+        else:
+            with stages.stage(filmed.name) as progress:
+                problem = Problem(mesh, with_law(material, filmed), load, finger=design)
+                solution = solved(filmed, problem, progress)
+            if not solution.status.converged:
+                raise UserError(f"{filmed.name} {solution.status.message}; its displacements are not filmed")
+            source = f"displacements of {filmed.name}, rendered by the virtual rig; no camera was involved"
+        displacement = solution.displacement(mesh.at_nodes())
+        course = filmed_course(solution)
+        recording = Recording(
+            bench=bench,
+            displacement=displacement,
+            camera=camera,
+            pose=pose,
+            exposure=exposure,
+            motion=motion,
+            occluders=cables(bench, course, motion, covered, scene.cover_during, paint=scene.cover_paint),
+            seed=options.seed,
+            course=course,
+        )
+        with replaced_folder(out) as folder:
+            with stages.stage("film") as progress:
+                record(recording, folder, source=source, codec=codec, progress=progress)
+            write_csv(folder / "truth_force.csv", true_forces(solution, recording, design.depth))
+            if boards.boards:
+                with stages.stage("boards") as progress:
+                    poses = board_poses(board, camera, boards.boards, seed=options.seed)
+                    photograph(board_scene(board), poses, recording, folder / "boards", progress=progress)
+            write_run(
+                folder,
+                {
+                    "source": source,
+                    "cover": {"shares": covered, "during": scene.cover_during} if covered else None,
+                    "board": str(board) if boards.boards else None,
+                    "versions": package_versions(),
+                    "machine": machine(),
+                },
+            )
+    for path in sorted(out.iterdir()):
+        print(path)
+    return 0

@@ -1,0 +1,104 @@
+"""Track markers through a video."""
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+from rich.console import Console
+from rich.live import Live
+
+from compare.runtime.exits import say
+from pinnray.options.camera import FilmOptions, ForceOptions
+from pinnray.options.shared import FingerOptions, Flag, OutputFlag, OutputPath
+
+
+def track(
+    source: Annotated[str, Parameter(allow_leading_hyphen=True)],
+    finger: FingerOptions = FingerOptions(),
+    options: FilmOptions = FilmOptions(),
+    force: ForceOptions = ForceOptions(),
+    *,
+    live: Flag = False,
+    record: Path | None = None,
+    without_video: OutputFlag = False,
+    out: OutputPath = Path("out/track"),
+) -> int:
+    """Measure marker displacements from a video that shows the finger at rest, pressed, and held.
+
+    Writes the displacements with standard deviations for `compare --measurements`, the trajectory of every
+    marker, and annotated pictures to check by eye; with --force also the indenter's force and its place in
+    every frame, with intervals. Ctrl-C ends a camera or a pipe. Examples:
+
+    - pinnray track video.mkv --camera camera.json
+    - pinnray track frames/ --camera camera.json --workspace workspace.json --design slender
+    - pinnray track 0 --camera camera.json --live --force --young 11.4
+
+    Args:
+        source: Video, folder or glob of pictures, number of a camera, or - for a pipe.
+        live: Show the displacements of every frame as it comes.
+        record: Keep the frames of a camera or a pipe as a video: .mkv (lossless), .avi or .mp4.
+        without_video: Write no annotated video.
+        out: Output folder.
+    """
+    from compare.camera.force_estimate import (
+        MESH,
+        LiveForce,
+        force_table,
+        force_tracker,
+        forces_of,
+        write_forces,
+    )
+    from compare.camera.track_film import displacement_line, track_film, track_table
+    from compare.evaluation.shared_mesh import shared_mesh
+    from compare.runtime.output_folder import check_output, replaced_folder, write_run
+    from compare.runtime.provenance import machine, package_versions
+    from compare.runtime.stages import Stages
+
+    design, settings = finger.read()
+    if finger.mesh_size is None:
+        settings = MESH
+    film, material = options.film(source), force.read()
+    if material:
+        finger.check_cost(design, settings, ["fem-id"])
+    check_output(out)
+    console = Console(stderr=True)
+    forces, pace = [], None
+    with replaced_folder(out) as folder:
+        with Stages(console, quiet=live) as stages, ExitStack() as stack:
+            mesh = shared_mesh(design, settings, stages)[0] if material else None
+            following = tracker = None
+            if mesh is not None and material and live:
+                tracker = force_tracker(mesh, material, design.markers, design.marker_radius)
+                following = stack.enter_context(LiveForce(tracker, design.depth))
+            line = stack.enter_context(Live(console=console, refresh_per_second=10)) if live else None
+            watch = displacement_line(line, following) if line else None
+            report = stack.enter_context(stages.stage("track"))
+            tracking, observations = track_film(
+                film, design, folder, report, video=not without_video, record=record, watch=watch
+            )
+            if following is not None:
+                forces, pace = following.finish(), following.live_rate
+        if mesh is not None and material and not live:
+            with Stages(console) as more, more.stage("force") as report:
+                tracker = force_tracker(mesh, material, observations.points, design.marker_radius)
+                forces = forces_of(tracking, tracker, report)
+        provenance = {"design": design.definition(), "versions": package_versions(), "machine": machine()}
+        if tracker is not None and material:
+            write_forces(folder, forces, design.depth)
+            provenance["force"] = {
+                "material": material.model_dump() | {"law": tracker.laws[0]},
+                "laws_not_excluded": tracker.laws,
+                "mesh": settings.model_dump(),
+                "frames": len(forces),
+                "live": pace and pace._asdict(),
+            }
+        write_run(folder, provenance | {"seconds": stages.seconds})
+    for warning in tracking.warnings:
+        say(f"warning: {warning}")
+    Console().print(track_table(tracking, observations))
+    if forces:
+        Console().print(force_table(forces, design.depth, pace))
+    for path in sorted(out.iterdir()):
+        print(path)
+    return 0

@@ -1,0 +1,167 @@
+"""The main job: solve one finger with several solvers and compare them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+from rich.console import Console
+
+from compare.camera.film import Film
+from compare.evaluation.truths import SLIDING
+from compare.runtime.exits import NOT_CONVERGED, say
+from compare.runtime.output_folder import RUN_FILE
+from compare.runtime.provenance import cores
+from geometry.errors import UserError
+from pinnray.options.camera import FilmOptions
+from pinnray.options.file import OPTION, given_options, note_inputs, note_versions, read_options_file
+from pinnray.options.shared import (
+    OUTPUT,
+    Adapt,
+    FingerOptions,
+    OptionalOutputPath,
+    OutputFlag,
+    PhysicsOptions,
+    SolverOptions,
+    comma_list,
+    existing,
+)
+from solvers.solver import Solver
+
+
+def compare(
+    finger: FingerOptions = FingerOptions(),
+    physics: PhysicsOptions = PhysicsOptions(),
+    options: SolverOptions = SolverOptions(),
+    *,
+    adapt: Adapt = None,
+    solvers: str | None = None,
+    measurements: str | None = None,
+    truth: str | None = None,
+    film: FilmOptions = FilmOptions(),
+    reference: str | None = None,
+    from_: Annotated[Path | None, Parameter(name=OPTION)] = None,
+    out: OptionalOutputPath = None,
+    pictures: Annotated[str, Parameter(group=OUTPUT)] = "",
+    resume: OutputFlag = False,
+    quiet: OutputFlag = False,
+    json_: Annotated[bool, Parameter(name="--json", group=OUTPUT)] = False,
+) -> int:
+    """Solve one finger with several solvers and compare them at the markers and on the shared mesh.
+
+    Draws and meshes the finger, solves it with every solver, and writes a report with tables, pictures and
+    fields. Examples:
+
+    - compare --design default
+    - compare --design slender --solvers fem
+    - compare --set rib_count=6 --set height=110 --measurements markers.csv
+    - compare --design default --measurements video.mkv --camera camera.json
+    - compare --truth cylinder
+    - compare --preset paper --device cuda
+    - compare --from out/default/run.json --out out/again
+
+    Args:
+        adapt: Refine the mesh until the estimated error of fem at the markers is below this, mm.
+        solvers: Names of solvers, separated by commas; `pinnray solvers` lists them. Default: those of the
+            complete table that support the problem.
+        measurements: CSV file of marker displacements (x_mm, y_mm, u_mm, v_mm), or a video, a folder or
+            glob of pictures to track. Default: simulated by a finite-strain run, and labelled as such.
+        truth: What is simulated where nothing is measured: sliding (the default), stvk, gent, cylinder,
+            oblique, friction, 3d or sticking; docs/how-to/own-truth.md explains them.
+        reference: Solver that the others are compared with; default fem, else the first.
+        from_: File with options that the command line leaves out: TOML or JSON with a table `options`, or the
+            run.json of an earlier run, which is repeated so; default: none.
+        out: Output folder; default out/DESIGN.
+        pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
+        resume: Reuse solutions that an earlier run finished.
+        quiet: Show no progress and no table.
+        json_: Print metrics.json and nothing else.
+    """
+    from compare.evaluation.shared_mesh import tolerance_reached
+    from compare.pipeline.job import Job
+    from compare.pipeline.pipeline import run
+    from compare.report.terminal import body_table, marker_table
+    from compare.runtime.stages import Stages
+    from pinnray.commands.launch import on_ranks
+    from pinnray.options.cost import EXPERIMENT
+    from pinnray.options.preset_jobs import job_defaults
+
+    earlier = read_options_file(from_) if from_ else None
+    if from_ and earlier:
+        note_versions(from_, earlier)
+    design, mesh = finger.read(options.preset)
+    material, load = physics.read(options.preset)
+    made = options.read(job_defaults(options.preset).solvers if solvers is None else solvers)
+    physics.check_law(made)
+    finger.check_cost(design, mesh, [solver.name for solver in made] + [EXPERIMENT] * (measurements is None))
+    job = Job(
+        design=design,
+        solvers=made,
+        spare=_optional_solvers(made, options, reference) if solvers is None else (),
+        mesh=mesh,
+        adapt=adapt,
+        material=material,
+        load=load,
+        truth=_truth(truth, measurements),
+        measurements=_measurements(measurements, film),
+        reference=reference,
+        out=out or Path("out") / design.name,
+        resume=resume,
+        picture_formats=comma_list(pictures),
+        processes=1 if on_ranks() else min(cores(), 2),
+        options=given_options(
+            *(finger, physics, options, film),
+            **{"adapt": adapt, "solvers": solvers, "measurements": measurements, "truth": truth},
+            **{"reference": reference, "pictures": pictures},
+        ),
+    )
+    try:
+        with Stages(Console(stderr=True), quiet=quiet or json_) as stages:
+            comparison = run(job, stages)
+    except KeyboardInterrupt:
+        kept = job.out.with_name(f"{job.out.name}.partial").exists()
+        note = "what was finished is kept; --resume goes on from it" if kept else "nothing was finished yet"
+        raise KeyboardInterrupt(note) from None
+    if from_ and earlier:
+        note_inputs(from_, earlier, job.out / RUN_FILE)
+    for remark in comparison.remarks:
+        say(f"warning: {remark}")
+    if json_:
+        print((job.out / "metrics.json").read_text(encoding="utf-8"), end="")
+    elif not quiet:
+        console = Console()
+        if comparison.observations.known:
+            console.print(marker_table(comparison))
+            console.print()
+        console.print(body_table(comparison))
+        console.print(f"report: {job.out / 'report.html'}", soft_wrap=True, highlight=False)
+    for fault in comparison.failed.values():
+        say(f"error: {fault}")
+    for evaluation in comparison.unconverged:
+        say(f"error: {evaluation.solver} did not converge: {evaluation.message}")
+    done = not (comparison.failed or comparison.unconverged) and tolerance_reached(comparison.adaptation)
+    return 0 if done else NOT_CONVERGED
+
+
+def _optional_solvers(solvers: Sequence[Solver], options: SolverOptions, reference: str | None) -> list[str]:
+    """Names of the solvers that no other option names."""
+    asked = {text.partition(".")[0] for text in options.solver_set} | {reference}
+    if options.preset is not None:
+        asked |= {solver.name for solver in solvers if solver.settings().get("preset") == options.preset}
+    return [solver.name for solver in solvers if solver.name not in asked]
+
+
+def _truth(name: str | None, measurements: str | None) -> str:
+    """The name of what is simulated; nothing is where there are measurements."""
+    if name is not None and measurements is not None:
+        raise UserError("--truth is for a simulated experiment; with --measurements leave it out")
+    return SLIDING.name if name is None else name
+
+
+def _measurements(source: str | None, options: FilmOptions) -> Path | Film | None:
+    """A CSV file by its suffix, else a film."""
+    if source is None or Path(source).suffix.lower() != ".csv":
+        if source is None and options != FilmOptions():
+            raise UserError("a camera, workspace, colour or method is for --measurements VIDEO; give it too")
+        return None if source is None else options.film(source)
+    return existing(Path(source))

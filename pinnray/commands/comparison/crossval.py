@@ -1,0 +1,119 @@
+"""Score solvers on held-out markers, loads and fields."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+from compare.runtime.exits import NOT_CONVERGED, say
+from pinnray.options.shared import (
+    FingerOptions,
+    OptionalOutputPath,
+    PhysicsOptions,
+    SolverOptions,
+    comma_list,
+    existing_table,
+    read_formats,
+    read_processes,
+)
+from solvers.problem import Material
+
+if TYPE_CHECKING:  # SciPy's statistics come with it, and `--help` has to be quick
+    from compare.crossval.study import SolverVariant
+
+
+def crossval(
+    finger: FingerOptions = FingerOptions(),
+    physics: PhysicsOptions = PhysicsOptions(),
+    options: SolverOptions = SolverOptions(),
+    *,
+    solvers: str = "fem,fem-nonlinear,fem-asm,fem-id,gp,statfem",
+    schemes: str = "one-out,tip-out,random,load-out",
+    truth: str = "sliding",
+    layouts: str | None = None,
+    seeds: int = 5,
+    noise: float = 0.005,
+    measurements: Path | None = None,
+    processes: int | None = None,
+    pictures: str = "",
+    out: OptionalOutputPath = None,
+) -> int:
+    """Score solvers on markers, loads and fields that they were not given.
+
+    A truth is a finite-strain simulation on a finer mesh; the marker displacements are taken from it with
+    noise. The default --mesh-size is 0.5. Finished folds are kept: the same command again goes on where it
+    was stopped.
+
+    Args:
+        solvers: Names of solvers, separated by commas. One that can choose the weight of the markers runs in
+            three variants (linear law).
+        schemes: Hold-out schemes, separated by commas.
+        truth: Truths, separated by commas, or all: sliding, stvk, gent, print, base, cylinder, oblique,
+            mixed, friction, 3d, sticking.
+        layouts: Marker layouts at which the same truth is sampled, separated by commas; default: the
+            design's own.
+        seeds: Number of noise draws.
+        noise: Standard deviation of a simulated marker's displacement, mm.
+        measurements: CSV file of marker displacements; default: simulated.
+        processes: Solvers run at a time; default: one per core.
+        pictures: Formats of the pictures besides PNG (default: none), separated by commas: svg, pdf.
+        out: Output folder; default out/crossval-DESIGN.
+    """
+    from compare.crossval.cross_validation import cross_validate
+    from compare.crossval.folds import LOAD
+    from compare.crossval.study import ELEMENT_SIZE, Study
+    from compare.crossval.tables import tables
+    from compare.runtime.stages import Stages
+    from pinnray.options.cost import EXPERIMENT
+    from vision.measurements import read_measurements
+
+    design, mesh = finger.read(options.preset)
+    if finger.mesh_size is None and options.preset is None:
+        mesh = mesh.model_copy(update={"size": ELEMENT_SIZE})
+    material, load = physics.read(options.preset)
+    file = existing_table(measurements)
+    study = Study(
+        design=design,
+        mesh=mesh,
+        material=material,
+        load=load,
+        variants=read_variants(options, solvers, material),
+        schemes=comma_list(schemes),
+        truths=comma_list(truth),
+        layouts=comma_list(layouts) if layouts else (),
+        seeds=seeds,
+        noise=noise,
+        measurements=read_measurements(file, marker_radius=design.marker_radius) if file else None,
+        out=out or Path("out") / f"crossval-{design.name}",
+        processes=read_processes(processes),
+        picture_formats=read_formats(pictures),
+    )
+    made = [variant.make(0) for variant in study.variants]
+    physics.check_law(made)
+    finger.check_cost(design, mesh, [EXPERIMENT, *(solver.name for solver in made)])
+    if study.measurements and LOAD in study.schemes:
+        say(f"warning: {LOAD} needs a truth at other loads, and is left out with --measurements")
+    try:
+        with Stages() as stages:
+            result = cross_validate(study, stages)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"the same command goes on from what {study.out} keeps") from None
+    console = Console()
+    for table in tables(result):
+        console.print(table)
+    for name in ("crossval.json", "report.html", "truths.csv", "held_out.csv", "fields.csv"):
+        if (study.out / name).exists():
+            print(study.out / name)
+    for name, message in result.failed.items():
+        say(f"error: {name} failed, and is tried again by the same command: {message}")
+    converged = all(score.converged == 1 for score in result.scores)
+    return 0 if converged and not result.failed else NOT_CONVERGED
+
+
+def read_variants(options: SolverOptions, names: str, material: Material) -> "list[SolverVariant]":
+    """The solvers and their variants; a single one where --solver-set chooses the weight of the markers."""
+    from compare.crossval.study import solver_variants
+
+    keys = [text.partition("=")[0].split(".") for text in options.solver_set]
+    fixed = [key[0] for key in keys if key[1:] in (["choose"], ["weights"])]
+    return solver_variants(options.read(names), material, fixed=fixed)

@@ -1,0 +1,1 @@
+"""Commands about one finger: draw it, mesh it, solve it."""

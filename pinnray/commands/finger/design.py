@@ -1,0 +1,52 @@
+"""Draw the finger."""
+
+from pathlib import Path
+
+from geometry.errors import UserError
+from pinnray.options.shared import FingerOptions, OutputPath, comma_list
+
+STEP = "finger"
+"""Name of the STEP file, beside which its clamp and contact lie."""
+CAD_FILES = ("finger.step", "finger-body.stl", "finger-markers.stl", "section.dxf", "section.svg")
+PICTURE = "design.png"
+
+
+def design(
+    finger: FingerOptions = FingerOptions(),
+    *,
+    out: OutputPath = Path("out/cad"),
+    formats: str = "step,stl,dxf,svg",
+) -> int:
+    """Draw the finger: CAD files of the body and its markers, and a dimensioned picture.
+
+    A .toml file has clamp, contact and markers as lines to change: those of finger.step or, with --section,
+    of the drawing, with what was proposed.
+
+    Args:
+        out: Output folder.
+        formats: File formats, separated by commas: step, stl, dxf, svg.
+    """
+    from compare.figures.design_drawing import draw_design
+    from geometry.atomic import write_text
+    from geometry.cache import cad_files
+    from geometry.drawing.drawn_finger import DrawnFinger, description_lines
+    from geometry.finger.design import Design
+
+    chosen, _ = finger.read()
+    stem = Path(chosen.file).stem if isinstance(chosen, DrawnFinger) else STEP
+    lines = out / f"{stem}.toml"
+    written = [
+        lines,
+        out / PICTURE,
+        *(out / name for name in CAD_FILES if name.endswith(tuple(comma_list(formats)))),
+    ]
+    for given in finger.files():
+        if any(path.exists() and path.samefile(given) for path in written):
+            raise UserError(f"--out {out}: this would overwrite {given}, which is read; name another folder")
+    paths = cad_files(chosen, out, formats=comma_list(formats))
+    write_text(lines, description_lines(chosen))
+    drawn = draw_design(chosen) if isinstance(chosen, Design) else chosen.plot()
+    picture = drawn.save(out / PICTURE)
+    for path in [*paths, lines, picture]:
+        print(path)
+    return 0

@@ -1,0 +1,99 @@
+"""Solve one finger with one solver."""
+
+from functools import partial
+from pathlib import Path
+
+from compare.runtime.exits import NOT_CONVERGED, say
+from geometry.errors import UserError
+from pinnray.options.shared import (
+    Adapt,
+    FingerOptions,
+    OutputPath,
+    PhysicsOptions,
+    SolverOptions,
+    existing_table,
+)
+
+
+def solve(
+    solver: str,
+    finger: FingerOptions = FingerOptions(),
+    physics: PhysicsOptions = PhysicsOptions(),
+    options: SolverOptions = SolverOptions(),
+    *,
+    adapt: Adapt = None,
+    measurements: Path | None = None,
+    out: OutputPath = Path("out/solution.vtu"),
+) -> int:
+    """Solve one finger with one solver and write its fields.
+
+    Args:
+        solver: Name of a solver; `pinnray solvers` lists them.
+        adapt: Refine the mesh until the estimated error of fem at the markers is below this, mm.
+        measurements: CSV file of marker displacements, for an assimilating solver.
+        out: VTU file of the fields.
+    """
+    from compare.evaluation.convergence import with_certificates
+    from compare.evaluation.deformed_body import with_body_checks
+    from compare.evaluation.force_displacement import force_curves, write_force_displacement
+    from compare.evaluation.metrics import evaluated
+    from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
+    from compare.evaluation.shared_mesh import shared_mesh, tolerance_reached
+    from compare.figures.force_chart import draw_force_displacement
+    from compare.report.vtu_file import write_vtu
+    from compare.runtime.stages import Stages
+    from solvers.problem import Problem
+    from solvers.solver import Traits, solved, with_law
+    from vision.measurements import read_measurements
+
+    chosen, settings = finger.read(options.preset)
+    material, load = physics.read(options.preset)
+    if out.suffix != ".vtu":
+        raise UserError(f"--out {out}: the fields are a VTU file; give a name that ends in .vtu")
+    if out.is_dir():
+        raise UserError(f"--out {out}: this is a folder; name a file that ends in .vtu")
+    chosen_solvers = options.read(solver)
+    if len(chosen_solvers) != 1:
+        raise UserError(f"name one solver, not {solver!r}; `compare` takes several")
+    physics.check_law(chosen_solvers)
+    (made,) = chosen_solvers
+    finger.check_cost(chosen, settings, [made.name])
+    given = None
+    if file := existing_table(measurements):
+        given = read_measurements(file, marker_radius=chosen.marker_radius)
+    if given and not Traits.of(made).assimilates:
+        raise UserError(f"{made.name} does not assimilate markers; `compare` compares it with --measurements")
+    with Stages() as stages:
+        triangles, adaptation = shared_mesh(
+            chosen,
+            settings,
+            stages,
+            tolerance=adapt,
+            material=material,
+            load=load,
+            solvers=[made],
+            check=partial(check_positions, given) if given else None,
+        )
+        with stages.stage(made.name) as progress:
+            problem = Problem(triangles, with_law(material, made), load, given, chosen)
+            measured = displacement_remarks(given, problem) if given else []
+            for remark in [*unit_remarks(problem), *measured]:
+                say(f"warning: {remark}")
+            solution = solved(made, problem, progress)
+        with stages.stage("certificate"):
+            certified = with_certificates([evaluated(solution, triangles)], problem)
+            (evaluation,), remarks = with_body_checks(certified, triangles)
+        write_vtu(out, triangles, evaluation)
+        written = [out]
+        if curves := force_curves([evaluation], load):
+            written += [out.with_name(f"{out.stem}_force_displacement.{kind}") for kind in ("csv", "png")]
+            write_force_displacement(written[1], curves, load, depth=chosen.depth)
+            draw_force_displacement(curves, depth=chosen.depth).save(written[2])
+    for remark in remarks:
+        say(f"warning: {remark}")
+    print(f"{evaluation.label}: {evaluation.message}")
+    u, v = solution.reaction
+    print(f"energy {solution.energy:.6g} N mm/mm, reaction ({u:.6g}, {v:.6g}) N/mm")
+    for path in written:
+        print(path)
+    return 0 if evaluation.converged and tolerance_reached(adaptation) else NOT_CONVERGED

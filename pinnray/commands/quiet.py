@@ -1,0 +1,35 @@
+"""The option --quiet of every command."""
+
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from functools import wraps
+from inspect import Parameter as Argument
+from inspect import signature
+from io import StringIO
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from compare.runtime.stages import silenced
+from pinnray.options.shared import OUTPUT
+
+Quiet = Annotated[bool, Parameter(group=OUTPUT, help="Show no progress and print only warnings and errors.")]
+
+
+def quietable(command: Callable[..., int]) -> Callable[..., int]:
+    """The command with an option --quiet; itself if it has one of its own."""
+    arguments = signature(command)
+    if "quiet" in arguments.parameters:
+        return command
+
+    @wraps(command)
+    def run(*positional: Any, quiet: bool = False, **named: Any) -> int:
+        if not quiet:
+            return command(*positional, **named)
+        with redirect_stdout(StringIO()), silenced():
+            return command(*positional, **named)
+
+    added = Argument("quiet", Argument.KEYWORD_ONLY, default=False, annotation=Quiet)
+    run.__signature__ = arguments.replace(parameters=[*arguments.parameters.values(), added])  # type: ignore[attr-defined]
+    run.__annotations__ = {**command.__annotations__, "quiet": Quiet}
+    return run

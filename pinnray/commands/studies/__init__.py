@@ -1,0 +1,1 @@
+"""Commands that solve many problems: sweep, predict, optimise, gridsearch."""

@@ -1,0 +1,303 @@
+"""Options that several commands share, and the objects that they describe."""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Group, Parameter
+
+from compare.runtime.provenance import cores
+from geometry.cache import drawn_finger
+from geometry.drawing.description import description_beside, load_description
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.finger.finger import Finger
+from geometry.finger.presets import load_design, parse_overrides
+from geometry.mesh.settings import MeshSettings
+from geometry.text_files import parse_toml
+from pinnray.options.preset_jobs import job_defaults
+from solvers.elasticity import LawName
+from solvers.problem import Load, LoadKind, Material
+from solvers.registry import PRESETS, make_solver
+from solvers.solver import Solver
+
+FINGER = Group("Finger", sort_key=1)
+PHYSICS = Group("Physics", sort_key=2)
+TRAINING = Group("Solvers' settings", sort_key=3)
+OUTPUT = Group("Output", sort_key=4, default_parameter=Parameter(negative="", show_default=False))
+
+Repeated = Annotated[tuple[str, ...], Parameter(negative="", show_default=False)]
+Flag = Annotated[bool, Parameter(negative="", show_default=False)]
+OutputFlag = Annotated[bool, Parameter(group=OUTPUT)]
+OutputPath = Annotated[Path, Parameter(group=OUTPUT, show_default=True)]
+OptionalOutputPath = Annotated[Path | None, Parameter(group=OUTPUT)]
+Adapt = Annotated[float | None, Parameter(group=FINGER)]
+
+
+@Parameter(name="*", group=FINGER)
+@dataclass(frozen=True, kw_only=True)
+class FingerOptions:
+    """The finger and its mesh.
+
+    Attributes:
+        design: Preset (default, csiro, slender, ...) or .toml file.
+        section: A drawing instead of a design: a .step, .dxf or .svg file, or a .msh mesh. A .toml file of
+            the same name beside it may say where it is clamped, touched and marked.
+        clamp: Clamped part of the drawing's outline, such as "[[0, 0], [0, -30]]" or a label of the file;
+            default: the file's own, else proposed.
+        contact: Point of the outline where the indenter touches, such as "[35, 0]", or a label; default as
+            for --clamp.
+        markers: Centres of the markers, such as "[[10, -1], [20, -1]]", their number, or a label; default as
+            for --clamp.
+        set: Change a parameter, such as rib_count=6 or N=6, or a line on the drawing, such as depth=12; may
+            be repeated.
+        mesh_size: Element size in walls and ribs, mm, default 0.25; up to 4 times larger in the tip.
+        yes: Go on although the mesh is so fine that a run takes more than five minutes or much memory.
+    """
+
+    design: str = "default"
+    section: Path | None = None
+    clamp: str | None = None
+    contact: str | None = None
+    markers: str | None = None
+    set: Repeated = ()
+    mesh_size: float | None = None
+    yes: Flag = False
+
+    def read(self, preset: str | None = None) -> tuple[Finger, MeshSettings]:
+        """The finger and the mesh settings; a preset of the solvers may have its own mesh settings."""
+        settings = job_defaults(preset).mesh.model_dump()
+        if self.mesh_size is not None:
+            settings["size"] = self.mesh_size
+        try:
+            mesh = MeshSettings(**settings)
+        except UserError as error:
+            raise UserError(f"--mesh-{error}") from None
+        return (self._designed() if self.section is None else self._drawn(self.section)), mesh
+
+    def files(self) -> list[Path]:
+        """The files that describe the finger."""
+        given = [Path(self.design), self.section, self.section and description_beside(self.section)]
+        return [path for path in given if path is not None and path.is_file()]
+
+    def check_cost(self, finger: Finger, mesh: MeshSettings, parts: Sequence[str] = ()) -> None:
+        """Raise a `UserError` with the price of a fine mesh, unless --yes is given; see `check_mesh_cost`."""
+        if not self.yes:
+            from pinnray.options.cost import check_mesh_cost
+
+            check_mesh_cost(finger, mesh, parts)
+
+    def _designed(self) -> Design:
+        for option in ("clamp", "contact", "markers"):
+            if getattr(self, option) is not None:
+                raise UserError(f"--{option} belongs to a drawing; give it by --section FILE")
+        changes = parse_overrides(self.set)
+        design = load_design(self.design, changes)
+        if changes and "name" not in changes:  # so that it has its own output folder
+            design = design.replaced(name=_changed_name(design, changes))
+        return design
+
+    def _drawn(self, file: Path) -> Finger:
+        if self.design != "default":
+            raise UserError(f"--section {file} and --design {self.design}: give one of them")
+        lines = [
+            f"{option} = {toml_value(text)}"
+            for option in ("clamp", "contact", "markers")
+            if (text := getattr(self, option)) is not None
+        ]
+        keys = [line.partition("=")[0].strip() for line in (*lines, *self.set)]
+        if twice := [key for key in keys if keys.count(key) > 1]:
+            raise UserError(f"{twice[0]} is set twice; give it once")
+        for setting in self.set:
+            key, _, value = setting.partition("=")
+            lines.append(f"{key.strip()} = {toml_value(value.strip())}" if value else setting)
+        return drawn_finger(file, load_description(description_beside(file), lines))
+
+
+def toml_value(text: str) -> str:
+    """The text as a value of TOML: a number, list or quoted text as it is, any other in quotes."""
+    try:
+        parse_toml(f"value = {text}")
+    except ValueError:
+        return json.dumps(text)
+    return text
+
+
+def _changed_name(design: Design, changes: Mapping[str, object]) -> str:
+    """The preset's name with the changes, in the letters and the length that a name may have."""
+    parts = (f"-{name}-{value}" for name, value in changes.items())
+    name = design.name + re.sub(r"[^A-Za-z0-9._-]", "", "".join(parts))
+    return name if len(name) <= 64 else f"{name[:55]}-{design.digest[:8]}"
+
+
+@Parameter(name="*", group=PHYSICS)
+@dataclass(frozen=True, kw_only=True)
+class PhysicsOptions:
+    """Material and load.
+
+    Attributes:
+        young: Young's modulus, MPa.
+        poisson: Poisson's ratio.
+        plane: Plane strain, or plane stress as in the paper.
+        law: Material law of the solvers that have it; default: each solver's own.
+        load: Indenter. mean (default): prescribed weighted mean displacement of the contact; point: one
+            prescribed point, as in the paper, which has no limit under refinement; patch: rigid patch;
+            cylinder: rigid cylinder without friction.
+        radius: Radius of --load cylinder, mm, default 5.
+        stroke: Travel of the indenter, mm.
+        direction: Direction of the travel, degrees: 0 into the finger, 90 along it to the tip.
+        slide: Let the contact slide along the finger (u free).
+    """
+
+    young: float = 11.4
+    poisson: float = 0.45
+    plane: Literal["strain", "stress"] = "strain"
+    law: LawName | None = None
+    load: LoadKind | None = None
+    radius: float | None = None
+    stroke: float = 10.0
+    direction: float = 0.0
+    slide: Flag = False
+
+    def read(self, preset: str | None = None) -> tuple[Material, Load]:
+        """The material and the load; a preset of the solvers may choose the kind of load."""
+        if self.young == inf:
+            raise UserError("--young inf: a rigid finger does not bend; give a finite Young's modulus, MPa")
+        kind = self.load or job_defaults(preset).load
+        try:
+            load = Load.of_travel(
+                kind, stroke=self.stroke, direction=self.direction, slide=self.slide, radius=self.radius
+            )
+        except UserError as error:
+            known = ("stroke", "direction", "slide")
+            raise UserError(f"--{error}" if str(error).startswith(known) else str(error)) from None
+        material = Material(
+            young=self.young, poisson=self.poisson, plane=self.plane, law=self.law or "linear"
+        )
+        return material, load
+
+    def check_law(self, solvers: Sequence[Solver]) -> None:
+        """Raise a `UserError` if none of the solvers has the law."""
+        if self.law is not None and not any(self.law in solver.laws for solver in solvers):
+            known = "; ".join(f"{solver.name} has {', '.join(solver.laws)}" for solver in solvers)
+            raise UserError(f"--law {self.law}: none of the solvers has it ({known})")
+
+
+@Parameter(name="*", group=TRAINING)
+@dataclass(frozen=True, kw_only=True)
+class SolverOptions:
+    """Settings of the chosen solvers.
+
+    Attributes:
+        preset: Preset of pinn-std and pinn-asm. fast (default): random hidden weights, output layer solved
+            exactly. local: likewise, with windows in place of gates. paper: the paper's training, 60,000
+            epochs, many hours on a CPU; also takes the paper's uniform mesh of 91,006 nodes and --load point,
+            unless --mesh-size or --load is given. trained: the paper's networks, every weight trained by
+            Gauss-Newton steps, about ten minutes; linear law.
+        solver_set: Change a setting of a solver, such as pinn-std.neurons=7; may be repeated.
+        device: cpu (default) or cuda, for the solvers that can use either.
+        seed: Seed of the random numbers.
+    """
+
+    preset: str | None = None
+    solver_set: Repeated = ()
+    device: str | None = None
+    seed: int = 0
+
+    def read(self, names: str) -> list[Solver]:
+        """The solvers with these names, separated by commas.
+
+        Raises:
+            UserError: If a solver, preset or setting does not exist or a text cannot be read.
+        """
+        if self.seed < 0:
+            raise UserError(f"--seed {self.seed}: give a whole number from 0")
+        chosen = comma_list(names)
+        given = _settings(chosen, self.solver_set)
+        if self.preset is not None:
+            having = [name for name in given if self.preset in PRESETS.get(name, ())]
+            if not having:
+                known = "; ".join(f"{name} has {', '.join(presets)}" for name, presets in PRESETS.items())
+                raise UserError(f"--preset {self.preset}: none of the solvers {names} has it ({known})")
+            for name in having:
+                given[name].setdefault("preset", self.preset)
+        shared: dict[str, object] = {"seed": self.seed}
+        if self.device is not None:
+            shared["device"] = self.device
+        solvers = [_made(name, given[name], shared) for name in chosen]
+        if "device" in shared and not any("device" in solver.settings() for solver in solvers):
+            able = {preset for name in chosen for preset in _presets_with_device(name)}
+            hint = f"; with --preset {' or '.join(sorted(able))} one can" if able else ""
+            raise UserError(f"--device {self.device}: none of the solvers {names} can choose a device{hint}")
+        return solvers
+
+
+def _presets_with_device(name: str) -> list[str]:
+    """The presets of a solver that can choose a device."""
+    presets = PRESETS.get(name, ())
+    return [preset for preset in presets if "device" in make_solver(name, preset=preset).settings()]
+
+
+def _settings(names: list[str], texts: tuple[str, ...]) -> dict[str, dict[str, object]]:
+    """The settings of each solver from texts such as `pinn-std.neurons=7`."""
+    given: dict[str, dict[str, object]] = {name: {} for name in names}
+    for text in texts:
+        target, dot, rest = text.partition(".")
+        key, equals, value = rest.partition("=")
+        if not (dot and equals and key and value):
+            raise UserError(f"cannot read {text!r}; write solver.setting=value, such as pinn-std.neurons=7")
+        if target not in given:
+            raise UserError(f"{text!r} is for {target!r}, which is not among the solvers {', '.join(names)}")
+        if key in given[target]:
+            raise UserError(f"{target}.{key} is set twice; set it once")
+        given[target][key] = value
+    return given
+
+
+def _made(name: str, given: Mapping[str, object], shared: Mapping[str, object]) -> Solver:
+    """The solver with its own settings and those of the shared settings that it has."""
+    solver = make_solver(name, **given)
+    had = {key: value for key, value in shared.items() if key in solver.settings() and key not in given}
+    return make_solver(name, **given, **had)
+
+
+def comma_list(text: str) -> list[str]:
+    """The words of a text with commas between them."""
+    return [word for part in text.split(",") if (word := part.strip())]
+
+
+def read_formats(text: str) -> list[str]:
+    """Formats of pictures besides PNG, from their names with commas between them."""
+    from compare.figures import check_formats
+
+    check_formats(formats := comma_list(text))
+    return formats
+
+
+def read_processes(processes: int | None) -> int:
+    """Processes at a time: as many as there are cores if None."""
+    count = cores() if processes is None else processes
+    if count < 1:
+        raise UserError(f"--processes {count}: give a whole number from 1")
+    return count
+
+
+def existing_table(path: Path | None) -> Path | None:
+    """The path, if it is None or a CSV file; else a `UserError`."""
+    if path is not None and path.suffix.lower() != ".csv":
+        raise UserError(
+            f"--measurements {path}: this command takes a CSV file of displacements, and no film; "
+            "`pinnray track` makes one from a film"
+        )
+    return existing(path)
+
+
+def existing(path: Path | None) -> Path | None:
+    """The path, if it is None or a file; else a `UserError`."""
+    if path is not None and not path.is_file():
+        raise UserError(f"there is no file {path}")
+    return path

@@ -1,0 +1,227 @@
+"""The emulator of a sweep: fitted to its samples, kept in its folder, asked for any finger in its range."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from compare.runtime.stages import Stages
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.finger.parameters import Parameters
+from geometry.finger.section import finger_section
+from geometry.section.section import Section
+from geometry.text_files import read_json
+from studies.emulator.gaussian_process import GaussianProcess
+from studies.emulator.inputs import Inputs, Numbers
+from studies.sweep.quantities import QUANTITIES, narrowest_gap, thinnest_wall
+from studies.sweep.study import Study, Value
+from studies.sweep.sweep import STUDY_FILE, Sweep, load_sweep
+
+FEWEST = 60
+"""Least number of converged samples."""
+
+MOST = 4000
+"""Largest number of samples that a process is fitted to: time grows with their cube."""
+
+PROPORTIONAL = 1e-9
+"""Largest relative change of a ratio of two quantities that counts as none."""
+
+EXACT: Mapping[str, Callable[[Section, Parameters, Study], float]] = {
+    "area": lambda section, _, __: section.area,
+    "mass": lambda section, shape, study: section.area * shape.depth * study.density / 1000,
+    "thinnest_wall": lambda section, _, __: thinnest_wall(section),
+    "narrowest_gap": lambda section, _, __: narrowest_gap(section),
+}
+"""Quantities that follow from the section."""
+
+
+@dataclass(frozen=True)
+class Predictions:
+    """Predicted quantities of n fingers.
+
+    Attributes:
+        names: Of the q quantities, in the order of `studies.sweep.quantities.QUANTITIES`.
+        values: Predictions, shape (n, q), in the quantities' units.
+        low: Lower ends of the 95 % intervals, shape (n, q); the value itself where it is exact.
+        high: Upper ends, shape (n, q).
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+    def column(self, name: str) -> FloatArray:
+        """Predictions of one quantity, shape (n,)."""
+        return self.values[:, self.names.index(name)]
+
+
+@dataclass(frozen=True, eq=False)
+class Learnt:
+    """A quantity that a process predicts.
+
+    Attributes:
+        process: Of the logarithm of the quantity over its base, or of the difference over its unit.
+        positive: Whether it is the logarithm.
+    """
+
+    process: GaussianProcess
+    positive: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Emulator:
+    """Predicts the quantities of a study's fingers; made by `emulator_of`.
+
+    Attributes:
+        inputs: Makes the numbers of fingers.
+        learnt: The processes by quantity.
+        ratios: Quantities that are another one times a number.
+        count: Number of samples that it was fitted to.
+    """
+
+    inputs: Inputs
+    learnt: Mapping[str, Learnt]
+    ratios: Mapping[str, tuple[str, float]]
+    count: int
+
+    @property
+    def study(self) -> Study:
+        """The study."""
+        return self.inputs.study
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The quantities that it predicts."""
+        return tuple(name for name in QUANTITIES if name in {*self.learnt, *self.ratios, *EXACT})
+
+    def read(self, settings: Mapping[str, str]) -> dict[str, Value]:
+        """A finger from texts by name or symbol; a `UserError` where one is no value of its parameter."""
+        return self.inputs.read(settings)
+
+    def fault(self, finger: Mapping[str, Value]) -> str | None:
+        """The reason why it does not predict a finger: range, unknown or missing parameter, broken rule."""
+        return self.inputs.fault(finger)
+
+    def predict(
+        self, fingers: Sequence[Mapping[str, Value]], names: Sequence[str] | None = None
+    ) -> Predictions:
+        """Predict quantities of fingers given by the study's varied parameters.
+
+        Args:
+            fingers: Values of every varied parameter; see `fault`, which is not asked again.
+            names: Quantities; None means all. Those that follow from the section alone (`area`, `mass`,
+                `thinnest_wall`, `narrowest_gap`) are exact, and take most of the time.
+        """
+        chosen = tuple(name for name in self.names if names is None or name in names)
+        shapes = [self.inputs.parameters(finger) for finger in fingers]
+        learnt = {self.ratios.get(name, (name, 1.0))[0] for name in chosen} & self.learnt.keys()
+        found: dict[str, FloatArray] = {}
+        if learnt and fingers:
+            numbers = self.inputs.numbers(fingers, shapes)
+            found = {name: _predicted(self.learnt[name], name, numbers) for name in learnt}
+        if exact := [name for name in chosen if name in EXACT]:
+            sections = [finger_section(shape) for shape in shapes]
+            for name in exact:
+                pairs = zip(sections, shapes, strict=True)
+                values = np.array([EXACT[name](section, shape, self.study) for section, shape in pairs])
+                found[name] = np.stack([values] * 3)
+        for name, (other, ratio) in self.ratios.items():
+            if name in chosen and other in found:
+                found[name] = ratio * found[other]
+        whole = np.array([found[name] for name in chosen]).reshape(len(chosen), 3, len(fingers))
+        return Predictions(chosen, *whole.transpose(1, 2, 0))
+
+
+def fitted(sweep: Sweep, inputs: Inputs, stages: Stages | None = None, *, fewest: int = FEWEST) -> Emulator:
+    """The emulator of a sweep's converged samples, of which it needs `fewest`.
+
+    Raises:
+        UserError: If there are too few of them.
+    """
+    good = sweep.good
+    if len(good) < fewest:
+        raise UserError(
+            f"the sweep {sweep.study.name} has {len(good)} converged samples, and an emulator needs at least "
+            f"{fewest}; let `pinnray sweep` finish, or raise samples in the study"
+        )
+    order = np.random.default_rng(0).permutation(len(good))[:MOST]
+    fingers = [sweep.samples[good[place].number] for place in order]
+    table = {
+        name: np.array([good[place].values.get(name, np.nan) for place in order], dtype=np.float64)
+        for name in QUANTITIES
+        if name not in EXACT
+    }
+    known = {name: column for name, column in table.items() if np.isfinite(column).sum() >= fewest}
+    ratios = _proportional(known)
+    numbers = inputs.numbers(fingers, [inputs.parameters(finger) for finger in fingers])
+    learnt: dict[str, Learnt] = {}
+    left = [name for name in known if name not in ratios]
+    with (stages or Stages(quiet=True)).stage("emulator") as progress:
+        for place, name in enumerate(left):
+            progress(place / len(left), name)
+            learnt[name] = _learnt(known[name], name, numbers)
+        progress(1.0, f"{len(order)} samples")
+    return Emulator(inputs, learnt, ratios, len(order))
+
+
+def emulator_of(folder: Path, *, refit: bool = False, stages: Stages | None = None) -> Emulator:
+    """The emulator of a sweep's folder: the one that is kept there, or fitted and kept.
+
+    Args:
+        folder: Of the sweep.
+        refit: Fit again although the one kept there is of the same samples.
+        stages: Shows the progress of a fit.
+
+    Raises:
+        UserError: If the folder holds no sweep, too few samples, or a study that cannot be emulated; or if
+            the file of the emulator is damaged.
+    """
+    from studies.emulator.store import FILE, digest_of, load, save
+
+    sweep = load_sweep(folder)
+    inputs = Inputs(sweep.study, read_json(folder / STUDY_FILE, "sweep").get("finger", {}))
+    file, digest = folder / FILE, digest_of(sweep, inputs)
+    kept = None if refit else load(file, inputs, digest)
+    if kept is None:
+        kept = fitted(sweep, inputs, stages)
+        save(file, kept, digest)
+    return kept
+
+
+def _learnt(values: FloatArray, name: str, numbers: Numbers) -> Learnt:
+    good = np.isfinite(values)
+    base = numbers.bases[name]
+    positive = bool((values[good] > 0).all() and (base > 0).all())
+    with np.errstate(divide="ignore", invalid="ignore"):
+        wanted = np.log(values / base) if positive else (values - base) / numbers.units[name]
+    return Learnt(GaussianProcess.fitted(numbers.inputs[good], wanted[good]), positive)
+
+
+def _predicted(learnt: Learnt, name: str, numbers: Numbers) -> FloatArray:
+    """Prediction and both ends of the interval, shape (3, n)."""
+    middle, width = learnt.process.predict(numbers.inputs)
+    ends = np.stack([middle, middle - width, middle + width])
+    if learnt.positive:
+        return np.asarray(numbers.bases[name] * np.exp(ends))
+    return np.asarray(numbers.bases[name] + numbers.units[name] * ends)
+
+
+def _proportional(table: Mapping[str, FloatArray]) -> dict[str, tuple[str, float]]:
+    """Quantities in constant ratio to an earlier one, such as the forces of the linear law."""
+    found: dict[str, tuple[str, float]] = {}
+    for name, values in table.items():
+        for other in table:
+            if other == name:
+                break
+            if other in found:
+                continue
+            with np.errstate(divide="ignore", invalid="ignore"):
+                ratio = values / table[other]
+            middle = float(np.median(ratio))
+            if np.isfinite(ratio).all() and np.abs(ratio - middle).max() <= PROPORTIONAL * abs(middle):
+                found[name] = (other, middle)
+                break
+    return found

@@ -1,0 +1,237 @@
+"""From a finger of a study to the numbers that an emulator works with."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.finger.parameters import SYMBOLS, Parameters
+from geometry.finger.section import cavity_ends, rib_feet, rib_pitch
+from geometry.finger.validation import broken_rule
+from solvers.problem import Load, Material
+from studies.emulator.frame import Frame
+from studies.sweep.study import LOAD, MATERIAL, PHYSICS, WHOLE, Range, Study, Value, unit_of
+
+WIDE = 1.8
+"""Ratio of a range's ends from which the logarithm of the parameter is taken."""
+
+STRESS_SCALE = 0.3
+"""Change of a stress's logarithm that counts as much as a parameter's standard deviation."""
+
+LEAST_STRESS = 1e-9
+"""Least stress of a frame over Young's modulus, for fingers without ribs."""
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """The numbers of n fingers.
+
+    Attributes:
+        inputs: Of the processes, shape (n, d).
+        bases: What the frames say of quantities, by name, in the quantities' units, shape (n,) each.
+        units: Unit of the difference from the base of quantities that can be negative, shape (n,) each.
+    """
+
+    inputs: FloatArray
+    bases: dict[str, FloatArray]
+    units: dict[str, FloatArray]
+
+
+class Inputs:
+    """Makes the numbers of a study's fingers.
+
+    Args:
+        study: The study.
+        base: Parameters of the finger that the study does not vary.
+
+    Raises:
+        UserError: If the study is of drawings.
+    """
+
+    def __init__(self, study: Study, base: Mapping[str, Any]) -> None:
+        if "section" in {*study.fixed, *study.varied}:
+            raise UserError(
+                f"the sweep {study.name} is of drawings, and an emulator needs the parameters of a design; "
+                "sweep a design, or solve the drawing by `compare --section FILE`"
+            )
+        self.study = study
+        self.base = {name: value for name, value in base.items() if name in Parameters.model_fields}
+
+    def read(self, settings: Mapping[str, str]) -> dict[str, Value]:
+        """A finger from texts.
+
+        Raises:
+            UserError: If a text is no value of its parameter; `fault` tells all other faults.
+        """
+        named = [(SYMBOLS.get(name, name), text) for name, text in settings.items()]
+        return {
+            name: _read(name, self.study.varied[name], text) if name in self.study.varied else text
+            for name, text in named
+        }
+
+    def fault(self, finger: Mapping[str, Value]) -> str | None:
+        """The reason why a finger cannot be predicted, or None."""
+        varied = self.study.varied
+        if unknown := [name for name in finger if name not in varied]:
+            return f"{unknown[0]} is not varied in this sweep, which varies {', '.join(varied)}"
+        if missing := [name for name in varied if name not in finger]:
+            return f"{missing[0]} is missing; give {_in_words(missing[0], varied[missing[0]])}"
+        for name, values in varied.items():
+            if not _contains(name, values, finger[name]):
+                return f"{name} = {_text(finger[name])} is outside the sweep: {_in_words(name, values)}"
+        return broken_rule(self.parameters(finger))
+
+    def parameters(self, finger: Mapping[str, Value]) -> Parameters:
+        """The parameters of a finger's shape."""
+        shape = {name: value for name, value in finger.items() if name not in PHYSICS}
+        return Parameters(**{**self.base, **shape, "name": "predicted"})
+
+    def physics(self, finger: Mapping[str, Value]) -> tuple[Material, Load]:
+        """Material and load of a finger."""
+        values = {**self.study.fixed, **finger}
+        material = {name: values[name] for name in MATERIAL if name in values}
+        load = {"kind" if name == "load" else name: values[name] for name in LOAD if name in values}
+        return Material.model_validate(material), Load.of_travel(**load)  # type: ignore[arg-type]
+
+    def numbers(self, fingers: Sequence[Mapping[str, Value]], shapes: Sequence[Parameters]) -> Numbers:
+        """The numbers of fingers and their parameters."""
+        columns = [self._column(name, [finger[name] for finger in fingers]) for name in self._columns]
+        phase = 2 * np.pi * np.array([_rib_phase(shape) for shape in shapes])
+        answers, scales = self._frames(fingers, shapes)
+        stress = np.log(np.maximum(answers[:, 6:9], LEAST_STRESS)) / STRESS_SCALE
+        modulus, depth = scales.T
+        force = answers[:, 0] * modulus * depth
+        largest = np.maximum(answers[:, 6:9].max(axis=1), LEAST_STRESS)
+        bases = {
+            **{"force": force, "force_25": force / 4, "force_50": force / 2, "force_75": 0.75 * force},
+            **{"tip_u": answers[:, 3], "tip_v": answers[:, 4], "wrap": answers[:, 5]},
+            "compliance_along": answers[:, 1] / (modulus * depth),
+            "compliance_across": answers[:, 2] / (modulus * depth),
+            **{"von_mises": modulus * largest, "principal_strain": largest},
+        }
+        one = np.ones(len(fingers))
+        forces = dict.fromkeys(("force", "force_25", "force_50", "force_75"), modulus * depth)
+        return Numbers(
+            np.concatenate([*columns, np.stack([np.cos(phase), np.sin(phase)], axis=1), stress], axis=1),
+            bases,
+            {**dict.fromkeys(bases, one), **forces},
+        )
+
+    @cached_property
+    def _columns(self) -> list[str]:
+        """Varied parameters of which a process has an input: Young's modulus and depth act as factors."""
+        factors = {"young"} if self.study.solver == "fem-3d" else {"young", "depth"}
+        return [name for name in self.study.varied if name not in factors]
+
+    def _column(self, name: str, values: Sequence[Value]) -> FloatArray:
+        """Inputs of a parameter, with a standard deviation of about one, shape (n, 1) or (n, choices)."""
+        chosen = self.study.varied[name]
+        if chosen.values is not None and not _is_number(chosen):
+            places = np.array([chosen.values.index(value) for value in values])
+            return np.asarray(2.0 * np.eye(len(chosen.values))[places])
+        low, high = _ends(chosen)
+        numbers = np.array(values, dtype=np.float64)
+        if low > 0 and high / low >= WIDE:
+            low, high, numbers = np.log(low), np.log(high), np.log(numbers)
+        return np.asarray(np.sqrt(12) * ((numbers - low) / ((high - low) or 1.0) - 0.5))[:, None]
+
+    def _frames(
+        self, fingers: Sequence[Mapping[str, Value]], shapes: Sequence[Parameters]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Answers of the frames, shape (n, 9), and Young's modulus and depth, shape (n, 2).
+
+        The answers are force, two compliances, tip displacement (2), wrap angle and three stresses.
+        """
+        physics = [self.physics(finger) for finger in fingers]
+        groups: dict[tuple[Any, ...], list[int]] = {}
+        for place, (shape, (material, load)) in enumerate(zip(shapes, physics, strict=True)):
+            travel = (None, load.displacement[1]) if load.kind == "cylinder" else load.displacement
+            key = (shape.rib_count, material.poisson, material.plane, travel)
+            groups.setdefault(key, []).append(place)
+        answers = np.zeros((len(shapes), 9))
+        for (*_, travel), places in groups.items():
+            own = [shapes[place] for place in places]
+            found = Frame.of(own).response(physics[places[0]][0], travel)
+            answers[places, 0] = found.force
+            answers[places, 1:3] = found.compliance
+            answers[places, 3:5] = found.tip
+            answers[places, 5] = _wrap(own, found.contact, found.tip)
+            answers[places, 6:9] = found.stress
+        scales = [(material.young, shape.depth) for shape, (material, _) in zip(shapes, physics, strict=True)]
+        return answers, np.array(scales)
+
+
+def _wrap(shapes: Sequence[Parameters], contact: FloatArray, tip: FloatArray) -> FloatArray:
+    """The wrap angle of fingers whose contact and apex move, shape (n,), degrees."""
+    middle = np.array([[shape.contact_abscissa, 0.0] for shape in shapes]) + contact
+    apex = np.array([[shape.height, 0.0] for shape in shapes]) + tip
+    rear, ahead = np.arctan2(middle[:, 1], middle[:, 0]), np.arctan2(*(apex - middle).T[::-1])
+    return np.asarray(np.degrees(ahead - rear))
+
+
+def _rib_phase(p: Parameters) -> float:
+    """Place of the contact between the ribs, in pitches; a whole number at a rib."""
+    first = rib_feet(p)[0] if p.rib_count else cavity_ends(p)[0]
+    return float((p.contact_abscissa - first) / rib_pitch(p))
+
+
+def _is_number(values: Range) -> bool:
+    return all(isinstance(each, int | float) and not isinstance(each, bool) for each in values.values or ())
+
+
+def _ends(values: Range) -> tuple[float, float]:
+    """Smallest and largest value of a range, or of choices that are numbers."""
+    if values.values is not None:
+        numbers = [float(each) for each in values.values]
+        return min(numbers), max(numbers)
+    assert values.low is not None
+    assert values.high is not None
+    return float(values.low), float(values.high)
+
+
+def _contains(name: str, values: Range, value: Value) -> bool:
+    """Whether the sweep had the value within its range or among its choices."""
+    if values.values is not None:
+        return value in values.values
+    if isinstance(value, bool | str):
+        return False
+    low, high = _ends(values)
+    return low <= value <= high and (name not in WHOLE or float(value).is_integer())
+
+
+def _read(name: str, values: Range, text: str) -> Value:
+    """The value of a parameter in a text."""
+    if values.values is not None:
+        if found := [each for each in values.values if _text(each).lower() == text.strip().lower()]:
+            return found[0]
+        if not _is_number(values):
+            return text.strip()
+    try:
+        number = float(text)
+    except ValueError:
+        raise UserError(f"{name} = {text.strip()!r} is no number; give {_in_words(name, values)}") from None
+    whole = name in WHOLE and number.is_integer()
+    choices = values.values or ()
+    return next((each for each in choices if each == number), int(number) if whole else number)
+
+
+def _in_words(name: str, values: Range) -> str:
+    if values.values is not None:
+        return f"one of {', '.join(map(_text, values.values))}"
+    low, high = _ends(values)
+    kind = "a whole number from " if name in WHOLE else ""
+    return f"{kind}{low:g} to {high:g} {unit_of(name)}".rstrip()
+
+
+def _text(value: Value) -> str:
+    return (
+        str(value).lower()
+        if isinstance(value, bool)
+        else f"{value:g}"
+        if not isinstance(value, str)
+        else value
+    )

@@ -1,0 +1,85 @@
+"""The file of an emulator: arrays as safetensors, the rest as JSON in its header."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save as to_bytes
+
+from compare.runtime.provenance import sources_digest
+from geometry.arrays import FloatArray
+from geometry.atomic import write_bytes
+from geometry.content_hash import content_hash
+from geometry.errors import UserError
+from studies.emulator.emulator import Emulator, Learnt
+from studies.emulator.gaussian_process import GaussianProcess
+from studies.emulator.inputs import Inputs
+from studies.sweep.sweep import Sweep
+
+FILE = "emulator.safetensors"
+PARTS = ("inputs", "weights", "factor", "lengths", "numbers")
+
+
+def digest_of(sweep: Sweep, inputs: Inputs) -> str:
+    """SHA-256 of everything that an emulator of the sweep depends on, in hexadecimal."""
+    return content_hash(
+        {
+            "study": sweep.study.model_dump(mode="json", exclude={"samples"}),
+            "base": inputs.base,
+            "samples": [(sweep.samples[each.number], each.values) for each in sweep.good],
+            "program": sources_digest(["studies.emulator", "geometry.finger"]),
+        }
+    )
+
+
+def save(file: Path, emulator: Emulator, digest: str) -> None:
+    """Write an emulator atomically, with the digest of what it depends on."""
+    arrays = {
+        f"{name}.{part}": np.ascontiguousarray(getattr(learnt.process, part))
+        for name, learnt in emulator.learnt.items()
+        for part in PARTS
+    }
+    header = {
+        "digest": digest,
+        "arrays": _arrays_digest(arrays),
+        "positive": json.dumps({name: learnt.positive for name, learnt in emulator.learnt.items()}),
+        "ratios": json.dumps(dict(emulator.ratios)),
+        "count": str(emulator.count),
+    }
+    write_bytes(file, to_bytes(arrays, metadata=header))
+
+
+def load(file: Path, inputs: Inputs, digest: str) -> Emulator | None:
+    """The emulator in a file; None if there is none, or one of something else.
+
+    Raises:
+        UserError: If the file is damaged.
+    """
+    if not file.is_file():
+        return None
+    try:
+        with safe_open(file, framework="numpy") as content:
+            header = content.metadata() or {}
+            if header["digest"] != digest:
+                return None
+            arrays = {name: content.get_tensor(name) for name in content.keys()}  # noqa: SIM118
+        if header["arrays"] != _arrays_digest(arrays):
+            raise ValueError("its numbers have changed")
+        learnt = {
+            name: Learnt(GaussianProcess(*(arrays[f"{name}.{part}"] for part in PARTS)), positive)
+            for name, positive in json.loads(header["positive"]).items()
+        }
+        ratios = {name: (other, ratio) for name, (other, ratio) in json.loads(header["ratios"]).items()}
+        return Emulator(inputs, learnt, ratios, int(header["count"]))
+    except (SafetensorError, KeyError, ValueError, OSError) as error:
+        reason = " ".join(str(error).split())
+        raise UserError(f"{file} is damaged ({reason}); fit the emulator again by --refit") from None
+
+
+def _arrays_digest(arrays: dict[str, FloatArray]) -> str:
+    sha = hashlib.sha256()
+    for name in sorted(arrays):
+        sha.update(f"{name} {arrays[name].shape}".encode() + arrays[name].tobytes())
+    return sha.hexdigest()

@@ -1,0 +1,121 @@
+"""Pictures of a search: the front among all runs, its growth, and the fingers on it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.collections import LineCollection
+
+from compare.figures.style import HALO, axes_at, heading
+from geometry.arrays import FloatArray, IntArray
+from geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
+from geometry.mesh.boundary import boundary_edges
+from solvers.solution import Solution
+from studies.optimum.search import Optimum, is_allowed
+from studies.sweep.quantities import QUANTITIES
+
+BLUE = "#0072b2"
+
+
+def draw_front(optimum: Optimum, shown: Sequence[int]) -> Figure:
+    """Draw the first two objectives of every run; those on the front are filled, the shown ones numbered."""
+    first, second, *third = optimum.question.objectives
+    with figure(3.9) as drawn:
+        senses = ", ".join(f"{sense} {name}" for name, sense in optimum.question.objectives.items())
+        solver = optimum.question.study.solver
+        rest = f"the third objective, {third[0]}, is not drawn" if third else "every point is a run"
+        note = f"{len(optimum.measurements)} runs of {solver}; {rest}"
+        heading(drawn, f"Pareto front: {senses}", note)
+        axes = axes_at(drawn, (0.7, 0.55, WIDTH - 0.9, 2.75))
+        others = [each for each in optimum.measurements if each.number not in optimum.front and each.values]
+        allowed = np.array([is_allowed(optimum.question, each) for each in others], dtype=bool)
+        points = np.array([[each.values[name] for name in (first, second)] for each in others]).reshape(-1, 2)
+        axes.plot(*points[allowed].T, "o", ms=3.5, mfc="none", c=MUTED, label="other runs")
+        if not allowed.all():
+            axes.plot(*points[~allowed].T, "x", ms=3.5, c=MUTED, label="impossible or against a constraint")
+        on_front = [optimum.measurements[run].values for run in optimum.front]
+        best = np.array([[values[name] for name in (first, second)] for values in on_front])
+        axes.plot(*best.T, "-" if not third else "", color=BLUE, lw=0.8)
+        axes.scatter(best[:, 0], best[:, 1], s=18, color=BLUE, zorder=3, label="front")
+        for run in shown:
+            values = optimum.measurements[run].values
+            axes.annotate(
+                str(optimum.place(run)),
+                (values[first], values[second]),
+                xytext=(5, 4),
+                textcoords="offset points",
+                color=CONTACT,
+                weight="bold",
+                path_effects=HALO,
+            )
+        axes.set(xlabel=_axis(first), ylabel=_axis(second))
+        axes.legend(loc="best")
+    return drawn
+
+
+def draw_growth(optimum: Optimum) -> Figure:
+    """Draw the hypervolume over the number of runs."""
+    start = len(optimum.measurements) // 3
+    with figure(2.4) as drawn:
+        heading(
+            drawn, "Hypervolume over the runs", f"the first {start} runs are samples, then come proposals"
+        )
+        axes = axes_at(drawn, (0.7, 0.5, WIDTH - 0.9, 1.4))
+        axes.plot(np.arange(1, len(optimum.volumes) + 1), optimum.volumes, color=BLUE, lw=1.4)
+        axes.axvline(start, color=MUTED, lw=0.8, ls=":")
+        axes.set(xlabel="runs", ylabel="hypervolume", ylim=(0, None), xlim=(0, None))
+    return drawn
+
+
+def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution]) -> Figure:
+    """Draw fingers on the front, at rest and deformed, to one scale.
+
+    Args:
+        optimum: The search.
+        solutions: Solutions of the runs to draw, by their numbers.
+    """
+    shapes: list[tuple[int, FloatArray, FloatArray, IntArray]] = []
+    for run, solution in solutions.items():
+        mesh = solution.problem.mesh
+        moved = mesh.points + solution.displacement(mesh.points)
+        shapes.append((run, mesh.points, moved, boundary_edges(mesh.triangles)))
+    every = np.concatenate([points for _, rest, moved, _ in shapes for points in (rest, moved)])
+    low, high = every.min(axis=0) - 1, every.max(axis=0) + 1
+    columns = 2
+    rows = -(-len(shapes) // columns)
+    width = (WIDTH - 0.3) / columns
+    height = (width - 0.1) * (high[1] - low[1]) / (high[0] - low[0])
+    label = 0.42
+    with figure(0.55 + rows * (height + label)) as drawn:
+        heading(drawn, "Fingers on the front", "grey: at rest; black: under the load; all to one scale")
+        for place, (run, rest, moved, edges) in enumerate(shapes):
+            row, column = divmod(place, columns)
+            box = (0.1 + column * (width + 0.1), 0.5 + row * (height + label) + label, width - 0.1, height)
+            axes = axes_at(drawn, box)
+            axes.add_collection(LineCollection(list(rest[edges]), colors="#b0b0b0", linewidths=0.6))
+            axes.add_collection(LineCollection(list(moved[edges]), colors=INK, linewidths=0.8))
+            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+            axes.set_axis_off()
+            values = optimum.measurements[run].values
+            text = ", ".join(
+                f"{name} {values[name]:.3g} {_unit(name)}" for name in optimum.question.objectives
+            )
+            axes.text(
+                0,
+                1.03,
+                f"{optimum.place(run)}",
+                size=9,
+                weight="bold",
+                color=CONTACT,
+                transform=axes.transAxes,
+            )
+            axes.text(0.08, 1.03, text, size=SMALL, transform=axes.transAxes)
+    return drawn
+
+
+def _axis(name: str) -> str:
+    unit = _unit(name)
+    return f"{name}, {unit}" if unit else name
+
+
+def _unit(name: str) -> str:
+    return QUANTITIES[name].unit.replace("deg", "°")

@@ -1,0 +1,116 @@
+"""Objectives and constraints of an optimisation, and their TOML file."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from geometry.errors import UserError
+from geometry.finger.parameters import CheckedModel, bounded
+from geometry.text_files import read_toml
+from studies.sweep.quantities import QUANTITIES
+from studies.sweep.study import Study
+
+Sense = Literal["least", "largest"]
+
+FEWEST = 40
+"""Smallest number of solver runs."""
+
+
+class Limit(CheckedModel):
+    """Limits of a quantity.
+
+    Attributes:
+        at_least: Smallest allowed value; None means no limit.
+        at_most: Largest allowed value.
+    """
+
+    at_least: float | None = None
+    at_most: float | None = None
+
+    @model_validator(mode="after")
+    def _limits(self) -> Self:
+        if self.at_least is None and self.at_most is None:
+            raise ValueError("give at_least, at_most or both")
+        return self
+
+    def excess(self, value: float) -> float:
+        """How far a value is beyond the limits; negative or zero within them."""
+        over = -float("inf") if self.at_most is None else value - self.at_most
+        under = -float("inf") if self.at_least is None else self.at_least - value
+        return max(over, under)
+
+
+class Question(CheckedModel):
+    """Objectives and constraints over the parameters of a study.
+
+    Attributes:
+        study: Parameters and solver; its samples are those that the search starts from.
+        objectives: Two or three quantities, each to be the least or the largest.
+        constraints: Limits of quantities.
+        runs: Number of runs of the solver in all.
+    """
+
+    study: Study
+    objectives: dict[str, Sense] = Field(min_length=2, max_length=3)
+    constraints: dict[str, Limit] = Field(default_factory=dict)
+    runs: int = bounded(120, FEWEST, 100_000, "", "", "Number of runs of the solver")
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        for name in (*self.objectives, *self.constraints):
+            if name not in QUANTITIES:
+                raise ValueError(f"there is no quantity {name!r}; there are {', '.join(QUANTITIES)}")
+        if "section" in {*self.study.fixed, *self.study.varied}:
+            raise ValueError("a drawing has no parameters to optimise; give a design")
+        return self
+
+    @property
+    def names(self) -> list[str]:
+        """Quantities of the objectives and constraints, each once."""
+        return list(dict.fromkeys((*self.objectives, *self.constraints)))
+
+    def costs(self, values: Mapping[str, float]) -> list[float]:
+        """The objectives as numbers of which the least is best."""
+        return [
+            values[name] if sense == "least" else -values[name] for name, sense in self.objectives.items()
+        ]
+
+    def excesses(self, values: Mapping[str, float]) -> list[float]:
+        """How far each constrained quantity is beyond its limits; at most zero if it obeys them."""
+        return [limit.excess(values[name]) for name, limit in self.constraints.items()]
+
+    def allows(self, values: Mapping[str, float]) -> bool:
+        """Whether every constraint is obeyed."""
+        return all(excess <= 0 for excess in self.excesses(values))
+
+
+def load_question(path: Path) -> Question:
+    """The question in a TOML file: a study without sampling, with objectives, constraints and runs.
+
+    Raises:
+        UserError: If it cannot be read, or something in it is wrong.
+    """
+    content: dict[str, Any] = read_toml(path, "question")
+    own = {name: content.pop(name) for name in ("objectives", "constraints", "runs") if name in content}
+    try:
+        if given := [name for name in ("sampling", "samples") if name in content]:
+            raise UserError(f"{given[0]} belongs to a study; the search chooses its samples: give runs")
+        limits = own.get("constraints", {})
+        if not isinstance(limits, Mapping) or not all(isinstance(each, Mapping) for each in limits.values()):
+            raise UserError("write constraints as NAME = {at_least = LOW, at_most = HIGH}")
+        own["constraints"] = {name: _limit(name, entry) for name, entry in limits.items()}
+        runs = own.get("runs", 120)
+        start = max(runs // 3, 2) if isinstance(runs, int) else 2
+        study = Study(**{"name": path.stem, **content, "sampling": "sobol", "samples": start})
+        return Question(study=study, **own)
+    except UserError as error:
+        raise UserError(f"question {path}: {error}") from None
+
+
+def _limit(name: str, entry: Mapping[str, Any]) -> Limit:
+    try:
+        return Limit(**entry)
+    except UserError as error:
+        raise UserError(f"constraints.{name}: {error}") from None

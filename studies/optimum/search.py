@@ -1,0 +1,243 @@
+"""The search for a Pareto front: rounds of an emulator's proposals, each judged by the solver."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from compare.runtime.output_folder import locked
+from compare.runtime.provenance import package_versions, sources_digest
+from compare.runtime.resumable_folder import check_resumable_folder
+from compare.runtime.stages import Stages
+from geometry.arrays import FloatArray
+from geometry.atomic import write_json
+from geometry.errors import UserError
+from geometry.finger.parameters import Parameters
+from geometry.finger.validation import broken_rule
+from studies.emulator.emulator import fitted
+from studies.emulator.inputs import Inputs
+from studies.optimum.front import hypervolume, reference_point, unbeaten
+from studies.optimum.question import Question
+from studies.sweep.measurement import Measurement
+from studies.sweep.sampling import samples
+from studies.sweep.store import Journal, opened
+from studies.sweep.study import Study, TaskMaker, Value
+from studies.sweep.sweep import JOURNAL, Sweep, finish
+from studies.sweep.workers import Workers
+
+QUESTION_FILE, FINGERS_FILE = "question.json", "fingers.json"
+
+ROUNDS = 8
+"""Rounds of proposals."""
+
+ENOUGH = 12
+"""Smallest number of converged runs to which the emulator is fitted."""
+
+CANDIDATES = 64
+"""Samples that are drawn at most for each that the search starts from, because some break a rule."""
+
+
+@dataclass(frozen=True)
+class OptimumJob:
+    """A search to run, and its output folder.
+
+    Attributes:
+        question: Objectives, constraints and parameters.
+        folder: Folder from which paths in the question are meant.
+        out: Output folder; runs that an earlier start finished there are kept.
+        processes: Worker processes on this machine.
+        scheduler: Address of a Dask scheduler whose workers are used instead.
+    """
+
+    question: Question
+    folder: Path
+    out: Path
+    processes: int
+    scheduler: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """All runs of a search, and those on the front.
+
+    Attributes:
+        question: The question.
+        fingers: Of the runs.
+        measurements: Their results, in the same order.
+        front: Numbers of the runs on the Pareto front, ordered by the first objective.
+        volumes: Hypervolume after each run, shape (n,), in the product of the objectives' units.
+        reference: Point from which it counts, as values of the objectives.
+    """
+
+    question: Question
+    fingers: list[dict[str, Value]]
+    measurements: list[Measurement]
+    front: list[int]
+    volumes: FloatArray
+    reference: dict[str, float]
+
+    def place(self, run: int) -> int:
+        """Place of a run on the front, from 1: its number in the table and in the names of the files."""
+        return 1 + self.front.index(run)
+
+
+def search_front(job: OptimumJob, stages: Stages | None = None) -> Optimum:
+    """Search for the Pareto front with a given number of runs of the solver.
+
+    A third of the runs are samples of a Sobol sequence. Then rounds follow: the emulator is fitted to all
+    runs, proposes fingers, and the solver judges them. Every point on the front is a run of the solver. The
+    same question and seed give the same runs, on machines that compute alike.
+
+    Raises:
+        UserError: If the question cannot be asked, the folder holds another one, or nothing is allowed.
+    """
+    stages, question = stages or Stages(quiet=True), job.question
+    maker = TaskMaker(question.study, job.folder)
+    definition = _definition(question, maker)
+    check_resumable_folder(job.out / QUESTION_FILE, definition, job="search")
+    job.out.mkdir(parents=True, exist_ok=True)
+    with (
+        locked(job.out),
+        opened(job.out / JOURNAL) as journal,
+        Workers(job.processes, job.scheduler) as workers,
+    ):
+        write_json(job.out / QUESTION_FILE, definition)
+        journal.forget("failed")
+        fingers = _known_fingers(job.out / FINGERS_FILE)
+        start = len(samples(question.study))
+        if not fingers:
+            fingers = starting_fingers(question, maker, start)
+            _keep_fingers(job.out / FINGERS_FILE, fingers)
+        done = 0
+        while True:
+            with stages.stage(f"runs {done + 1} to {len(fingers)}") as progress:
+                tasks = {n: maker.task(n, finger) for n, finger in enumerate(fingers)}
+                finish(tasks, journal, workers, progress)
+            done = len(fingers)
+            if done >= question.runs:
+                return _optimum(question, fingers, journal)
+            count = min(-(-(question.runs - start) // ROUNDS), question.runs - done)
+            with stages.stage(f"proposals after {done}") as progress:
+                progress(0.0, "the emulator is fitted and searched")
+                fingers = fingers + _proposed(question, maker, fingers, journal, count)
+            _keep_fingers(job.out / FINGERS_FILE, fingers)
+
+
+def starting_fingers(question: Question, maker: TaskMaker, count: int) -> list[dict[str, Value]]:
+    """The first samples of the Sobol sequence that break no rule.
+
+    Raises:
+        UserError: If nearly all break one.
+    """
+    many = question.study.model_copy(update={"samples": CANDIDATES * count})
+    found: list[dict[str, Value]] = []
+    fault: str | None = None
+    for number, finger in enumerate(samples(many)):
+        why = broken_rule(Parameters(**maker.task(number, finger).definition))
+        fault = why or fault
+        if why is None:
+            found.append(finger)
+        if len(found) == count:
+            return found
+    raise UserError(
+        f"only {len(found)} of {CANDIDATES * count} fingers in these ranges can be made ({fault}); change "
+        "the ranges"
+    )
+
+
+def _proposed(
+    question: Question, maker: TaskMaker, fingers: list[dict[str, Value]], journal: Journal, count: int
+) -> list[dict[str, Value]]:
+    """The next fingers; random ones if the emulator has none that are apart from the others."""
+    from studies.optimum.proposals import proposals
+
+    measured = journal.measurements()
+    inputs = Inputs(question.study, maker.task(0, fingers[0]).definition)
+    with threadpool_limits(1):  # the same sums, whatever the number of cores
+        emulator = fitted(Sweep(question.study, fingers, measured), inputs, fewest=ENOUGH)
+        costs = _allowed_costs(question, measured)
+        every = np.array([question.costs(each.values) for each in measured if each.state == "done"])
+        found = proposals(
+            question,
+            emulator,
+            costs,
+            fingers,
+            reference_point(every),
+            count=count,
+            seed=question.study.seed + len(fingers),
+        )
+    more = starting_fingers(question, maker, len(fingers) + count)[len(fingers) :]
+    return found + more[: count - len(found)]
+
+
+def is_allowed(question: Question, run: Measurement) -> bool:
+    """Whether a run has converged, obeys the constraints and is of a finger that can be so deformed."""
+    return run.state == "done" and not run.through_itself and question.allows(run.values)
+
+
+def _allowed_costs(question: Question, measured: list[Measurement]) -> FloatArray:
+    """Costs of the runs that are allowed, shape (n, m)."""
+    rows = [question.costs(each.values) for each in measured if is_allowed(question, each)]
+    return np.array(rows).reshape(-1, len(question.objectives))
+
+
+def _optimum(question: Question, fingers: list[dict[str, Value]], journal: Journal) -> Optimum:
+    measured = journal.measurements()
+    allowed = [each for each in measured if is_allowed(question, each)]
+    if not allowed:
+        found = sum(each.state == "done" for each in measured)
+        crossed = sum(each.through_itself for each in measured)
+        besides = f", {crossed} go through themselves" if crossed else ""
+        raise UserError(
+            f"none of {len(measured)} runs obeys the constraints ({found} converged{besides}); relax a "
+            "constraint, widen the ranges or take a smaller stroke"
+        )
+    costs = np.array([question.costs(each.values) for each in allowed])
+    converged = [question.costs(each.values) for each in measured if each.state == "done"]
+    reference = reference_point(np.array(converged))
+    on_front = [each.number for each, best in zip(allowed, unbeaten(costs), strict=True) if best]
+    first = next(iter(question.objectives))
+    on_front.sort(key=lambda number: measured[number].values[first])
+    volumes = [
+        hypervolume(costs[[each.number <= number for each in allowed]], reference)
+        for number in range(len(measured))
+    ]
+    signs = [1.0 if sense == "least" else -1.0 for sense in question.objectives.values()]
+    point = dict(zip(question.objectives, map(float, reference * signs), strict=True))
+    return Optimum(question, fingers, measured, on_front, np.array(volumes), point)
+
+
+def _definition(question: Question, maker: TaskMaker) -> dict[str, Any]:
+    """The question, and everything else on which its results depend."""
+    study: Study = question.study
+    modules = ["studies.sweep.quantities", "studies.sweep.measurement", "studies.sweep.sampling"]
+    sources = ["studies.optimum.proposals", "studies.optimum.search", "studies.emulator"]
+    first = maker.task(0, samples(study)[0]).definition
+    return {
+        "schema": 1,
+        "study": study.model_dump(mode="json", by_alias=True, exclude_none=True),
+        "objectives": dict(question.objectives),
+        "constraints": {name: limit.model_dump() for name, limit in question.constraints.items()},
+        "runs": question.runs,
+        "finger": {name: value for name, value in first.items() if name not in study.varied},
+        "versions": package_versions(),
+        "program_sha256": sources_digest([*modules, *sources, "geometry", "solvers"]),
+    }
+
+
+def _known_fingers(file: Path) -> list[dict[str, Value]]:
+    """The fingers that an earlier start has chosen."""
+    if not file.exists():
+        return []
+    try:
+        found: list[dict[str, Value]] = json.loads(file.read_text(encoding="utf-8"))["fingers"]
+    except (ValueError, KeyError, OSError):
+        raise UserError(f"{file} is damaged; remove its folder to search again") from None
+    return found
+
+
+def _keep_fingers(file: Path, fingers: list[dict[str, Value]]) -> None:
+    write_json(file, {"fingers": fingers})

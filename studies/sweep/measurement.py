@@ -1,0 +1,78 @@
+"""The work of a worker: one sample from its definition to its quantities."""
+
+import time
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from compare.evaluation.deformed_body import THROUGH_ITSELF, Body
+from compare.evaluation.plausibility import unit_remarks
+from geometry.cache import finger_mesh
+from geometry.drawing.definition import finger_from
+from geometry.errors import UserError
+from geometry.finger.parameters import Parameters
+from geometry.finger.validation import broken_rule
+from geometry.mesh.settings import MeshSettings
+from solvers.problem import Problem
+from solvers.registry import make_solver
+from studies.sweep.quantities import FRACTIONS, quantities
+from studies.sweep.study import Task, load_of, material_of
+
+State = Literal["done", "not converged", "refused", "failed"]
+"""`refused`: the design breaks a rule or the solver does not take it; `failed`: an error of the program."""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What one sample gave.
+
+    Attributes:
+        number: Of the sample.
+        state: How it ended.
+        message: The solver's sentence, or the reason why there is no result.
+        seconds: Time of the worker, meshing included, s.
+        values: The quantities by name; empty if there is no result.
+    """
+
+    number: int
+    state: State
+    message: str
+    seconds: float
+    values: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def through_itself(self) -> bool:
+        """Whether the deformed body goes through itself: a result that no real finger has."""
+        return THROUGH_ITSELF in self.message
+
+
+def measured(task: Task) -> Measurement:
+    """Draw, mesh and solve one sample.
+
+    Whatever goes wrong with this sample is told in the answer, so that it does not stop the others.
+    """
+    started = time.perf_counter()
+
+    def ended(state: State, message: str, values: dict[str, float] | None = None) -> Measurement:
+        words = " ".join(message.split())
+        return Measurement(task.number, state, words, time.perf_counter() - started, values or {})
+
+    try:
+        if "section" not in task.definition and (fault := broken_rule(Parameters(**task.definition))):
+            return ended("refused", fault)
+        finger = finger_from(task.definition)
+        material, load = material_of(task), load_of(task)
+        mesh = finger_mesh(finger, settings=MeshSettings(size=task.mesh_size), keep=False)
+        problem = Problem(mesh, material, load, finger=finger)
+        solver = make_solver(task.solver, **task.settings)
+        solution, values = quantities(finger, problem, solver, density=task.density)
+    except UserError as error:
+        return ended("refused", str(error))
+    except Exception as error:
+        return ended("failed", f"{type(error).__name__}: {error}")
+    status, _ = Body(mesh).status(solution)
+    said = "; ".join([status.message, *unit_remarks(problem)])
+    if unknown := [name for name, value in values.items() if np.isnan(value) and name not in FRACTIONS]:
+        return ended("not converged", f"{', '.join(unknown)} cannot be computed; {said}", values)
+    return ended("done" if status.converged else "not converged", said, values)

@@ -1,0 +1,106 @@
+"""The page of a sweep: summary, tables and pictures in one HTML file."""
+
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+from compare.runtime.html import template_environment
+from geometry.atomic import write_text
+from studies.sweep.pictures import SHOWN, draw_fingers, draw_pairs, draw_sensitivity
+from studies.sweep.sensitivity import TRUSTED, Sensitivity, sensitivities
+from studies.sweep.study import TaskMaker
+from studies.sweep.sweep import Sweep
+from studies.sweep.tables import failure_grid, quantity_grid
+
+PAGE = "sweep.html"
+
+FILES = (
+    "samples.parquet and samples.csv (a row for each sample, units in the headings), sweep.json (the study, "
+    "versions and hashes), journal.sqlite (from which the same command goes on)"
+)
+
+SAMPLED = {"grid": "on a grid", "latin": "of a Latin hypercube", "sobol": "of a Sobol sequence"}
+
+
+def write_page(
+    sweep: Sweep, maker: TaskMaker, folder: Path, record: dict[str, Any], formats: Collection[str] = ()
+) -> list[Path]:
+    """Write the pictures and the page, and return the paths.
+
+    Args:
+        sweep: The sweep.
+        maker: Makes the fingers of its samples.
+        folder: Where to write.
+        record: Start, durations and machine, from `Stages.record`.
+        formats: Of the pictures besides PNG.
+    """
+    pictures: dict[Path, str] = {}
+    found = sensitivities(sweep, SHOWN)
+    if len(sweep.good) > 1:
+        drawn = {
+            "pairs": (draw_pairs(sweep), "Quantities over the varied parameters, a dot for each finger."),
+            "fingers": (
+                draw_fingers(sweep, maker),
+                "The fingers with the least, the median and the largest value of a quantity, to one scale.",
+            ),
+        }
+        if found:
+            drawn["sensitivity"] = (draw_sensitivity(found), sensitivity_caption(found))
+        pictures = {each.save(folder / f"{name}.png", formats): text for name, (each, text) in drawn.items()}
+    failures = failure_grid(sweep)
+    page = (
+        template_environment()
+        .get_template("designs.html.j2")
+        .render(
+            title=f"Sweep {sweep.study.name}",
+            summary=summary(sweep),
+            grids=[quantity_grid(sweep), *([failures] if failures.rows else [])],
+            pictures=pictures,
+            files=FILES,
+            provenance=f"Started {record['started']}.",
+        )
+    )
+    write_text(folder / PAGE, page)
+    return [folder / PAGE, *pictures]
+
+
+def summary(sweep: Sweep) -> list[str]:
+    """The sweep in sentences."""
+    study = sweep.study
+    how = {"grid": "on a grid", "latin": "of a Latin hypercube", "sobol": "of a Sobol sequence"}[
+        study.sampling
+    ]
+    found, good = len(sweep.measurements), len(sweep.good)
+    varied = ", ".join(f"{name} ({_range(values)})" for name, values in study.varied.items())
+    fixed = ", ".join(f"{name} = {value}" for name, value in study.fixed.items())
+    sentences = [
+        f"{found} of {len(sweep.samples)} samples {how} were run; {good} have a converged result by "
+        f"{study.solver} with elements of {study.mesh_size:g} mm.",
+        f"Varied: {varied}. The rest is that of the design {study.design}"
+        + (f", with {fixed}." if fixed else "."),
+    ]
+    if found > good:
+        sentences.append(
+            f"{found - good} have none, for the reasons in the table below. Statistics, pictures and "
+            "sensitivities are of the converged ones."
+        )
+    return [*sentences, *(f"{remark}." for remark in sweep.remarks)]
+
+
+def sensitivity_caption(found: dict[str, Sensitivity]) -> str:
+    """What the picture of the sensitivities shows, and how far to trust it."""
+    caption = (
+        "Sobol' indices by polynomial chaos: the share of a quantity's variance that each parameter causes "
+        "alone and with others, if all vary independently over their ranges. The polynomials explain "
+    )
+    shares = [f"{100 * each.explained:.1f} % of {name}" for name, each in found.items()]
+    caption += f"{', '.join(shares)} at samples that were left out of the fit."
+    if any(each.explained < TRUSTED for each in found.values()):
+        caption += f" Below {100 * TRUSTED:.0f} % (marked *) do not trust the indices: run more samples."
+    return caption
+
+
+def _range(values: Any) -> str:
+    if values.values is not None:
+        return " or ".join(map(str, values.values))
+    return f"{values.low:g} to {values.high:g}"

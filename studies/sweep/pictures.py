@@ -1,0 +1,210 @@
+"""Pictures of a sweep: quantities over parameters, sensitivities, and fingers."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+
+from compare.figures.style import axes_at, heading
+from geometry.arrays import FloatArray
+from geometry.drawing.definition import finger_from
+from geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
+from geometry.finger.picture import draw_section
+from geometry.mesh.boundary import boundary_edges
+from solvers.solution import Solution
+from studies.sweep.quantities import QUANTITIES, kink_points, turn
+from studies.sweep.sensitivity import TRUSTED, Sensitivity
+from studies.sweep.study import TaskMaker, unit_of
+from studies.sweep.sweep import Sweep
+
+SHOWN = ("force", "wrap", "tip_v", "compliance_across", "von_mises", "mass")
+"""Quantities of the pictures; the tables have all."""
+
+MOST_DOTS = 2_000
+"""Largest number of samples drawn in a panel."""
+
+WIDE = 6
+"""Largest number of columns that have room for long words."""
+
+COLUMNS = 3
+"""Fingers in a row of the drawing: with the least, the median and the largest value."""
+
+
+def draw_pairs(sweep: Sweep) -> Figure:
+    """Draw quantities over the varied parameters: a dot for each sample, and medians of eight bins."""
+    names = [name for name in SHOWN if _varies(sweep, name)]
+    parameters = list(sweep.study.varied)
+    good = sweep.good[:MOST_DOTS]
+    size = float(np.clip(60 / np.sqrt(len(good)), 1.2, 4.0))
+    left, head, foot, gap, tall = 0.95, 0.5, 0.95, 0.12, 0.62
+    width = (WIDTH - left - 0.1 - gap * (len(parameters) - 1)) / len(parameters)
+    with figure(head + foot + (tall + gap) * len(names)) as drawn:
+        note = f"{len(good)} of {len(sweep.good)} samples; line: medians of eight bins"
+        heading(drawn, f"Quantities over parameters: {sweep.study.name}", note)
+        for row, name in enumerate(names):
+            values = np.array([each.values[name] for each in good])
+            for column, parameter in enumerate(parameters):
+                place = (left + column * (width + gap), head + row * (tall + gap), width, tall)
+                axes = axes_at(drawn, place)
+                texts = [sweep.samples[each.number][parameter] for each in good]
+                choices = sweep.study.varied[parameter].values
+                x = np.array([choices.index(text) if choices else text for text in texts], dtype=np.float64)
+                axes.plot(x, values, ".", ms=size, color="#0072b2", alpha=0.5, mew=0)
+                _draw_medians(axes, x, values)
+                axes.tick_params(length=2, pad=1.5)
+                axes.locator_params(axis="y", nbins=3)
+                ends = _ends(sweep, parameter)
+                axes.set_xticks([0, len(choices) - 1] if choices else [float(end) for end in ends])
+                axes.margins(0.08)
+                if column:
+                    axes.set_yticklabels([])
+                else:
+                    axes.set_ylabel(_label(name), rotation=0, ha="right", va="center")
+                if row < len(names) - 1:
+                    axes.set_xticklabels([])
+                else:
+                    labels = axes.set_xticklabels(ends)
+                    labels[0].set_horizontalalignment("left")
+                    labels[-1].set_horizontalalignment("right")
+                    axes.set_xlabel(_wrapped(parameter, narrow=len(parameters) > WIDE), labelpad=2)
+    return drawn
+
+
+def draw_sensitivity(found: Mapping[str, Sensitivity]) -> Figure:
+    """Draw the total indices as a table of colours, with the first-order ones in brackets."""
+    names, parameters = list(found), list(next(iter(found.values())).total)
+    left, head, foot, tall = 1.25, 1.2, 0.3, 0.34
+    width = WIDTH - left - 0.1
+    with figure(head + foot + tall * len(names)) as drawn:
+        heading(
+            drawn,
+            "Share of each quantity's variance by parameter, %",
+            "alone and with others; in brackets: alone",
+        )
+        axes = axes_at(drawn, (left, head, width, tall * len(names)))
+        table = np.array([[100 * found[name].total[p] for p in parameters] for name in names])
+        axes.imshow(table, cmap=colormaps["Blues"], norm=Normalize(0, 130), aspect="auto")
+        for row, name in enumerate(names):
+            for column, parameter in enumerate(parameters):
+                total, first = (100 * share[parameter] for share in (found[name].total, found[name].first))
+                text = f"{total:.0f}" + (f" ({first:.0f})" if len(parameters) <= WIDE else f"\n({first:.0f})")
+                axes.text(column, row, text, ha="center", va="center", size=SMALL, linespacing=0.95)
+        axes.set_xticks(
+            range(len(parameters)), [_wrapped(name, narrow=len(parameters) > WIDE) for name in parameters]
+        )
+        axes.set_yticks(range(len(names)), [name + _doubt(found[name]) for name in names])
+        axes.xaxis.tick_top()
+        axes.tick_params(length=0)
+        axes.spines[:].set_visible(False)
+        if any(map(_doubt, found.values())):
+            drawn.text(0.012, 0.1 / drawn.get_figheight(), "*: not to be trusted", size=SMALL, color=MUTED)
+    return drawn
+
+
+def draw_fingers(sweep: Sweep, maker: TaskMaker) -> Figure:
+    """Draw, to one scale, the fingers with the least, the median and the largest value of each quantity."""
+    names = [name for name in SHOWN[:4] if _varies(sweep, name)]
+    chosen = []
+    for name in names:
+        ranked = sorted(sweep.good, key=lambda each: each.values[name])
+        for each in (ranked[0], ranked[len(ranked) // 2], ranked[-1]):
+            finger = finger_from(maker.task(each.number, sweep.samples[each.number]).definition)
+            chosen.append((finger, each.number, name, each.values[name]))
+    low = np.min([finger.section.bounds[0] for finger, *_ in chosen], axis=0)
+    high = np.max([finger.section.bounds[1] for finger, *_ in chosen], axis=0)
+    width = (WIDTH - 0.2) / COLUMNS
+    height = (width - 0.1) * (high[1] - low[1]) / (high[0] - low[0])
+    head, label = 0.38, 0.4
+    with figure(head + (height + label) * len(names)) as drawn:
+        heading(drawn, "Fingers with the least, the median and the largest value", "all to one scale")
+        for place, (finger, number, name, value) in enumerate(chosen):
+            row, column = divmod(place, COLUMNS)
+            box = (0.1 + column * width, head + row * (height + label) + label, width - 0.1, height)
+            axes = axes_at(drawn, box)
+            draw_section(axes, finger.section)
+            front = np.array([finger.section.front_point(x) for x in np.linspace(*finger.contact_ends, 5)])
+            axes.plot(*front.T, color=CONTACT, lw=2.5, solid_capstyle="butt", zorder=3)
+            axes.set(xlim=(low[0] - 1, high[0] + 1), ylim=(low[1] - 1, high[1] + 1), aspect="equal")
+            axes.set_axis_off()
+            if not column:
+                unit = QUANTITIES[name].unit.replace("deg", "°")
+                axes.set_title(f"{name}, {unit}", size=SMALL, pad=14, loc="left", weight="bold")
+            axes.text(0, 1.04, f"{value:.3g} (sample {number})", size=SMALL, transform=axes.transAxes)
+    return drawn
+
+
+def draw_wrap(solution: Solution) -> Figure:
+    """Draw the wrap angle of a solution: both chords of the front face, before and under the load."""
+    mesh = solution.problem.mesh
+    rest = kink_points(solution.problem)
+    moved = rest + solution.displacement(rest)
+    shape, edges = mesh.points + solution.displacement(mesh.points), boundary_edges(mesh.triangles)
+    low, high = np.minimum(mesh.points.min(0), shape.min(0)), np.maximum(mesh.points.max(0), shape.max(0))
+    height = (WIDTH - 0.2) * (high[1] - low[1] + 14) / (high[0] - low[0] + 16)
+    with figure(0.5 + height) as drawn:
+        angle = turn(moved) - turn(rest)
+        heading(drawn, f"Wrap angle {angle:.1f}°", "grey: at rest; the chords join base, contact and tip")
+        axes = axes_at(drawn, (0.1, 0.5, WIDTH - 0.2, height))
+        for points, colour in ((mesh.points, "#c4c4c4"), (shape, INK)):
+            for start, end in points[edges]:
+                axes.plot(*np.transpose([start, end]), color=colour, lw=0.7, zorder=1)
+        axes.plot(*rest.T, "--", color=MUTED, lw=1.2, zorder=2)
+        axes.plot(*moved.T, "o-", color=CONTACT, lw=1.6, ms=4, zorder=3)
+        ahead = moved[1] + 0.55 * (moved[1] - moved[0])
+        axes.plot(*np.transpose([moved[1], ahead]), ":", color=CONTACT, lw=1.2, zorder=2)
+        _draw_arc(axes, moved, ahead)
+        axes.set(xlim=(low[0] - 6, high[0] + 10), ylim=(low[1] - 4, high[1] + 10), aspect="equal")
+        axes.set_axis_off()
+    return drawn
+
+
+def _draw_arc(axes: Axes, kink: FloatArray, ahead: FloatArray) -> None:
+    """An arc from the first chord's extension to the second chord, with the word."""
+    start, end = (np.arctan2(*(point - kink[1])[::-1]) for point in (ahead, kink[2]))
+    radius = 0.8 * float(np.linalg.norm(ahead - kink[1]))
+    angles = np.linspace(start, end, 40)
+    arc = kink[1] + radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    axes.plot(*arc.T, color=CONTACT, lw=1.2)
+    axes.annotate("wrap", arc[20] + (1.5, 0), ha="left", va="center", color=CONTACT)
+
+
+def _draw_medians(axes: Axes, x: FloatArray, values: FloatArray) -> None:
+    levels = np.unique(x)
+    edges = np.linspace(x.min(), x.max(), 9) if len(levels) > 12 else np.append(levels, np.inf)
+    bins = np.clip(np.digitize(x, edges) - 1, 0, len(edges) - 2)
+    used = [number for number in range(len(edges) - 1) if (bins == number).any()]
+    middles = [np.median(x[bins == number]) for number in used]
+    axes.plot(middles, [np.median(values[bins == number]) for number in used], color=INK, lw=1.0)
+
+
+def _varies(sweep: Sweep, name: str) -> bool:
+    values = np.array([each.values[name] for each in sweep.good])
+    if len(values) < 2 or not np.isfinite(values).all():
+        return False
+    return bool(np.ptp(values) > 1e-9 * np.abs(values).max())
+
+
+def _label(name: str) -> str:
+    unit = QUANTITIES[name].unit.replace("deg", "°")
+    return name.replace("_", "\n") + (f"\n{unit}" if unit else "")
+
+
+def _wrapped(parameter: str, *, narrow: bool) -> str:
+    """A parameter with a line for each of its words, and its unit; long words are cut for a narrow column."""
+    unit = unit_of(parameter).replace("deg", "°")
+    words = parameter.replace("_", "\n")
+    return (words.replace("thickness", "thick-\nness") if narrow else words) + (f"\n{unit}" if unit else "")
+
+
+def _ends(sweep: Sweep, parameter: str) -> tuple[str, str]:
+    """Both ends of a parameter's range, or its first and last choice."""
+    values = sweep.study.varied[parameter]
+    if values.values is not None:
+        return str(values.values[0])[:9], str(values.values[-1])[:9]
+    return f"{values.low:g}", f"{values.high:g}"
+
+
+def _doubt(found: Sensitivity) -> str:
+    return "" if found.explained >= TRUSTED else " *"

@@ -1,0 +1,81 @@
+"""The samples of a study: a grid, a Latin hypercube or a Sobol sequence over its varied parameters."""
+
+import warnings
+from collections.abc import Sequence
+from itertools import product
+from math import prod
+
+import numpy as np
+from scipy.stats import qmc
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from studies.sweep.study import MOST, WHOLE, Range, Study, Value
+
+
+def samples(study: Study) -> list[dict[str, Value]]:
+    """The values of the varied parameters of every sample; the same study has the same samples.
+
+    The first samples of a Sobol sequence are the same however many there are.
+
+    Raises:
+        UserError: If a grid has too many.
+    """
+    names = list(study.varied)
+    if study.sampling == "grid":
+        axes = [grid_values(name, study.varied[name]) for name in names]
+        if (count := prod(map(len, axes))) > MOST:
+            raise UserError(f"the grid has {count:,} samples; at most {MOST:,} can be run")
+        return [dict(zip(names, values, strict=True)) for values in product(*axes)]
+    places = unit_points(study.sampling, len(names), study.samples or 0, study.seed)
+    return [
+        {name: value_at(name, study.varied[name], float(at)) for name, at in zip(names, row, strict=True)}
+        for row in places
+    ]
+
+
+def unit_points(sampling: str, dimensions: int, count: int, seed: int) -> FloatArray:
+    """Points of the unit cube, shape (count, dimensions), by scipy.stats.qmc."""
+    random = np.random.default_rng(seed)
+    if sampling == "latin":
+        return np.asarray(qmc.LatinHypercube(dimensions, rng=random).random(count))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # that only powers of two are balanced
+        return np.asarray(qmc.Sobol(dimensions, scramble=True, rng=random).random(count))
+
+
+def value_at(name: str, values: Range, place: float) -> Value:
+    """The value of a parameter at a place from 0 to 1 of its range."""
+    if values.values is not None:
+        return values.values[min(int(place * len(values.values)), len(values.values) - 1)]
+    low, high = _ends(values)
+    if name in WHOLE:
+        return min(int(low + place * (high - low + 1)), int(high))
+    return low + place * (high - low)
+
+
+def place_of(name: str, values: Range, value: Value) -> float:
+    """The place from 0 to 1 of a value in a parameter's range: the inverse of `value_at`."""
+    if values.values is not None:
+        return (values.values.index(value) + 0.5) / len(values.values)
+    low, high = _ends(values)
+    if name in WHOLE:
+        return (float(value) - low + 0.5) / (high - low + 1)
+    return (float(value) - low) / (high - low)
+
+
+def grid_values(name: str, values: Range) -> Sequence[Value]:
+    """The values of a parameter on a grid."""
+    if values.values is not None:
+        return values.values
+    low, high = _ends(values)
+    if name in WHOLE:
+        count = values.count or int(high - low) + 1
+        return sorted({round(value) for value in np.linspace(low, high, count)})
+    return [float(value) for value in np.linspace(low, high, values.count or 2)]
+
+
+def _ends(values: Range) -> tuple[float, float]:
+    assert values.low is not None
+    assert values.high is not None
+    return float(values.low), float(values.high)

@@ -1,0 +1,96 @@
+"""The journal of a sweep: an SQLite file with one row for every finished sample.
+
+Only the process that runs the sweep writes to it, a row in a transaction: after a kill at any moment a sample
+is in it as a whole or not at all.
+"""
+
+import json
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+from geometry.errors import UserError
+from studies.sweep.measurement import Measurement
+
+_NAMES_A_FILE = bytes.fromhex("d9d505f920a163d7")
+"""End of a rollback journal that names another file. Source: SQLite, pager.c, `aJournalMagic`."""
+
+_TABLE = """
+create table if not exists samples (
+    number integer primary key,
+    state text not null,
+    message text not null,
+    seconds real not null,
+    quantities text not null
+)
+"""
+
+
+class Journal:
+    """Finished samples on disk; made by `opened`."""
+
+    def __init__(self, connection: sqlite3.Connection) -> None:
+        self._connection = connection
+        with connection:
+            connection.execute(_TABLE)
+
+    def add(self, measurement: Measurement) -> None:
+        """Keep a sample's result.
+
+        Raises:
+            sqlite3.IntegrityError: If it has one already.
+        """
+        row = (measurement.number, measurement.state, measurement.message, measurement.seconds)
+        with self._connection:
+            self._connection.execute(
+                "insert into samples values (?, ?, ?, ?, ?)", (*row, json.dumps(measurement.values))
+            )
+
+    def forget(self, state: str) -> int:
+        """Remove the samples that ended in a state, and return how many there were."""
+        with self._connection:
+            return self._connection.execute("delete from samples where state = ?", (state,)).rowcount
+
+    def numbers(self) -> set[int]:
+        """Numbers of the samples that have a result."""
+        return {number for (number,) in self._connection.execute("select number from samples")}
+
+    def measurements(self) -> list[Measurement]:
+        """Every result, ordered by the samples' numbers."""
+        rows = self._connection.execute(
+            "select number, state, message, seconds, quantities from samples order by number"
+        )
+        return [
+            Measurement(number, state, message, seconds, json.loads(values))
+            for number, state, message, seconds, values in rows
+        ]
+
+
+@contextmanager
+def opened(file: Path) -> Iterator[Journal]:
+    """The journal in a file, which is made if it does not exist.
+
+    Raises:
+        UserError: If the file is no journal or cannot be written.
+    """
+    _check_rollback(file.with_name(f"{file.name}-journal"))
+    try:
+        with closing(sqlite3.connect(file)) as connection:
+            yield Journal(connection)
+    except sqlite3.DatabaseError as error:
+        raise UserError(
+            f"cannot use {file}: {error}; free some space if the disk is full, else remove the file to run "
+            "every sample again"
+        ) from None
+
+
+def _check_rollback(journal: Path) -> None:
+    """Refuse the rollback journal of a transaction over several files: SQLite removes the file that it names.
+
+    A sweep that is killed leaves one of its own file alone; another one comes from somebody else.
+    """
+    if journal.is_file() and journal.read_bytes().endswith(_NAMES_A_FILE):
+        raise UserError(
+            f"{journal} names another file, which SQLite would remove; no sweep leaves such a one: remove it"
+        )

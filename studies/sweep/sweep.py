@@ -1,0 +1,170 @@
+"""Run a study: every sample once, whatever happens to the workers or to the program."""
+
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from compare.evaluation.deformed_body import ADVICE
+from compare.evaluation.plausibility import LOOKS_LIKE
+from compare.runtime.output_folder import check_links, locked
+from compare.runtime.provenance import package_versions, sources_digest
+from compare.runtime.resumable_folder import check_resumable_folder
+from compare.runtime.stages import Stages
+from geometry.atomic import write_json
+from geometry.errors import UserError
+from geometry.text_files import read_json
+from solvers.solver import Progress, silent
+from studies.sweep.measurement import Measurement
+from studies.sweep.sampling import samples
+from studies.sweep.store import Journal, opened
+from studies.sweep.study import Study, Task, TaskMaker, Value
+from studies.sweep.workers import Workers
+
+STUDY_FILE, JOURNAL = "sweep.json", "journal.sqlite"
+
+FEW = 5
+"""Samples that a remark names."""
+
+POOLS = 50
+"""Most times that the worker processes are started anew, because some of them died while they started."""
+
+
+@dataclass(frozen=True)
+class SweepJob:
+    """A sweep to run, and its output folder.
+
+    Attributes:
+        study: The study.
+        folder: Folder from which paths in the study are meant.
+        out: Output folder; samples that an earlier start finished there are kept.
+        processes: Worker processes on this machine.
+        scheduler: Address of a Dask scheduler whose workers are used instead.
+    """
+
+    study: Study
+    folder: Path
+    out: Path
+    processes: int
+    scheduler: str | None = None
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The finished samples of a study.
+
+    Attributes:
+        study: The study.
+        samples: Values of the varied parameters of every sample.
+        measurements: Results, ordered by the samples' numbers.
+    """
+
+    study: Study
+    samples: list[dict[str, Value]]
+    measurements: list[Measurement]
+
+    @property
+    def good(self) -> list[Measurement]:
+        """The converged results."""
+        return [each for each in self.measurements if each.state == "done"]
+
+    @property
+    def remarks(self) -> list[str]:
+        """Remarks on samples that have a result that no real finger has, or look like another unit."""
+        found = []
+        for fault, advice in (*ADVICE.items(), (LOOKS_LIKE, "check the units of the study")):
+            having = [each.number for each in self.measurements if fault in each.message]
+            if having:
+                few = ", ".join(map(str, having[:FEW])) + (" ..." if having[FEW:] else "")
+                found.append(f"{len(having)} of {len(self.samples)} samples ({few}): {fault}; {advice}")
+        return found
+
+
+def run_sweep(job: SweepJob, stages: Stages | None = None) -> Sweep:
+    """Run every sample of a study that has no result yet, and keep each result at once.
+
+    Samples that failed by an error of the program are tried again; refused ones are not, because the same
+    design is refused again.
+
+    Raises:
+        UserError: If the study cannot be run, or the folder holds another one.
+    """
+    stages = stages or Stages(quiet=True)
+    all_samples = samples(job.study)
+    maker = TaskMaker(job.study, job.folder)
+    tasks = {number: maker.task(number, sample) for number, sample in enumerate(all_samples)}
+    definition = _definition(job, tasks[0].definition)
+    free = {"study.samples"} if job.study.sampling == "sobol" else set()  # which may be continued
+    check_resumable_folder(job.out / STUDY_FILE, definition, job="sweep", free=free)
+    job.out.mkdir(parents=True, exist_ok=True)
+    with locked(job.out), ExitStack() as stack:
+        write_json(job.out / STUDY_FILE, definition)  # first: a folder without it is taken for someone's
+        journal = stack.enter_context(opened(job.out / JOURNAL))
+        journal.forget("failed")
+        with stages.stage("samples") as progress, Workers(job.processes, job.scheduler) as workers:
+            finish(tasks, journal, workers, progress)
+        found = [each for each in journal.measurements() if each.number in tasks]
+        return Sweep(job.study, all_samples, found)
+
+
+def finish(
+    tasks: Mapping[int, Task], journal: Journal, workers: Workers, progress: Progress = silent
+) -> None:
+    """Run the tasks that have no result in the journal, and keep each result at once.
+
+    Args:
+        tasks: By the samples' numbers.
+        journal: Where the results are kept.
+        workers: The processes that do the work.
+        progress: Called with the share that is done and a note.
+
+    Raises:
+        UserError: If the workers die whenever they start.
+    """
+    for _ in range(POOLS):
+        known = journal.numbers() & tasks.keys()
+        missing = {number: task for number, task in tasks.items() if number not in known}
+        if not missing:
+            return
+        for answer in workers.answers(missing):
+            journal.add(answer)
+            known.add(answer.number)
+            progress(len(known) / len(tasks), f"{len(known)} of {len(tasks)} samples")
+        if len(known) < len(tasks):
+            workers.stop()  # some of them died while they started
+    raise UserError(
+        f"worker processes died while they started, {POOLS} times; the same command goes on with the "
+        f"{len(missing)} samples that are left"
+    )
+
+
+def _definition(job: SweepJob, first: dict[str, Any]) -> dict[str, Any]:
+    """The study, and everything else on which its results depend."""
+    modules = ["studies.sweep.quantities", "studies.sweep.measurement", "studies.sweep.sampling"]
+    return {
+        "schema": 1,
+        "study": job.study.model_dump(mode="json", by_alias=True, exclude_none=True),
+        "finger": {name: value for name, value in first.items() if name not in job.study.varied},
+        "versions": package_versions(),
+        "program_sha256": sources_digest([*modules, "geometry", "solvers"]),
+    }
+
+
+def load_sweep(folder: Path) -> Sweep:
+    """The finished samples of a sweep's folder.
+
+    Raises:
+        UserError: If the folder holds no sweep, or one without results.
+    """
+    if not (folder / JOURNAL).is_file():
+        raise UserError(f"{folder} holds no sweep; make one by `pinnray sweep STUDY.toml`")
+    try:
+        study = Study(**read_json(folder / STUDY_FILE, "sweep")["study"])
+    except (KeyError, TypeError):
+        raise UserError(f"{folder / STUDY_FILE} is no description of a sweep") from None
+    check_links(folder)
+    every = samples(study)
+    with opened(folder / JOURNAL) as journal:
+        found = [each for each in journal.measurements() if each.number < len(every)]
+    return Sweep(study, every, found)

@@ -1,0 +1,88 @@
+"""The samples of a sweep as a table: Parquet and CSV, with units in the headings."""
+
+import re
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from compare.runtime.tables import plain
+from geometry.atomic import write_bytes, write_text
+from studies.sweep.quantities import QUANTITIES, heading
+from studies.sweep.study import title
+from studies.sweep.sweep import Sweep
+
+FEW = 5
+"""Numbers of samples that the table of failures lists for a reason."""
+
+
+def table(sweep: Sweep) -> pd.DataFrame:
+    """A row for every finished sample: number, varied parameters, state, quantities, time and message."""
+    rows = []
+    for each in sweep.measurements:
+        row: dict[str, object] = {"sample": each.number}
+        row |= {title(name): value for name, value in sweep.samples[each.number].items()}
+        row |= {"state": each.state}
+        row |= {heading(name): each.values.get(name, float("nan")) for name in QUANTITIES}
+        rows.append(row | {"seconds": each.seconds, "message": each.message})
+    return pd.DataFrame(rows)
+
+
+def write_tables(sweep: Sweep, folder: Path) -> list[Path]:
+    """Write `samples.parquet` and `samples.csv`, and return the paths."""
+    frame = table(sweep)
+    buffer = BytesIO()
+    frame.to_parquet(buffer, engine="pyarrow", index=False)
+    write_bytes(folder / "samples.parquet", buffer.getvalue())
+    write_text(folder / "samples.csv", frame.map(plain).to_csv(index=False, lineterminator="\n"))
+    return [folder / "samples.parquet", folder / "samples.csv"]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A table of texts.
+
+    Attributes:
+        title: Above it.
+        headings: Of the columns.
+        rows: Texts, as many as headings.
+        left: Numbers of the columns that are aligned to the left.
+    """
+
+    title: str
+    headings: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+    left: tuple[int, ...] = (0,)
+
+
+def quantity_grid(sweep: Sweep) -> Grid:
+    """Least, median and largest value of each quantity over the converged samples."""
+    rows = []
+    for name, quantity in QUANTITIES.items():
+        values = np.array([each.values[name] for each in sweep.good])
+        known = values[np.isfinite(values)]
+        ends = np.quantile(known, [0, 0.5, 1]) if len(known) else []
+        numbers = [f"{end:.4g}" for end in ends] or ["–"] * 3
+        rows.append((name, quantity.unit, *numbers, quantity.meaning))
+    headings = ("quantity", "unit", "least", "median", "largest", "meaning")
+    return Grid(f"Quantities of {len(sweep.good)} fingers", headings, rows, (0, 1, 5))
+
+
+def failure_grid(sweep: Sweep) -> Grid:
+    """Samples without a result, and those that did not converge: counts of each reason."""
+    reasons: dict[tuple[str, str], list[int]] = {}
+    for each in sweep.measurements:
+        if each.state != "done":
+            reasons.setdefault((each.state, _kind_of(each.message)), []).append(each.number)
+    rows: list[tuple[str, ...]] = []
+    for (state, reason), numbers in sorted(reasons.items(), key=lambda entry: -len(entry[1])):
+        few = ", ".join(map(str, numbers[:FEW])) + (" ..." if numbers[FEW:] else "")
+        rows.append((state, str(len(numbers)), reason, few))
+    return Grid("Samples without a result", ("state", "samples", "reason", "numbers"), rows, (0, 2, 3))
+
+
+def _kind_of(message: str) -> str:
+    """A message up to its first number or colon, so that like reasons are counted together."""
+    return re.split(r":| -?\d", message, maxsplit=1)[0]

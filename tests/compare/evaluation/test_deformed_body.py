@@ -1,0 +1,163 @@
+"""Bodies that are not finite, turned inside out, or go through themselves."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compare.evaluation.comparison import Comparison
+from compare.evaluation.deformed_body import Body, with_body_checks
+from compare.evaluation.evaluation import Evaluation
+from compare.report.html_report import render
+from compare.report.metrics_json import metrics
+from geometry import MeshSettings, finger_mesh, load_design
+from geometry.arrays import FloatArray
+from geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.cli import main
+
+SELF = "THE BODY GOES THROUGH ITSELF"
+
+
+def rolled(points: FloatArray, turns: float) -> FloatArray:
+    """Displacement of a strip of 12 mm that is bent to a circle's arc of so many turns, shape (n, 2), mm."""
+    x, y = points.T
+    radius = 12 / (2 * np.pi * turns)
+    angle = x / radius
+    return np.stack([(radius - y) * np.sin(angle) - x, radius - (radius - y) * np.cos(angle) - y], axis=1)
+
+
+def moved(
+    evaluation: Evaluation, mesh: TriangleMesh, displacement: Callable[[FloatArray], FloatArray]
+) -> Evaluation:
+    middles = mesh.points[mesh.edges].mean(axis=1)
+    return replace(
+        evaluation, node_displacement=displacement(mesh.points), edge_displacement=displacement(middles)
+    )
+
+
+@pytest.mark.parametrize(
+    ("turns", "through"),
+    [
+        (0.0001, False),  # nearly straight
+        (0.9, False),  # a ring with a gap
+        (1.2, True),  # its end lies in its start
+    ],
+)
+def test_a_strip_rolled_by_more_than_a_turn_goes_through_itself(
+    turns: float, through: bool, mesh: TriangleMesh
+) -> None:
+    assert bool(len(Body(mesh).crossings(rolled(mesh.points, turns)))) is through
+
+
+def test_places_of_crossings_are_where_the_outline_meets(mesh: TriangleMesh) -> None:
+    """A node of the upper face is pushed through the lower one, y = -4: its edges of 0.5 mm cross it."""
+    pushed = np.zeros_like(mesh.points)
+    pushed[np.isclose(mesh.points, [6.0, 0.0]).all(axis=1), 1] = -6.0
+    places = Body(mesh).crossings(pushed)
+    np.testing.assert_allclose(places, [[6 - 0.5 / 3, -4.0], [6 + 0.5 / 3, -4.0]], rtol=1e-12)
+
+
+def test_a_slit_that_is_closed_at_rest_is_no_crossing() -> None:
+    """Two squares whose facing sides lie on each other but share no node but one."""
+    points = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [2, 0], [2, 1], [1, 1]], dtype=float)
+    triangles = np.array([[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 6]])
+    slit = TriangleMesh(
+        points=points,
+        triangles=triangles,
+        boundaries={name: np.array([[3, 0]]) for name in ("base", "front", "contact")},
+        marker_nodes=np.array([0]),
+        contact_node=0,
+    )
+    assert len(Body(slit).crossings(np.zeros_like(points))) == 0
+
+
+@pytest.mark.parametrize(
+    ("law", "converged"),
+    [
+        ("linear", True),  # its equations are those of the body at rest
+        ("neo-hookean", False),  # its energy is infinite there
+    ],
+)
+def test_a_body_inside_out_is_said_and_is_no_result_of_finite_strain(
+    law: str, converged: bool, fem: Evaluation, mesh: TriangleMesh
+) -> None:
+    mirrored = moved(replace(fem, law=law), mesh, lambda points: -2 * points * [0, 1])
+    (checked,), remarks = with_body_checks([mirrored], mesh)
+    assert "TURNED INSIDE OUT in 384 of 384 triangles" in checked.message
+    assert checked.converged is converged
+    assert [remark.partition(";")[0] for remark in remarks] == ["fem: TURNED INSIDE OUT"]
+
+
+def test_one_quarter_of_a_quadratic_triangle_can_be_inside_out(fem: Evaluation, mesh: TriangleMesh) -> None:
+    bent = fem.edge_displacement.copy()
+    inner = np.flatnonzero(
+        np.bincount(mesh.edges.ravel(), minlength=len(mesh.points))[mesh.edges].min(axis=1) >= 6
+    )[0]
+    bent[inner] += [0.0, 0.6]  # the middle of an edge of 0.5 mm
+    assert Body(mesh).inside_out(np.concatenate([fem.node_displacement, bent])).any()
+    assert not Body(mesh).inside_out(np.zeros((len(mesh.points) + len(mesh.edges), 2))).any()
+
+
+@pytest.mark.parametrize("field", ["node_displacement", "edge_displacement", "marker_displacement", "stress"])
+@pytest.mark.parametrize("law", ["linear", "neo-hookean"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_field_that_is_not_finite_is_no_result(
+    field: str, law: str, value: float, fem: Evaluation, mesh: TriangleMesh
+) -> None:
+    broken = getattr(fem, field).copy()
+    broken[-1] = value
+    (checked,), remarks = with_body_checks([replace(fem, law=law, **{field: broken})], mesh)
+    assert not checked.converged
+    assert "not finite everywhere" in checked.message
+    assert len(remarks) == 1
+
+
+def test_a_sound_body_is_left_as_it_is(fem: Evaluation, pinn: Evaluation, mesh: TriangleMesh) -> None:
+    small = moved(fem, mesh, lambda points: 0.01 * points)
+    assert with_body_checks([small], mesh, truth=small) == ([small], [])
+
+
+def test_the_warning_names_all_and_the_simulated_finger(
+    fem: Evaluation, pinn: Evaluation, mesh: TriangleMesh, compared: Callable[..., Comparison]
+) -> None:
+    through = [moved(each, mesh, lambda points: rolled(points, 1.2)) for each in (fem, pinn)]
+    checked, remarks = with_body_checks(through, mesh, truth=through[0])
+    assert [each.converged for each in checked] == [True, True]  # each solved what it was asked
+    assert (
+        len(
+            [
+                remark
+                for remark in remarks
+                if remark.startswith(f"fem, pinn-std, the simulated finger: {SELF}")
+            ]
+        )
+        == 1
+    )
+    comparison = compared(*checked, warnings=remarks)
+    assert metrics(comparison)["warnings"] == remarks
+    page = render(comparison, [], {})
+    assert f"<li>fem, pinn-std, the simulated finger: {SELF};" in page
+    assert (
+        page.index("What speaks against these numbers?")
+        < page.index(SELF)
+        < page.index("What is not converged?")
+    )
+
+
+def test_a_stroke_through_the_back_is_said_everywhere(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], without_pictures: None
+) -> None:
+    design, out = load_design(), tmp_path / "run"
+    markers = finger_mesh(design, settings=MeshSettings(size=2.0)).markers
+    rows = "".join(f"{x},{y},0,0\n" for x, y in markers)
+    (tmp_path / "still.csv").write_text(f"x_mm,y_mm,u_mm,v_mm\n{rows}")
+    options = ["--solvers", "fem", "--mesh-size", "2", "--measurements", str(tmp_path / "still.csv")]
+    assert main(["compare", *options, "--stroke", "60", "--out", str(out)]) == 0
+    assert f"warning: fem: {SELF}" in " ".join(capsys.readouterr().err.split())
+    numbers = json.loads((out / "metrics.json").read_text())
+    assert SELF in numbers["solvers"]["fem"]["message"]
+    assert any(SELF in warning for warning in numbers["warnings"])
+    assert SELF in (out / "report.html").read_text()

@@ -1,0 +1,274 @@
+"""The simulated measurements: what is solved, when, and what is said of it; on the small rectangle."""
+
+import csv
+import json
+import sys
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from compare.evaluation.comparison import Comparison
+from compare.evaluation.truths import TRUTHS
+from compare.evaluation.virtual_experiment import UnfinishedExperimentError, virtual_experiment
+from compare.pipeline.job import Job
+from compare.pipeline.pipeline import run
+from compare.runtime.stages import Stages
+from geometry.cache import finger_mesh
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
+from solvers.problem import Load, Material, Problem
+from solvers.registry import make_solver
+from solvers.solution import Solution, Status
+from tests.meshes import permuted
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache of this test's own."""
+    monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def solutions(cache: Path, monkeypatch: pytest.MonkeyPatch) -> list[Solution]:
+    """What the finite-strain solver has returned so far."""
+    returned: list[Solution] = []
+    solve = FemNonlinearSolver.solve
+
+    def watched(self: FemNonlinearSolver, *arguments: object) -> Solution:
+        returned.append(solve(self, *arguments))
+        return returned[-1]
+
+    monkeypatch.setattr(FemNonlinearSolver, "solve", watched)
+    return returned
+
+
+@pytest.fixture
+def problem(mesh: TriangleMesh) -> Problem:
+    return Problem(mesh, load=Load(displacement=(0.0, -0.5)))
+
+
+def test_a_cache_that_cannot_be_written_is_a_warning(problem, cache):
+    cache.touch()  # a file, not a folder
+    with pytest.warns(RuntimeWarning, match=r"cache \(File exists\), so that the virtual experiment is rep"):
+        observations, _ = virtual_experiment(problem, 0.8)
+    assert observations.visible.all()
+
+
+def test_a_sliding_patch_presses_on_a_neo_hookean_finger(problem, solutions):
+    virtual_experiment(problem, 0.8)
+    (solution,) = solutions
+    solved = solution.problem
+    assert (solved.load.kind, solved.load.displacement) == ("patch", (None, -0.5))
+    assert (solved.material.law, solved.material.plane) == ("neo-hookean", "strain")
+    assert (solved.material.young, solved.material.poisson) == (11.4, 0.45)
+    contact = problem.mesh.points[np.unique(problem.mesh.boundary("contact"))]
+    u, v = solution.displacement(contact).T
+    np.testing.assert_allclose(v, -0.5, atol=1e-12)
+    assert abs(u).max() > 1e-3  # it slides
+    assert abs(solution.reaction[0]) < 1e-8 * abs(solution.reaction[1])  # without friction
+
+
+def test_the_markers_of_the_mesh_are_observed_and_said_to_be_simulated(problem, solutions):
+    observations, _ = virtual_experiment(problem, 0.8)
+    markers = problem.mesh.markers
+    np.testing.assert_array_equal(observations.points, markers)
+    np.testing.assert_array_equal(observations.displacements, solutions[0].displacement(markers))
+    assert observations.marker_radius == 0.8
+    assert observations.visible.all()
+    assert not observations.standard_deviations.any()
+    assert observations.simulated
+    assert observations.source.startswith("simulated by fem-nonlinear")
+    assert "no camera" in observations.source
+    assert f"pressed in by {-problem.load.displacement[1]:.4g} mm" in observations.source
+
+
+def test_the_second_time_it_is_read_from_the_cache(problem, solutions):
+    first, _ = virtual_experiment(problem, 0.8)
+    notes: list[str] = []
+    second, _ = virtual_experiment(problem, 0.8, lambda _, note: notes.append(note))
+    assert (len(solutions), notes) == (1, ["from the cache"])
+    np.testing.assert_array_equal(second.displacements, first.displacements)
+    assert (second.source, second.simulated) == (first.source, first.simulated)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"load": Load(displacement=(0.0, -0.4))},
+        {"material": Material(young=5.0)},
+        {"material": Material(poisson=0.3)},
+    ],
+    ids=["stroke", "young", "poisson"],
+)
+def test_another_problem_is_simulated_again(problem, solutions, changes):
+    virtual_experiment(problem, 0.8)
+    virtual_experiment(replace(problem, **changes), 0.8)
+    assert len(solutions) == 2
+
+
+def test_another_mesh_is_simulated_again(problem, solutions):
+    virtual_experiment(problem, 0.8)
+    virtual_experiment(replace(problem, mesh=permuted(problem.mesh, 1)), 0.8)
+    assert len(solutions) == 2
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"load": Load(kind="point", displacement=(0.0, -0.5))},
+        {"load": Load(displacement=(None, -0.5))},
+        {"material": Material(plane="stress")},
+    ],
+    ids=["load", "free u", "plane"],
+)
+def test_what_has_no_part_in_the_experiment_does_not_repeat_it(problem, solutions, changes):
+    virtual_experiment(problem, 0.8)
+    virtual_experiment(replace(problem, **changes), 0.8)
+    assert len(solutions) == 1
+
+
+def test_another_version_of_a_package_or_of_our_sources_is_simulated_again(problem, solutions, monkeypatch):
+    virtual_experiment(problem, 0.8)
+    monkeypatch.setattr("compare.evaluation.virtual_experiment.package_versions", lambda: {"numpy": "9"})
+    virtual_experiment(problem, 0.8)
+    monkeypatch.setattr("compare.evaluation.virtual_experiment.sources_digest", lambda _: "other")
+    virtual_experiment(problem, 0.8)
+    assert len(solutions) == 3
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"\xff\x00"])
+def test_a_damaged_file_in_the_cache_is_made_again(problem, solutions, cache, content):
+    virtual_experiment(problem, 0.8)
+    (entry,) = cache.iterdir()
+    entry.write_bytes(content)
+    with pytest.warns(RuntimeWarning, match="is damaged .* and is made again"):
+        virtual_experiment(problem, 0.8)
+    assert len(solutions) == 2
+    assert virtual_experiment(problem, 0.8)[0].simulated
+    assert len(solutions) == 2
+
+
+def test_the_truth_is_the_simulated_field_on_the_mesh(problem, solutions):
+    """Also when it comes from the cache."""
+    for _ in range(2):
+        observations, truth = virtual_experiment(problem, 0.8)
+        np.testing.assert_array_equal(truth.node_displacement, solutions[0].displacement(problem.mesh.points))
+        np.testing.assert_array_equal(truth.marker_displacement, observations.displacements)
+        assert truth.law == "neo-hookean"
+    assert len(solutions) == 1
+
+
+def test_an_experiment_that_stops_halfway_is_refused_and_not_kept(problem, cache, monkeypatch):
+    solve = FemNonlinearSolver.solve
+
+    def stops(self: FemNonlinearSolver, *arguments: object) -> Solution:
+        return replace(solve(self, *arguments), status=Status(False, "stopped at 50% of the load"))
+
+    monkeypatch.setattr(FemNonlinearSolver, "solve", stops)
+    with pytest.raises(UserError, match=r"experiment stopped at 50% of the load; or give --measurements"):
+        virtual_experiment(problem, 0.8)
+    assert not cache.exists()
+
+
+def test_another_truth_has_its_law_and_load(problem, solutions):
+    observations, _ = virtual_experiment(problem, 0.8, truth=TRUTHS["gent"])
+    assert solutions[0].problem.material.law == "gent"
+    assert "Gent, which stiffens" in observations.source
+    virtual_experiment(problem, 0.8)
+    assert len(solutions) == 2  # the cache tells them apart
+
+
+def test_a_truth_in_three_dimensions_is_that_of_the_side_face(problem, cache, monkeypatch):
+    """It is sampled on the shared mesh, and differs from plane strain as the depth makes it differ."""
+    monkeypatch.setattr("compare.evaluation.virtual_experiment.SOLID_SIZE", 2.5)
+    design = Design(height=40, rib_count=0, tip_length=12, contact_position=18)
+    short = finger_mesh(design, settings=MeshSettings(size=2.0))
+    known = Problem(short, load=Load(displacement=(0.0, -0.5)), finger=design)
+    plane, _ = virtual_experiment(known, 0.8)
+    seen, truth = virtual_experiment(known, 0.8, truth=TRUTHS["3d"])
+    assert truth.solid
+    assert truth.solver == "fem-3d"
+    assert "fem-3d" in seen.source
+    assert truth.von_mises.shape == truth.weights.shape
+    apart = np.abs(seen.displacements - plane.displacements).max()
+    assert 1e-4 < apart < 0.1 * np.abs(plane.displacements).max()
+
+
+def test_truths_that_the_problem_cannot_have_are_refused(problem, solutions):
+    with pytest.raises(UserError, match=r"--truth print: its walls are not those of the drawing"):
+        virtual_experiment(problem, 0.8, truth=TRUTHS["print"])
+    with pytest.raises(UserError, match=r"--truth 3d: the problem has to know its finger"):
+        virtual_experiment(problem, 0.8, truth=TRUTHS["3d"])
+    assert not solutions
+
+
+def test_without_a_prescribed_v_there_is_no_experiment(problem, solutions):
+    with pytest.raises(UserError, match="prescribe v; or give --measurements"):
+        virtual_experiment(replace(problem, load=Load(displacement=(1.0, None))), 0.8)
+    assert not solutions
+
+
+def test_a_load_that_is_not_on_the_meshs_contact_is_refused(problem, solutions):
+    with pytest.raises(UserError, match="presses where the mesh has its contact"):
+        virtual_experiment(replace(problem, load=Load(position=5.0)), 0.8)
+    assert not solutions
+
+
+def test_without_the_finite_element_library_measurements_are_asked_for(problem, cache, monkeypatch):
+    monkeypatch.setitem(sys.modules, "solvers.fem.finite_strain.solver", None)
+    with pytest.raises(UserError, match=r"'fem-nonlinear' cannot be loaded: .*; or give measurements"):
+        virtual_experiment(problem, 0.8)
+
+
+@pytest.fixture
+def unfinished(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A virtual experiment that stops before its full load."""
+
+    def stops(*_: object) -> None:
+        raise UnfinishedExperimentError("the virtual experiment stopped at 67.5% of the load")
+
+    monkeypatch.setattr("compare.pipeline.pipeline.virtual_experiment", stops)
+
+
+def _compared(out: Path, *names: str, spare: tuple[str, ...] = ()) -> Comparison:
+    job = Job(Design(), [make_solver(name) for name in names], spare, MeshSettings(size=1.0), out=out)
+    with Stages(Console(file=StringIO()), quiet=True) as stages:
+        return run(job, stages)
+
+
+def test_a_comparison_goes_on_without_a_truth(tmp_path: Path, unfinished: None) -> None:
+    comparison = _compared(tmp_path / "run", "fem", "fem-asm", spare=("fem-asm",))
+    assert [each.solver for each in comparison.evaluations] == ["fem"]
+    assert comparison.truth is None
+    assert not comparison.observations.known
+    assert comparison.remarks == [
+        "left out: fem-asm (no markers to assimilate)",
+        "no truth: the virtual experiment stopped at 67.5% of the load",
+    ]
+    page = (tmp_path / "run" / "report.html").read_text()
+    assert "No marker displacement is known" in page
+    assert "Errors at the markers" not in page
+    assert not (tmp_path / "run" / "figures" / "markers.png").exists()
+    assert (tmp_path / "run" / "figures" / "overlay.png").exists()
+    solver = json.loads((tmp_path / "run" / "metrics.json").read_text())["solvers"]["fem"]
+    assert solver["held_out"] is None
+    assert solver["markers"]["mae_sum"] is None
+    [row] = csv.DictReader((tmp_path / "run" / "summary.csv").open())
+    assert row["mae_sum_mm"] == row["held_out_mae_sum_mm"] == ""
+    assert float(row["energy_N_mm_per_mm"]) > 0
+
+
+def test_without_a_truth_a_chosen_solver_that_needs_markers_is_refused(
+    tmp_path: Path, unfinished: None
+) -> None:
+    with pytest.raises(UserError, match=r"stopped at 67\.5% of the load"):
+        _compared(tmp_path / "run", "fem", "fem-asm")
+    assert not (tmp_path / "run").exists()

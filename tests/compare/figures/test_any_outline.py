@@ -1,0 +1,139 @@
+"""Pictures and report of bodies that are no wedge: a ring is square, a beam thin, a foot has two soles."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
+
+from compare.evaluation.comparison import Comparison
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.metrics import evaluated
+from compare.figures.gallery import draw
+from compare.report.html_report import render
+from geometry.finger.finger import Finger
+from geometry.finger.presets import load_design
+from geometry.mesh.mesher import build_mesh
+from geometry.mesh.settings import MeshSettings
+from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.observations import Observations
+from solvers.problem import Problem
+from solvers.solution import Solution, Status
+from tests.compare.conftest import BendingField
+from tests.compare.figures.drawn_pages import Page, page_of
+from tests.fingers import beam, ring
+
+FINGERS: dict[str, Finger] = {"ring": ring(), "beam": beam(), "csiro": load_design("csiro")}
+
+
+def compared(finger: Finger) -> Comparison:
+    """Two solvers with a known field, on a coarse mesh."""
+    mesh = build_mesh(finger, MeshSettings(size=2.0))
+    evaluations = [_evaluation(mesh, name, scale) for name, scale in (("fem", 0.02), ("pinn-std", 0.021))]
+    observations = Observations(
+        points=mesh.markers,
+        displacements=evaluations[0].marker_displacement + 0.1,
+        standard_deviations=np.zeros_like(mesh.markers),
+        visible=np.ones(len(mesh.markers), dtype=bool),
+        source="simulated by another solver",
+        simulated=True,
+        marker_radius=0.8,
+    )
+    return Comparison(finger, mesh, observations, evaluations, evaluations[0])
+
+
+def _evaluation(mesh: TriangleMesh, name: str, scale: float) -> Evaluation:
+    solution = Solution(
+        solver=name,
+        problem=Problem(mesh),
+        field=BendingField(scale),
+        energy=scale**2,
+        reaction=np.array([0.0, -scale]),
+        status=Status(True, "a closed form"),
+        stats={"seconds": 1.0},
+    )
+    return evaluated(solution, mesh)
+
+
+@pytest.fixture(scope="module", params=FINGERS)
+def comparison(request: pytest.FixtureRequest) -> Comparison:
+    return compared(FINGERS[request.param])
+
+
+def pages(comparison: Comparison) -> dict[str, Page]:
+    names = ("overlay", "von_mises", "strain_xx", "mesh", "design", "marker_errors")
+    return {name: page_of(draw(comparison, name).figure) for name in names}
+
+
+def test_no_type_runs_into_other_type_or_leaves_the_page(comparison: Comparison) -> None:
+    for name, page in pages(comparison).items():
+        assert (name, page.cut_off(), page.overlaps()) == (name, [], [])
+        assert page.figure.get_figheight() < 11
+
+
+def test_notes_and_scale_bars_do_not_lie_on_the_body(comparison: Comparison) -> None:
+    """Neither undeformed nor, in the overlay, deformed."""
+    deformed = [comparison.mesh.points + each.node_displacement for each in comparison.evaluations]
+    for name in ("overlay", "von_mises", "mesh"):
+        page = page_of(draw(comparison, name).figure)
+        notes = [
+            (axes, text)
+            for axes in page.figure.axes
+            for text in axes.texts
+            if text.get_text().startswith(("MAE", "largest", "rel.")) or text.get_text().endswith(" mm")
+        ]
+        assert notes
+        for axes, text in notes:
+            box = text.get_window_extent()
+            for cloud in [comparison.mesh.points, *(deformed if name == "overlay" else [])]:
+                corners = axes.transData.transform(cloud)
+                assert (name, text.get_text(), [box.contains(*corner) for corner in corners].count(True)) == (
+                    name,
+                    text.get_text(),
+                    0,
+                )
+
+
+def test_the_base_is_hatched_along_each_of_its_parts(comparison: Comparison) -> None:
+    """Hatches start on a clamped piece of the section and lead out of the body."""
+    (axes, *_) = draw(comparison, "mesh").figure.axes
+    hatches = [
+        np.array(lines.get_segments())
+        for lines in axes.collections
+        if isinstance(lines, LineCollection) and lines.get_zorder() == 0.5
+    ]
+    section = comparison.design.section
+    pieces = [loop.along(which, np.linspace(0, 1, 401)) for loop, which in section.named("base")]
+    assert len(hatches) == len(pieces)
+    for strokes in hatches:
+        away = [np.linalg.norm(strokes[:, :1] - piece, axis=2).min(axis=1).max() for piece in pieces]
+        assert min(away) < 0.3
+        assert section.clearance(strokes[:, 1]).max() < 0
+
+
+def test_the_report_of_a_finger_without_parameters_has_its_facts_and_no_symbols() -> None:
+    text = render(compared(ring()), [], {})
+    assert "60 mm by 60 mm" in text
+    assert "1 cavity" in text
+    assert ring().section.digest in text
+    assert "<sub>tip</sub>" not in text
+    assert 'class="tight"' not in text
+    assert "The base is clamped (31.42 mm)" in text
+
+
+def test_the_report_of_a_finger_with_parameters_has_the_symbols_of_the_paper() -> None:
+    text = render(compared(load_design("csiro")), [], {})
+    assert "<sub>tip</sub>" in text
+    assert "in 2 pieces" in text
+
+
+def test_a_cylinder_stands_on_a_curved_front() -> None:
+    """Its motion starts on the ring, not on y = 0."""
+    found = compared(ring())
+    aside = replace(
+        found, load=found.load.model_copy(update={"kind": "cylinder", "radius": 5.0, "position": 35.0})
+    )
+    axes, *_ = draw(aside, "overlay").figure.axes
+    starts = [text.xyann for text in axes.texts if not text.get_text()]
+    height = float(ring().section.front_point(35.0)[1])
+    assert min(abs(y - height) for _, y in starts) < 0.05

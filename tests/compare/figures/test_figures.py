@@ -1,0 +1,301 @@
+"""Pictures as a whole: their files, their colours, and type that neither overlaps nor leaves the page."""
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from PIL import Image
+
+from compare.evaluation.comparison import Comparison
+from compare.evaluation.convergence import with_certificates
+from compare.evaluation.evaluation import Evaluation
+from compare.evaluation.metrics import held_out_errors, marker_errors
+from compare.figures import FORMATS, draw_all
+from compare.figures.fields import QUANTITIES, draw_field
+from compare.figures.gallery import DRAWINGS, Drawing, draw
+from compare.figures.overlay import overlay_extent
+from geometry.errors import UserError
+from geometry.figure import DPI, NOTEBOOK_DPI, WIDTH
+from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.observations import Observations
+from solvers.problem import Problem
+from tests.compare.figures.drawn_pages import Page, page_of
+
+
+def certificate_of(evaluation: Evaluation, mesh: TriangleMesh) -> Evaluation:
+    """The evaluation with its certificate, but not with the verdict."""
+    (judged,) = with_certificates([evaluation], Problem(mesh))
+    return replace(evaluation, certificate=judged.certificate)
+
+
+@pytest.fixture(scope="module")
+def comparison(
+    mesh: TriangleMesh,
+    fem: Evaluation,
+    pinn: Evaluation,
+    failed: Evaluation,
+    observe: Callable[..., Observations],
+    compared: Callable[..., Comparison],
+) -> Comparison:
+    """Three solvers, of which one followed the load and failed, with one marker not seen."""
+    steps = np.array([0.0, 0.2, 0.6])
+    record = {"load_fraction": steps, "energy": steps**2, "reaction_x": 0 * steps, "reaction_y": -(steps**2)}
+    followed = replace(certificate_of(failed, mesh), history=record)
+    observations = observe(fem.marker_displacement, hidden=(1,))
+    return compared(fem, certificate_of(pinn, mesh), followed, observations=observations)
+
+
+@pytest.fixture(scope="module")
+def drawings(comparison: Comparison) -> dict[str, Drawing]:
+    """All pictures of the comparison; no network of it has losses to draw."""
+    drawings = {name: draw(comparison) for name, (_, draw) in DRAWINGS.items()}
+    return {name: drawing for name, drawing in drawings.items() if drawing is not None}
+
+
+@pytest.fixture(scope="module")
+def pages(drawings: dict[str, Drawing]) -> dict[str, Page]:
+    return {name: page_of(drawing.figure) for name, drawing in drawings.items()}
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_every_picture_is_written_for_print_too(comparison, drawings, tmp_path, kind, monkeypatch) -> None:
+    """In letters, not in pixels; and the same file every time."""
+    chosen = {"marker_errors": DRAWINGS["marker_errors"], "mesh": DRAWINGS["mesh"]}
+    monkeypatch.setattr("compare.figures.gallery.DRAWINGS", chosen)
+    first, second = (
+        [path.read_bytes() for path in sorted(folder.glob(f"*.{kind}"))]
+        for folder in (tmp_path / "first", tmp_path / "second")
+        if draw_all(folder, comparison, formats=[kind])
+    )
+    assert len(first) == 2
+    assert first == second
+    assert all((b"/FontFile2" if kind == "pdf" else b"<path") in content for content in first)
+
+
+def test_every_picture_is_told_in_numbers_to_those_who_cannot_see_it(drawings, comparison) -> None:
+    for name, drawing in drawings.items():
+        assert re.search(r"\d", drawing.alt), name
+        if name in ("overlay", "marker_errors", "energy", *FIELDS):
+            assert all(f"{each.label} " in drawing.alt for each in comparison.evaluations), name
+    largest = np.hypot(*comparison.evaluations[0].node_displacement.T).max()
+    assert drawings["overlay"].alt.startswith(f"Largest displacement, mm: fem {largest:.3g}, ")
+
+
+FIELDS = tuple(quantity.name for quantity in QUANTITIES)
+ALL = ("overlay", "marker_errors", *FIELDS, "force_displacement", "excess", "energy", "design", "mesh")
+
+
+def test_every_picture_is_written_in_the_order_of_the_report(
+    comparison: Comparison, drawings: dict[str, Drawing], tmp_path: Path
+) -> None:
+    """Each is as wide as a page, and not blank; progress goes from none to all."""
+    said: list[float] = []
+    pictures = draw_all(tmp_path, comparison, lambda done, _: said.append(done))
+    assert [picture.path.stem for picture in pictures] == list(ALL) == list(drawings)
+    assert [picture.caption for picture in pictures] == [each.caption for each in drawings.values()]
+    assert said == sorted(said)
+    assert (said[0], said[-1], len(said)) == (0.0, 1.0, len(DRAWINGS) + 1)
+    for picture in pictures:
+        with Image.open(picture.path) as image:
+            assert image.width == round(WIDTH * DPI)
+            low, high = image.convert("L").getextrema()
+        assert (picture.path.stem, low < 60, high) == (picture.path.stem, True, 255)
+
+
+def test_a_picture_shows_itself_in_a_notebook(drawings: dict[str, Drawing]) -> None:
+    with Image.open(BytesIO(drawings["energy"].figure._repr_png_())) as image:
+        assert (image.format, image.width) == ("PNG", round(WIDTH * NOTEBOOK_DPI))
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("stress", "there is no picture 'stress'; there are overlay, marker_errors, von_mises"),
+        ("losses", "losses: no solver of this comparison has data for the chart of the losses"),
+    ],
+)
+def test_a_picture_that_there_is_not(comparison: Comparison, name: str, message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        draw(comparison, name)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_no_text_leaves_the_page_or_runs_into_another(
+    name: str, drawings: dict[str, Drawing], pages: dict[str, Page]
+) -> None:
+    assert drawings[name].caption.endswith(".")
+    assert pages[name].cut_off() == []
+    assert pages[name].overlaps() == []
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_type_is_readable_in_a_column(name: str, pages: dict[str, Page]) -> None:
+    """In 3.4 inches no letter is below 5 points, the least that journals print."""
+    assert pages[name].smallest * 3.4 / WIDTH >= 5.0
+
+
+@pytest.mark.slow
+def test_eight_solvers_find_room_too(
+    mesh: TriangleMesh,
+    fem: Evaluation,
+    pinn: Evaluation,
+    failed: Evaluation,
+    compared: Callable[..., Comparison],
+) -> None:
+    pinn, failed = (certificate_of(evaluation, mesh) for evaluation in (pinn, failed))
+    more = [replace(pinn, solver=f"pinn-{name}", converged=name != "asm") for name in ("local", "asm", "x")]
+    told = replace(pinn, in_sample=True, left_out=pinn.marker_displacement + 0.5)
+    more += [replace(told, solver="gp"), replace(told, solver="statfem", converged=False)]
+    eight = compared(fem, pinn, failed, *more)
+    for name in ("overlay", "marker_errors", "von_mises", "excess", "energy"):
+        page = page_of(draw(eight, name).figure)
+        assert (name, page.cut_off(), page.overlaps()) == (name, [], [])
+
+
+@pytest.mark.parametrize("name", ["overlay", "marker_errors", *FIELDS, "excess"])
+def test_a_solver_that_failed_is_marked(name: str, pages: dict[str, Page]) -> None:
+    assert "fem-nonlinear (not converged)" in pages[name].text
+
+
+@pytest.mark.parametrize("name", ["overlay", "marker_errors"])
+def test_a_solver_that_was_given_the_markers_is_marked_at_them(
+    name: str, fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
+) -> None:
+    drawing = draw(compared(fem, replace(pinn, in_sample=True)), name)
+    assert "pinn-std †" in page_of(drawing.figure).text
+    assert "† was given these markers" in drawing.caption
+
+
+def test_pictures_say_which_errors_are_held_out_and_which_are_of_training(
+    fem: Evaluation, pinn: Evaluation, observations: Observations, compared: Callable[..., Comparison]
+) -> None:
+    told = replace(pinn, in_sample=True, left_out=pinn.marker_displacement + 0.5)
+    untold = replace(told, solver="pinn-x", left_out=None)
+    errors = held_out_errors(told, observations), marker_errors(told, observations)
+    comparison = compared(fem, told, untold)
+    overlay, bars = (page_of(draw(comparison, name).figure) for name in ("overlay", "marker_errors"))
+    for kind, found in zip(("held out", "training"), errors, strict=True):
+        assert found is not None
+        assert f"MAE {kind}: u {found.mae_u:.3f}, v {found.mae_v:.3f} mm" in overlay.text
+        assert f"{found.mae_u:.3f} {kind}" in bars.text
+    assert "† was given these markers" in overlay.text
+    assert "mean, mm" in bars.text
+    assert "training: it was given this marker (†)" in bars.text
+    assert (overlay.cut_off(), overlay.overlaps(), bars.cut_off(), bars.overlaps()) == ([], [], [], [])
+
+
+def test_a_circle_shows_a_training_error_that_vanishes(
+    fem: Evaluation, pinn: Evaluation, observations: Observations, compared: Callable[..., Comparison]
+) -> None:
+    met = replace(pinn, in_sample=True, marker_displacement=observations.displacements.copy())
+    figure = draw(compared(fem, met), "marker_errors").figure
+    (circles,) = figure.axes[2].lines
+    assert circles.get_marker() == "o"
+    np.testing.assert_array_equal(circles.get_ydata(), 0.0)
+
+
+def test_a_difference_has_its_scale_beside_its_name(pages: dict[str, Page]) -> None:
+    assert re.search(r"minus fem, ±[\d.e-]+ MPa", pages["von_mises"].text)
+
+
+@pytest.mark.parametrize("name", ["overlay", "marker_errors"])
+def test_simulated_markers_are_called_simulated(
+    name: str, drawings: dict[str, Drawing], pages: dict[str, Page]
+) -> None:
+    assert "simulated" in pages[name].text
+    assert "simulated by another solver" in drawings[name].caption
+
+
+def test_a_marker_that_was_not_seen_has_no_bar(pages: dict[str, Page]) -> None:
+    for axes in pages["marker_errors"].figure.axes:
+        middles = {round(bar.get_x() + bar.get_width() / 2) for bar in axes.patches}
+        assert middles == {1, 3}
+    assert pages["marker_errors"].text.count("×") == 6
+
+
+def area_of(colour: tuple[int, ...], path: Path) -> float:
+    """Share of the picture that is within two units of a colour."""
+    with Image.open(path) as image:
+        pixels = np.asarray(image.convert("RGB"), dtype=int)
+    return float((np.abs(pixels - colour).max(axis=2) <= 2).mean())
+
+
+def test_a_field_of_half_the_size_has_the_colour_of_half_the_scale(
+    fem: Evaluation, compared: Callable[..., Comparison], tmp_path: Path
+) -> None:
+    whole = replace(fem, von_mises=np.full(len(fem.weights), 2.0))
+    half = replace(fem, solver="half", von_mises=np.full(len(fem.weights), 1.0))
+    path = draw(compared(whole, half), "von_mises").figure.save(tmp_path / "field.png")
+    viridis = mpl.colormaps["viridis"]
+    full, middle = (viridis(share, bytes=True)[:3] for share in (1.0, 0.5))
+    assert area_of(full, path) > 0.1
+    assert area_of(middle, path) == pytest.approx(area_of(full, path), rel=0.1)
+
+
+def test_the_overlay_shows_the_whole_of_every_solution_that_converged(
+    mesh: TriangleMesh, pinn: Evaluation, failed: Evaluation, compared: Callable[..., Comparison]
+) -> None:
+    extent = overlay_extent(compared(pinn, failed), 5.0)
+    lowest = (mesh.points + pinn.node_displacement)[:, 1].min()
+    assert extent.bottom < lowest
+    assert extent.bottom > (mesh.points + failed.node_displacement)[:, 1].min()
+    assert extent.top > 0
+
+
+def test_the_reference_energy_is_a_line(pages: dict[str, Page]) -> None:
+    energies, distances, *_ = pages["energy"].figure.axes
+    assert [2.0, 2.0] in [list(line.get_ydata()) for line in energies.get_lines()]
+    np.testing.assert_allclose(distances.get_lines()[0].get_ydata(), [4400.0, 100.0, 21.0])
+
+
+def test_no_remark_on_a_field_lies_on_a_slender_finger(
+    fem: Evaluation, pinn: Evaluation, mesh: TriangleMesh, compared: Callable[..., Comparison]
+) -> None:
+    x, y = mesh.points.T
+    length, width = float(np.ptp(x)), float(np.ptp(y))
+    points = np.column_stack([x, y * (1.01 - x / length) * 28 / 120 * length / width])
+    finger = replace(mesh, points=points)
+    for quantity in QUANTITIES:
+        page = page_of(draw_field(compared(fem, pinn, mesh=finger), quantity))
+        for axes in page.figure.axes:
+            corners = axes.transData.transform(points)
+            for text in axes.texts:
+                if text.get_text().startswith(("largest", "rel.")):
+                    box = text.get_window_extent()
+                    covered = [corner for corner in corners if box.contains(*corner)]
+                    assert (quantity.name, text.get_text(), covered) == (quantity.name, text.get_text(), [])
+        assert (quantity.name, page.cut_off(), page.overlaps()) == (quantity.name, [], [])
+
+
+def test_the_number_beside_a_field_is_its_largest_mean_of_a_triangle(
+    fem: Evaluation, compared: Callable[..., Comparison]
+) -> None:
+    peak = replace(fem, von_mises=np.zeros(len(fem.weights)))
+    peak.von_mises[0] = 3.0  # at one of a triangle's three points, which have equal weights
+    assert "largest 1 MPa" in page_of(draw(compared(peak), "von_mises").figure).text
+
+
+def test_ticks_of_six_characters_leave_room_for_the_labels(
+    fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
+) -> None:
+    history = {"units": np.array([3200.0, 8000.0]), "energy": np.array([1.1015, 1.0881])}
+    followed = {"load_fraction": np.array([0.0, 1.0]), "reaction_x": np.zeros(2), "reaction_y": [0, -0.0021]}
+    near = replace(fem, energy=1.0924)
+    assert page_of(draw(compared(near, replace(pinn, history=history)), "energy").figure).cut_off() == []
+    follower = replace(pinn, history=followed, reaction=np.array([0.0, -0.0021]))
+    assert page_of(draw(compared(follower), "force_displacement").figure).cut_off() == []
+
+
+def test_the_field_of_the_truth_is_drawn_where_it_is_known(
+    fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
+) -> None:
+    with_truth, without = (
+        page_of(draw(compared(fem, **known), "von_mises").figure).text for known in ({"truth": pinn}, {})
+    )
+    assert "truth" in with_truth
+    assert "truth" not in without

@@ -1,0 +1,71 @@
+"""The picture of the deformed finger."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle
+
+from compare.evaluation.comparison import Comparison
+from compare.evaluation.evaluation import Evaluation
+from compare.figures.overlay import draw_overlay
+from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.observations import Observations
+from solvers.problem import Load, Problem
+from solvers.solution import Solution, Status
+from tests.compare.conftest import BendingField
+from tests.compare.figures.drawn_pages import page_of
+
+
+def test_crosses_are_at_the_observed_points_even_if_they_are_not_the_meshs_markers(
+    mesh: TriangleMesh, compared: Callable[..., Comparison], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    points = np.array([[2.3, -1.1], [7.7, -3.2]])
+    solution = Solution(
+        solver="bent",
+        problem=Problem(mesh),
+        field=BendingField(1.0),
+        energy=1.0,
+        reaction=np.zeros(2),
+        status=Status(True, "a closed form"),
+        stats={},
+    )
+    observations = Observations(
+        points=points,
+        displacements=np.zeros((2, 2)),
+        standard_deviations=np.zeros((2, 2)),
+        visible=np.ones(2, dtype=bool),
+        source="a test",
+        simulated=True,
+        marker_radius=0.8,
+    )
+    crosses = []
+    plot = Axes.plot
+
+    def watched(axes: Axes, *arguments: object, **options: object) -> object:
+        if isinstance(arguments[-1], str) and arguments[-1] == "x":
+            crosses.append(np.column_stack(arguments[:2]))
+        return plot(axes, *arguments, **options)
+
+    monkeypatch.setattr(Axes, "plot", watched)
+    evaluation = Evaluation.of(solution, mesh, points)
+    page_of(draw_overlay(compared(evaluation, observations=observations)))
+    x, y = points.T
+    expected = points + np.stack([0.01 * y**2, -0.02 * x**2], axis=1)
+    assert len(crosses) > 0
+    for drawn in crosses:
+        np.testing.assert_allclose(drawn, expected, rtol=1e-12)
+
+
+def test_a_cylinder_is_drawn_where_it_ends(
+    mesh: TriangleMesh, fem: Evaluation, compared: Callable[..., Comparison]
+) -> None:
+    load = Load(kind="cylinder", displacement=(1.0, -3.0), radius=2.0)
+    page = page_of(draw_overlay(compared(fem, load=load)))
+    (circle,) = [patch for patch in page.figure.axes[0].patches if isinstance(patch, Circle)]
+    contact = mesh.points[mesh.boundary("contact").ravel(), 0]
+    middle = (contact.min() + contact.max()) / 2
+    np.testing.assert_allclose(circle.center, (middle + 1.0, -1.0), atol=1e-12)
+    assert circle.radius == 2.0
+    assert "cylinder’s motion" in page.text

@@ -1,0 +1,187 @@
+"""The paper's networks in the main job and the search: killed or interrupted, they go on to the same bits."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from compare.pipeline.job import Job
+from compare.pipeline.pipeline import run
+from compare.runtime.exits import NOT_CONVERGED
+from compare.runtime.stages import Stages
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.fem.linear import FemSolver
+from solvers.problem import Load, Material, Problem
+from solvers.registry import make_solver
+from solvers.solver import Progress, silent
+from studies.gridsearch.training_run import GridPoint, ReferenceSolution, TrainingRun, TrainingTask, train
+from tests.pinnray.commands.programs import WITHOUT_PICTURES
+
+ROOT = Path(__file__).parents[3]
+COARSE = MeshSettings(size=1.0)
+TINY = {"preset": "paper", "width": 4, "layers": 1, "base_points": 5, "checkpoint_every": 5, "threads": 1}
+
+
+class Interrupting(Stages):
+    """Stages that are interrupted when one of them is halfway, as by Ctrl-C."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(Console(file=StringIO()), quiet=True)
+        self._name = name
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[Progress]:
+        with super().stage(name) as report:
+
+            def interrupted(fraction: float, note: str) -> None:
+                report(fraction, note)
+                if name == self._name and 0.5 <= fraction < 1:
+                    raise KeyboardInterrupt
+
+            yield interrupted
+
+
+def quiet() -> Stages:
+    return Stages(Console(file=StringIO()), quiet=True)
+
+
+@pytest.fixture
+def job(tmp_path: Path, without_pictures: None) -> Job:
+    measured = tmp_path / "measured.csv"
+    measured.write_text("x_mm,y_mm,u_mm,v_mm\n20,-1,-0.5,-5\n")
+    solvers = [make_solver("pinn-std", **TINY, epochs=13)]
+    return Job(Design(), solvers, mesh=COARSE, measurements=measured, out=tmp_path / "run")
+
+
+def bits(out: Path) -> dict[str, bytes]:
+    """Every array of the solution but its times."""
+    with np.load(out / "solutions" / "pinn-std.npz") as archive:
+        kept = (name for name in archive.files if name not in ("header", "history_seconds"))
+        return {name: archive[name].tobytes() for name in kept}
+
+
+def record(folder: Path) -> list[str]:
+    """The header and a line for every epoch, with its time: what was trained again has another one."""
+    return (folder / "history.csv").read_text().splitlines()
+
+
+def test_an_interrupted_run_ends_as_if_it_had_not_been(job, tmp_path):
+    with quiet() as stages:
+        run(replace(job, out=tmp_path / "whole"), stages)
+    with Interrupting("pinn-std") as stages, pytest.raises(KeyboardInterrupt):
+        run(job, stages)
+    left = tmp_path / "run.partial" / "training" / "pinn-std"
+    assert (left / "checkpoint.safetensors").is_file()
+    before = record(left)
+    assert 1 < len(before) < 13
+    with quiet() as stages:
+        run(replace(job, resume=True), stages)
+    assert bits(job.out) == bits(tmp_path / "whole")
+    assert record(job.out / "training" / "pinn-std")[: len(before)] == before
+    assert sorted(path.name for path in (job.out / "training" / "pinn-std").iterdir()) == [
+        "checkpoint.safetensors",
+        "history.csv",
+    ]
+
+
+def test_a_checkpoint_of_another_job_is_refused_in_one_line(job):
+    with Interrupting("pinn-std") as stages, pytest.raises(KeyboardInterrupt):
+        run(job, stages)
+    other = replace(job, load=Load(displacement=(0.0, -9.0)), resume=True)
+    with quiet() as stages, pytest.raises(UserError) as refused:
+        run(other, stages)
+    assert re.fullmatch(r".*checkpoint\.safetensors belongs to another problem .*", str(refused.value))
+
+
+@pytest.mark.slow
+def test_a_killed_run_ends_as_if_it_had_not_been(job, tmp_path):
+    """Killed without notice, it goes on from the last checkpoint that it wrote.
+
+    All in processes of their own: the order in which a process loads torch and PETSc, each with its BLAS, was
+    seen to change the last bits.
+    """
+    line = f"compare --solvers pinn-std --mesh-size 1.0 --quiet --measurements {job.measurements}"
+    line += "".join(f" --solver-set pinn-std.{key}={value}" for key, value in {**TINY, "epochs": 200}.items())
+
+    def started(*options: str) -> subprocess.Popen[bytes]:
+        return subprocess.Popen(
+            [sys.executable, "-c", WITHOUT_PICTURES, *line.split(), *options],
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            stderr=subprocess.DEVNULL,
+        )
+
+    whole, killed = started("--out", str(tmp_path / "whole")), started("--out", str(job.out))
+    left = tmp_path / "run.partial" / "training" / "pinn-std"
+    limit = time.monotonic() + 240
+    while not (left / "history.csv").exists() and time.monotonic() < limit:
+        time.sleep(0.005)
+    killed.kill()
+    assert killed.wait() == -signal.SIGKILL
+    assert not job.out.exists()
+    before = record(left)
+    resumed = started("--out", str(job.out), "--resume")
+    assert resumed.wait() == whole.wait() == NOT_CONVERGED
+    assert bits(job.out) == bits(tmp_path / "whole")
+    assert record(job.out / "training" / "pinn-std")[: len(before)] == before
+
+
+@pytest.fixture
+def search_task(tmp_path: Path, coarse_mesh: TriangleMesh) -> Callable[..., TrainingTask]:
+    """`search_task(name, learning_rate, epochs)`: a run of a grid search in a folder of that name."""
+    coarse_mesh.save(tmp_path / "mesh.npz")
+    reference = ReferenceSolution.of(FemSolver(degree=1).solve(Problem(coarse_mesh)))
+
+    def make(name: str, learning_rate: float = 1e-3, epochs: int = 20) -> TrainingTask:
+        return TrainingTask(
+            GridPoint(learning_rate, 10.0),
+            {**TINY, "epochs": epochs},
+            tmp_path / "mesh.npz",
+            Material(),
+            Load(),
+            reference,
+            tmp_path / name,
+            threads=1,
+        )
+
+    return make
+
+
+def test_an_interrupted_run_of_a_search_ends_as_if_it_had_not_been(search_task):
+    """In this process; `test_processes` interrupts those of a search."""
+
+    def interrupted(fraction: float, note: str) -> None:
+        if fraction >= 0.5:
+            raise KeyboardInterrupt
+
+    whole, task = train(search_task("whole"), silent), search_task("run")
+    with pytest.raises(KeyboardInterrupt):
+        train(task, interrupted)
+    assert not (task.folder / "result.json").exists()
+    before = record(task.folder)
+    resumed = train(task, silent)
+    assert record(task.folder)[: len(before)] == before
+    assert whole.measured is not None
+    assert resumed.measured is not None
+    assert replace(resumed.measured, seconds=0.0) == replace(whole.measured, seconds=0.0)
+
+
+def test_a_run_of_a_search_that_diverges_is_recorded(search_task):
+    task = search_task("run", learning_rate=1e30)
+    diverged = train(task, silent)
+    assert diverged.status == "diverged"
+    assert "learning_rate" in diverged.message
+    assert TrainingRun.load(task.folder / "result.json") == diverged

@@ -1,0 +1,178 @@
+"""Text and names of others: they stay text in every page, and never lead out of the output folder."""
+
+import ast
+import csv
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from compare.evaluation.comparison import Comparison
+from compare.evaluation.evaluation import Evaluation
+from compare.figures import Picture
+from compare.pipeline.job import Job, checked
+from compare.report.html_report import render
+from compare.report.metrics_json import metrics
+from compare.report.runs import read_runs, write_runs
+from compare.runtime.html import PNG, SMALL, template_environment
+from geometry import Design, UserError
+from geometry.atomic import write_json
+from geometry.drawing.description import Description
+from geometry.observations import Observations
+from pinnray.cli import main
+from solvers.registry import make_solver
+
+ROOT = Path(__file__).parents[3]
+HOSTILE = """</script></table><x-evil onerror="x()">&amp; ' "><img src=x onerror=x()>"""
+UP = ["../up", "/tmp/up", "a/../../up", "..", "a/b", "a\x00b", "\N{FULLWIDTH SOLIDUS}up"]
+
+
+class Elements(HTMLParser):
+    """Names of all elements, and all attributes that would run a script."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.names: set[str] = set()
+        self.running: list[str] = []
+        self.text = ""
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.names.add(tag)
+        self.running += [name for name, value in attrs if name.startswith("on") or value == "x"]
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+@pytest.fixture
+def hostile(
+    fem: Evaluation,
+    pinn: Evaluation,
+    observe: Callable[..., Observations],
+    compared: Callable[..., Comparison],
+) -> Comparison:
+    """A comparison in which every text that a solver, a file or a user can set is hostile."""
+    said = {"message": HOSTILE, "stats": {HOSTILE: HOSTILE, "seconds": 1.0}}
+    evaluations = [replace(each, solver=f"{each.solver}{HOSTILE}", **said) for each in (fem, pinn)]
+    evaluations.append(replace(evaluations[1], solver=HOSTILE, converged=False, in_sample=True))
+    return compared(
+        *evaluations,
+        observations=observe(fem.marker_displacement, source=f"simulated {HOSTILE}"),
+        truth=replace(fem, solver="truth"),
+        design=Design.model_construct(**{**Design().model_dump(), "name": HOSTILE}),
+        settings={HOSTILE: {HOSTILE: HOSTILE}},
+        unsupported={HOSTILE: HOSTILE},
+        failed={HOSTILE: HOSTILE},
+        warnings=[HOSTILE],
+    )
+
+
+def test_the_report_escapes_every_text_of_others(hostile: Comparison, tmp_path: Path) -> None:
+    path = tmp_path / 'a <b> & "c".png'
+    path.write_bytes(PNG)
+    picture = Picture(path, HOSTILE, HOSTILE, HOSTILE)
+    page = render(hostile, [picture], {HOSTILE: HOSTILE, "group": {HOSTILE: HOSTILE}})
+    found, plain = Elements(page), Elements(render(hostile, [], {}))
+    assert "x-evil" not in found.names
+    assert found.running == []
+    assert page.count("<script") == page.count("</script>") == 4
+    assert found.text.count("x-evil") > plain.text.count("x-evil") > 10
+
+
+def test_the_page_of_runs_escapes_numbers_and_folders_of_others(
+    hostile: Comparison, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folders = [tmp_path / f"run {number} <x-evil onerror=x()> & '\"" for number in range(2)]
+    for number, folder in enumerate(folders):
+        write_json(folder / "metrics.json", metrics(hostile))
+        options = {"seed": {HOSTILE: number}, "left_out": {HOSTILE: HOSTILE}, "failed": {HOSTILE: HOSTILE}}
+        write_json(folder / "run.json", options)
+    assert main(["report", *map(str, folders), "--out", str(tmp_path / "both")]) == 0
+    found = Elements((tmp_path / "both" / "runs.html").read_text(encoding="utf-8"))
+    assert "x-evil" not in found.names
+    assert found.running == []
+    assert "x-evil" in found.text
+
+
+@pytest.mark.parametrize("padding", [0, SMALL], ids=["small", "large"])
+@pytest.mark.parametrize("content", [b"key of mine", b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n"])
+def test_the_page_of_runs_takes_pictures_alone(
+    hostile: Comparison, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes, padding: int
+) -> None:
+    """Another file would be passed on with the page, and for EPS Pillow runs a program."""
+    runs: list[object] = []
+    monkeypatch.setattr("subprocess.check_call", lambda *given, **_: runs.append(given))
+    for name in ("one", "two"):
+        write_json(tmp_path / name / "metrics.json", metrics(hostile))
+        write_json(tmp_path / name / "run.json", {})
+    picture = tmp_path / "one" / "figures" / "overlay.png"
+    picture.parent.mkdir()
+    picture.write_bytes(content + b"%" * padding)
+    with pytest.raises(UserError, match=r"overlay\.png is no PNG picture"):
+        write_runs(tmp_path / "both", read_runs([tmp_path / "one", tmp_path / "two"]))
+    assert runs == []
+
+
+def test_a_run_with_a_link_is_not_read(hostile: Comparison, tmp_path: Path) -> None:
+    write_json(tmp_path / "run" / "metrics.json", metrics(hostile))
+    write_json(tmp_path / "run" / "run.json", {})
+    (tmp_path / "mine.png").write_bytes(b"")
+    (tmp_path / "run" / "figures").mkdir()
+    (tmp_path / "run" / "figures" / "overlay.png").symlink_to(tmp_path / "mine.png")
+    with pytest.raises(UserError, match=r"figures/overlay\.png is a link, which no run has made"):
+        read_runs([tmp_path / "run"])
+
+
+def test_a_text_of_others_is_no_formula_and_no_command_of_the_terminal(
+    hostile: Comparison, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    numbers = metrics(hostile)
+    numbers["solvers"]["=1+1\x1b[2J"] = numbers["solvers"].pop(numbers["reference"])
+    numbers["reference"] = "=1+1\x1b[2J"
+    for name in ("-one", "two"):
+        write_json(tmp_path / name / "metrics.json", numbers)
+        write_json(tmp_path / name / "run.json", {})
+    folders = [str(tmp_path / name) for name in ("-one", "two")]
+    assert main(["report", folders[0]]) == 0
+    assert main(["report", *folders, "--out", str(tmp_path / "both")]) == 0
+    assert main(["report", str(tmp_path / "\x1b[2J")]) == 2
+    said = "".join(capsys.readouterr())
+    assert "=1+1\N{REPLACEMENT CHARACTER}[2J" in said
+    assert "\x1b" not in said
+    cells = [cell for row in csv.reader((tmp_path / "both" / "runs.csv").open()) for cell in row]
+    assert {"'=1+1\x1b[2J", "'-one"} <= {*cells}
+    assert [cell for cell in cells if cell.startswith(("=", "+", "@", "-o"))] == []
+
+
+def test_no_template_and_no_script_puts_text_in_as_html() -> None:
+    assert template_environment().autoescape is True
+    for path in sorted((ROOT / "compare" / "templates").iterdir()):
+        text = path.read_text(encoding="utf-8")
+        found = re.findall(
+            r"\|\s*safe\b|autoescape|innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\(", text
+        )
+        assert (path.name, found) == (path.name, [])
+
+
+def test_html_is_made_of_constants_alone() -> None:
+    """`Markup` marks a text as safe; texts of others come in by its method `format`, which escapes them."""
+    for path in sorted((ROOT / "compare").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Markup":
+                assert all(isinstance(each, ast.Constant) for each in node.args), f"{path}:{node.lineno}"
+
+
+@pytest.mark.parametrize("name", UP)
+def test_no_name_of_a_finger_or_a_solver_is_a_path(name: str, tmp_path: Path) -> None:
+    with pytest.raises(UserError):
+        Design(name=name)
+    with pytest.raises(UserError):
+        Description(name=name)
+    solver = make_solver("fem")
+    named = type("Named", (type(solver),), {"name": name})()
+    with pytest.raises(UserError, match="a solver is called"):
+        checked(Job(design=Design(), solvers=[named], out=tmp_path / "out"))

@@ -1,0 +1,220 @@
+"""The report as a reader has it: opened in Chromium, at the sizes of a desk and of a phone."""
+
+import csv
+import io
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import Browser, Page
+
+from compare.evaluation.comparison import Comparison
+from compare.evaluation.evaluation import Evaluation
+from compare.figures import Picture
+from compare.figures.gallery import draw
+from compare.report.html_report import write_report
+from geometry.mesh.triangle_mesh import TriangleMesh
+from tests.compare.report.browser import SOFTWARE_WEBGL, TIMEOUT, Opened, chromium, opened
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium(*SOFTWARE_WEBGL) as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def written(
+    estimated: Evaluation,
+    pinn: Evaluation,
+    failed: Evaluation,
+    evaluate: Callable[..., Evaluation],
+    compared: Callable[..., Comparison],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Path:
+    """A report with four solvers, one of which followed the load, a truth and two pictures."""
+    folder = tmp_path_factory.mktemp("report")
+    given = replace(evaluate("pinn-asm", 1.02), in_sample=True, left_out=estimated.marker_displacement)
+    end, fractions = failed.node_displacement, np.array([0.0, 0.5, 1.0])
+    path = np.stack([0 * end, 0.1 * end, end])  # far from linear
+    followed = replace(failed, path=path, history={"load_fraction": fractions})
+    comparison = compared(estimated, pinn, followed, given, truth=evaluate("fem-nonlinear", 1.05))
+    pictures = []
+    for name in ("marker_errors", "von_mises"):
+        drawing = draw(comparison, name)
+        picture = drawing.figure.save(folder / f"{name}.png")
+        pictures.append(Picture(picture, drawing.title, drawing.caption, drawing.alt))
+    write_report(folder / "report.html", comparison, pictures, {"seed": 17})
+    return folder / "report.html"
+
+
+@pytest.fixture(scope="module")
+def desk(browser: Browser, written: Path) -> Opened:
+    return opened(browser, written)
+
+
+@pytest.fixture(scope="module")
+def viewer(desk: Opened) -> Page:
+    """The page with its field viewer ready."""
+    desk.page.evaluate("document.getElementById('viewer').scrollIntoView()")
+    desk.page.locator("#viewer[data-ready]").wait_for()
+    return desk.page
+
+
+def painted(page: Page) -> set[tuple[int, int, int]]:
+    """The colours on the canvas of the field viewer."""
+    shot = Image.open(io.BytesIO(page.locator("#viewer-canvas").screenshot())).convert("RGB")
+    return {colour for _, colour in shot.getcolors(shot.width * shot.height)}
+
+
+def test_the_field_is_drawn_switched_and_zoomed(viewer: Page) -> None:
+    first = painted(viewer)
+    assert len(first) > 50
+    viewer.select_option("#viewer-solver", label="pinn-std")
+    viewer.select_option("#viewer-quantity", label="Von Mises stress")
+    viewer.select_option("#viewer-show", label="minus fem")
+    assert viewer.inner_text("#viewer-title") == "Von Mises stress, MPa: pinn-std minus fem"
+    assert "a scale of its own" in viewer.inner_text("#viewer-note")
+    viewer.wait_for_timeout(300)
+    second = painted(viewer)
+    assert len(second - first) > 20
+    before = viewer.locator("#viewer-canvas").screenshot()
+    viewer.locator("#viewer-canvas").focus()
+    viewer.keyboard.press("+")
+    viewer.wait_for_timeout(300)
+    assert viewer.locator("#viewer-canvas").screenshot() != before
+
+
+def test_the_middle_is_read_by_the_keyboard(viewer: Page, pinn: Evaluation, mesh: TriangleMesh) -> None:
+    """The value is that of the triangle that is named, to the three digits shown."""
+    viewer.select_option("#viewer-solver", label="pinn-std")
+    viewer.select_option("#viewer-quantity", label="Displacement magnitude")
+    viewer.select_option("#viewer-show", label="field")
+    viewer.locator("#viewer-canvas").focus()
+    viewer.keyboard.press("0")
+    said = viewer.inner_text("#viewer-probe").replace("−", "-")
+    x, y, value = (float(text) for text in re.findall(r"-?\d+\.?\d*", said))
+    near = np.linalg.norm(mesh.points[mesh.triangles].mean(axis=1) - [x, y], axis=1).argmin()
+    expected = pinn.per_triangle(np.hypot(*pinn.displacement.T))[near]
+    assert value == pytest.approx(expected, rel=5e-3)
+
+
+def test_the_body_moves_along_the_path_that_the_solver_found(viewer: Page) -> None:
+    half = "pinnrayFields.displacement(pinnrayFields.manifest.solvers[%d], 0.5)"
+    end = "pinnrayFields.displacement(pinnrayFields.manifest.solvers[%d], 1)"
+    for solver, share in ((0, 0.5), (2, 0.1)):  # linear; recorded
+        shares = np.array(viewer.evaluate(f"[...{half}]" % solver)) / np.array(
+            viewer.evaluate(f"[...{end}]" % solver)
+        )
+        assert np.nanmedian(shares) == pytest.approx(share, abs=1e-2)
+    viewer.select_option("#viewer-solver", index=0)
+    assert "as the linear law has it" in viewer.inner_text("#viewer-note")
+    viewer.select_option("#viewer-solver", index=2)
+    assert "load path of 2 equilibria" in viewer.inner_text("#viewer-note")
+
+
+def test_the_load_is_played_until_it_is_stopped(viewer: Page) -> None:
+    viewer.evaluate("document.getElementById('viewer-play').click()")
+    viewer.wait_for_function("document.getElementById('viewer-load').value < 90")
+    viewer.evaluate("document.getElementById('viewer-play').click()")
+    assert viewer.inner_text("#viewer-play") == "Play"
+
+
+def test_nothing_moves_for_a_reader_who_wants_no_motion(viewer: Page) -> None:
+    viewer.evaluate("document.getElementById('viewer-play').click()")
+    viewer.emulate_media(reduced_motion="reduce")
+    viewer.locator("#viewer-play").wait_for(state="hidden")
+    assert viewer.get_attribute("#viewer-play", "aria-pressed") == "false"
+    viewer.emulate_media(reduced_motion="no-preference")
+
+
+@pytest.mark.parametrize("without", ["scripts", "WebGL"])
+def test_still_pictures_stand_in_for_the_viewer(browser: Browser, written: Path, without: str) -> None:
+    page = browser.new_page(java_script_enabled=without != "scripts")
+    page.set_default_timeout(TIMEOUT)
+    page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+    page.goto(written.as_uri())
+    assert page.locator("#viewer").is_hidden()
+    assert "as still pictures" in page.inner_text("#viewer-absent")
+    assert page.locator("#stills img").is_visible()
+    page.close()
+
+
+def test_the_page_complains_of_nothing_and_asks_for_nothing(desk: Opened, viewer: Page) -> None:
+    assert desk.complaints == []
+    assert desk.asked == []
+
+
+def test_every_picture_is_drawn(desk: Opened) -> None:
+    widths = desk.page.evaluate("[...document.images].map((image) => image.naturalWidth)")
+    assert len(widths) > 0
+    assert min(widths) > 0
+
+
+def test_nothing_is_wider_than_a_phone(desk: Opened) -> None:
+    desk.page.set_viewport_size({"width": 390, "height": 900})
+    assert desk.page.evaluate("document.documentElement.scrollWidth") == 390
+    desk.page.set_viewport_size({"width": 1400, "height": 900})
+    assert desk.page.evaluate("document.documentElement.scrollWidth") == 1400
+
+
+def column(desk: Opened, number: int) -> list[str]:
+    """The cells of a column of Table I, without the paper's rows."""
+    cells = desk.page.locator(f"#table-one tbody:nth-of-type(1) tr > :nth-child({number})")
+    return [text.strip() for text in cells.all_inner_texts()]
+
+
+def test_a_table_is_sorted_by_a_key(desk: Opened) -> None:
+    before = column(desk, 1)
+    head = desk.page.locator("#table-one thead tr:nth-child(2) th").nth(1)
+    head.locator("button").focus()
+    desk.page.keyboard.press("Enter")
+    assert head.get_attribute("aria-sort") == "ascending"
+    values = [float(text) for text in column(desk, 2)]
+    assert values == sorted(values)
+    desk.page.keyboard.press("Enter")
+    assert head.get_attribute("aria-sort") == "descending"
+    values = [float(text) for text in column(desk, 2)]
+    assert values == sorted(values, reverse=True)
+    assert sorted(column(desk, 1)) == sorted(before)
+    assert column(desk, 1) != before
+
+
+def test_a_table_is_copied_as_csv_and_latex(desk: Opened) -> None:
+    found = desk.page.evaluate("pinnrayTables.csv(document.getElementById('differences'))")
+    rows = list(csv.DictReader(io.StringIO(found)))
+    assert rows[0]["Solver"] == "pinn-std"
+    assert float(rows[0]["displ. rel. L², %"]) == pytest.approx(10, rel=1e-3)
+    assert float(rows[0]["displ. rel. L², % ±"]) == pytest.approx(1, rel=1e-3)
+    latex = desk.page.evaluate("pinnrayTables.latex(document.getElementById('differences'))")
+    assert r"\begin{tabular}{lrrrrrr}" in latex
+    assert r"pinn-std & 10.0 $\pm$ 1.0 & " in latex
+    assert r", \%" in latex
+
+
+def test_the_button_puts_the_table_on_the_clipboard(desk: Opened) -> None:
+    page = desk.page
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    page.get_by_role("button", name="Copy as CSV: Mean absolute error").click()
+    page.get_by_text("copied as CSV").wait_for()
+    assert page.evaluate("navigator.clipboard.readText()").startswith("Solver,")
+
+
+def test_a_part_is_folded_by_a_key(desk: Opened) -> None:
+    part = desk.page.locator("#design")
+    assert part.get_attribute("open") is not None
+    part.locator("summary").focus()
+    desk.page.keyboard.press("Enter")
+    assert part.get_attribute("open") is None
+
+
+def test_paper_has_every_part_unfolded(desk: Opened) -> None:
+    page = desk.page
+    page.evaluate("document.querySelectorAll('details').forEach((part) => (part.open = false))")
+    page.emulate_media(media="print")
+    assert page.locator("#viewer").is_hidden()
+    assert page.locator("#design table").bounding_box()["height"] > 20

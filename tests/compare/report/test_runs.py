@@ -1,0 +1,137 @@
+"""Several finished runs side by side: `pinnray report`."""
+
+import csv
+import json
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from compare.evaluation.comparison import Comparison
+from compare.evaluation.evaluation import Evaluation
+from compare.report.metrics_json import metrics
+from compare.report.runs import differences, read_runs
+from geometry.atomic import write_json
+from pinnray.cli import main
+
+Save = Callable[..., Path]
+
+
+@pytest.fixture
+def save(
+    compared: Callable[..., Comparison],
+    estimated: Evaluation,
+    evaluate: Callable[..., Evaluation],
+    tmp_path: Path,
+) -> Save:
+    """`save(name, scale, seed)`: the folder of a run with a network and a solver that was given markers."""
+
+    def make(name: str, scale: float = 1.005, seed: int = 0) -> Path:
+        given = replace(evaluate("fem-asm", scale), in_sample=True, left_out=estimated.marker_displacement)
+        comparison = compared(estimated, evaluate("pinn-std", scale), given)
+        folder = tmp_path / name
+        write_json(folder / "metrics.json", metrics(comparison))
+        write_json(folder / "run.json", {"seed": {"pinn-std": seed}, "left_out": {"gp": "too slow"}})
+        (folder / "figures").mkdir()
+        Image.new("RGB", (4, 3), "red").save(folder / "figures" / "overlay.png")
+        return folder
+
+    return make
+
+
+def test_one_run_gives_its_answers(save: Save, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = save("first")
+    assert main(["report", str(folder)]) == 0
+    said = capsys.readouterr().out
+    assert "May the network be trusted here?\n  Yes, as a solver" in said
+    assert "gp was left out: too slow." in said
+    assert said.endswith(f"report: {folder / 'report.html'}\n")
+    assert [path.name for path in folder.parent.iterdir()] == ["first"]
+
+
+def test_several_runs_are_one_page_and_one_table(save: Save, tmp_path: Path) -> None:
+    runs = [save("first"), save("second", 1.1, seed=7)]
+    assert main(["report", *map(str, runs), "--out", str(tmp_path / "both")]) == 0
+    with (tmp_path / "both" / "runs.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["run"], row["solver"]) for row in rows] == [
+        (run, solver) for run in ("first", "second") for solver in ("fem", "pinn-std", "fem-asm")
+    ]
+    assert [row["given_mae_u_mm"] == "" for row in rows] == 2 * [True, True, False]
+    assert float(rows[4]["to_reference_displacement_rel_l2"]) == pytest.approx(0.1)
+    html = (tmp_path / "both" / "runs.html").read_text(encoding="utf-8")
+    assert html.count("data:image/png") == 2
+    assert re.findall(r"<script src|<link|https?://", html) == []
+    assert "simulated" in html
+
+
+def test_held_out_and_given_errors_are_in_tables_of_their_own(save: Save, tmp_path: Path) -> None:
+    main(["report", str(save("first")), str(save("second")), "--out", str(tmp_path / "both")])
+    html = (tmp_path / "both" / "runs.html").read_text(encoding="utf-8")
+    given = re.search(r"<caption>Errors at markers that the solver was given.*?</table>", html, re.DOTALL)
+    assert given is not None
+    assert "fem-asm" in given.group()
+    assert "pinn-std" not in given.group()
+
+
+def test_what_differs_between_runs_is_named(save: Save) -> None:
+    runs = read_runs([save("first"), save("second", seed=7)])
+    assert differences(runs) == [["seed pinn-std", "0", "7"]]
+
+
+def test_runs_of_one_name_are_told_apart_by_their_paths(save: Save) -> None:
+    folders = [save("a/run"), save("b/run")]
+    assert [run.name for run in read_runs(folders)] == [str(folder) for folder in folders]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "no run was given"),
+        (["nowhere"], "there is no folder nowhere"),
+        (["empty"], "empty has no metrics.json"),
+        (["damaged"], "metrics.json is damaged"),
+        (["foreign"], "is not of `compare`"),
+        (["first", "first"], "a run is given twice"),
+        (["first", "--out", "elsewhere"], "--out is for several runs"),
+        (["first", "second", "--out", "first/run.json"], "is a file"),
+    ],
+)
+def test_a_wrong_folder_is_refused_in_a_line(
+    save: Save,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    words: str,
+) -> None:
+    save("first"), save("second")
+    for name, text in (("damaged", "{"), ("foreign", json.dumps({"schema": 99}))):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "metrics.json").write_text(text, encoding="utf-8")
+        (tmp_path / name / "run.json").write_text("{}", encoding="utf-8")
+    (tmp_path / "empty").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert main(["report", *arguments]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert words in line
+
+
+@pytest.mark.parametrize(
+    ("solver", "key", "value"),
+    [("pinn-std", "to_reference", None), ("pinn-std", "energy", "1.1"), ("fem-asm", "markers", [])],
+)
+def test_a_run_that_lacks_a_number_is_one_line(
+    save: Save, capsys: pytest.CaptureFixture[str], solver: str, key: str, value: object
+) -> None:
+    folder = save("first")
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    content["solvers"][solver][key] = value
+    write_json(folder / "metrics.json", content)
+    assert main(["report", str(folder)]) == 2
+    assert capsys.readouterr().err.endswith(
+        "metrics.json is damaged: a number is missing; make the run again\n"
+    )

@@ -1,0 +1,782 @@
+"""The command line as a user meets it: what it refuses, prints and returns."""
+
+import csv
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from importlib.metadata import version
+from io import BytesIO, TextIOWrapper
+from pathlib import Path
+
+import pytest
+import pyvista
+
+from compare.runtime.exits import BAD_INPUT, INTERRUPTED, NOT_CONVERGED
+from geometry.cache import cad_files, finger_mesh
+from geometry.finger.design import Design
+from geometry.finger.presets import preset_names
+from geometry.mesh.triangle_mesh import TriangleMesh
+from pinnray.cli import compare_main, main
+from pinnray.options.preset_jobs import JOBS, JobDefaults, job_defaults
+from pinnray.options.shared import FingerOptions, PhysicsOptions, SolverOptions
+from solvers.fem import adaptive_refinement as adapt
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
+from solvers.fem.linear import FemSolver
+from solvers.registry import PRESETS, solver_names
+from solvers.solution import Solution, Status
+
+ROOT = Path(__file__).parents[3]
+HEADER = "x_mm,y_mm,u_mm,v_mm"
+SMALL = ["compare", "--solvers", "fem", "--mesh-size", "1.0"]
+
+BEAM = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="60mm" height="10mm" viewBox="0 0 60 10">'
+    '<path d="M 0 0 H 60 V 10 H 0 Z"/></svg>'
+)
+
+INPUTS: dict[str, str | bytes] = {
+    "broken.toml": "height = = 90",
+    "other.toml": "hight = 90",
+    "column.csv": "x_mm,y_mm,u_mm\n20,-1,0\n",
+    "text.csv": f"{HEADER}\n20,-1,left,0\n",
+    "nan.csv": f"{HEADER}\n20,-1,nan,0\n",
+    "outside.csv": f"{HEADER}\n10,-10,0,0\n",
+    "unseen.csv": f"{HEADER},visible\n20,-1,,,0\n",
+    "flag.csv": f"{HEADER},visible\n20,-1,0,0,2\n",
+    "header.csv": f"{HEADER}\n",
+    "empty.csv": "",
+    "binary.csv": bytes(range(256)),
+    "good.csv": f"{HEADER}\n20,-1,0,-5\n85,-1,-2,-0.5\n",
+    "file": "",
+    "far.csv": f"{HEADER}\n20,-1,1e308,0\n",
+    "underscore.csv": f"{HEADER}\n2_0,-1,0,0\n",
+    "close.csv": f"{HEADER}\n20,-1,0,-5\n20.000000001,-1,0,5\n",
+    "unsure.csv": f"{HEADER},std_u_mm\n20,-1,0,-5,1e-300\n",
+    "beam.svg": BEAM,
+    "finger.toml": "height = 95",
+    "folder.vtu/kept": "",
+    "foreign/thesis.txt": "three years of work",
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with files that are wrong in one way each."""
+    for name, content in INPUTS.items():
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path): path.read_bytes() if path.is_file() else b"" for path in folder.rglob("*")}
+
+
+# Bad input: one line, exit code 2, nothing written
+
+BAD = [
+    # what does not exist
+    ("compare --frobnicate", "Unknown option: --frobnicate"),
+    (
+        "frobnicate",
+        "Unknown command .* commands: compare, report, design, mesh, solve, sweep, predict, optimise, ",
+    ),
+    ("compare slender", "'slender' belongs to no option"),  # forgot --design
+    ("compare --seed", "--seed requires an argument"),
+    ("compare --solvers fen", r"no solver is called 'fen'; did you mean 'fem'\?"),  # near match
+    ("compare --solvers comsol", r"no solver is called 'comsol' \(there are: fem, "),  # nothing near
+    ("compare --solvers ,", "no solver was asked for"),
+    ("sweep ribs.toml --pictures eps", "there are no pictures as eps; besides PNG there are svg, pdf"),
+    ("compare --design slendr", "there is no design 'slendr'; the presets are default, "),
+    ("compare --design absent.toml", "there is no design file absent.toml"),
+    # designs
+    ("compare --design broken.toml", r"cannot read the design file broken.toml: .* line 1"),
+    ("compare --design other.toml", r"unknown parameter 'hight'; did you mean height \(H\)"),
+    ("compare --set rib_count", "cannot read 'rib_count'; write parameter=value"),
+    ("compare --set rib_cuont=3", r"unknown parameter 'rib_cuont'; did you mean rib_count \(N\)\?"),
+    ("compare --set rib_count=many", r"rib_count \(N\) = 'many' is not a whole number"),
+    ("compare --set N=4 --set rib_count=5", "set twice"),
+    ("compare --set rib_count=40", "ribs overlap: .* allowed with the rest unchanged: rib_count up to"),
+    ("compare --set height=9999", "outside its range, 10 to 500 mm"),
+    ("compare --set contact_position=200", "contact"),  # beyond the tip
+    ("compare --set name=../up", "must be a letter or digit"),  # would leave the output folder
+    ("compare --mesh-size 0", "--mesh-size = 0 mm is outside its range"),
+    ("compare --mesh-size nan", "--mesh-size = nan is not a finite number"),
+    ("compare --mesh-size fine", 'unable to convert "fine" into float'),
+    ("compare --adapt 0", "a tolerance of 0 mm at the markers"),
+    ("compare --adapt -1", "a tolerance of -1 mm at the markers"),
+    ("compare --adapt 0.001 --load point", "a point load has no limit under refinement"),
+    ("mesh --adapt 0.001 --load point", "a point load has no limit under refinement"),
+    # material and load
+    ("compare --young -1", "young = -1.0: input should be greater than 0"),
+    ("compare --young inf", "--young inf"),
+    ("compare --young 1e-300", "young = 1e-300: no solid has this Young's modulus"),
+    ("compare --young 11400000", r"young = 11400000.0: no solid .* MPa \(1 MPa = 10\^6 Pa\)"),  # in pascals
+    ("compare --poisson 0.5", "poisson = 0.5: input should be less than 0.5"),  # incompressible
+    ("compare --stroke 0", "--stroke 0: the indenter presses"),
+    ("compare --stroke -10", "--stroke -10: the indenter presses"),  # not the displacement v
+    ("compare --stroke nan", "--stroke nan"),
+    (
+        "solve fem --mesh-size 1 --stroke 10000 --quiet",  # in micrometres
+        "moves the contact by 10000 mm, farther than the finger is large",
+    ),
+    ("compare --direction 90", "--direction 90: give an angle between -90 and 90 degrees"),
+    ("compare --direction 5 --slide", "--slide leaves the travel along the finger free"),
+    ("compare --load pull", 'Choose from: "mean", "point", "patch"'),
+    ("compare --solvers fem --load cylinder", "fem takes .*, not 'cylinder'; `pinnray solvers` lists"),
+    ("compare --radius 5", "a radius belongs to the load cylinder, and to no other"),
+    ("solve fem-nonlinear --load cylinder --radius 0", "radius = 0.0: input should be greater than 0"),
+    ("solve fem-nonlinear --load cylinder --slide", "a cylinder .* has no friction"),
+    ("compare --plane stress --solvers fem-nonlinear", "fem-nonlinear: .* plane strain only"),
+    ("compare --law hooke", 'Choose from: "linear", "neo-hookean", "st-venant-kirchhoff", "gent"'),
+    (
+        "compare --solvers fem,gp --law st-venant-kirchhoff",
+        r"none of the solvers has it \(fem has linear; gp has linear\)",
+    ),
+    ("solve fem --law neo-hookean", r"--law neo-hookean: none of the solvers has it \(fem has linear\)"),
+    ("gridsearch --law neo-hookean", r"--law neo-hookean: none of the solvers has it \(pinn-std has linear"),
+    ("compare --plane stress --law neo-hookean", "the neo-hookean law is given for plane strain only"),
+    ("compare --truth none", "--truth: there is no truth 'none'"),
+    ("compare --truth print", "--truth print: its walls are not those of the drawing"),
+    ("compare --truth stvk --measurements markers.csv", "--truth is for a simulated experiment"),
+    # solvers and their settings
+    ("compare --solvers fem,fem", "named twice: fem, fem"),
+    ("compare --solvers fem --reference pinn-std", "reference 'pinn-std' is not among the solvers fem"),
+    ("compare --solvers fem --solver-set degree=1", "write solver.setting=value"),
+    (
+        "compare --solvers fem --solver-set pinn-std.neurons=9",
+        "'pinn-std', which is not among the solvers fem",
+    ),
+    ("compare --solvers fem --solver-set fem.order=1", "fem has no setting 'order'; it has degree"),
+    ("compare --solvers fem --solver-set fem.degree=two", "fem: degree = 'two'"),
+    ("compare --solvers fem --solver-set fem.degree=7", "degree 1 and 2, not 7"),
+    ("compare --solvers fem --solver-set fem.degree=1 --solver-set fem.degree=2", "fem.degree is set twice"),
+    ("compare --seed -1", "--seed -1: give a whole number from 0"),
+    (
+        "compare --preset papre",
+        r"none of the solvers fem,.* has it \(pinn-std has fast, local, paper, trained;",
+    ),
+    ("compare --preset paper --solvers fem", "--preset paper: none of the solvers fem has it"),
+    ("compare --solver-set pinn-std.ridges=7", "pinn-std: the setting 'ridges' is now called 'neurons'"),
+    ("compare --solver-set pinn-std.preset=slow", "pinn-std has no preset 'slow'; it has fast, local, paper"),
+    (
+        "compare --preset paper --solver-set pinn-std.neurons=9",
+        "pinn-std has no setting 'neurons'; it has epochs",
+    ),
+    ("compare --preset paper --load patch", "pinn-std takes the loads mean, point, not 'patch'"),
+    ("compare --device cuda", "--device cuda: none of the solvers fem,.*,statfem can choose a device"),
+    ("compare --preset paper --device tpu", "pinn-std: device = 'tpu': input should be 'cpu' or 'cuda'"),
+    ("solve fem --preset paper", "--preset paper: none of the solvers fem has it"),
+    ("compare --solvers fem --load cylinder", "fem takes the loads mean, point, patch, not 'cylinder'"),
+    ("compare --reference fem --load cylinder", "fem takes the loads mean, point, patch, not 'cylinder'"),
+    ("compare --solver-set fem.degree=1 --load cylinder", "fem takes the loads mean, point, patch, not 'cyl"),
+    (
+        "compare --solvers gp --mesh-size 1 --quiet --measurements good.csv",
+        "gp .* needs 4 .*, not 2",
+    ),
+    # measurements
+    ("compare --measurements absent.csv", "there is no file absent.csv"),
+    ("compare --measurements foreign", "foreign holds no picture"),  # a folder
+    ("compare --measurements column.csv", "column.csv has no column v_mm"),
+    ("compare --measurements text.csv", "text.csv, line 2: u_mm is 'left', which is not a number"),
+    ("compare --measurements nan.csv", "nan.csv, line 2: u_mm is 'nan', which is not a number"),
+    ("compare --measurements far.csv", "far.csv, line 2: u_mm is 1e308, beyond 1e[+]06 mm"),
+    ("compare --measurements underscore.csv", "line 2: x_mm is '2_0', which is not a number"),  # 20 in Python
+    ("compare --measurements close.csv", "close.csv, line 3: there is already a marker at"),
+    ("compare --measurements unsure.csv", "unsure.csv: standard deviations must be 0 or from 1e-12 to 1e"),
+    ("compare --measurements flag.csv", "flag.csv, line 2: visible is '2'"),
+    ("compare --measurements unseen.csv", "unseen.csv: none of the markers is visible"),
+    ("compare --measurements header.csv", "header.csv has a header but no marker"),
+    ("compare --measurements empty.csv", "empty.csv has no column x_mm"),
+    ("compare --measurements binary.csv", "binary.csv: it is not a CSV file in UTF-8"),
+    ("compare --mesh-size 1 --measurements outside.csv", "not of this finger: .* outside the body"),
+    ("solve fem --measurements outside.csv", "fem does not assimilate markers; `compare` compares"),
+    ("solve fem-asm --measurements absent.csv", "there is no file absent.csv"),
+    ("solve fem-asm --mesh-size 1 --measurements outside.csv", "not of this finger: .* outside the body"),
+    # where to write
+    ("compare --out foreign", "foreign holds thesis.txt, and it has no run.json"),
+    ("compare --out file", "file is a file; name a folder with --out"),
+    ("compare --out file/below", "cannot write to .*: Not a directory"),
+    ("compare --out /proc/absent/run", "cannot write to /proc/absent/run.partial"),  # whoever runs this
+    ("compare --out .", "cannot run inside it"),
+    # the other verbs
+    ("solve", "--solver requires an argument"),
+    ("solve fem,pinn-std", "name one solver, not 'fem,pinn-std'"),
+    ("solve ''", "name one solver"),
+    ("crossval --measurements film.mkv", "takes a CSV file of displacements, .*pinnray track. makes one"),
+    ("solve fem-asm --measurements film.mkv", "takes a CSV file of displacements, and no film"),
+    ("compare --solvers pinn-std --device cuda", "can choose a device; with --preset paper one can"),
+    ("compare --solvers fem --device cuda", "none of the solvers fem can choose a device"),
+    ("solve fem --out folder.vtu", "--out folder.vtu: this is a folder; name a file that ends in .vtu"),
+    ("design --design finger.toml --formats svg --out .", "this would overwrite finger.toml, which is read"),
+    ("design --section beam.svg --set depth=5 --set depth=6", "depth is set twice"),
+    ("design --section beam.svg --clamp '[[nan, 0], [0, -10]]'", r"clamp = \[\[nan, .* is no pair of points"),
+    ("fiducials --marker-plane nan", "workspace: marker_plane: Input should be a finite number"),
+    ("fiducials --marker-plane 1e9", "workspace: marker_plane: Input should be less than or equal to 1000"),
+    ("fiducials --square 1e9", "a square of 1e[+]09 mm; its side must be 0.2 to 1000 mm"),
+    ("crossval --solvers fem --noise 1e6", "--noise 1e[+]06: .* zero or more, at most 100 mm"),  # a kilometre
+    ("solve fem --out fields.csv", "give a name that ends in .vtu"),
+    ("gridsearch --learning-rates 1e-3;1e-2", "--learning-rates 1e-3;1e-2: give numbers with commas"),
+    ("gridsearch --bc-weights 1,1.0", "--bc-weights 1,1.0: give different numbers above 0"),
+    ("gridsearch --bc-weights 0", "--bc-weights 0: give different numbers above 0"),
+    ("gridsearch --learning-rates inf", "--learning-rates inf: give different numbers above 0"),
+    ("gridsearch --processes 0", "--processes 0: give a whole number from 1"),
+    ("gridsearch --epochs 0", "pinn-std: epochs must be positive, got 0"),
+    ("gridsearch --epochs 9 --solver-set pinn-std.epochs=8", "pinn-std.epochs is set twice"),
+    ("gridsearch --preset fast", "--preset fast: the search is for the settings of the preset paper"),
+    ("gridsearch --solver-set pinn-std.bc_weight=1", "is what is searched for; give its values with --bc-we"),
+    ("gridsearch --solver-set pinn-asm.neurons=3", "'pinn-asm', which is not among the solvers pinn-std"),
+    ("gridsearch --load patch", "pinn-std takes the loads mean, point, not 'patch'"),
+    ("gridsearch --out foreign", "foreign holds files that are not of a grid search"),
+    ("gridsearch --out file", "file is a file; name a folder with --out"),
+    ("design --formats step,dwg", "unknown CAD format 'dwg'; there are step, stl, dxf, svg"),
+    ("mesh --mesh-size 1 --out file", "--out file: this is a file; name a folder"),
+]
+
+
+@pytest.mark.parametrize(("line", "message"), BAD, ids=[line for line, _ in BAD])
+def test_bad_input_is_one_line_and_nothing_is_written(folder, capsys, line, message):
+    before = contents(folder)
+    assert main(shlex.split(line)) == BAD_INPUT
+    output = capsys.readouterr()
+    assert output.out == ""
+    (error,) = output.err.splitlines()
+    assert error.startswith("error: ")
+    assert re.search(message, error), error
+    assert contents(folder) == before
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_read_only_folder_is_one_line(folder, capsys):
+    (folder / "foreign").chmod(0o555)
+    assert main([*SMALL, "--out", "foreign/run"]) == BAD_INPUT
+    assert capsys.readouterr().err.endswith("run.partial: Permission denied\n")
+
+
+def test_a_link_to_itself_is_no_output_folder(folder, capsys):
+    Path("loop").symlink_to("loop")
+    assert main([*SMALL, "--out", "loop"]) == BAD_INPUT
+    assert capsys.readouterr().err == "error: loop is a link that leads nowhere; name a folder with --out\n"
+
+
+def test_a_drawing_is_not_replaced_by_what_is_drawn_from_it(folder, capsys):
+    Path("section.svg").write_text(BEAM)
+    assert main(["design", "--section", "section.svg", "--formats", "svg", "--out", "."]) == BAD_INPUT
+    assert "this would overwrite section.svg, which is read" in capsys.readouterr().err
+    assert Path("section.svg").read_text() == BEAM
+
+
+@pytest.mark.parametrize(
+    ("command", "closed"),
+    [("--version", "<&-"), ("solvers", ">&-"), ("--version", "2>&-")],  # a table by Rich where it is closed
+)
+def test_a_closed_stream_is_no_fault(command, closed):
+    command = f'"{sys.executable}" -m pinnray.cli {command} {closed}'
+    done = subprocess.run(
+        ["bash", "-c", command], env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+@pytest.mark.parametrize(
+    ("before", "argument", "said"),
+    [
+        ("ulimit -n 16; ", "out", "the limit of open files is 16; allow 128 (ulimit -n 128)"),
+        (
+            "ulimit -f 8; ",
+            "out",
+            "files may not become longer than 8192 bytes; allow 16777216 (ulimit -f 16384)",
+        ),
+        ("", r"$'a\xff'", r"the argument 'a\udcff' is not UTF-8; take another name"),
+    ],
+)
+def test_what_the_libraries_cannot_start_with_is_one_line(folder, before, argument, said):
+    """MPI aborts with forty lines, or is killed by SIGXFSZ, and DOLFINx ends in a traceback."""
+    command = f'{before}"{sys.executable}" -m pinnray.cli compare --solvers fem --out {argument}'
+    done = subprocess.run(
+        ["bash", "-c", command],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (BAD_INPUT, f"error: {said}\n")
+
+
+def test_bad_input_of_a_process_has_no_traceback(folder):
+    done = subprocess.run(
+        [sys.executable, "-m", "pinnray.cli", "compare", "--solvers", "fen"],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (BAD_INPUT, "")
+    assert done.stderr.startswith("error: no solver is called 'fen'")
+    assert done.stderr.count("\n") == 1
+
+
+# What is printed
+
+
+def test_the_table_and_the_report_are_named(folder, capsys, without_pictures):
+    assert compare_main([*SMALL[1:], "--measurements", "good.csv"]) == 0
+    output = capsys.readouterr()
+    assert "Mean absolute error at" in output.out
+    assert "measured" in output.out
+    mae = json.loads(Path("out/default/metrics.json").read_text())["solvers"]["fem"]["markers"]["mae_u"]
+    row, _ = [line for line in output.out.splitlines() if line.startswith("  fem ")]
+    assert f"{mae:.3f}" in row
+    assert output.out.splitlines()[-1] == "report: out/default/report.html"
+    assert Path("out/default/report.html").is_file()
+    stages = [line.split(":")[0] for line in output.err.splitlines()]
+    assert stages == ["mesh", "measurements", "fem", "certificate", "pictures", "report"]
+
+
+def test_quiet_prints_nothing(folder, capsys, without_pictures):
+    assert main([*SMALL, "--measurements", "good.csv", "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_json_prints_the_metrics_and_nothing_else(folder, capsys, without_pictures):
+    assert main([*SMALL, "--measurements", "good.csv", "--json", "--out", "here"]) == 0
+    output = capsys.readouterr()
+    assert json.loads(output.out) == json.loads(Path("here/metrics.json").read_text())
+    assert output.err == ""
+
+
+@pytest.mark.parametrize("options", [["--quiet"], ["--json"]])
+def test_quiet_does_not_hide_an_error(folder, capsys, options):
+    assert main(["compare", "--solvers", "fen", *options]) == BAD_INPUT
+    assert capsys.readouterr().err.startswith("error: no solver is called 'fen'")
+
+
+def test_the_options_reach_the_job(folder, capsys, without_pictures):
+    options = "--set N=5 --young 3 --poisson 0.3 --plane stress --load point --stroke 4 --slide"
+    options += " --solver-set fem.degree=1"  # whose stress is far from that of quadratic elements
+    given = [*SMALL, *options.split(), "--measurements", "good.csv", "--json", "--out", "here"]
+    assert main(given) == NOT_CONVERGED
+    told = json.loads(capsys.readouterr().out)
+    assert told["design"]["rib_count"] == 5
+    assert told["material"] == {"young": 3, "poisson": 0.3, "plane": "stress", "law": "linear"}
+    assert told["load"] == {"kind": "point", "displacement": [None, -4], "position": None, "radius": None}
+    assert told["solvers"]["fem"]["stats"]["degree"] == 1
+    assert json.loads(Path("here/run.json").read_text())["mesh"]["size"] == 1
+
+
+def test_the_direction_turns_the_travel_toward_the_tip():
+    _, load = PhysicsOptions(stroke=5.0, direction=30.0).read()
+    assert load.displacement == pytest.approx((2.5, -2.5 * 3**0.5))
+
+
+@pytest.mark.parametrize(
+    ("settings", "name"),
+    [
+        ([], "default"),
+        (["N=5"], "default-rib_count-5"),
+        (["rib_count=+5", "L_angle=-10.5"], "default-rib_count-5-rib_angle--10.5"),
+        (["N=5", "name=mine"], "mine"),
+    ],
+)
+def test_a_changed_design_has_a_folder_of_its_own(settings, name):
+    assert FingerOptions(set=tuple(settings)).read()[0].name == name
+
+
+@pytest.mark.parametrize(
+    ("preset", "finger", "physics", "mesh", "load"),
+    [
+        (None, {}, {}, (0.25, 4), "mean"),
+        ("fast", {}, {}, (0.25, 4), "mean"),
+        ("paper", {}, {}, (0.0823, 1), "point"),
+        ("paper", {"mesh_size": 0.5}, {"load": "mean"}, (0.5, 1), "mean"),  # what is given wins
+        ("paper", {"mesh_size": 0.25}, {"load": "point"}, (0.25, 1), "point"),  # even if it is the usual
+    ],
+)
+def test_a_preset_brings_its_job_unless_told_otherwise(preset, finger, physics, mesh, load):
+    settings = FingerOptions(**finger).read(preset)[1]
+    assert (settings.size, settings.coarsening) == mesh
+    assert PhysicsOptions(**physics).read(preset)[1].kind == load
+
+
+def test_a_preset_as_a_setting_changes_the_solver_and_not_the_job(folder, capsys, without_pictures):
+    """Both ways lead to the same solver."""
+    tiny = ["--solver-set", "pinn-std.epochs=2", "--solver-set", "pinn-std.width=4", "--quiet"]
+    small = ["--solvers", "pinn-std", "--mesh-size", "1.0", "--measurements", "good.csv"]
+    for name, options in (("a", ["--preset", "paper"]), ("b", ["--solver-set", "pinn-std.preset=paper"])):
+        assert main(["compare", *small, *tiny, *options, "--device", "cpu", "--out", name]) == NOT_CONVERGED
+    (first, second) = (json.loads(Path(name, "run.json").read_text()) for name in "ab")
+    assert first["solvers"] == second["solvers"]
+    assert first["solvers"]["pinn-std"]["epochs"] == 2
+    assert (first["load"]["kind"], second["load"]["kind"]) == ("point", "mean")
+    assert (first["mesh"]["coarsening"], second["mesh"]["coarsening"]) == (1, 4)
+
+
+def test_the_seed_reaches_every_preset():
+    for preset in ("fast", "paper", "trained"):
+        (solver,) = SolverOptions(preset=preset, seed=7).read("pinn-std")
+        assert (solver.settings()["preset"], solver.settings()["seed"]) == (preset, 7)
+
+
+def test_a_setting_of_one_solver_wins_over_an_option_for_all():
+    texts = ("pinn-std.preset=fast", "pinn-std.seed=3")
+    (solver,) = SolverOptions(preset="paper", seed=7, solver_set=texts).read("pinn-std")
+    assert (solver.settings()["preset"], solver.settings()["seed"]) == ("fast", 3)
+
+
+@pytest.mark.slow
+def test_the_paper_mesh_has_about_as_many_nodes_as_the_paper():
+    """90,959; another release of Gmsh may place them a little differently."""
+    design, settings = FingerOptions().read("paper")
+    assert len(finger_mesh(design, settings=settings).points) == pytest.approx(90_959, rel=0.005)
+
+
+def test_a_design_with_many_changes_still_has_a_name():
+    changes = ("rib_thickness=2.1", "front_thickness=2.1", "back_thickness=2.1", "base_thickness=2.1")
+    names = {FingerOptions(set=(*changes, f"height={height}")).read()[0].name for height in (95, 96)}
+    assert [len(name) for name in names] == [64, 64]  # and they differ
+
+
+def test_without_names_a_solver_that_cannot_do_the_job_is_left_out(folder, capsys, monkeypatch):
+    """Two are known before anything is solved, for their law, and one once the markers are."""
+    monkeypatch.setattr("compare.pipeline.pipeline.draw_all", lambda *_: [])
+    monkeypatch.setitem(JOBS, "", JobDefaults(solvers="gp,fem-id,fem,fem-nonlinear"))
+    options = ["--load", "patch", "--plane", "stress", "--mesh-size", "1", "--measurements", "good.csv"]
+    assert main(["compare", *options]) == 0
+    output = capsys.readouterr()
+    warnings = [line for line in output.err.splitlines() if line.startswith("warning: ")]
+    assert len(warnings) == 3
+    assert warnings[0].startswith("warning: left out: fem-id (fem-id: the neo-hookean law is given")
+    assert warnings[1].startswith("warning: left out: fem-nonlinear (fem-nonlinear: ")
+    assert warnings[2].startswith("warning: left out: gp (gp goes through markers")
+    assert not any(line.startswith("gp:") for line in output.err.splitlines())
+    run = json.loads(Path("out/default/run.json").read_text())
+    assert (list(run["solvers"]), list(run["left_out"])) == (["fem"], ["fem-id", "fem-nonlinear", "gp"])
+    assert "Left out: fem-id (fem-id: the neo-hookean law" in Path("out/default/report.html").read_text(
+        "utf-8"
+    )
+
+
+def test_the_complete_table_and_that_of_the_paper_are_solvers_that_exist():
+    complete, paper = (
+        SolverOptions(preset=preset).read(job_defaults(preset).solvers) for preset in (None, "paper")
+    )
+    assert len(complete) == 8
+    assert [solver.name for solver in paper] == ["fem", "pinn-std", "pinn-asm"]
+    assert [solver.settings().get("preset") for solver in paper] == [None, "paper", "paper"]
+
+
+# How a run ends
+
+
+def ends(monkeypatch: pytest.MonkeyPatch, end: BaseException | Callable[[Solution], Solution]) -> None:
+    """Let `fem` end as the test says."""
+    solve = FemSolver.solve
+
+    def scripted(self: FemSolver, *arguments: object) -> Solution:
+        if isinstance(end, BaseException):
+            raise end
+        return end(solve(self, *arguments))
+
+    monkeypatch.setattr(FemSolver, "solve", scripted)
+    # The check of the measurements solves with `fem`, too.
+    monkeypatch.setattr("compare.pipeline.pipeline.displacement_remarks", lambda *_: [])
+
+
+def test_an_interrupted_run_says_how_to_go_on(folder, capsys, monkeypatch, without_pictures):
+    """What the first solver had finished is not solved again."""
+    calls = []
+    solve = FemNonlinearSolver.solve
+
+    def counted(self: FemNonlinearSolver, *arguments: object) -> Solution:
+        calls.append(self)
+        return solve(self, *arguments)
+
+    monkeypatch.setattr(FemNonlinearSolver, "solve", counted)
+    options = ["--solvers", "fem-nonlinear,fem", "--mesh-size", "1.0", "--measurements", "good.csv"]
+    with monkeypatch.context() as patch:
+        ends(patch, KeyboardInterrupt())
+        assert main(["compare", *options, "--quiet"]) == INTERRUPTED
+    output = capsys.readouterr()
+    assert output == ("", "interrupted; what was finished is kept; --resume goes on from it\n")
+    assert not Path("out/default").exists()
+    assert main(["compare", *options, "--quiet", "--resume"]) == 0
+    assert len(calls) == 1
+    assert not Path("out/default.partial").exists()
+
+
+def test_an_interrupted_verb_says_so(folder, capsys, monkeypatch):
+    ends(monkeypatch, KeyboardInterrupt())
+    assert main(["solve", "fem", "--mesh-size", "1.0"]) == INTERRUPTED
+    assert capsys.readouterr().err.splitlines()[-1] == "interrupted"
+
+
+def test_a_solver_that_did_not_converge_has_its_own_exit_code(folder, capsys, monkeypatch, without_pictures):
+    """The result is written all the same."""
+    status = Status(False, "stopped at 40 % of the load;\n take smaller steps")
+    ends(monkeypatch, lambda solution: replace(solution, status=status))
+    assert main([*SMALL, "--measurements", "good.csv", "--quiet"]) == NOT_CONVERGED
+    said = "error: fem did not converge: stopped at 40 % of the load; take smaller steps\n"
+    assert capsys.readouterr() == ("", said)
+    assert "Stopped at 40 % of the load" in Path("out/default/report.html").read_text(encoding="utf-8")
+
+
+def test_a_training_that_is_too_short_does_not_converge(folder, capsys, without_pictures):
+    settings = ["pinn-std.wall_spacing=5", "pinn-std.corner_spacing=5"]
+    options = [word for setting in settings for word in ("--solver-set", setting)]
+    small = ["--solvers", "pinn-std", "--mesh-size", "1.0", "--measurements", "good.csv", "--quiet"]
+    assert main(["compare", *small, *options]) == NOT_CONVERGED
+    assert capsys.readouterr().err.startswith("error: pinn-std did not converge: ")
+
+
+def test_a_full_disk_is_one_line_with_its_folders(folder, capsys, monkeypatch, without_pictures):
+    """Compilers and other libraries do not say where."""
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    cache = folder / "absent" / "cache"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
+    monkeypatch.setattr("compare.pipeline.pipeline.write_report", full)
+    monkeypatch.setattr(
+        "pinnray.commands.launch._space", lambda path: 10**3 if path.is_relative_to(cache) else 10**9
+    )
+    assert main([*SMALL, "--measurements", "good.csv", "--quiet"]) == BAD_INPUT
+    assert capsys.readouterr().err.splitlines()[-1] == f"error: {cache}: No space left on device"
+
+
+def test_a_missing_library_is_one_line(folder, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "solvers.pinn.finite_basis.presets", None)
+    assert main(["compare", "--solvers", "pinn-std"]) == BAD_INPUT
+    assert capsys.readouterr().err.startswith("error: solver 'pinn-std' cannot be loaded: ")
+
+
+# The other verbs
+
+
+def test_solvers_are_listed(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["solvers"]) == 0
+    listed = capsys.readouterr().out
+    assert "…" not in listed  # no value is cut off
+    assert all(f"│ {name} " in listed for name in solver_names())
+    assert all(f"preset={preset}" in listed for presets in PRESETS.values() for preset in presets)
+
+
+def test_a_broken_plug_in_is_one_line_among_the_solvers(tmp_path, capsys, monkeypatch):
+    info = tmp_path / "broken-0.1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 0.1\n")
+    (info / "entry_points.txt").write_text("[pinnray.solvers]\nbroken = no_such_module:Solver\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert main(["solvers"]) == 0
+    output = capsys.readouterr()
+    assert "│ fem " in output.out
+    assert output.err.startswith("warning: solver 'broken' is left out: ")
+    assert output.err.count("\n") == 1
+
+
+def test_one_solver_alone(folder, capsys):
+    assert main(["solve", "fem", "--mesh-size", "1.0", "--out", "fields/fem.vtu"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("fem: solved directly")
+    assert lines[1].startswith("energy 1.10")
+    assert lines[-1] == "fields/fem.vtu"
+    assert pyvista.read("fields/fem.vtu").n_cells > 1000
+
+
+def test_one_solver_that_follows_the_load_has_its_forces_beside_the_fields(folder, capsys):
+    options = "--mesh-size 1.0 --load patch --slide --stroke 2 --law st-venant-kirchhoff"
+    assert main(["solve", "fem-nonlinear", *options.split(), "--out", "fields/pressed.vtu"]) == 0
+    written = [
+        "fields/pressed.vtu",
+        *(f"fields/pressed_force_displacement.{kind}" for kind in ("csv", "png")),
+    ]
+    assert capsys.readouterr().out.splitlines()[-3:] == written
+    rows = list(csv.DictReader(Path(written[1]).read_text().splitlines()))
+    assert rows[0]["law"] == "st-venant-kirchhoff"
+    assert rows[-1]["travel_mm"] == "2.0"
+
+
+@pytest.fixture
+def cad_in_cache(tmp_path_factory) -> None:
+    cad_files(Design(), tmp_path_factory.mktemp("cad"))
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (["solve", "fem", "--out", "here/fem.vtu"], "error: here/fem.vtu: File too large"),
+        (["mesh", "--out", "here"], "error: here/mesh.vtu: File too large"),
+        (["design", "--out", "here"], "error: here/"),
+    ],
+)
+def test_a_full_disk_is_told_in_one_line_and_leaves_no_part_of_a_file(
+    command, said, folder, coarse_mesh, cad_in_cache, full_disk, capsys
+):
+    assert main([*command, "--mesh-size", "1.0"]) == BAD_INPUT
+    errors = [line for line in capsys.readouterr().err.splitlines() if not line.startswith(("mesh:", "fem:"))]
+    assert len(errors) == 1 + (command[0] == "solve")  # the stage of the certificate
+    assert errors[-1].startswith(said)
+    assert all(path.stat().st_size < 4096 for path in Path("here").iterdir())
+    assert not list(Path("here").glob(".*"))
+
+
+def test_the_mesh_alone(folder, capsys):
+    assert main(["mesh", "--mesh-size", "1.0", "--out", "here"]) == 0
+    assert "triangles, area" in capsys.readouterr().out
+    assert sorted(path.name for path in Path("here").iterdir()) == ["mesh.npz", "mesh.png", "mesh.vtu"]
+
+
+def test_the_design_alone(folder, capsys):
+    assert main(["design", "--formats", "svg", "--out", "here"]) == 0
+    listed = capsys.readouterr().out.splitlines()
+    assert listed == ["here/section.svg", "here/finger.toml", "here/design.png"]
+    assert all(Path(name).is_file() for name in listed)
+
+
+# Surroundings
+
+
+def test_a_home_that_cannot_be_written_is_not_needed(folder, coarse_mesh, tmp_path_factory):
+    """Neither for the mesh nor for what DOLFINx compiles and matplotlib remembers."""
+    cache = tmp_path_factory.mktemp("cache")
+    place = {"HOME": "/proc/absent", "PINNRAY_CACHE": str(cache), "XDG_CACHE_HOME": ""}
+    del (rest := {**os.environ, "PYTHONPATH": str(ROOT), **place})["XDG_CACHE_HOME"]
+    done = subprocess.run(
+        [sys.executable, "-m", "pinnray.cli", "solve", "fem", "--mesh-size", "1.0", "--out", "here/fem.vtu"],
+        env=rest,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, "/proc/absent" in done.stderr) == (0, False), done.stderr
+    assert {path.name for path in cache.iterdir()} >= {"fenics"}
+
+
+def test_a_terminal_without_greek_letters_shows_the_tables(folder, monkeypatch, without_pictures):
+    with TextIOWrapper(BytesIO(), encoding="ascii") as terminal:
+        monkeypatch.setattr("sys.stdout", terminal)
+        assert main([*SMALL, "--measurements", "good.csv", "--out", "here"]) == 0
+        shown = terminal.buffer.getvalue()
+    assert b"Mean absolute error at 2 markers" in shown
+    assert b"?" in shown
+
+
+# A solver of another package
+
+
+def test_a_plug_in_runs_in_the_main_job(folder, plugin_folder, monkeypatch, capsys, without_pictures):
+    monkeypatch.syspath_prepend(str(plugin_folder))
+    options = "--solvers fem,skfem-p2 --mesh-size 1.0 --measurements good.csv --json"
+    assert main(["compare", *options.split()]) == 0
+    output = capsys.readouterr()
+    assert output.err == ""
+    told = json.loads(output.out)["solvers"]["skfem-p2"]
+    assert told["message"] == "solved directly"
+    # The same elements as those of `fem`, assembled by another program: rounding.
+    assert told["to_reference"]["rel_l2_displacement"] < 1e-8
+    assert Path("out/default/fields/skfem-p2.vtu").is_file()
+
+
+# Help
+
+
+@pytest.mark.parametrize("arguments", [["--version"], ["compare", "--version"], ["track", "--version"]])
+def test_the_version_is_that_of_this_program(arguments, capsys):
+    assert main(arguments) == 0
+    assert capsys.readouterr().out == f"{version('pinn-ray')}\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--help"], ["compare", "design", "gridsearch", "mesh", "solve", "solvers"]),
+        (
+            ["compare", "--help"],
+            ["Parameters", "Finger", "Physics", "Solvers' settings", "Output", "compare --design slender"],
+        ),
+    ],
+)
+def test_help_teaches_quickly(arguments, words):
+    """It names every group and the exit codes, takes two seconds at most and loads no heavy library."""
+    code = (
+        "import json, sys, time\n"
+        "from pinnray.cli import main\n"
+        "status = main(sys.argv[1:])\n"
+        "json.dump([time.process_time(), sorted(sys.modules)], sys.stderr)\n"
+        "sys.exit(status)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0
+    seconds, modules = json.loads(done.stderr)
+    heavy = {"torch", "dolfinx", "petsc4py", "cadquery", "gmsh", "pyvista", "vtk", "matplotlib", "cv2"}
+    assert not heavy & set(modules)
+    assert seconds < 2
+    for word in [*words, "Exit codes", "130 interrupted"]:
+        assert word in " ".join(done.stdout.split())
+
+
+def test_help_names_every_option_of_the_main_job(capsys):
+    assert main(["compare", "--help"]) == 0
+    text = capsys.readouterr().out
+    options = (
+        "design set mesh-size adapt young poisson plane law load radius stroke direction slide solvers "
+        "solver-set seed preset device measurements reference out resume quiet json"
+    )
+    assert all(f"--{option} " in text for option in options.split())
+    assert "[default: ()]" not in text
+
+
+def test_every_preset_is_accepted():
+    for name in preset_names():
+        assert FingerOptions(design=name).read()[0].name == name
+
+
+def test_a_tolerance_that_is_not_reached_ends_with_its_own_code(monkeypatch, tmp_path, capsys):
+    """Everything is written, and the line says how far it came."""
+    monkeypatch.setattr(adapt, "adapted", partial(adapt.adapted, most_rounds=2))
+    options = ["--mesh-size", "1", "--adapt", "1e-6", "--out", str(tmp_path / "mesh")]
+    assert main(["mesh", *options]) == NOT_CONVERGED
+    progress, error = capsys.readouterr().err.split("error: --adapt 1e-06: ")
+    assert "s, the markers are known to 0.00" in progress
+    assert error.startswith("the markers are known to 0.00")
+    assert len((tmp_path / "mesh" / "adapt.csv").read_text(encoding="utf-8").splitlines()) == 3
+    assert len(TriangleMesh.load(tmp_path / "mesh" / "mesh.npz").triangles) > 3520
+
+
+def test_solve_gives_the_markers_to_a_solver_that_assimilates(tmp_path, capsys):
+    markers = tmp_path / "markers.csv"
+    markers.write_text("x_mm,y_mm,u_mm,v_mm\n50,-1,-1.5,-8.5\n85,-1,-2,-0.5\n")
+    out = tmp_path / "pulled.vtu"
+    options = ["--mesh-size", "1.0", "--measurements", str(markers), "--out", str(out)]
+    assert main(["solve", "fem-asm", *options]) == 0
+    assert "mm when they are left out" in capsys.readouterr().out
+    assert out.exists()
+
+
+@pytest.mark.parametrize(("given", "threads"), [({}, {1}), ({"OPENBLAS_NUM_THREADS": "2"}, {2})])
+def test_the_linear_algebra_computes_on_one_thread_unless_told_otherwise(given, threads):
+    """So that numbers do not depend on the cores of a machine."""
+    program = (
+        "import pinnray.cli, numpy, petsc4py.PETSc; from threadpoolctl import threadpool_info; "
+        "print({each['num_threads'] for each in threadpool_info() if each['internal_api'] == 'openblas'})"
+    )
+    kept = {key: value for key, value in os.environ.items() if not key.endswith("_NUM_THREADS")}
+    answer = subprocess.run(
+        [sys.executable, "-c", program], env=kept | given, capture_output=True, text=True, check=True
+    )
+    assert answer.stdout == f"{threads}\n"

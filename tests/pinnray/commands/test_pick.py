@@ -1,0 +1,78 @@
+"""`pinnray pick`: a colour that can be pasted, and a picture of what has it."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from compare.runtime.exits import BAD_INPUT
+from pinnray.cli import main
+
+RED = (40, 40, 200)
+
+
+@pytest.fixture(autouse=True)
+def shots(tmp_path, monkeypatch):
+    """Two pictures, with three red discs of radius 8 at (50, 40), (90, 40) and (130, 40) on the second."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    image = np.full((80, 160, 3), 210, np.uint8)
+    Path("shots").mkdir()
+    cv2.imwrite("shots/1.png", image)
+    for x in (50, 90, 130):
+        cv2.circle(image, (x, 40), 8, RED, -1, cv2.LINE_AA)
+    cv2.imwrite("shots/2.png", image)
+
+
+def test_a_click_gives_a_colour_and_a_picture(capsys):
+    assert main(["pick", "shots", "--frame", "1", "--at", "51,39", "--radii", "5,12"]) == 0
+    colour, found, path = capsys.readouterr().out.splitlines()
+    assert colour.startswith("--colour ")
+    share, _, circles = found.partition("% of the image, ")
+    assert float(share) == pytest.approx(100 * 3 * np.pi * 64 / 12800, rel=0.1)
+    assert circles == "3 circles"
+    assert path == "out/pick.png"
+    picture = cv2.imread("out/pick.png")
+    magenta = (picture == (200, 0, 200)).all(axis=2)
+    assert magenta[40, [50, 90, 130]].all()
+    assert not magenta[40, [35, 70, 110, 150]].any()
+    option, text = colour.split()
+    assert main(["pick", "shots/2.png", option, text, "--out", "again.png"]) == 0
+    assert capsys.readouterr().out.splitlines()[0] == colour
+
+
+def test_a_picture_comes_through_a_pipe(monkeypatch, capsys):
+    with Path("shots/2.png").open() as file:
+        monkeypatch.setattr("sys.stdin", file)
+        assert main(["pick", "-", "--at", "51,39", "--radii", "5,12"]) == 0
+    assert "3 circles" in capsys.readouterr().out
+
+
+def test_a_colour_that_much_else_has_is_warned_of(capsys):
+    assert main(["pick", "shots", "--at", "10,10"]) == 0
+    assert "warning: 100% of the image has this colour" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("shots", "give either --at X,Y or --colour"),
+        ("shots --at 1,1 --colour dark", "give either --at X,Y or --colour"),
+        ("shots --wrong 5 --colour dark", "--wrong"),
+        ("shots --at 5", "--at '5': give 2 or 4 numbers"),
+        ("shots --at 5,x", "--at '5,x': give 2 or 4 numbers"),
+        ("shots --at 200,5", "200,5 is not within the image of 160x80"),
+        ("shots --colour red", "cannot read the colour 'red'"),
+        ("shots --colour dark --radii 9,5", "radii from 9 to 5 pixels"),
+        ("shots --colour dark --frame 2", "shots has no frame 2"),
+        ("shots --colour dark --out pick.txt", "--out pick.txt: give the name of a picture"),
+        ("absent.mkv --colour dark", "'absent.mkv': there is no such video"),
+    ],
+)
+def test_bad_input_is_one_line_and_writes_nothing(line, message, capsys):
+    assert main(["pick", *line.split()]) == BAD_INPUT
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert [path.name for path in Path().iterdir()] == ["shots"]

@@ -1,0 +1,88 @@
+"""`pinnray rig` from the command line to its files."""
+
+import json
+
+import numpy as np
+import pytest
+
+from pinnray.cli import main
+from vision.calibration.chessboard import Board
+from vision.frames.sources import open_frames, photographs
+from vision.measurements import read_measurements
+
+QUICK = "--mesh-size 1 --size 480x270 --rest 2 --moving 0 --held 2"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    out = tmp_path_factory.mktemp("rig") / "film"
+    options = f"{QUICK} --tilt 4 --noise 2 --seed 3 --boards 2 --square 9 --cover 5=0.5 --cover-during held"
+    assert main(["rig", *options.split(), "--out", str(out)]) == 0
+    return out
+
+
+def filmed(folder):
+    with open_frames(folder / "video.mkv") as frames:
+        return [frame.image for frame in frames]
+
+
+def test_it_films_the_virtual_experiment_that_compare_takes_for_measurements(folder):
+    truth = read_measurements(folder / "observations_true.csv", marker_radius=0.8)
+    assert truth.simulated
+    assert "fem-nonlinear" in truth.source
+    # The patch that the markers 4 and 5 are near is pressed in by 10 mm.
+    assert truth.displacements[3:5, 1].min() < -8
+    images = filmed(folder)
+    assert len(images) == 4
+    assert images[0].shape == (270, 480, 3)
+    assert np.abs(images[0].astype(int) - images[3]).max() > 100
+
+
+def test_its_boards_are_found(folder):
+    images = [image for _, image in photographs([folder / "boards"])]
+    assert len(images) == 2
+    assert all(Board(9, 6, 9.0).find(image) is not None for image in images)
+
+
+def test_the_run_says_what_it_depends_on_and_may_be_replaced(folder):
+    run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    assert set(run["files_sha256"]) >= {
+        "video.mkv",
+        "truth.csv",
+        "truth.json",
+        "camera.json",
+        "boards/000.png",
+    }
+    assert run["cover"] == {"shares": {"5": 0.5}, "during": "held"}
+    before = filmed(folder)
+    options = f"{QUICK} --tilt 4 --noise 2 --seed 3 --cover 5=0.5 --cover-during held"
+    assert main(["rig", *options.split(), "--out", str(folder)]) == 0
+    np.testing.assert_array_equal(filmed(folder), before)
+    assert not (folder / "boards").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ("--noise -1", "noise = -1 grey levels is outside its range, 0 to 100 grey levels"),
+        ("--blur soft", "blur = 'soft' is not a finite number"),
+        ("--rest 0", "rest = 0 frames is outside its range"),
+        ("--size big", "--size big: give width and height"),
+        ("--size 4000x3000", "frames of 4000x3000 pixels; the rig makes up to 4 million"),
+        ("--tilt 80", "--tilt 80: the camera looks down"),
+        ("--codec h264", "no codec 'h264'; there are ffv1, mjpg, mp4v, png"),
+        ("--cover 5", "--cover 5: write marker=share"),
+        ("--irregular 0.2", "--irregular 0.2: give a share from 0 to 0.1"),
+        ("--layers 0.6", "--layers 0.6: give a share from 0 to 0.5"),
+        ("--cover 10=0.5", "there is no marker 10 to cover; there are 1 to 9"),
+        ("--solver fem,pinn-std", "name one --solver"),
+        ("--boards 3 --board 9", "cannot read the board '9'"),
+    ],
+)
+def test_what_is_wrong_is_told_in_one_line_and_nothing_is_left(options, said, capsys, tmp_path):
+    out = tmp_path / "film"
+    assert main(["rig", "--mesh-size", "1", *options.split(), "--out", str(out)]) == 2
+    errors = [line for line in capsys.readouterr().err.splitlines() if line.startswith("error")]
+    assert len(errors) == 1
+    assert said in errors[0]
+    assert not list(tmp_path.iterdir())

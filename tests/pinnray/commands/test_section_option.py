@@ -1,0 +1,99 @@
+"""`--section`: drawings in place of parameters, and what is refused, in one line with exit code 2."""
+
+from pathlib import Path
+
+import pytest
+
+from geometry.drawing.drawn_finger import DrawnFinger
+from pinnray.cli import main
+from pinnray.options.shared import FingerOptions
+
+BEAM = "M 0 0 L 0 -10 L 60 -10 L 60 0 Z"
+
+
+def drawing(folder: Path, path: str = BEAM, *, name: str = "beam.svg", size: str = "100mm") -> Path:
+    """An SVG file with a path in millimetres, y up; nothing but its size has a unit."""
+    file = folder / name
+    file.write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{size}" height="{size}" viewBox="-20 -50 100 100">'
+        f'<g transform="scale(1 -1)"><path d="{path}"/></g></svg>'
+    )
+    return file
+
+
+def test_lines_on_the_command_line_are_those_of_a_description(tmp_path: Path) -> None:
+    options = FingerOptions(
+        section=drawing(tmp_path),
+        clamp="[[0, 0], [0, -10]]",
+        contact="[40, 0]",
+        markers="5",
+        set=("depth=12",),
+    )
+    finger, _ = options.read()
+    assert isinstance(finger, DrawnFinger)
+    assert (finger.contact_abscissa, finger.depth, len(finger.markers)) == (40.0, 12.0, 5)
+    assert finger.section.area == pytest.approx(600, rel=1e-12)
+
+
+def test_a_description_beside_the_drawing_counts_and_the_command_line_wins(tmp_path: Path) -> None:
+    file = drawing(tmp_path)
+    file.with_suffix(".toml").write_text("depth = 7\ncontact = [30, 0]\n")
+    finger, _ = FingerOptions(section=file, contact="[45, 0]").read()
+    assert (finger.depth, finger.contact_abscissa) == (7.0, 45.0)
+
+
+def test_solve_works_on_a_drawing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["--solver", "fem", "--mesh-size", "1", "--out", str(tmp_path / "u.vtu")]
+    assert main(["solve", "--section", str(drawing(tmp_path)), *options]) == 0
+    assert "energy" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("path", "options", "text"),
+    [
+        ("M 0 0 L 0 -10 L 60 -10 L 60 0", "", "open"),  # no Z
+        ("M 0 0 L 60 -10 L 60 0 L 0 -10 Z", "", "cross"),  # a bow tie
+        (f"{BEAM} M 80 0 L 80 -5 L 85 -5 Z", "", "outside"),  # a second body
+        (f"{BEAM} M 10 -2 L 10 -9.99 L 50 -9.99 L 50 -2 Z", "", "thin"),  # a wall of 0.01 mm
+        (f"{BEAM} M 10 -2 L 10 -10 L 50 -10 L 50 -2 Z", "", "touch"),  # a cavity on the outline
+        (BEAM, "--set units=um", "units"),  # a beam of 60 micrometres
+        (BEAM, "--set units=m", "units"),  # a beam of 60 metres
+        (BEAM, "--clamp [[0,0],[0,-20]]", "off the outline"),
+        (BEAM, "--clamp [[0,0],[0,0]]", "has no length"),
+        (BEAM, "--clamp base", "nothing is clamped"),  # the file has none
+        (BEAM, "--contact [30,-5]", "off the outline"),  # inside the body
+        (BEAM, "--clamp [[0,0],[0,-10]] --contact [0,-5]", "clamp"),  # where it is held
+        (BEAM, "--markers [[30,5]]", "marker"),
+        (BEAM, "--markers 0", "markers = 0"),
+        (BEAM, "--set thickness=2", "thickness"),  # no such line
+        (BEAM, "--design slender", "give one of them"),
+    ],
+)
+def test_a_bad_section_is_refused_in_one_line(
+    path: str, options: str, text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    file = drawing(tmp_path, path)
+    assert main(["mesh", "--section", str(file), "--out", str(out), *options.split()]) == 2
+    said = capsys.readouterr().err.strip()
+    assert text in said
+    assert "\n" not in said
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ("--section missing.dxf", "there is no drawing missing.dxf"),
+        ("--section pyproject.toml", "as a drawing"),
+        ("--clamp [[0,0],[0,-30]]", "--clamp belongs to a drawing"),
+        ("--markers 5", "--markers belongs to a drawing"),
+    ],
+)
+def test_what_is_no_drawing_is_refused_in_one_line(
+    options: str, text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["mesh", "--out", str(tmp_path / "out"), *options.split()]) == 2
+    said = capsys.readouterr().err.strip()
+    assert text in said
+    assert "\n" not in said

@@ -1,0 +1,229 @@
+"""`pinnray track` from the command line to its files, and what it refuses."""
+
+import csv
+import json
+import re
+
+import cv2
+import numpy as np
+import pytest
+
+from compare.runtime.exits import BAD_INPUT
+from pinnray.cli import main
+from vision.frames.pictures import write_picture
+from vision.frames.sources import open_frames
+from vision.measurements import read_measurements
+
+QUICK = "--mesh-size 1 --rest 3 --moving 0 --held 3 --noise 2 --tilt 4 --seed 1"
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory):
+    out = tmp_path_factory.mktemp("film") / "rig"
+    assert main(["rig", *QUICK.split(), "--out", str(out)]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def tracked(film, tmp_path_factory):
+    out = tmp_path_factory.mktemp("tracked") / "track"
+    files = ["--camera", str(film / "camera.json"), "--workspace", str(film / "workspace.json")]
+    assert main(["track", str(film / "video.mkv"), *files, "--out", str(out)]) == 0
+    return out
+
+
+def test_a_video_becomes_measurements_within_hundredths_of_a_millimetre(film, tracked):
+    found, true = (
+        read_measurements(path, marker_radius=0.8)
+        for path in (tracked / "observations.csv", film / "observations_true.csv")
+    )
+    assert found.visible.all()
+    assert np.abs(found.displacements - true.displacements).sum(axis=1).mean() < 0.02
+    np.testing.assert_allclose(found.points, true.points, rtol=0, atol=0.02)
+    assert "means of 3 and 3 frames at rest, standard deviations" in found.source
+
+
+def test_what_is_tracked_in_a_film_of_the_rig_is_simulated(film, tracked):
+    assert (tracked / "observations.csv").read_text(encoding="utf-8").startswith("# simulated\n")
+    found = read_measurements(tracked / "observations.csv", marker_radius=0.8)
+    assert found.source.startswith("simulated by pinnray rig, tracked by pinnray track (precise, ")
+    assert json.loads((tracked / "track.json").read_text(encoding="utf-8"))["simulated"] is True
+
+
+def test_the_same_frames_come_through_a_pipe(film, tracked, tmp_path, monkeypatch, capsys):
+    with open_frames(film / "video.mkv") as frames:
+        pictures = [cv2.imencode(".png", frame.image)[1].tobytes() for frame in frames]
+    (tmp_path / "pictures").write_bytes(b"".join(pictures))
+    files = ["--camera", str(film / "camera.json"), "--workspace", str(film / "workspace.json")]
+    with (tmp_path / "pictures").open() as pipe:
+        monkeypatch.setattr("sys.stdin", pipe)
+        assert main(["track", "-", *files, "--live", "--out", str(tmp_path / "out")]) == 0
+    # The pictures were encoded anew and lost the rig's mark, but its workspace has one, too.
+    assert "the workspace is that of a film of pinnray rig" in capsys.readouterr().err
+    assert (tmp_path / "out" / "observations.csv").read_text().startswith("# simulated\n")
+    found, before = (
+        read_measurements(folder / "observations.csv", marker_radius=0.8).displacements
+        for folder in (tmp_path / "out", tracked)
+    )
+    np.testing.assert_allclose(found, before, rtol=0, atol=0.001)  # live looks at fewer fiducials
+
+
+def test_a_pipe_is_recorded_even_if_its_film_is_refused(film, tmp_path, monkeypatch, capsys):
+    with open_frames(film / "video.mkv") as frames:
+        rest = [frame.image for frame in frames][:3]
+    (tmp_path / "pictures").write_bytes(b"".join(cv2.imencode(".png", image)[1].tobytes() for image in rest))
+    options = ["--camera", str(film / "camera.json"), "--record", str(tmp_path / "run.mkv")]
+    with (tmp_path / "pictures").open() as pipe:
+        monkeypatch.setattr("sys.stdin", pipe)
+        assert main(["track", "-", *options, "--out", str(tmp_path / "out")]) == BAD_INPUT
+    assert "the film must end while it is pressed" in capsys.readouterr().err
+    with open_frames(tmp_path / "run.mkv") as kept:
+        np.testing.assert_array_equal([frame.image for frame in kept], rest)
+
+
+def test_a_file_is_not_recorded_again(film, tmp_path, capsys):
+    assert main(["track", str(film / "video.mkv"), "--record", str(tmp_path / "run.mkv")]) == BAD_INPUT
+    assert "--record keeps the frames of a camera or a pipe" in capsys.readouterr().err
+    assert not (tmp_path / "run.mkv").exists()
+
+
+def test_the_table_shows_deviations_below_a_micrometre(film, tmp_path, capsys):
+    """They are 0.0002 to 0.0005 mm in this film."""
+    options = ["--camera", str(film / "camera.json"), "--without-video"]
+    assert main(["track", str(film / "video.mkv"), *options, "--out", str(tmp_path / "out")]) == 0
+    shown = [float(number) for number in re.findall(r"±([\d.]+)", capsys.readouterr().out)]
+    assert len(shown) == 18
+    assert min(shown) > 0
+
+
+def test_its_files_are_whole(tracked):
+    names = {path.name for path in tracked.iterdir()}
+    assert names == {
+        *("annotated.mp4", "final.png", "initial.png", "observations.csv"),
+        *("run.json", "track.json", "tracks.csv"),
+    }
+    with open_frames(tracked / "annotated.mp4") as frames:
+        assert len(list(frames)) == 6
+    with (tracked / "tracks.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 6 * 9
+    assert float(rows[-1]["x_mm"]) - float(rows[8]["x_mm"]) < -1
+    summary = json.loads((tracked / "track.json").read_text(encoding="utf-8"))
+    assert summary["rest"] == {"initial": [0, 2], "final": [3, 5]}
+    assert np.shape(summary["displacement_covariance_mm2"]) == (18, 18)
+    run = json.loads((tracked / "run.json").read_text(encoding="utf-8"))
+    assert set(run["files_sha256"]) == names - {"run.json"}
+
+
+def test_a_result_is_replaced_by_another_and_the_video_may_be_left_out(film, tmp_path):
+    out = tmp_path / "track"
+    for _ in range(2):
+        options = ["--camera", str(film / "camera.json"), "--without-video", "--live"]
+        assert main(["track", str(film / "video.mkv"), *options, "--out", str(out)]) == 0
+    assert not (out / "annotated.mp4").exists()
+
+
+def spoilt(kind, film, folder):
+    """A source that is no film of the finger, and further options."""
+    whole = (film / "video.mkv").read_bytes()
+    video = folder / "video.mkv"
+    if kind == "absent":
+        return ["nowhere.mkv"]
+    if kind == "empty":
+        video.write_bytes(b"")
+    elif kind == "corrupt":
+        video.write_bytes(whole[:1000] + bytes(len(whole) - 1000))
+    elif kind == "text":
+        video.write_text("no video")
+    elif kind == "black":
+        for number in range(4):
+            write_picture(folder / f"{number}.png", np.zeros((720, 1280, 3), dtype=np.uint8))
+        return [str(folder)]
+    elif kind == "mirrored":
+        with open_frames(film / "video.mkv") as frames:
+            for frame in frames:
+                write_picture(folder / f"{frame.number}.png", np.ascontiguousarray(frame.image[:, ::-1]))
+        return [str(folder)]
+    else:
+        video.write_bytes(whole)
+    options = {
+        "other design": ["--set", "height=60", "--set", "tip_length=12"],
+        "other workspace": ["--workspace", str(folder / "other.json")],
+        "no workspace": ["--workspace", str(folder / "half.json")],
+        "no camera": ["--camera", str(folder / "other.json")],
+        "colour": ["--colour", "pink"],
+    }
+    corners = ((0, 0), (50, 0), (50, 30), (0, 30), (20, 60))
+    (folder / "other.json").write_text(json.dumps({"fiducials": corners}))
+    (folder / "half.json").write_text('{"fiducials": [')
+    return [str(video), *options.get(kind, [])]
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        ("absent", "no such video"),
+        ("empty", "video.mkv"),
+        ("corrupt", "video.mkv"),
+        ("text", "video.mkv"),
+        ("black", "neither the fiducials nor the markers can be made out"),
+        ("mirrored", "the image is mirrored"),
+        ("other design", "0 of 9 markers are where the design has them"),
+        ("other workspace", "5 fiducials cannot be made out"),
+        ("no workspace", "half.json: it is not JSON"),
+        ("no camera", "other.json"),
+        ("colour", "cannot read the colour 'pink'"),
+    ],
+)
+def test_what_cannot_be_tracked_is_one_line_and_writes_nothing(kind, said, film, tmp_path, capfd):
+    source, out = tmp_path / "source", tmp_path / "out"
+    source.mkdir()
+    assert main(["track", *spoilt(kind, film, source), "--out", str(out)]) == BAD_INPUT
+    error = [line for line in capfd.readouterr().err.splitlines() if line.startswith("error")]
+    assert len(error) == 1
+    assert said in error[0]
+    assert [path.name for path in tmp_path.iterdir()] == ["source"]
+
+
+def test_a_truncated_video_is_refused_or_tracked_as_far_as_it_goes(film, tmp_path, capfd):
+    whole = (film / "video.mkv").read_bytes()
+    (tmp_path / "video.mkv").write_bytes(whole[: len(whole) // 2])
+    assert main(["track", str(tmp_path / "video.mkv"), "--out", str(tmp_path / "out")]) == BAD_INPUT
+    assert "error" in capfd.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_compare_goes_from_pixels_to_the_table(film, tmp_path, capsys):
+    out = tmp_path / "out"
+    options = ["--solvers", "fem", "--mesh-size", "1", "--camera", str(film / "camera.json")]
+    video = str(film / "video.mkv")
+    assert main(["compare", *options, "--measurements", video, "--out", str(out)]) == 0
+    assert "Mean absolute error at 9 markers, mm (simulated displacements)" in capsys.readouterr().out
+    assert read_measurements(out / "observations.csv", marker_radius=0.8).label == "simulated"
+    metrics = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
+    assert metrics["measurements"]["source"] == "simulated"
+    assert "standard deviations" in metrics["measurements"]["description"]
+    report = (out / "report.html").read_text(encoding="utf-8")
+    assert "The finger pressed, as the virtual camera saw it" in report
+    assert "Measured by" not in report
+    assert "Predicted finger in the film" in report
+    pictures = {"initial.png", "final.png", "predicted.png"}
+    assert {path.name for path in (out / "track").iterdir()} >= pictures
+    run = json.loads((out / "run.json").read_text(encoding="utf-8"))
+    assert len(run["film"]["video_sha256"]) == 64
+    assert "track/final.png" in run["files_sha256"]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--measurements", "nowhere.mkv"], "no such video"),
+        (["--measurements", "nowhere.csv"], "there is no file nowhere.csv"),
+        (["--camera", "camera.json"], "is for --measurements VIDEO"),
+    ],
+)
+def test_compare_refuses_what_is_no_film(options, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["compare", "--solvers", "fem", *options]) == BAD_INPUT
+    assert said in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,281 @@
+"""`fem-3d` against closed forms, plane strain, plane stress and its own energy."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compare.crossval.true_fields import FieldSampler
+from compare.evaluation.convergence import with_certificates
+from compare.evaluation.evaluation import Evaluation
+from compare.report.sentences import certificate_sentences
+from geometry.errors import UserError
+from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
+from solvers.fem.finite_strain.solver import FemNonlinearSolver
+from solvers.fem.linear import FemSolver
+from solvers.fem.linear_solvers import Multigrid
+from solvers.fem.solid.cost import affordable
+from solvers.fem.solid.extrusion import ExtrudedSpace
+from solvers.fem.solid.side_face import FaceField
+from solvers.fem.solid.solver import Fem3dSolver
+from solvers.problem import Load, Material, Problem
+from solvers.solution import State
+from tests.solvers.bodies import body_mesh
+from tests.solvers.conftest import bar_mesh
+
+SLIDING = Load(kind="patch", displacement=(None, -4.0))
+
+
+@pytest.fixture(scope="module")
+def wedge():
+    """A wedge with two cavities whose base leans, 6 mm deep, of elements of 1.5 mm."""
+    return replace(body_mesh("tilted wedge", 1.5), depth=6.0)
+
+
+def test_the_tetrahedra_fill_the_half_body(wedge):
+    space = ExtrudedSpace.of(wedge, 3, 0.25)
+    corners = space.nodes[space.vertices][space.cells]
+    volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
+    assert volumes.min() > 0
+    assert volumes.sum() == pytest.approx(3.0 * wedge.areas.sum(), rel=1e-12)
+    thickness = np.diff(space.faces)
+    assert thickness[-1] / thickness[0] == pytest.approx(0.25)
+
+
+def test_neighbouring_tetrahedra_share_whole_faces(wedge):
+    """Every face belongs to two tetrahedra, or lies on the outline or on one of the two end planes."""
+    space = ExtrudedSpace.of(wedge, 2, 0.5)
+    sides = np.sort(space.cells[:, [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]].reshape(-1, 3), axis=1)
+    _, counts = np.unique(sides, axis=0, return_counts=True)
+    rim = len(wedge.edges) * 2 - 3 * len(wedge.triangles)  # edges with one triangle
+    assert counts.max() == 2
+    assert (counts == 1).sum() == 2 * len(wedge.triangles) + 2 * 2 * rim
+
+
+def bent(nodes: np.ndarray, curvature: float, ν: float) -> np.ndarray:
+    """Displacement of a bar under end couples: Timoshenko, Goodier, Theory of Elasticity, article 102."""
+    x, y, z = nodes.T
+    across = -0.5 * curvature * (x**2 + ν * (y**2 - z**2))
+    return np.column_stack([curvature * x * y, across, -ν * curvature * y * z])
+
+
+def test_pure_bending_is_exact():
+    """Its displacement is quadratic, so that forces act on the two ends alone, and strain turns with y."""
+    mesh, curvature = replace(bar_mesh(10, 2, 10, 3, contact=(8, 10)), depth=3.0), 0.01
+    material = Material()
+    space = ExtrudedSpace.of(mesh, 2, 0.5)
+    equilibrium = FiniteStrainEquilibrium(Problem(mesh, material), space)
+    nodal = bent(space.nodes, curvature, material.poisson)
+    force = equilibrium.internal_force(nodal)
+    inside = (space.nodes[:, 0] > 0) & (space.nodes[:, 0] < 10)
+    assert np.abs(force[inside & ~space.mirrored.any(axis=1)]).max() < 1e-12 * np.abs(force).max()
+    # E κ² / 2 times the integral of y² over 10 mm by 0 to -2 mm
+    assert equilibrium.energy(nodal) == pytest.approx(0.5 * 11.4 * curvature**2 * 10 * 8 / 3, rel=1e-12)
+    equilibrium.factors.destroy()
+    location = mesh.at_centroids()
+    for face in ("side", "middle"):
+        gradient = FaceField(space, nodal, face).solid_gradient(location)
+        state = State.from_solid_gradient(gradient, Problem(mesh, material))
+        expected = 11.4 * curvature * location.points[:, 1]
+        np.testing.assert_allclose(state.stress[:, 0, 0], expected, atol=1e-12)
+        np.testing.assert_allclose(state.von_mises, np.abs(expected), atol=1e-12)
+
+
+def test_a_narrow_beam_bends_with_youngs_modulus():
+    """Tip force of Timoshenko's beam; the modulus of plane strain would be a tenth larger."""
+    length, height, middle = 40.0, 4.0, 39.0
+    mesh = replace(bar_mesh(length, height, 40, 4, contact=(38.0, 40.0)), depth=2.0)
+    material = Material(young=10.0, poisson=0.3)
+    problem = Problem(mesh, material, Load(displacement=(None, -0.1)))
+    solution = Fem3dSolver(layers=1).solve(problem)
+    shear = material.young / (2 * (1 + material.poisson))
+    compliance = middle**3 / (3 * material.young * height**3 / 12) + middle / (5 / 6 * shear * height)
+    assert solution.reaction[1] == pytest.approx(
+        -0.1 / compliance, rel=0.01
+    )  # the clamp stiffens it a little
+
+
+@pytest.mark.parametrize("law", ["linear", "neo-hookean", "st-venant-kirchhoff"])
+def test_held_side_faces_make_plane_strain(wedge, law):
+    problem = Problem(wedge, Material(law=law), SLIDING)
+    solid = Fem3dSolver(sides="held", layers=2).solve(problem)
+    plane = (FemSolver(estimate=False) if law == "linear" else FemNonlinearSolver()).solve(problem)
+    assert solid.status.converged
+    # More unknowns than in the plane, so less energy, by the error of elements of 1 mm.
+    assert 0.995 < solid.energy / plane.energy < 1
+    gap = solid.displacement(wedge.markers) - plane.displacement(wedge.markers)
+    assert np.abs(gap).max() < 0.005
+
+
+def test_a_cylinder_between_held_side_faces_presses_as_in_the_plane(wedge):
+    load = Load(kind="cylinder", radius=5.0, displacement=(0.0, -2.0))
+    problem = Problem(wedge, Material(law="neo-hookean"), load)
+    solid, plane = Fem3dSolver(sides="held", layers=1).solve(problem), FemNonlinearSolver().solve(problem)
+    assert solid.status.converged
+    assert solid.energy == pytest.approx(plane.energy, rel=0.005)  # elements of 1 mm
+    assert solid.reaction[1] == pytest.approx(plane.reaction[1], rel=0.005)
+    for name in ("contact_start_mm", "contact_end_mm"):
+        assert solid.stats[name] == plane.stats[name]
+    assert solid.stats["contact_pressure_MPa"] == pytest.approx(plane.stats["contact_pressure_MPa"], rel=0.05)
+    assert solid.stats["penetration_mm"] < 1e-5
+
+
+def test_a_thin_finger_is_in_plane_stress(wedge):
+    problem = Problem(replace(wedge, depth=0.2), Material(), Load(kind="patch", displacement=(0.0, -2.0)))
+    solid = Fem3dSolver(layers=1).solve(problem)
+    plane = FemSolver(estimate=False).solve(replace(problem, material=Material(plane="stress")))
+    strain = FemSolver(estimate=False).solve(problem)
+    assert solid.energy == pytest.approx(plane.energy, rel=0.01)  # the rest is at corners, clamp and patch
+    assert strain.energy > 1.2 * plane.energy
+    location = wedge.at_centroids()
+    ours, theirs = (each.state(location).von_mises for each in (solid, plane))
+    assert np.linalg.norm(ours - theirs) < 0.05 * np.linalg.norm(theirs)
+
+
+def test_the_side_face_carries_no_traction():
+    """Beside clamp and patch of a deep ring; 0.12 is the elements', and 0.09 with those of 1 mm."""
+    mesh = replace(body_mesh("ring", 1.5), depth=20.0)
+    location, problem = mesh.at_centroids(), Problem(mesh, load=SLIDING)
+    beside, across = np.abs(location.points[:, 0]) > 12, {}
+    for face in ("side", "middle"):
+        solution = Fem3dSolver(layers=3, face=face).solve(problem)
+        across[face] = np.linalg.norm(solution.state(location).stress_zz[beside])
+    assert across["side"] < 0.2 * across["middle"]
+
+
+def test_force_is_the_slope_of_the_energy(wedge):
+    """Of three equilibria at finite strain, by a central difference."""
+    energies = []
+    for stroke in (3.99, 4.0, 4.01):
+        load = Load(kind="patch", displacement=(None, -stroke))
+        solution = Fem3dSolver(layers=1).solve(Problem(wedge, Material(law="neo-hookean"), load))
+        energies.append(solution.energy)
+        if stroke == 4.0:
+            force = solution.reaction
+    assert (energies[2] - energies[0]) / 0.02 == pytest.approx(-force[1], rel=1e-4)
+    assert abs(force[0]) < 1e-8  # u is free
+
+
+def test_a_finger_of_other_depth_is_stiffer_where_it_is_deeper(wedge):
+    forces = [
+        Fem3dSolver(layers=2).solve(Problem(replace(wedge, depth=depth), load=SLIDING)).reaction[1]
+        for depth in (2.0, 20.0)
+    ]
+    assert forces[1] < 1.05 * forces[0] < 0
+
+
+def test_plane_strain_does_not_certify_it(wedge):
+    problem = Problem(wedge, load=Load(displacement=(0.0, -2.0)))
+    evaluation = Evaluation.of(Fem3dSolver(layers=1).solve(problem), wedge)
+    (judged,) = with_certificates([evaluation], problem)
+    assert judged.converged
+    assert judged.certificate is None
+    assert "three dimensions" in certificate_sentences(judged)
+
+
+def test_cross_validation_does_not_read_its_stress_as_that_of_the_plane(wedge):
+    solution = Fem3dSolver(layers=1).solve(Problem(wedge, load=SLIDING))
+    sampler = FieldSampler.of(wedge, wedge.markers, 0.4)
+    sampled = sampler.of_solution(solution, wedge)
+    expected = solution.state(sampler.inside).von_mises
+    np.testing.assert_array_equal(sampled.state(solution.problem).von_mises, expected)
+    plane = State.from_gradient(sampled.gradient[:, :2, :2], solution.problem).von_mises
+    assert np.abs(plane - expected).max() > 0.01 * expected.max()
+
+
+@pytest.mark.parametrize(
+    ("settings", "text"),
+    [
+        ({"layers": 0}, "at least 1 layer"),
+        ({"grading": 0.0}, "0 < grading <= 1"),  # a layer without thickness
+        ({"grading": 2.0}, "0 < grading <= 1"),  # thicker where the stress changes
+        ({"face": "top"}, "side, middle"),
+        ({"sides": "loose"}, "free or held"),
+        ({"linear_solver": "fast"}, "auto, direct, iterative"),
+        ({"max_step": 0.0}, "min_step <= max_step"),
+        ({"tolerance": 1e30}, r"0 < tolerance <= 0.001, not 1e\+30"),  # the linear guess would do
+    ],
+)
+def test_wrong_settings_are_refused(settings, text):
+    with pytest.raises(UserError, match=text):
+        Fem3dSolver(**settings)
+
+
+@pytest.mark.mpi
+def test_two_ranks_find_what_one_finds(start_ranks, wedge, tmp_path):
+    wedge.save(tmp_path / "mesh.npz")
+    process = start_ranks(2, "-m", "tests.solvers.fem.rank_programs", "solid", str(tmp_path / "mesh.npz"))
+    output, errors = process.communicate()
+    assert process.returncode == 0, errors
+    ((energy, displacement),) = json.loads(output)["solutions"]
+    load = Load(displacement=(0.0, -2.0))
+    alone = Fem3dSolver(layers=1).solve(Problem(wedge, Material(law="neo-hookean"), load))
+    assert energy == pytest.approx(alone.energy, rel=1e-10)
+    np.testing.assert_allclose(displacement, alone.displacement(wedge.markers), rtol=0, atol=1e-8)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("law", "load"),
+    [
+        ("linear", SLIDING),
+        ("linear", Load(displacement=(0.0, -4.0))),  # a mean: two more solves, for unit forces
+        ("neo-hookean", SLIDING),
+    ],
+)
+def test_multigrid_finds_what_factors_find(wedge, law, load):
+    problem = Problem(wedge, Material(law=law), load)
+    direct, iterative = (
+        Fem3dSolver(layers=1, linear_solver=method).solve(problem) for method in ("direct", "iterative")
+    )
+    assert iterative.status.converged
+    assert iterative.stats["iterations"] > 0
+    assert iterative.energy == pytest.approx(
+        direct.energy, rel=1e-7
+    )  # Newton's criterion is 1e-8 of the force
+    gap = iterative.displacement(wedge.markers) - direct.displacement(wedge.markers)
+    assert np.abs(gap).max() < 1e-5  # mm
+
+
+def test_an_indefinite_matrix_is_solved_by_minres(wedge):
+    """The stiffness minus 4e-6 of its diagonal has a negative eigenvalue."""
+    equilibrium = FiniteStrainEquilibrium(Problem(wedge), ExtrudedSpace.of(wedge, 1, 1.0))
+    system = equilibrium.distributed, equilibrium.matrix, equilibrium.clamped
+    multigrid = Multigrid(*system, tolerance=1e-6, tangent=True)
+    equilibrium.matrix.setDiagonal((1 - 4e-6) * equilibrium.matrix.getDiagonal())
+    equilibrium.matrix.assemble()
+    force = np.where(equilibrium.clamped, 0.0, 1.0)
+    equilibrium.factors.update()
+    exact = equilibrium.factors.solve(force)
+    assert (exact * force).sum() < 0  # it gives way against the force
+    multigrid.update()
+    found = multigrid.solve(force)
+    assert np.linalg.norm(found - exact) < 1e-4 * np.linalg.norm(exact)
+
+
+@pytest.mark.parametrize(
+    ("asked", "free", "iterative"),
+    [
+        ("auto", 40.0, False),  # factors fit
+        ("auto", 10.0, True),  # they do not, but coarser matrices do
+        ("direct", 40.0, False),
+        ("iterative", 40.0, True),
+    ],
+)
+def test_the_linear_solver_is_chosen_by_memory(asked, free, iterative):
+    cost = affordable(1_000_000, 13, asked, free)
+    assert cost.iterative is iterative
+    assert cost.words.startswith("1,000,000 unknowns")
+
+
+@pytest.mark.parametrize(
+    ("asked", "free", "advice"),
+    [
+        ("auto", 2.0, "fewer layers"),  # not even multigrid fits
+        ("direct", 10.0, "linear_solver=iterative"),
+    ],
+)
+def test_too_little_memory_is_told_before_the_start(asked, free, advice):
+    with pytest.raises(UserError, match=advice):
+        affordable(1_000_000, 13, asked, free)

@@ -1,0 +1,250 @@
+"""Training of the paper's networks: saved, resumed, interrupted, ended; alone and in two processes."""
+
+import csv
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import torch
+
+from geometry.errors import UserError
+from solvers.pinn.paper.checkpoint import save_checkpoint
+from solvers.pinn.paper.solver import PaperPinnSolver
+from solvers.problem import Load, Problem
+from solvers.solution import Solution
+from solvers.solver import TrainingContext, TrainingDiverged
+from tests.solvers.conftest import bar_mesh
+
+SMALL = PaperPinnSolver(epochs=40, width=8, layers=2, base_points=20, threads=1, checkpoint_every=7)
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    return Problem(bar_mesh(24.0, 4.0, 12, 4, contact=(14.0, 18.0)))
+
+
+@pytest.fixture(scope="module")
+def straight(problem) -> Solution:
+    """40 epochs without a pause."""
+    return SMALL.solve(problem)
+
+
+def assert_identical(first: Solution, second: Solution) -> None:
+    assert torch.equal(first.field.parameters, second.field.parameters)
+    for name, column in first.history.items():
+        if name != "seconds":
+            np.testing.assert_array_equal(column, second.history[name], err_msg=name)
+
+
+def test_resumed_training_is_the_same_to_the_bit(problem, straight, tmp_path):
+    """20 epochs and 20 more; the second run starts from the files alone."""
+    context = TrainingContext(tmp_path, resume=True)
+    half = replace(SMALL, epochs=20).in_context(context).solve(problem)
+    assert half.stats["epochs"] == 20
+    whole = SMALL.in_context(context).solve(problem)
+    assert_identical(whole, straight)
+    assert (np.diff(whole.history["seconds"]) > 0).all(), "the clock goes on"
+
+
+def test_threads_do_not_change_a_bit(problem, straight):
+    assert_identical(replace(SMALL, threads=2).solve(problem), straight)
+
+
+@pytest.mark.parametrize("epoch", [3, 13])  # before the first checkpoint; between two
+def test_interrupted_training_goes_on(problem, straight, tmp_path, epoch):
+    def interrupt(fraction: float, text: str) -> None:
+        if text.startswith(f"epoch {epoch} of 40"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        SMALL.in_context(TrainingContext(tmp_path)).solve(problem, interrupt)
+    assert len(rows(tmp_path)) == epoch
+    again: list[str] = []
+    resumed = SMALL.in_context(TrainingContext(tmp_path, resume=True))
+    assert_identical(resumed.solve(problem, lambda _, text: again.append(text)), straight)
+    assert len(again) == 40 - epoch
+
+
+def test_an_interrupt_within_a_step_saves_the_epoch_before(problem, straight, tmp_path, monkeypatch):
+    """The optimiser has changed the parameters, but not yet recorded the epoch."""
+    step, calls = torch.optim.Adam.step, []
+
+    def interrupted(self, closure):
+        result = step(self, closure)
+        calls.append(1)
+        if len(calls) == 10:
+            raise KeyboardInterrupt
+        return result
+
+    with monkeypatch.context() as patch:
+        patch.setattr(torch.optim.Adam, "step", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            SMALL.in_context(TrainingContext(tmp_path)).solve(problem)
+    assert len(rows(tmp_path)) == 9
+    assert_identical(SMALL.in_context(TrainingContext(tmp_path, resume=True)).solve(problem), straight)
+
+
+def test_without_resume_a_checkpoint_is_ignored(problem, straight, tmp_path):
+    context = TrainingContext(tmp_path)
+    replace(SMALL, epochs=5).in_context(context).solve(problem)
+    assert_identical(SMALL.in_context(context).solve(problem), straight)
+
+
+@pytest.mark.parametrize(
+    ("settings", "load"),
+    [
+        ({"learning_rate": 2e-3}, Load()),  # another training
+        ({"seed": 1}, Load()),  # other initial weights
+        ({}, Load(kind="point")),  # another problem
+    ],
+)
+def test_a_checkpoint_of_something_else_is_refused(problem, tmp_path, settings, load):
+    replace(SMALL, epochs=1).in_context(TrainingContext(tmp_path)).solve(problem)
+    other = replace(SMALL, **settings).in_context(TrainingContext(tmp_path, resume=True))
+    with pytest.raises(UserError, match="belongs to another problem or other settings; remove it, or"):
+        other.solve(replace(problem, load=load))
+
+
+def test_a_broken_checkpoint_is_refused(problem, tmp_path):
+    (tmp_path / "checkpoint.safetensors").write_bytes(b"half of it")
+    with pytest.raises(UserError, match=r"checkpoint\.safetensors cannot be read .*; remove it, or"):
+        SMALL.in_context(TrainingContext(tmp_path, resume=True)).solve(problem)
+
+
+def test_a_full_disk_names_the_checkpoint(tmp_path, full_disk):
+    with pytest.raises(OSError, match="File too large") as error:
+        save_checkpoint(tmp_path, {"weights": torch.zeros(9000)}, "digest")
+    assert error.value.filename == str(tmp_path / "checkpoint.safetensors")
+
+
+def test_the_history_is_a_table_with_units(problem, straight, tmp_path):
+    SMALL.in_context(TrainingContext(tmp_path)).solve(problem)
+    table = rows(tmp_path)
+    assert list(table[0]) == [
+        "epoch",
+        "PDE [MPa]",
+        "BC [mm2]",
+        "total [MPa]",
+        "energy [N mm/mm]",
+        "seconds [s]",
+    ]
+    assert [int(row["epoch"]) for row in table] == list(range(1, 41))
+    for name, title in (("BC", "BC [mm2]"), ("energy", "energy [N mm/mm]")):
+        np.testing.assert_allclose([float(row[title]) for row in table], straight.history[name], rtol=1e-8)
+    area = problem.mesh.areas.sum()
+    np.testing.assert_allclose(straight.history["energy"], area * straight.history["PDE"])
+    assert [path.name for path in tmp_path.iterdir() if "partial" in path.name] == []
+
+
+def rows(folder: Path) -> list[dict[str, str]]:
+    with (folder / "history.csv").open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_tensorboard_gets_every_epoch_once_if_it_is_installed(problem, tmp_path, monkeypatch):
+    written: list[tuple[str, int]] = []
+
+    class SummaryWriter:
+        def __init__(self, folder: Path, purge_step: int) -> None:
+            written.append(("purge", purge_step))
+
+        def add_scalar(self, name: str, value: float, epoch: int) -> None:
+            written.append((name, epoch))
+
+        def flush(self) -> None:
+            pass
+
+    monkeypatch.setattr("solvers.pinn.paper.checkpoint.find_spec", lambda name: name)
+    monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", SimpleNamespace(SummaryWriter=SummaryWriter))
+    context = TrainingContext(tmp_path, resume=True)
+    for epochs in (10, 20):
+        replace(SMALL, epochs=epochs).in_context(context).solve(problem)
+    assert [epoch for name, epoch in written if name == "BC"] == list(range(1, 21))
+    assert [epoch for name, epoch in written if name == "purge"] == [1, 11]
+
+
+def test_progress_tells_terms_energy_and_time(problem):
+    texts: list[str] = []
+    context = TrainingContext(reference_energy=2.0)
+    SMALL.in_context(context).solve(problem, lambda fraction, text: texts.append(f"{fraction:.3f} {text}"))
+    assert len(texts) == 40
+    assert texts[9].startswith("0.250 epoch 10 of 40: PDE ")
+    for part in (", BC ", ", energy ", " N mm/mm (", " x reference), ", " s left"):
+        assert part in texts[9]
+
+
+def test_a_loss_that_is_no_number_stops_the_training(problem, tmp_path):
+    """The last checkpoint before it stays."""
+    solver = replace(SMALL, learning_rate=1e300, precision="double", checkpoint_every=1)
+    with pytest.raises(TrainingDiverged, match=r"the loss .* in epoch 2; take a learning_rate below 1e\+300"):
+        solver.in_context(TrainingContext(tmp_path)).solve(problem)
+    assert len(rows(tmp_path)) == 1
+
+
+def test_a_loss_that_grows_beyond_bounds_stops_the_training(problem):
+    with pytest.raises(TrainingDiverged, match=r"the loss grew to .* times its first value in epoch"):
+        replace(SMALL, learning_rate=100.0).solve(problem)
+
+
+def test_training_ends_early_when_it_no_longer_gains(problem, straight):
+    """A tiny rate gains less than 10 % in five epochs; zero patience never ends it."""
+    lazy = replace(SMALL, learning_rate=1e-6, patience=5, min_change=0.1)
+    assert lazy.solve(problem).stats["epochs"] == 10
+    assert straight.stats["epochs"] == 40
+
+
+def test_status_says_what_was_reached(problem, straight):
+    assert not straight.status.converged
+    assert "40 epochs; over their last tenth the energy changed by" in straight.status.message
+    assert "take more epochs" in straight.status.message
+
+
+@pytest.mark.slow
+@pytest.mark.mpi
+def test_two_processes_train_as_one(problem, tmp_path):
+    """In double precision; 15 epochs let rounding of another order of summation grow little."""
+    one = replace(SMALL, precision="double", epochs=15).solve(problem)
+    command = [
+        *(sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2"),
+        *("-m", "tests.solvers.pinn.training_worker", str(tmp_path)),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stderr
+    two = [np.load(tmp_path / f"rank{rank}.npy") for rank in range(2)]
+    np.testing.assert_array_equal(*two)
+    np.testing.assert_allclose(two[0], one.field.parameters.numpy(), rtol=1e-9, atol=1e-12)
+    assert [(tmp_path / f"told{rank}").read_text() for rank in range(2)] == ["15", "0"]
+    assert len(rows(tmp_path)) == 15
+
+
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA device")
+def test_a_gpu_trains_as_the_processor_does(problem):
+    settings = {"precision": "double", "epochs": 15}
+    cpu, gpu = (replace(SMALL, device=device, **settings).solve(problem) for device in ("cpu", "cuda"))
+    torch.testing.assert_close(gpu.field.parameters, cpu.field.parameters, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"epochs": 0}, "epochs must be positive, got 0"),
+        ({"learning_rate": -1.0}, "learning_rate must be positive, got -1"),
+        ({"base_points": 1}, "base_points must be at least 2, got 1"),
+        ({"patience": -1}, "patience must be zero or more, got -1"),
+        ({"optimiser": "sgd"}, "optimiser must be adam, got 'sgd'"),
+    ],
+)
+def test_bad_settings_are_refused(settings, message):
+    with pytest.raises(UserError, match=message):
+        PaperPinnSolver(**settings)
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="a CUDA device is there")
+def test_a_gpu_that_is_not_there_is_refused_with_advice():
+    with pytest.raises(UserError, match="device cuda needs a GPU and torch's CUDA build; take device=cpu"):
+        PaperPinnSolver(device="cuda")

@@ -1,0 +1,150 @@
+"""`gp` against its own definition, and how it treats what it is not told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from geometry.errors import UserError
+from geometry.observations import Observations
+from solvers.problem import Load, Problem
+from solvers.registry import make_solver
+from solvers.statistics.gaussian_process import GaussianProcessSolver
+from tests.solvers.pinn.kernels import matern
+
+
+def observed(mesh, displacement, *, deviation=0.01, hidden=()):
+    points = mesh.markers
+    visible = np.ones(len(points), dtype=bool)
+    visible[list(hidden)] = False
+    deviations = np.full(points.shape, deviation)
+    return Observations(points, displacement(points), deviations, visible, "by a test", True, 0.8)
+
+
+def bump(points):
+    """Something smooth with different lengths in u and v."""
+    x = points[:, 0]
+    return np.stack([np.sin(x / 25), 5 * np.exp(-(((x - 40) / 15) ** 2))], axis=1)
+
+
+@pytest.fixture(scope="module")
+def problem(coarse_mesh):
+    return Problem(coarse_mesh, observations=observed(coarse_mesh, bump, hidden=(2,)))
+
+
+@pytest.fixture(scope="module")
+def solution(problem):
+    return GaussianProcessSolver().solve(problem)
+
+
+def conditioned(solution, points, given, *, axis):
+    """Mean and variance of the process with its constants, by the textbook's equations 2.25 and 2.26."""
+    observations = solution.problem.observations
+    known, d = observations.points[given], observations.displacements[given, axis]
+    variance, length = np.exp(solution.field.processes[axis].kernel_.theta)
+
+    def kernel(first, second):
+        return variance * matern(first, second, length)
+
+    inverse = np.linalg.inv(
+        kernel(known, known) + np.diag(observations.standard_deviations[given, axis] ** 2)
+    )
+    across = kernel(points, known)
+    return across @ inverse @ d, variance - np.einsum("ni,ij,nj->n", across, inverse, across)
+
+
+def test_mean_and_deviation_are_those_of_the_process(solution, coarse_mesh):
+    places = coarse_mesh.at_centroids()
+    seen = solution.problem.observations.visible
+    for axis in (0, 1):
+        mean, variance = conditioned(solution, places.points, seen, axis=axis)
+        np.testing.assert_allclose(solution.displacement(places)[:, axis], mean, atol=1e-6)
+        deviation = solution.field.standard_deviation(places)[:, axis]
+        np.testing.assert_allclose(deviation**2, variance, atol=1e-5)
+
+
+def test_gradient_is_the_derivative(solution, coarse_mesh):
+    points, step = coarse_mesh.at_centroids().points[::40], 1e-5
+    for axis in (0, 1):
+        shift = step * np.eye(2)[axis]
+        difference = (solution.displacement(points + shift) - solution.displacement(points - shift)) / (
+            2 * step
+        )
+        np.testing.assert_allclose(solution.gradient(points)[:, :, axis], difference, atol=1e-7)
+
+
+def test_it_goes_through_the_markers_and_knows_least_far_from_them(solution, coarse_mesh):
+    observations = solution.problem.observations
+    missed = (solution.displacement(observations.points) - observations.displacements)[observations.visible]
+    assert np.abs(missed).max() < 0.02
+    back = coarse_mesh.points[np.unique(coarse_mesh.boundary("back"))]
+    deviations = solution.field.standard_deviation(coarse_mesh.locate(back))
+    at_markers = solution.field.standard_deviation(coarse_mesh.locate(observations.points))
+    assert deviations.max() > 20 * at_markers[observations.visible].max()
+
+
+def test_energy_is_the_integral_of_its_density(solution, coarse_mesh):
+    from geometry.mesh.quadrature import body_quadrature
+
+    rule = body_quadrature(coarse_mesh, 2)
+    total = (rule.weights * solution.state(rule.location).energy_density).sum()
+    assert solution.energy == pytest.approx(total, rel=1e-3)
+
+
+def test_a_marker_that_is_left_out_has_no_say_at_all(problem, solution):
+    """Solving again without it, and with another value for it: neither constants nor data come from it."""
+    observations = problem.observations
+    assert np.isnan(solution.left_out[2]).all()
+    for marker in (0, 5):
+        visible = observations.visible.copy()
+        visible[marker] = False
+        again = GaussianProcessSolver().solve(
+            replace(problem, observations=replace(observations, visible=visible))
+        )
+        expected = again.displacement(observations.points[[marker]])[0]
+        np.testing.assert_allclose(solution.left_out[marker], expected, atol=1e-8)
+
+
+def test_it_knows_of_the_clamp_only_if_it_is_told(problem, coarse_mesh):
+    shifted = replace(problem, observations=observed(coarse_mesh, lambda points: bump(points) + 4.0))
+    base = coarse_mesh.points[np.unique(coarse_mesh.boundary("base"))]
+    for clamp in (False, True):
+        moved = np.abs(GaussianProcessSolver(clamp=clamp).solve(shifted).displacement(base)).max()
+        assert bool(moved < 0.1) is clamp
+
+
+def test_load_and_material_do_not_matter(problem, solution):
+    other = replace(problem, load=Load(kind="patch", displacement=(None, -3.0)))
+    again = GaussianProcessSolver().solve(other)
+    points = problem.observations.points
+    assert again.displacement(points).tolist() == solution.displacement(points).tolist()
+
+
+def test_it_needs_markers(coarse_mesh):
+    with pytest.raises(UserError, match="needs 4 that were seen, not 0"):
+        GaussianProcessSolver().solve(Problem(coarse_mesh))
+    few = observed(coarse_mesh, bump, hidden=(0, 1, 2, 3, 4, 5))
+    with pytest.raises(UserError, match="needs 4 that were seen, not 3"):
+        GaussianProcessSolver().solve(Problem(coarse_mesh, observations=few))
+    again = GaussianProcessSolver().refitter(Problem(coarse_mesh))(few)  # leaves none out: three will do
+    assert again.left_out is None
+
+
+@pytest.mark.parametrize("kernel", ["matern32", "gaussian"])
+def test_the_evidence_is_that_of_the_normal_distribution(problem, kernel):
+    solution = GaussianProcessSolver(kernel=kernel).solve(problem)
+    observations = problem.observations
+    seen, smoothness = observations.visible, {"matern32": 1.5, "gaussian": np.inf}[kernel]
+    points, expected = observations.points[seen], 0.0
+    for axis, process in enumerate(solution.field.processes):
+        variance, length = np.exp(process.kernel_.theta)
+        covariance = variance * matern(points, points, length, smoothness)
+        covariance += np.diag(observations.standard_deviations[seen, axis] ** 2)
+        expected += multivariate_normal.logpdf(observations.displacements[seen, axis], cov=covariance)
+    assert solution.stats["log_evidence"] == pytest.approx(expected, abs=1e-4)
+
+
+def test_an_unknown_kernel_is_refused():
+    with pytest.raises(UserError, match=r"kernel.*matern32"):
+        make_solver("gp", kernel="cubic")

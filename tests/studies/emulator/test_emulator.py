@@ -1,0 +1,272 @@
+"""The emulator of a sweep: accuracy, intervals, refusals, and the file that keeps it."""
+
+import csv
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from pinnray.cli import main
+from studies.emulator import emulator as module
+from studies.emulator.emulator import Emulator, emulator_of
+from studies.emulator.store import FILE
+from studies.sweep.quantities import narrowest_gap, thinnest_wall
+from studies.sweep.sampling import samples
+from studies.sweep.store import opened
+from studies.sweep.study import Study, Value
+from studies.sweep.sweep import JOURNAL
+from tests.studies.emulator.sweeps import DATA, solved_sweep, synthetic_sweep
+
+TRAINED = 200
+"""Fingers of the kept table that the emulator learns from; the other 100 are unseen."""
+
+FINGER: dict[str, Value] = {
+    **{"height": 90.0, "base_width": 30.0, "rib_angle": 15.0, "tip_length": 20.0, "rib_count": 5},
+    **{"rib_thickness": 1.7, "front_thickness": 1.5, "back_thickness": 2.0},
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return solved_sweep(tmp_path_factory.mktemp("sweep") / "ref", count=TRAINED, left_out=("wrap",))
+
+
+@pytest.fixture(scope="module")
+def emulator(folder: Path) -> Emulator:
+    return emulator_of(folder)
+
+
+@pytest.fixture(scope="module")
+def unseen(emulator: Emulator) -> tuple[list[dict[str, Value]], dict[str, np.ndarray]]:
+    every = samples(emulator.study)
+    with (DATA / "ref.csv").open(encoding="utf-8") as table:
+        rows = list(csv.DictReader(table))[TRAINED:]
+    fingers = [every[int(row["sample"])] for row in rows]
+    return fingers, {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+
+
+def small_study(count: int = 100, **changes: Any) -> Study:
+    return Study(
+        name="small",
+        samples=count,
+        fixed=changes.pop("fixed", {}),
+        varied={
+            "rib_thickness": {"from": 1.0, "to": 2.5},
+            "front_thickness": {"from": 1.0, "to": 2.0},
+            **changes,
+        },
+    )
+
+
+def smooth(sample: Mapping[str, Value]) -> dict[str, float]:
+    rib, front = float(sample["rib_thickness"]), float(sample["front_thickness"])
+    young = float(sample.get("young", 11.4))
+    force = young * np.exp(0.3 * np.sin(2 * rib) + front)
+    return {"force": force, "force_50": 0.5 * force, "tip_v": rib - front**2}
+
+
+def test_forces_of_fingers_that_it_has_not_seen_are_predicted(
+    emulator: Emulator, unseen: tuple[list[dict[str, Value]], dict[str, np.ndarray]]
+) -> None:
+    fingers, truth = unseen
+    found = emulator.predict(fingers)
+    errors = np.abs(found.column("force") / truth["force"] - 1)
+    assert np.median(errors) < 0.005
+
+
+def test_intervals_hold_for_most_fingers_that_it_has_not_seen(
+    emulator: Emulator, unseen: tuple[list[dict[str, Value]], dict[str, np.ndarray]]
+) -> None:
+    fingers, truth = unseen
+    found = emulator.predict(fingers)
+    held = [
+        (found.low[:, place] <= truth[name]) & (truth[name] <= found.high[:, place])
+        for place, name in enumerate(found.names)
+        if name in ("force", "tip_v", "von_mises")
+    ]
+    assert 0.9 <= np.mean(held) <= 0.995  # of 300, whose standard deviation is 0.013
+
+
+def test_quantities_in_constant_ratio_stay_so(emulator: Emulator) -> None:
+    found = emulator.predict([FINGER])
+    assert emulator.ratios.keys() == {"force_50"}
+    assert found.column("force_50") == pytest.approx(found.column("force") / 2, rel=1e-12)
+
+
+def test_quantities_of_the_section_are_exact(emulator: Emulator) -> None:
+    design = Design(**FINGER, marker_diameter=0.4)
+    found = emulator.predict([FINGER])
+    place = found.names.index("area")
+    assert found.column("area") == found.low[:, place] == found.high[:, place] == design.section.area
+    assert found.column("mass") == pytest.approx(design.section.area * 20 * 1.2 / 1000)
+    assert found.column("thinnest_wall") == thinnest_wall(design.section)
+    assert found.column("narrowest_gap") == narrowest_gap(design.section)
+
+
+def test_some_quantities_alone_are_the_same(emulator: Emulator) -> None:
+    some, every = emulator.predict([FINGER], ["von_mises", "force_50"]), emulator.predict([FINGER])
+    assert some.names == ("force_50", "von_mises")
+    assert [some.column(name) for name in some.names] == [every.column(name) for name in some.names]
+
+
+def test_it_is_kept_to_the_bit(folder: Path, emulator: Emulator, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "fitted", None)  # a second fit would fail
+    first, again = emulator.predict([FINGER]), emulator_of(folder).predict([FINGER])
+    for one, other in zip(first.__dict__.values(), again.__dict__.values(), strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_a_fit_is_repeatable(tmp_path: Path) -> None:
+    made = [
+        emulator_of(synthetic_sweep(tmp_path / name, small_study(), smooth)).predict(
+            [{"rib_thickness": 1.3, "front_thickness": 1.1}], ["force", "tip_v"]
+        )
+        for name in "ab"
+    ]
+    assert np.array_equal(made[0].values, made[1].values)
+    assert np.array_equal(made[0].high, made[1].high)
+
+
+def test_a_function_in_closed_form_is_learnt(tmp_path: Path) -> None:
+    emulator = emulator_of(synthetic_sweep(tmp_path / "s", small_study(), smooth))
+    unseen = samples(small_study(300))[100:]
+    found = emulator.predict(unseen, ["force", "tip_v"])
+    truth = np.array([[smooth(sample)[name] for name in found.names] for sample in unseen])
+    assert np.median(np.abs(found.values / truth - 1), axis=0) == pytest.approx(0, abs=5e-3)
+
+
+def test_youngs_modulus_is_a_factor(tmp_path: Path) -> None:
+    study = small_study(young={"from": 5.0, "to": 20.0})
+    emulator = emulator_of(synthetic_sweep(tmp_path / "s", study, smooth))
+    finger = {"rib_thickness": 1.3, "front_thickness": 1.1}
+    found = emulator.predict([{**finger, "young": 6.0}, {**finger, "young": 18.0}], ["force", "tip_v"])
+    assert found.values[1] == pytest.approx(found.values[0] * (3, 1), rel=1e-12)
+
+
+def test_choices_are_learnt_apart(tmp_path: Path) -> None:
+    def stiffer(sample: Mapping[str, Value]) -> dict[str, float]:
+        factor = 3.0 if sample["rib_reference"] == "base" else 1.0
+        return {"force": factor * smooth(sample)["force"]}
+
+    study = small_study(rib_reference={"values": ["front", "base"]})
+    emulator = emulator_of(synthetic_sweep(tmp_path / "s", study, stiffer))
+    finger = {"rib_thickness": 1.3, "front_thickness": 1.1}
+    found = emulator.predict([{**finger, "rib_reference": each} for each in ("front", "base")], ["force"])
+    assert found.values[1, 0] / found.values[0, 0] == pytest.approx(3, rel=0.02)
+    assert emulator.fault({**finger, "rib_reference": "tip"}) == (
+        "rib_reference = tip is outside the sweep: one of front, base"
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"height": 120.0}, "height = 120 is outside the sweep: 80 to 110 mm"),
+        ({"height": float("nan")}, "height = nan is outside the sweep"),
+        ({"rib_count": 9}, "rib_count = 9 is outside the sweep: a whole number from 2 to 8"),
+        ({"rib_count": 2.5}, "rib_count = 2.5 is outside the sweep: a whole number"),
+        ({"depth": 20.0}, "depth is not varied in this sweep, which varies height, base_width"),
+        ({"rib_count": 8, "rib_angle": -19.0}, "first rib runs into the base wall"),
+    ],
+)
+def test_what_it_cannot_predict_is_told(emulator: Emulator, change: dict[str, Value], words: str) -> None:
+    assert emulator.fault(FINGER) is None
+    assert words in str(emulator.fault({**FINGER, **change}))
+
+
+def test_a_missing_parameter_is_told(emulator: Emulator) -> None:
+    finger = {name: value for name, value in FINGER.items() if name != "tip_length"}
+    assert emulator.fault(finger) == "tip_length is missing; give 14 to 26 mm"
+
+
+def test_more_samples_fit_it_again(tmp_path: Path) -> None:
+    folder = solved_sweep(tmp_path / "s", count=70, left_out=("wrap", "tip_v", "von_mises"))
+    before = emulator_of(folder)
+    solved_sweep_of_more = solved_sweep(tmp_path / "more", count=90, left_out=("wrap", "tip_v", "von_mises"))
+    with opened(solved_sweep_of_more / JOURNAL) as journal:
+        later = journal.measurements()[70:]
+    with opened(folder / JOURNAL) as journal:
+        for each in later:
+            journal.add(each)
+    after = emulator_of(folder)
+    assert (before.count, after.count) == (70, 90)
+
+
+def test_too_few_samples_are_told(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="has 20 converged samples, and an emulator needs at least 60"):
+        emulator_of(solved_sweep(tmp_path / "s", count=20))
+
+
+@pytest.fixture
+def damaged(folder: Path, emulator: Emulator) -> Iterator[Path]:
+    file = folder / FILE
+    content = file.read_bytes()
+    yield file
+    file.write_bytes(content)
+
+
+@pytest.mark.parametrize("end", ["cut", "flipped", "empty"])
+def test_a_damaged_file_is_told_in_one_line(damaged: Path, end: str) -> None:
+    content = damaged.read_bytes()
+    damaged.write_bytes(
+        {"cut": content[:-100], "flipped": content[:-9] + b"#" + content[-8:], "empty": b""}[end]
+    )
+    with pytest.raises(UserError, match=r"emulator.safetensors is damaged \(.*\); fit .* again by --refit"):
+        emulator_of(damaged.parent)
+
+
+def test_the_command_prints_every_quantity(folder: Path, emulator: Emulator, capsys: Any) -> None:
+    settings = [f"--set={name}={value}" for name, value in FINGER.items()]
+    assert main(["predict", str(folder), *settings]) == 0
+    printed = capsys.readouterr().out
+    assert "ref: predicted from 200 samples" in printed
+    assert all(name in printed for name in emulator.names)
+    assert "exact" in printed
+
+
+def test_the_command_predicts_a_table(folder: Path, emulator: Emulator, tmp_path: Path, capsys: Any) -> None:
+    pd.DataFrame([FINGER, {**FINGER, "height": 100.0}]).to_csv(tmp_path / "two.csv", index=False)
+    assert main(["predict", str(folder), "--csv", str(tmp_path / "two.csv")]) == 0
+    found = pd.read_csv(tmp_path / "two-predicted.csv")
+    assert list(found["height_mm"]) == [90, 100]
+    assert found["force_N"][0] == pytest.approx(emulator.predict([FINGER]).column("force")[0])
+    assert (found["force_N_low"] < found["force_N"]).all()
+    assert "area_mm2_low" not in found
+    assert main(["predict", str(folder), "--csv", str(tmp_path / "two-predicted.csv")]) == 2
+    assert "row 1: force_N is not varied in this sweep" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "give one finger by --set PARAMETER=VALUE for every varied parameter, or many by --csv"),
+        (["--set", "height=200"], "base_width is missing; give 24 to 40 mm"),
+        (["--set", "height"], "cannot read 'height'; write parameter=value"),
+        (["--set", "height=tall"], "height = 'tall' is no number; give 80 to 110 mm"),
+        (["--set", "N=4", "--set", "rib_count=4"], "rib_count is set twice"),
+        (["--csv", "none.csv"], "there is no file none.csv"),
+        (["--set", "N=4", "--out", "x.csv"], "--out is for the predictions of --csv"),
+    ],
+)
+def test_the_command_refuses_in_one_line(
+    folder: Path, emulator: Emulator, arguments: list[str], words: str, capsys: Any
+) -> None:
+    assert main(["predict", str(folder), *arguments]) == 2
+    told = capsys.readouterr().err
+    assert words in told
+    assert told.count("\n") == 1
+
+
+def test_a_sweep_of_drawings_is_refused(tmp_path: Path) -> None:
+    from studies.emulator.inputs import Inputs
+
+    study = Study(
+        name="drawn", samples=4, fixed={"section": "a.dxf"}, varied={"stroke": {"from": 1, "to": 5}}
+    )
+    with pytest.raises(UserError, match="the sweep drawn is of drawings"):
+        Inputs(study, {})

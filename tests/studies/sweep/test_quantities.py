@@ -1,0 +1,138 @@
+"""The quantities against closed forms, and against solutions by another way."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from geometry.arrays import FloatArray
+from geometry.cache import finger_mesh
+from geometry.finger.design import Design
+from geometry.finger.section import rib_pitch
+from geometry.mesh.point_location import LocatedPoints
+from geometry.mesh.settings import MeshSettings
+from solvers.fem.linear import FemSolver
+from solvers.problem import Load, Material, Problem
+from solvers.registry import make_solver
+from solvers.solution import Solution, Status
+from studies.sweep.quantities import (
+    QUANTITIES,
+    forces,
+    largest_away_from_corners,
+    narrowest_gap,
+    quantities,
+    thinnest_wall,
+    wrap_angle,
+)
+
+FINGER = Design()
+PROBLEM = Problem(finger_mesh(FINGER, settings=MeshSettings(size=1.0)), finger=FINGER)
+
+
+@dataclass(frozen=True)
+class Affine:
+    """A displacement that is affine in space."""
+
+    gradient_: FloatArray
+
+    def displacement(self, location: LocatedPoints) -> FloatArray:
+        return np.asarray(location.points @ self.gradient_.T)
+
+    def gradient(self, location: LocatedPoints) -> FloatArray:
+        return np.broadcast_to(self.gradient_, (len(location), 2, 2)).copy()
+
+
+def affine(gradient: list[list[float]], problem: Problem = PROBLEM) -> Solution:
+    field = Affine(np.array(gradient))
+    return Solution("affine", problem, field, 1.0, np.array([0.3, -2.0]), Status(True, "exact"), {})
+
+
+def test_a_rigid_rotation_wraps_nothing() -> None:
+    turned = np.radians(25)
+    rotation = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]]) - np.eye(2)
+    assert wrap_angle(affine(rotation.tolist())) == pytest.approx(0, abs=1e-9)
+
+
+def test_wrap_is_positive_where_the_tip_stays_and_the_contact_moves_in() -> None:
+    solution = FemSolver(estimate=False).solve(PROBLEM)
+    tip = solution.displacement([[FINGER.height, 0.0]])[0]
+    (u, v), x = (0.0, -10.0), FINGER.contact_abscissa
+    before = np.arctan2(v, x + u)
+    beyond = np.arctan2(tip[1] - v, FINGER.height + tip[0] - x - u)
+    # The load prescribes a mean over the contact, so that its middle differs a little from (0, -10) mm.
+    assert wrap_angle(solution) == pytest.approx(np.degrees(beyond - before), abs=0.3)
+    assert wrap_angle(solution) > 0
+
+
+def test_the_largest_stress_of_a_uniform_strain_is_that_strains() -> None:
+    strained = affine([[0.01, 0.0], [0.0, -0.002]])
+    stress, strain = largest_away_from_corners(strained)
+    state = strained.state(PROBLEM.mesh.at_centroids())
+    assert stress == pytest.approx(state.von_mises[0], rel=1e-12)
+    assert strain == pytest.approx(0.01, rel=1e-12)
+
+
+def test_the_largest_stress_depends_little_on_the_mesh() -> None:
+    found = [
+        largest_away_from_corners(
+            FemSolver(estimate=False).solve(Problem(finger_mesh(FINGER, settings=MeshSettings(size=size))))
+        )[0]
+        for size in (0.5, 0.25)
+    ]
+    # A measured 1 % apart; the largest value at centroids, corners included, doubles.
+    assert found[0] == pytest.approx(found[1], rel=0.03)
+
+
+def test_compliance_across_is_displacement_over_force_of_a_load_that_leaves_u_free() -> None:
+    _, found = quantities(FINGER, PROBLEM, FemSolver(), density=1.2)
+    sliding = FemSolver(estimate=False).solve(replace(PROBLEM, load=Load(displacement=(None, -10.0))))
+    force = -sliding.reaction[1] * FINGER.depth
+    assert found["compliance_across"] == pytest.approx(10 / force, rel=1e-9)
+    along = FemSolver(estimate=False).solve(replace(PROBLEM, load=Load(displacement=(1.0, None))))
+    assert found["compliance_along"] == pytest.approx(1 / (along.reaction[0] * FINGER.depth), rel=1e-9)
+
+
+def test_the_quantities_of_the_default_finger() -> None:
+    solution, found = quantities(FINGER, PROBLEM, FemSolver(), density=1.2)
+    assert list(found) == list(QUANTITIES)
+    assert found["force"] == pytest.approx(-solution.reaction[1] * FINGER.depth)
+    assert found["force_25"] == pytest.approx(found["force"] / 4)
+    assert found["area"] == pytest.approx(PROBLEM.mesh.areas.sum(), rel=1e-9)
+    assert found["mass"] == pytest.approx(found["area"] * 20 * 1.2e-3)
+
+
+def test_force_acts_along_the_travel() -> None:
+    oblique = replace(PROBLEM, load=Load(displacement=(3.0, -4.0)))
+    assert forces(affine([[0, 0], [0, 0]], oblique), 20.0)["force"] == pytest.approx(20 * (0.18 + 1.6))
+
+
+def test_a_recorded_path_gives_the_force_on_the_way() -> None:
+    nonlinear = replace(PROBLEM, material=Material(law="neo-hookean"))
+    history = {
+        "load_fraction": np.array([0.5, 1.0]),
+        "reaction_x": np.zeros(2),
+        "reaction_y": np.array([-0.4, -2.0]),
+    }
+    found = forces(replace(affine([[0, 0], [0, 0]], nonlinear), history=history), 10.0)
+    assert [found[name] for name in ("force_25", "force_50", "force_75", "force")] == pytest.approx(
+        [2, 4, 12, 20]
+    )
+    assert np.isnan(forces(affine([[0, 0], [0, 0]], nonlinear), 10.0)["force_50"])
+
+
+def test_walls_and_gaps_of_a_finger_with_known_ones() -> None:
+    thin = Design(rib_thickness=1.2, back_thickness=3.0, rib_angle=0.0)
+    assert thinnest_wall(thin.section) == pytest.approx(1.2, abs=1e-6)
+    tall = Design(base_width=60.0, tip_length=30.0, rib_count=9, rib_angle=0.0)  # ribs are its narrowest gap
+    assert narrowest_gap(tall.section) == pytest.approx(rib_pitch(tall) - tall.rib_thickness, abs=1e-6)
+
+
+@pytest.mark.slow
+def test_a_cylinder_at_finite_strain_has_every_quantity() -> None:
+    pressed = replace(PROBLEM, load=Load.of_travel("cylinder"))
+    solution, found = quantities(FINGER, pressed, make_solver("fem-nonlinear"), density=1.2)
+    assert solution.status.converged
+    assert np.isfinite(list(found.values())).all()
+    # Force grows faster than the stroke, and the tip comes toward the indenter (docs/examples/rib_sweep.py).
+    assert found["force_50"] < 0.5 * found["force"]
+    assert found["tip_v"] > 0

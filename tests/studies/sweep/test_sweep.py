@@ -1,0 +1,298 @@
+"""A sweep as a whole: nothing lost, nothing twice, failures told, and the command."""
+
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from geometry.cache import cad_files
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from pinnray.cli import main
+from solvers.solution import Solution
+from studies.sweep.measurement import Measurement, measured
+from studies.sweep.quantities import quantities
+from studies.sweep.sampling import samples
+from studies.sweep.store import opened
+from studies.sweep.study import Study, TaskMaker, load_study
+from studies.sweep.sweep import JOURNAL, Sweep, SweepJob, load_sweep, run_sweep
+from studies.sweep.tables import failure_grid, table
+from tests.pinnray.commands.programs import COMMAND
+
+STUDY = """
+mesh_size = 2.0
+sampling = "sobol"
+samples = {samples}
+[fixed]
+marker_diameter = 0.4
+[varied]
+rib_count = {{from = 2, to = 5}}
+rib_thickness = {{from = 1.0, to = 2.5}}
+front_thickness = {{from = 0.3, to = 2.0}}
+"""
+
+
+def study_file(folder: Path, count: int) -> Path:
+    path = folder / "ribs.toml"
+    path.write_text(STUDY.format(samples=count), encoding="utf-8")
+    return path
+
+
+def test_a_sample_is_kept_once(tmp_path: Path) -> None:
+    with opened(tmp_path / JOURNAL) as journal:
+        journal.add(Measurement(3, "done", "fine", 0.1, {"force": 1.5}))
+    with opened(tmp_path / JOURNAL) as journal:
+        assert journal.numbers() == {3}
+        assert journal.measurements() == [Measurement(3, "done", "fine", 0.1, {"force": 1.5})]
+        with pytest.raises(sqlite3.IntegrityError):
+            journal.add(Measurement(3, "done", "again", 0.1))
+
+
+def test_a_damaged_journal_is_told_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / JOURNAL).write_bytes(b"no database at all, but longer than a header" * 9)
+    with (
+        pytest.raises(UserError, match=r"cannot use .*journal.sqlite: file is not a database"),
+        opened(tmp_path / JOURNAL),
+    ):
+        pass
+
+
+def test_what_goes_wrong_with_a_sample_is_its_answer(tmp_path: Path) -> None:
+    study = load_study(study_file(tmp_path, 1))
+    maker = TaskMaker(study, tmp_path)
+    refused = measured(maker.task(0, {"rib_count": 30, "rib_thickness": 2.5, "front_thickness": 1.0}))
+    assert (refused.state, refused.values) == ("refused", {})
+    assert "ribs" in refused.message
+    task = maker.task(1, {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0})
+    assert measured(task).state == "done"
+    pressed = measured(replace(task, load={**task.load, "stroke": 60.0}))
+    assert (pressed.state, pressed.through_itself) == ("done", True)
+    soft = measured(replace(task, load={**task.load, "stroke": 0.001}))
+    assert "this looks like metres" in soft.message
+    remarks = Sweep(study, [{}] * 2, [pressed, replace(soft, number=0)]).remarks
+    assert [remark.partition(";")[0] for remark in remarks] == [
+        "1 of 2 samples (1): THE BODY GOES THROUGH ITSELF",
+        "1 of 2 samples (0): this looks like",
+    ]
+    object.__setattr__(task, "mesh_size", "broken")
+    assert measured(task).state in ("refused", "failed")
+
+
+def test_a_quantity_that_is_no_number_is_no_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Statistics leave out what is no number: a sample that should have one must not be among them."""
+
+    def without_stress(*given: Any, **named: Any) -> tuple[Solution, dict[str, float]]:
+        solution, values = quantities(*given, **named)
+        return solution, {**values, "von_mises": float("nan")}
+
+    monkeypatch.setattr("studies.sweep.measurement.quantities", without_stress)
+    sample = {"rib_count": 2, "rib_thickness": 2.0, "front_thickness": 1.0}
+    found = measured(TaskMaker(load_study(study_file(tmp_path, 1)), tmp_path).task(1, sample))
+    assert (found.state, found.message.partition(";")[0]) == ("not converged", "von_mises cannot be computed")
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a sweep of six samples, one of whose workers was killed."""
+    folder = tmp_path_factory.mktemp("sweep")
+    study = study_file(folder, 6)
+    out = folder / "out"
+    process = subprocess.Popen(
+        [sys.executable, "-c", COMMAND, "sweep", str(study), "--out", str(out), "--processes", "2"],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    killed: set[int] = set()
+    while process.poll() is None:  # at its start, which Dask does not mend
+        if not killed and (workers := children(process.pid)):
+            with suppress(ProcessLookupError):
+                os.kill(min(workers), signal.SIGKILL)
+            killed.add(min(workers))
+        time.sleep(0.1)
+    assert process.stderr is not None
+    assert process.returncode == 0, process.stderr.read()
+    assert killed
+    return folder
+
+
+def children(parent: int) -> set[int]:
+    """Worker processes of a sweep."""
+    listed = subprocess.run(["pgrep", "-P", str(parent), "-f", "spawn_main"], capture_output=True, text=True)
+    return {int(word) for word in listed.stdout.split()}
+
+
+def test_the_death_of_a_worker_loses_no_sample(swept: Path) -> None:
+    sweep = load_sweep(swept / "out")
+    assert [each.number for each in sweep.measurements] == list(range(6))
+    assert {each.state for each in sweep.measurements} == {"done"}
+
+
+def test_the_tables_have_a_row_for_each_sample(swept: Path) -> None:
+    frame = pd.read_parquet(swept / "out" / "samples.parquet")
+    again = pd.read_csv(swept / "out" / "samples.csv")
+    assert list(frame.columns) == list(again.columns)
+    assert {"rib_thickness_mm", "force_N", "wrap_deg", "compliance_across_mm_per_N"} <= set(frame.columns)
+    assert (frame["force_N"] == again["force_N"]).all()
+    assert list(frame["sample"]) == list(range(6))
+
+
+def test_the_page_has_pictures_and_every_quantity(swept: Path) -> None:
+    page = (swept / "out" / "sweep.html").read_text(encoding="utf-8")
+    assert page.count("<img alt=") == 2  # six samples are too few for sensitivities
+    assert "6 of 6 samples of a Sobol sequence were run; 6 have a converged result" in page
+    assert "compliance_across" in page
+
+
+def test_a_second_start_goes_on_and_does_nothing_twice(swept: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(swept / "out", out)
+    before = load_sweep(out).measurements
+    study = load_study(study_file(tmp_path, 8))
+    study = study.model_copy(update={"name": "ribs"})
+    after = run_sweep(SweepJob(study, tmp_path, out, 1)).measurements
+    assert after[:6] == before
+    assert [each.number for each in after] == list(range(8))
+
+
+def test_another_study_in_the_folder_is_refused(
+    swept: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "ribs.toml"
+    path.write_text(STUDY.format(samples=6).replace("mesh_size = 2.0", "mesh_size = 1.9"), encoding="utf-8")
+    assert main(["sweep", str(path), "--out", str(swept / "out")]) == 2
+    assert "holds a sweep with other settings (study.mesh_size)" in capsys.readouterr().err
+
+
+def test_a_sample_that_always_kills_its_worker_is_listed_as_failed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("studies.sweep.workers.measured", die_at_one)
+    monkeypatch.setattr("studies.sweep.workers.DEATHS", 2)
+    monkeypatch.setattr("studies.sweep.workers.AWAY_S", 6)
+    monkeypatch.setattr("studies.sweep.workers.LOOK_S", 1)
+    study = load_study(study_file(tmp_path, 4))
+    sweep = run_sweep(SweepJob(study, tmp_path, tmp_path / "out", 1))
+    assert [each.state for each in sweep.measurements] == ["done", "failed", "done", "done"]
+    assert sweep.measurements[1].message == "its worker process died 2 times"
+    assert failure_grid(sweep).rows == [("failed", "1", "its worker process died", "1")]
+    assert list(table(sweep)["state"]) == ["done", "failed", "done", "done"]
+    monkeypatch.setattr("studies.sweep.workers.measured", answered)
+    again = run_sweep(SweepJob(study, tmp_path, tmp_path / "out", 1))
+    assert {each.state for each in again.measurements} == {"done"}
+
+
+def test_a_script_without_its_guard_is_told_what_it_lacks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_cluster(**settings: object) -> None:  # what LocalCluster does where the script has no guard
+        raise RuntimeError("Nanny failed to start.")
+
+    monkeypatch.setattr("distributed.LocalCluster", no_cluster)
+    study = load_study(study_file(tmp_path, 2))
+    with pytest.raises(UserError, match=r'what it does must stand under `if __name__ == "__main__":`'):
+        run_sweep(SweepJob(study, tmp_path, tmp_path / "out", 1))
+
+
+def die_at_one(task: object) -> Measurement:
+    if getattr(task, "number", None) == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return answered(task)
+
+
+def answered(task: object) -> Measurement:
+    return Measurement(getattr(task, "number", -1), "done", "", 0.0, {"force": 1.0})
+
+
+REFUSED: dict[str, tuple[Callable[[Path], list[str]], str]] = {
+    "no file": (lambda folder: [str(folder / "none.toml")], "cannot read the study"),
+    "no scheduler": (
+        lambda folder: [str(study_file(folder, 2)), "--scheduler", "tcp://127.0.0.1:9"],
+        "--scheduler tcp://127.0.0.1:9: no Dask scheduler answers there",
+    ),
+    "no address": (
+        lambda folder: [str(study_file(folder, 2)), "--scheduler", "nowhere"],
+        "--scheduler nowhere: no Dask scheduler answers there",
+    ),
+    "no workers": (lambda folder: [str(study_file(folder, 2)), "--processes", "0"], "--processes 0"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "message"), REFUSED.values(), ids=REFUSED)
+def test_the_command_refuses_in_one_line(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: Callable[[Path], list[str]],
+    message: str,
+) -> None:
+    monkeypatch.setattr("studies.sweep.workers.WAIT_S", 1)
+    assert main(["sweep", *arguments(tmp_path), "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.count("\n") == 1
+
+
+def test_an_empty_folder_is_no_sweep(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"holds no sweep; make one by `pinnray sweep STUDY.toml`"):
+        load_sweep(tmp_path)
+
+
+def test_a_journal_of_others_removes_no_file(tmp_path: Path) -> None:
+    """A rollback journal of an unfinished transaction may name a file, which SQLite removes after it."""
+    mine, journal, rollback = (tmp_path / name for name in ("thesis.tex", "a.sqlite", "a.sqlite-journal"))
+    mine.write_text("mine")
+    left = (  # a killed process leaves both files
+        "import os, signal, sqlite3, sys\n"
+        "sqlite3.connect(sys.argv[1]).executescript('create table samples (number integer)')\n"
+        "open_one = sqlite3.connect(sys.argv[1], isolation_level=None)\n"
+        "open_one.executescript('pragma cache_size = 1; begin immediate')\n"
+        "for n in range(20000): open_one.execute('insert into samples values (?)', (n,))\n"
+        "os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    subprocess.run([sys.executable, "-c", left, str(journal)], check=False)
+    name = bytes(mine)
+    sizes = (0x40000000 // 4096 + 1, len(name), sum(name))
+    first, *last = (size.to_bytes(4, "big") for size in sizes)
+    with rollback.open("ab") as file:
+        file.write(first + name + b"".join(last) + bytes.fromhex("d9d505f920a163d7"))
+    with pytest.raises(UserError, match=r"a\.sqlite-journal names another file"), opened(journal) as content:
+        content.numbers()
+    assert mine.read_text() == "mine"
+
+
+def test_the_same_study_has_the_same_results(swept: Path, tmp_path: Path) -> None:
+    study = load_study(swept / "ribs.toml")
+    first = load_sweep(swept / "out").measurements[0]
+    again = measured(TaskMaker(study, tmp_path).task(0, samples(study)[0]))
+    assert again.values == first.values
+    assert isinstance(study, Study)
+
+
+def test_drawings_are_samples_too(tmp_path: Path) -> None:
+    for name, ribs in (("few", 2), ("many", 6)):
+        cad_files(Design(rib_count=ribs), tmp_path / name, formats=["dxf"])
+        (tmp_path / name / "section.dxf").rename(tmp_path / f"{name}.dxf")
+    path = tmp_path / "drawn.toml"
+    path.write_text(
+        'mesh_size = 2.0\nsampling = "grid"\n[varied]\nsection = {values = ["few.dxf", "many.dxf"]}\n'
+        "depth = {values = [10.0, 20.0]}\n",
+        encoding="utf-8",
+    )
+    study = load_study(path)
+    maker = TaskMaker(study, tmp_path)
+    found = [measured(maker.task(number, sample)) for number, sample in enumerate(samples(study))]
+    assert [each.state for each in found] == ["done"] * 4
+    areas = [Design(rib_count=ribs).section.area for ribs in (2, 2, 6, 6)]
+    assert [each.values["area"] for each in found] == pytest.approx(areas, rel=1e-6)
+    assert found[1].values["force"] == pytest.approx(2 * found[0].values["force"], rel=1e-9)

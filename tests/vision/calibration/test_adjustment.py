@@ -1,0 +1,109 @@
+"""The adjustment against the dense least-squares problem, solved by SciPy, and against OpenCV."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
+
+from tests.vision.calibration.chessboards import BOARD, CAMERA, poses, views
+from vision.calibration.bundle_adjustment import CornerObservations, Poses, adjust
+
+VIEWS = list(views(6, noise=0.3).values())
+FREE = np.arange(9) < 8
+START = CAMERA.with_intrinsics([1000, 1000, 640, 360, 0, 0, 0, 0, 0])
+
+
+def observations(*, seen: np.ndarray) -> CornerObservations:
+    view, corner = np.nonzero(seen)
+    return CornerObservations(BOARD.corners[corner], np.array(VIEWS)[seen], view)
+
+
+def placed() -> Poses:
+    rotations, translations = zip(*poses(6), strict=True)
+    return Poses(Rotation.from_rotvec(rotations), np.array(translations))
+
+
+ALL = observations(seen=np.ones((6, 54), dtype=bool))
+SOME = observations(seen=np.random.default_rng(5).random((6, 54)) < 0.4)
+
+
+@pytest.mark.parametrize("seen", [ALL, SOME])
+def test_fit_and_covariance_are_those_of_the_dense_problem(seen):
+    found = adjust(START, placed(), seen, free=FREE)
+
+    def missed(unknowns):
+        camera = CAMERA.with_intrinsics([*unknowns[:8], 0])
+        six = unknowns[8:].reshape(6, 6)
+        board = Poses(Rotation.from_rotvec(six[:, :3]), six[:, 3:])
+        return (camera.project(board.to_camera(seen.points, seen.view)) - seen.pixels).ravel()
+
+    begin = [*CAMERA.intrinsics[:8], *np.column_stack([placed().rotations.as_rotvec(), placed()[1]]).ravel()]
+    dense = least_squares(missed, begin, x_scale="jac", xtol=1e-12, ftol=1e-12, jac="3-point")
+    upper = np.linalg.qr(dense.jac, mode="r")
+    covariance = np.linalg.inv(upper.T @ upper) * 2 * dense.cost / (dense.jac.shape[0] - 44)
+    deviations = np.sqrt(np.diag(covariance))[:8]
+    assert (np.abs(found.camera.intrinsics[:8] - dense.x[:8]) < 1e-3 * deviations).all()
+    scale = np.outer(deviations, deviations)
+    known = np.array(found.camera.covariance)
+    np.testing.assert_allclose(known[:8, :8] / scale, covariance[:8, :8] / scale, rtol=0, atol=1e-4)
+    assert not known[8].any()  # what is fixed has no error
+
+
+def test_standard_deviations_are_those_of_opencv():
+    found = adjust(START, placed(), ALL, free=FREE).camera
+    points, pixels = [BOARD.corners.astype(np.float32)] * 6, [view.astype(np.float32) for view in VIEWS]
+    size, flags = (CAMERA.width, CAMERA.height), cv2.CALIB_FIX_K3
+    expected = cv2.calibrateCameraExtended(points, pixels, size, np.eye(3), np.zeros(5), flags=flags)[5]
+    np.testing.assert_allclose(found.standard_deviations, expected.ravel()[:9], rtol=2e-3)
+
+
+@pytest.mark.slow
+def test_the_covariance_covers_the_errors_of_200_fits():
+    rng, exact = np.random.default_rng(11), CAMERA.project(placed().to_camera(ALL.points, ALL.view))
+    squares, scores = [], []
+    for _ in range(200):
+        seen = replace(ALL, pixels=exact + rng.normal(0, 0.3, exact.shape))
+        found = adjust(CAMERA, placed(), seen, free=FREE).camera
+        off = (found.intrinsics - CAMERA.intrinsics)[:8]
+        squares.append(off @ np.linalg.solve(np.array(found.covariance)[:8, :8], off))
+        scores.append(np.abs(off) / found.standard_deviations[:8])
+    # of 200: the mean of χ² with 8 degrees of freedom has a deviation of 0.28, shares of 3.3 and 1.5 points
+    assert abs(np.mean(squares) - 8) < 1
+    assert abs(np.mean(np.array(squares) < chi2(8).ppf(0.95)) - 0.95) < 0.045
+    np.testing.assert_allclose(np.mean(np.array(scores) < 1, axis=0), 0.683, rtol=0, atol=0.11)
+
+
+def scores(*, bend: float, fits: int = 20, count: int = 15) -> np.ndarray:
+    """Errors of the intrinsics over their standard deviations, root mean square, of boards bent by mm."""
+    rotations, translations = zip(*poses(count), strict=True)
+    board = Poses(Rotation.from_rotvec(rotations), np.array(translations))
+    view, points = np.repeat(np.arange(count), 54), np.tile(BOARD.corners, (count, 1))
+    x, y, _ = (BOARD.corners - BOARD.corners.mean(axis=0)).T / 80
+    rng, found = np.random.default_rng(1), []
+    for _ in range(fits):
+        curved = points.copy()
+        bowl, saddle = bend * rng.standard_normal((2, count, 1))
+        curved[:, 2] = (bowl * (x**2 + y**2) + saddle * x * y).ravel()
+        pixels = CAMERA.project(board.to_camera(curved, view)) + rng.normal(0, 0.1, (len(view), 2))
+        camera = adjust(CAMERA, board, CornerObservations(points, pixels, view), free=FREE).camera
+        found.append((camera.intrinsics - CAMERA.intrinsics)[:8] / camera.standard_deviations[:8])
+    return np.sqrt(np.mean(np.square(found), axis=0))
+
+
+def test_errors_that_the_corners_of_a_photograph_share_are_in_the_standard_deviations():
+    """Without the jackknife the scores of bent boards are 4 to 6."""
+    assert scores(bend=1.0).max() < 1.6  # 20 fits tell a deviation within a sixth
+    assert scores(bend=0.0).min() > 0.6  # the larger of two deviations is a little too large
+
+
+def test_a_known_camera_leaves_only_the_poses():
+    found = adjust(CAMERA, placed(), SOME, free=np.zeros(9, dtype=bool))
+    assert found.camera.intrinsics.tolist() == CAMERA.intrinsics.tolist()
+    assert np.abs(found.residuals).mean() < 0.3
+    off = found.poses.moved(np.full((6, 6), 1e-4))  # it is a minimum
+    missed = CAMERA.project(off.to_camera(SOME.points, SOME.view)) - SOME.pixels
+    assert np.sum(missed**2) > np.sum(found.residuals**2)

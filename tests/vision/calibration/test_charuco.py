@@ -1,0 +1,77 @@
+"""ChArUco boards against exact pictures of them."""
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.vision.calibration.chessboards import photographed
+from vision.calibration.camera import Pose
+from vision.calibration.charuco import CharucoBoard
+from vision.calibration.chessboard import Board
+
+CHARUCO = CharucoBoard(7, 5, 20.0, 15.0, "5X5_100")
+TILTS = [(20, -15, 5), (5, 30, 170)]
+
+
+def pose(angles: tuple[float, float, float], *, shift: float = 0.0, distance: float = 250.0) -> Pose:
+    turn = Rotation.from_euler("xyz", angles, degrees=True)
+    return Pose(turn.as_rotvec(), np.array([shift, 0, distance]) - turn.apply((60, 40, 0)))
+
+
+@pytest.mark.parametrize("board", [CHARUCO, Board(7, 5, 20.0)])
+def test_corners_are_found_to_hundredths_of_a_pixel(board):
+    errors = []
+    for angles in TILTS:
+        image, exact = photographed(board, pose(angles))
+        found = board.find(image)
+        turned = type(board) is Board and np.abs(found - exact).max() > 5  # a chessboard has no up
+        errors.append((found[::-1] if turned else found) - exact)
+    errors = np.concatenate(errors)
+    assert np.sqrt(np.mean(errors**2)) < 0.013  # 0.49 by OpenCV before 4.14, 0.027 by cv2.cornerSubPix
+    assert (np.abs(errors.mean(axis=0)) < 0.003).all()
+
+
+def test_a_part_of_the_board_is_enough():
+    image, exact = photographed(CHARUCO, pose(TILTS[0], shift=90.0))
+    found = CHARUCO.find(image)
+    seen = np.isfinite(found).all(axis=1)
+    assert 15 < seen.sum() < 35
+    np.testing.assert_allclose(found[seen], exact[seen], rtol=0, atol=0.06)
+
+
+@pytest.mark.parametrize("angles", [(55, 10, 30), (10, -55, 80)])
+def test_a_far_board_is_found_where_single_markers_are_not(angles):
+    """Of the tilted board 12 corners or none were found without another look for the markers missed."""
+    image, exact = photographed(CHARUCO, pose(angles, distance=500.0))
+    found = CHARUCO.find(image)
+    seen = np.isfinite(found).all(axis=1)
+    assert seen.sum() > 25  # 33 and 29
+    np.testing.assert_allclose(found[seen], exact[seen], rtol=0, atol=0.15)  # 0.09
+
+
+def test_boards_of_the_layout_before_opencv_4_6_are_found():
+    board = cv2.aruco.CharucoBoard((8, 6), 20, 15, cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_100))
+    board.setLegacyPattern(True)
+    found = CHARUCO.find(board.generateImage((480, 360), marginSize=0))
+    expected = CHARUCO.corners[:, :2] * 3 + 59.5  # squares of 60 pixels, the first ends at 59.5
+    np.testing.assert_allclose(found, expected, rtol=0, atol=0.01)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        CharucoBoard(7, 5, 20.0, 15.0, "4X4_50"),
+        CharucoBoard(4, 4, 20.0, 15.0, "7X7_50"),
+    ],
+)
+def test_another_board_is_not_found(other):
+    image, _ = photographed(CHARUCO, pose(TILTS[0]))
+    assert other.find(image) is None
+    assert other.suggest(image) == "markers 5X5"
+
+
+def test_its_own_markers_are_no_other_ones():
+    image, _ = photographed(CHARUCO, pose(TILTS[0]))
+    assert CHARUCO.suggest(image) is None
+    assert CHARUCO.suggest(np.full((100, 150), 128, np.uint8)) is None

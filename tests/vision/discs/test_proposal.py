@@ -1,0 +1,149 @@
+"""Proposals: all markers, under bad light, at every size."""
+
+import numpy as np
+import pytest
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from tests.vision.discs.dots import Dots, dots, draw_disc, exposed, step
+from vision.discs.circle_proposals import highlight_colour, propose_circles
+from vision.discs.colour import DARK, ColourRange
+from vision.rig.bench import Bench
+from vision.rig.exposure import Exposure
+from vision.rig.render import render
+from vision.rig.virtual_camera import default_camera, viewing_pose
+from vision.tracking.workspace import default_workspace
+
+
+def missed(scene: Dots, found: FloatArray) -> int:
+    """How many discs have no proposal within 2 pixels of the centre and of the radius."""
+    apart = (
+        np.abs(found[:, None] - scene.discs).max(axis=2) if len(found) else np.full((1, len(scene.discs)), 9)
+    )
+    return int((apart.min(axis=0) > 2).sum())
+
+
+@pytest.mark.parametrize("grey", [False, True])
+@pytest.mark.parametrize(
+    ("radius", "other"),
+    [
+        (4.0, {}),
+        (7.6, {}),
+        (15.0, {}),
+        (25.0, {}),
+        (7.6, {"wall": 180.0, "background": 225.0}),  # the wall is darker than what is around it
+        (7.6, {"noise": 0.0, "blur": 0.5, "shading": 0.0}),
+    ],
+)
+def test_every_disc_is_proposed(radius, other, grey):
+    """Noise 6, blur 1.5, shading 30 % if not said otherwise; sixteen discs."""
+    scene = dots(radius, **other)
+    image = scene.image[:, :, 1] if grey else scene.image
+    found = propose_circles(image, radii=(0.7 * radius, 1.3 * min(2.5 * radius, 25)))
+    assert missed(scene, found) == 0
+    assert len(found) < 45
+    if radius > 5:
+        error = np.abs(found[:, None, :2] - scene.discs[:, :2]).max(axis=2).min(axis=0)
+        assert np.sqrt(np.mean(error**2)) < 0.8
+
+
+def test_markers_on_a_thin_wall_before_a_dark_background_are_proposed():
+    """Two pixels of wall, blurred by 1.5, part marker and background."""
+    scene = dots(7.6, background=90.0)
+    found = propose_circles(scene.image, radii=(5, 10))
+    assert missed(Dots(scene.image, scene.discs[:9]), found) == 0
+
+
+def test_coloured_discs_are_proposed_alone():
+    """Red ones by their colour: not the seven dark ones."""
+    scene = dots(7.6, colour=(40, 40, 200))
+    found = propose_circles(scene.image, ColourRange((20, 25, 5), (80, 90, 80)), radii=(5, 11))
+    assert missed(Dots(scene.image, scene.discs[:9]), found) == 0
+    assert len(found) == 9
+
+
+@pytest.mark.parametrize("paint", ["dark", "blue"])
+@pytest.mark.parametrize("monochrome", [False, True])
+def test_all_markers_and_fiducials_of_the_rig_are_proposed(paint, monochrome, coarse_mesh):
+    """A pressed finger seen under 5 degrees, in bad light: nearly nothing else is proposed."""
+    workspace, camera = default_workspace(Design()), default_camera()
+    bench = Bench(coarse_mesh, Design(), workspace, paint=paint)
+    x = coarse_mesh.points[:, 0] / 90
+    pressed = -10 * np.column_stack([0.2 * x**2, x**2])
+    pose = viewing_pose(camera, workspace, tilt=5.0)
+    exposure = Exposure(noise=6, blur=1.5, gradient=0.3, monochrome=monochrome)
+    image = render(bench.scene(pressed), camera, pose, exposure)
+    fiducials = np.column_stack([workspace.points, np.zeros(7)])
+    for points, radius in ((bench.markers(pressed), 7.6), (fiducials, 19.0)):  # pixels
+        found = propose_circles(image, radii=(0.7 * radius, 1.3 * radius))
+        apart = np.linalg.norm(found[:, None, :2] - camera.project(points, pose), axis=2)
+        assert apart.min(axis=0).max() < 3
+        assert len(found) <= len(points) + 3
+
+
+def test_a_window_gives_what_the_whole_image_gives_there():
+    scene = dots(7.6)
+    x, y, _ = scene.discs[4]
+    window = (int(x) - 40, int(y) - 30, int(x) + 40, int(y) + 30)
+    found = propose_circles(scene.image, radii=(5, 10), window=window)
+    assert np.abs(found[0] - scene.discs[4]).max() < 2
+    whole = propose_circles(scene.image, radii=(5, 10))
+    assert np.abs(whole - found[0]).max(axis=1).min() <= 1
+
+
+@pytest.mark.parametrize(
+    "window", [(-50, -50, 10, 10), (1270, 0, 1300, 2), (2000, 0, 2100, 90), (9, 9, 9, 9)]
+)
+def test_a_window_beyond_the_image_gives_nothing(window):
+    assert propose_circles(dots(7.6).image, radii=(5, 10), window=window).shape == (0, 3)
+
+
+@pytest.mark.parametrize(("shape", "level"), [((200, 300), 128), ((200, 300, 3), 0), ((3, 3), 255)])
+def test_an_empty_image_gives_nothing(shape, level):
+    assert propose_circles(np.full(shape, level, np.uint8), radii=(4, 25)).shape == (0, 3)
+
+
+@pytest.mark.parametrize(("level", "hidden"), [(215, 5.0), (120, 5.0), (45, 2.5)])
+@pytest.mark.parametrize("turn", [0, 50, 100, 150])
+def test_a_partly_hidden_disc_is_proposed(level, hidden, turn):
+    """A straight edge hides `hidden` of its diameter of 15.2 pixels: 28 or 11 % of the area."""
+    disc = np.array([30.3, 29.8, 7.6])
+    canvas = np.full((60, 60, 3), 215.0)
+    draw_disc(canvas, disc, (45, 45, 45), 1.0)
+    rows, columns = np.ogrid[:60, :60]
+    angle = np.deg2rad(turn)
+    beyond = (columns - disc[0]) * np.cos(angle) + (rows - disc[1]) * np.sin(angle) - (7.6 - hidden)
+    canvas += step(beyond, 1.0)[:, :, None] * (level - canvas)
+    found = propose_circles(exposed(canvas, shading=0.1, noise=3.0, seed=turn), radii=(5.3, 9.9))
+    assert np.hypot(*(found[:, :2] - disc[:2]).T).min() < 3
+
+
+def test_discs_that_touch_are_told_apart_and_none_is_proposed_twice():
+    canvas = np.full((120, 160, 3), 200.0)
+    discs = np.array([(50.0, 60.0, 10.0), (71.0, 60.0, 10.0)])
+    for disc in discs:
+        draw_disc(canvas, disc, (40, 40, 40), 0.8)
+    found = propose_circles(canvas.astype(np.uint8), DARK, radii=(6, 14))
+    assert len(found) == 2
+    assert np.abs(found[np.argsort(found[:, 0])] - discs).max() < 2
+
+
+@pytest.mark.parametrize("radii", [(0, 5), (9, 5), (3, np.inf)])
+def test_impossible_radii_are_refused(radii):
+    with pytest.raises(UserError, match="they must go from above 0 upwards"):
+        propose_circles(np.zeros((20, 20), np.uint8), radii=radii)
+
+
+def test_the_picture_to_check_by_eye_shows_what_has_the_colour_and_the_circles():
+    scene = dots(7.6, noise=0.0, blur=0.5, shading=0.0, size=(640, 360))
+    picture, share = highlight_colour(
+        scene.image, ColourRange((0, -128, -128), (40, 127, 127)), scene.discs[:1]
+    )
+    magenta = (picture == (200, 0, 200)).all(axis=2)
+    assert magenta.mean() == pytest.approx(share)
+    assert share == pytest.approx(np.pi * (scene.discs[:, 2] ** 2).sum() / (640 * 360), rel=0.05)
+    x, y, _ = scene.discs[0]
+    green = (picture == (0, 140, 0)).all(axis=2)
+    rows, columns = np.nonzero(green)
+    assert np.hypot(columns - x, rows - y) == pytest.approx(7.6 + 2, abs=1)

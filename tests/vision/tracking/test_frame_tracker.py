@@ -1,0 +1,295 @@
+"""Tracking from frame to frame through pictures that are lists of discs; 8 pixels are 1 mm."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from geometry.arrays import FloatArray
+from geometry.errors import UserError
+from tests.fingers import beam
+from tests.vision.tracking.listed_discs import ListedDiscs
+from vision.discs.colour import DARK, ColourRange
+from vision.discs.disc_detector import DiscDetections
+from vision.frames.frame import Image
+from vision.tracking.data_association import distance_from_base, with_predictions
+from vision.tracking.frame_tracker import FrameTracker
+from vision.tracking.marker_plane import SIMILARITY, MarkerPlane
+from vision.tracking.scene import FilmedScene
+from vision.tracking.workspace import Workspace
+
+FINGER, RED = beam(), ColourRange((20.0, 40.0, 20.0), (80.0, 90.0, 80.0))
+MARKERS, RADIUS, COUNT = FINGER.markers, FINGER.marker_radius, 7
+REACH = distance_from_base(FINGER.section, MARKERS)
+SCALE = 8.0
+PLANE = MarkerPlane(SIMILARITY, np.array([SCALE, 0.0, 150.0, 200.0]), np.zeros((4, 4)), 0.0)
+CORNERS = np.array([[-12.0, 12.0], [112.0, 12.0], [112.0, -25.0], [-12.0, -22.0], [50.0, -24.0]])
+SIZE = 2 * SCALE
+BENT = -1.5 * np.column_stack([0.1 * (REACH / 100) ** 2, (REACH / 100) ** 2])
+"""A small step, mm."""
+
+
+class KnownPlane(FilmedScene):
+    """A scene whose first plane is given; the third fiducial is hidden in the first frame."""
+
+    def first_plane(self, image: Image) -> tuple[MarkerPlane, DiscDetections]:
+        """The plane, and the fiducials."""
+        centres, radii = PLANE.pixels(CORNERS), np.full(5, SIZE)
+        centres[2] = radii[2] = np.nan
+        return PLANE, DiscDetections(centres, np.zeros((5, 2, 2)), radii, np.full(5, 100.0))
+
+
+SCENE = KnownPlane(FINGER, Workspace(fiducials=tuple(map(tuple, CORNERS.tolist()))), colour=RED)
+
+
+def shown(
+    listed: ListedDiscs,
+    places: FloatArray = MARKERS,
+    *,
+    hidden: Sequence[int] = (),
+    false: Sequence[tuple[float, float]] = (),
+    size: FloatArray | float = 1.0,
+    contrasts: FloatArray | float = 100.0,
+    fiducials: FloatArray = CORNERS,
+) -> Image:
+    """A picture of the markers but for the hidden ones, false discs of their size, and the fiducials."""
+    levels, radii = (
+        np.broadcast_to(values, COUNT) for values in (contrasts, RADIUS * SCALE * np.array(size))
+    )
+    own = [
+        (RED, PLANE.pixels(places[n : n + 1]), float(radii[n]), float(levels[n]))
+        for n in range(COUNT)
+        if n not in hidden
+    ]
+    others = [(RED, PLANE.pixels(np.array([place])), RADIUS * SCALE, 100.0) for place in false]
+    return listed.picture(*own, *others, (DARK, PLANE.pixels(fiducials), SIZE, 100.0))
+
+
+def found(detections: DiscDetections) -> list[int]:
+    """Numbers of the markers that were detected."""
+    return np.nonzero(np.isfinite(detections.radii))[0].tolist()
+
+
+def searches(listed: ListedDiscs) -> int:
+    """How often all discs of a window were asked for."""
+    return sum(request.window is not None for request in listed.requests)
+
+
+def guesses_of_markers(listed: ListedDiscs) -> list[FloatArray]:
+    """Where markers were looked for, mm."""
+    return [PLANE.points(r.guesses) for r in listed.requests if r.window is None and r.colour is RED]
+
+
+def test_the_first_frame_names_the_markers_where_the_design_has_them(listed: ListedDiscs) -> None:
+    off = MARKERS + np.array([0.4, -0.3])
+    tracker = FrameTracker(SCENE, shown(listed, off))
+    first = tracker.first
+    np.testing.assert_allclose(first.markers.centres, PLANE.pixels(off))
+    np.testing.assert_allclose(first.places, off)
+    np.testing.assert_allclose(first.guesses, PLANE.pixels(off))
+    assert tracker.plane is PLANE
+
+
+def test_the_first_search_is_15_mm_around_the_design_for_discs_of_about_the_size(listed: ListedDiscs) -> None:
+    FrameTracker(SCENE, shown(listed))
+    (request,) = [request for request in listed.requests if request.window is not None][:1]
+    (x0, y0), (x1, y1) = MARKERS.min(axis=0) - 15, MARKERS.max(axis=0) + 15
+    assert request.window == (150 + 8 * x0, 200 - 8 * y1, 150 + 8 * x1 + 1, 200 - 8 * y0 + 1)
+    assert request.limits == pytest.approx((0.8 * 8 / 1.3, 0.8 * 8 * 1.3))
+    assert request.colour is RED
+    assert not len(request.radii), "not yet"
+
+
+def test_the_window_has_whole_pixels_around_the_part(listed: ListedDiscs) -> None:
+    """The corners of a turned plane lie between pixels."""
+    turned = MarkerPlane(SIMILARITY, np.array([0.9, 7.7, 350.3, 100.2]), np.zeros((4, 4)), 0.0)
+
+    class Turned(KnownPlane):
+        def first_plane(self, image: Image) -> tuple[MarkerPlane, DiscDetections]:
+            return turned, super().first_plane(image)[1]
+
+    with pytest.raises(UserError, match="0 of 7 markers"):
+        FrameTracker(Turned(FINGER, SCENE.workspace, colour=RED), listed.picture())
+    window = listed.requests[0].window
+    (x0, y0), (x1, y1) = MARKERS.min(axis=0) - 15, MARKERS.max(axis=0) + 15
+    across, down = turned.pixels(np.array([[x0, y0], [x0, y1], [x1, y0], [x1, y1]])).T
+    assert window is not None
+    assert window[0] <= across.min() < window[0] + 1
+    assert window[1] <= down.min() < window[1] + 1
+    assert window[2] - 2 < across.max() <= window[2] - 1  # the last pixel is not in it
+    assert window[3] - 2 < down.max() <= window[3] - 1
+
+
+@pytest.mark.parametrize("hidden", [range(4), range(5)])
+def test_three_markers_must_be_where_the_design_has_them(listed: ListedDiscs, hidden: range) -> None:
+    picture = shown(listed, hidden=hidden)
+    if len(hidden) == 4:
+        assert found(FrameTracker(SCENE, picture).first.markers) == [4, 5, 6]
+        return
+    with pytest.raises(UserError, match="2 of 7 markers are where the design has them, and 3 must be"):
+        FrameTracker(SCENE, picture)
+
+
+@pytest.mark.parametrize("size", [1.0, 1.2])
+def test_markers_are_looked_for_at_the_size_that_the_first_frame_shows(
+    listed: ListedDiscs, size: float
+) -> None:
+    tracker = FrameTracker(SCENE, shown(listed, size=size, hidden=[2]))
+    tracker.see(shown(listed, size=size))
+    near = [r for r in listed.requests if r.window is None and r.colour is RED]
+    assert len(near) >= 2
+    for request in near:
+        np.testing.assert_allclose(request.radii, size * RADIUS * SCALE)
+    again = [r for r in listed.requests if r.window is not None][-1]
+    assert len(again.radii), "of partly hidden discs, too"
+    np.testing.assert_allclose(again.radii, size * RADIUS * SCALE)
+    assert again.limits == pytest.approx((size * 6.4 / 1.3, size * 6.4 * 1.3))
+
+
+@pytest.mark.parametrize(
+    ("contrast", "seen"),
+    [(21.0, True), (19.0, False), (490.0, True), (510.0, False), (-100.0, False), (np.nan, True)],
+)
+def test_a_disc_of_another_contrast_is_no_marker(listed: ListedDiscs, contrast: float, seen: bool) -> None:
+    """A fifth to five times that of the first frame's markers; hough circles have none."""
+    tracker = FrameTracker(SCENE, shown(listed))
+    levels = np.full(COUNT, 100.0)
+    levels[4] = contrast
+    expected = list(range(7)) if seen else [0, 1, 2, 3, 5, 6]
+    assert found(tracker.see(shown(listed, contrasts=levels)).markers) == expected
+
+
+def test_the_usual_contrast_is_the_median(listed: ListedDiscs) -> None:
+    levels = np.array([10.0, 20, 30, 40, 50, 60, 190])
+    tracker = FrameTracker(SCENE, shown(listed, contrasts=levels))
+    levels[[1, 2]] = (8.2, 7.8)  # of 40 / 5
+    levels[[4, 5]] = (199, 201)
+    assert found(tracker.see(shown(listed, contrasts=levels)).markers) == [0, 1, 3, 4, 6]
+
+
+def test_markers_are_looked_for_where_the_last_step_leads(listed: ListedDiscs) -> None:
+    """From the second frame on; the offset of the first one from the design is no motion."""
+    off, step = MARKERS + np.array([0.5, 0.4]), 0.4 * BENT
+    tracker = FrameTracker(SCENE, shown(listed, off))
+    listed.requests.clear()
+    for number in (1, 2, 3):
+        seen = tracker.see(shown(listed, off + number * step))
+        assert found(seen.markers) == list(range(7))
+        np.testing.assert_allclose(seen.places, off + number * step, atol=1e-9)
+    np.testing.assert_allclose(guesses_of_markers(listed), [off, off + 2 * step, off + 3 * step], atol=1e-9)
+    assert searches(listed) == 0
+
+
+def test_a_hidden_marker_is_expected_where_the_others_predict(listed: ListedDiscs) -> None:
+    tracker = FrameTracker(SCENE, shown(listed))
+    seen = tracker.see(shown(listed, MARKERS + BENT, hidden=[3]))
+    assert found(seen.markers) == [0, 1, 2, 4, 5, 6]
+    step = BENT.copy()
+    step[3] = np.nan
+    expected = MARKERS + with_predictions(MARKERS, REACH, step)
+    np.testing.assert_allclose(seen.places, expected, atol=1e-9)
+    np.testing.assert_allclose(seen.guesses, PLANE.pixels(expected), atol=1e-9)
+    np.testing.assert_allclose(seen.places[3], (MARKERS + BENT)[3], atol=0.1)
+    again = tracker.see(shown(listed, MARKERS + 2 * BENT))
+    assert found(again.markers) == list(range(7))
+
+
+def test_a_jump_is_followed_by_a_search(listed: ListedDiscs) -> None:
+    """A step of 8 mm at the tip leaves what is looked for nearby."""
+    tracker = FrameTracker(SCENE, shown(listed))
+    listed.requests.clear()
+    jump = 6 * BENT
+    seen = tracker.see(shown(listed, MARKERS + jump))
+    assert searches(listed) == 1
+    assert found(seen.markers) == list(range(7))
+    np.testing.assert_allclose(seen.places, MARKERS + jump, atol=1e-9)
+
+
+def test_markers_that_a_search_leaves_out_are_looked_for_where_the_others_predict(
+    listed: ListedDiscs,
+) -> None:
+    """As one that is partly hidden: here its disc is too large for a search of all discs."""
+    tracker = FrameTracker(SCENE, shown(listed))
+    places, sizes = MARKERS + 6 * BENT, np.array([1, 1, 1, 1.33, 1, 1, 1])
+    listed.requests.clear()
+    seen = tracker.see(shown(listed, places, size=sizes))
+    assert searches(listed) == 1
+    first, second = guesses_of_markers(listed)
+    np.testing.assert_allclose(first, MARKERS, atol=1e-9)
+    others = np.delete(np.arange(COUNT), 3)
+    np.testing.assert_allclose(second[others], places[others], atol=1e-9)
+    assert np.linalg.norm(second[3] - places[3]) < 0.8 * RADIUS
+    assert found(seen.markers) == list(range(7))
+
+
+@pytest.mark.parametrize("live", [False, True])
+def test_markers_that_stay_lost_are_searched_for_in_every_frame_of_a_film_and_every_fifth_of_a_camera(
+    listed: ListedDiscs, live: bool
+) -> None:
+    tracker = FrameTracker(SCENE, shown(listed), live=live)
+    counts = []
+    for number in range(12):
+        before = searches(listed)
+        tracker.see(shown(listed, hidden=[2] if number < 11 else [2, 4]))
+        counts.append(searches(listed) - before)
+    # The first loss is searched for at once, as is one more at the end.
+    assert counts == ([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1] if live else [1] * 12)
+
+
+@pytest.mark.parametrize("live", [False, True])
+def test_markers_that_the_first_frame_lacks_are_searched_for_as_often(
+    listed: ListedDiscs, live: bool
+) -> None:
+    tracker = FrameTracker(SCENE, shown(listed, hidden=[2]), live=live)
+    counts = []
+    for _ in range(11):
+        before = searches(listed)
+        tracker.see(shown(listed, hidden=[2]))
+        counts.append(searches(listed) - before)
+    assert counts == ([0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0] if live else [1] * 11)
+
+
+def test_nothing_lost_is_nothing_searched_for(listed: ListedDiscs) -> None:
+    tracker = FrameTracker(SCENE, shown(listed), live=True)
+    before = searches(listed)
+    for _ in range(7):
+        tracker.see(shown(listed))
+    assert searches(listed) == before
+
+
+@pytest.mark.parametrize("live", [False, True])
+def test_fiducials_are_looked_for_in_every_frame_of_a_film_and_every_fifth_of_a_camera(
+    listed: ListedDiscs, live: bool
+) -> None:
+    tracker = FrameTracker(SCENE, shown(listed), live=live)
+    detections = [tracker.first, *(tracker.see(shown(listed)) for _ in range(11))]
+    looked = [number for number, each in enumerate(detections) if each.fiducials is not None]
+    assert looked == ([0, 5, 10] if live else list(range(12)))
+    assert detections[10].fiducials is not None
+    assert found(detections[10].fiducials) == [0, 1, 3, 4], "one was hidden in the first frame"
+
+
+def test_a_fiducial_is_known_within_its_radius_of_where_it_was(listed: ListedDiscs) -> None:
+    tracker = FrameTracker(SCENE, shown(listed))
+    moved = CORNERS[::-1].copy()  # the order in which they are detected is of no account
+    moved[4] += (0.5, 0.4)
+    moved[3] += (3.0, 0.0)
+    seen = tracker.see(shown(listed, fiducials=moved)).fiducials
+    assert seen is not None
+    assert found(seen) == [0, 3, 4]
+    np.testing.assert_allclose(seen.centres[[0, 3, 4]], PLANE.pixels(moved[::-1])[[0, 3, 4]])
+    last = [request for request in listed.requests if request.colour is DARK][-1]
+    np.testing.assert_allclose(last.guesses, PLANE.pixels(CORNERS[[0, 1, 3, 4]]))
+    np.testing.assert_allclose(last.radii, SIZE)
+    gone = tracker.see(shown(listed, fiducials=np.empty((0, 2)))).fiducials
+    assert gone is not None
+    assert gone.centres.shape == (5, 2)
+    assert found(gone) == []
+
+
+def test_a_false_disc_beside_a_marker_takes_no_name(listed: ListedDiscs) -> None:
+    tracker = FrameTracker(SCENE, shown(listed))
+    false = [(52.5, 8.0), (30.0, -18.0)]
+    seen = tracker.see(shown(listed, MARKERS + BENT, hidden=[5], false=false))
+    assert found(seen.markers) == [0, 1, 2, 3, 4, 6]
+    np.testing.assert_allclose(seen.places[[0, 6]], (MARKERS + BENT)[[0, 6]], atol=1e-9)
