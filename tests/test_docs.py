@@ -516,7 +516,7 @@ def test_observations_of_a_run_are_measurements(run_folder):
 
 
 def test_the_contract_in_the_docs_is_the_one_that_is_tested():
-    source = (ROOT / "tests" / "solvers" / "test_contract.py").read_text(encoding="utf-8")
+    source = (ROOT / "tests" / "solvers" / "contract" / "test_contract.py").read_text(encoding="utf-8")
     tests = [
         test for test in re.findall(r"^def (test_\w+)", source, re.MULTILINE) if "registered" not in test
     ]
