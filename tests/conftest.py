@@ -80,3 +80,9 @@ def start_ranks() -> Callable[..., subprocess.Popen[str]]:
         )
 
     return start
+
+
+@pytest.fixture
+def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures take most of the time of a small run, and have tests of their own."""
+    monkeypatch.setattr("compare.pipeline.pipeline.draw_all", lambda *_: [])

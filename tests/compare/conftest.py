@@ -178,9 +178,3 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     options = ["--solvers", "fem,fem-nonlinear", "--mesh-size", "1.0", "--quiet"]
     assert main(["compare", *options, "--out", str(out)]) == 0
     return out
-
-
-@pytest.fixture
-def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures take most of the time of a small run, and have tests of their own."""
-    monkeypatch.setattr("compare.pipeline.pipeline.draw_all", lambda *_: [])
