@@ -98,7 +98,7 @@ def solve(
     Raises:
         UserError: If the solver does not support the problem, or the measurements cannot be of it.
     """
-    from compare.evaluation.deformed_body import Body
+    from compare.evaluation.deformed_body import DeformedBody
     from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
 
     chosen = _solver(solver)
@@ -117,7 +117,7 @@ def solve(
         check_positions(given, problem.mesh)
         remarks += displacement_remarks(given, problem)
     solution = solved(chosen, problem)
-    status, faults = Body(problem.mesh).status(solution)
+    status, faults = DeformedBody(problem.mesh).status(solution)
     for remark in [*remarks, *faults]:
         warnings.warn(remark, stacklevel=2)
     return replace(solution, status=status)

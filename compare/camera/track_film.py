@@ -107,7 +107,7 @@ def recorded(frames: Frames, path: Path) -> Iterator[None]:
         UserError: If the frames are those of a file, which exists, or the video cannot be written.
     """
     if frames.count is not None:
-        raise UserError(f"{frames.name} is a file; --record keeps the frames of a camera or a pipe")
+        raise UserError(f"{frames.name} is a file; a recording keeps the frames of a camera or a pipe")
     refusal: UserError | None = None
     with video_writer(path, frames.size, frames.rate, comment=RIG_MARK if frames.simulated else "") as write:
         seen = 0

@@ -122,7 +122,7 @@ def _true_fields(study: Study, load_cases: Sequence[LoadCase], stages: Stages) -
         if isinstance(answer, ProcessFailed):
             raise UserError(
                 f"{name}: the virtual experiment did not come to its end; press less, leave the truth or "
-                f"{LOAD} out, or give --measurements"
+                f"{LOAD} out, or give measurements"
             )
         found[name] = answer
     return {

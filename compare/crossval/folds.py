@@ -134,8 +134,8 @@ def load_cases_of(problem: Problem, *, others: bool) -> list[LoadCase]:
         return cases
     if load.kind == "patch":
         raise UserError(
-            f"{LOAD} presses elsewhere on the same mesh, which --load patch cannot; take mean, or --schemes "
-            f"without {LOAD}"
+            f"{LOAD} presses elsewhere on the same mesh, which a load of kind patch cannot; take mean, or "
+            f"schemes without {LOAD}"
         )
     stroke = float(np.linalg.norm(load.values))
     for share in STROKES:
@@ -147,7 +147,7 @@ def load_cases_of(problem: Problem, *, others: bool) -> list[LoadCase]:
         try:
             replace(problem, load=moved)
         except UserError as error:
-            raise UserError(f"{LOAD}: {error}; take --schemes without it") from None
+            raise UserError(f"{LOAD}: {error}; take schemes without it") from None
         cases.append(LoadCase(f"contact {at:g}", moved, 1.0, at))
     return cases
 

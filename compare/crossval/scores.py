@@ -146,7 +146,7 @@ def score(results: SeedResults) -> Score:
     )
 
 
-def marker_errors(errors: FloatArray) -> dict[str, float]:
+def mean_errors(errors: FloatArray) -> dict[str, float]:
     """Mean absolute errors of errors of shape (n, 2), mm, by the paper's two definitions."""
     u, v = (float(value) for value in np.abs(errors).mean(axis=0))
     return {"mae_u": u, "mae_v": v, "mae_sum": u + v, "mae_rss": float(np.hypot(u, v))}
@@ -172,7 +172,7 @@ def _values(results: SeedResults, what: str) -> FloatArray | None:
             return nan if found.force is None else abs(found.force)
         if what in FIELDS:
             return found.fields.get(what, nan)
-        return marker_errors(found.held_out)[what] if len(found.held_out) else nan
+        return mean_errors(found.held_out)[what] if len(found.held_out) else nan
 
     values = np.array([[value(found) for found in seed] for seed in results])
     return values if np.isfinite(values).all() else None
@@ -197,7 +197,7 @@ def _errors(results: SeedResults, chosen: Callable[[FoldResult], FloatArray]) ->
     by_seed = [np.concatenate([chosen(found) for found in seed]) for seed in results]
     if not all(map(len, by_seed)):
         return {}
-    errors = [marker_errors(values) for values in by_seed]
+    errors = [mean_errors(values) for values in by_seed]
     return {name: Interval.of([entry[name] for entry in errors]) for name in MARKERS}
 
 

@@ -14,7 +14,7 @@ from compare.crossval.folds import ALL, Fold, FoldResult, LoadCase, hide_markers
 from compare.crossval.scores import LEVEL
 from compare.crossval.study import SolverVariant, Study
 from compare.crossval.true_fields import FieldSampler, SampledField, TrueField
-from compare.evaluation.deformed_body import Body
+from compare.evaluation.deformed_body import DeformedBody
 from compare.evaluation.truths import SLIDING, Truth
 from geometry.atomic import write_bytes
 from geometry.errors import UserError
@@ -116,7 +116,7 @@ class FoldRunner:
         self._true_law = replace(self.problem, material=(task.truth or SLIDING).material(material))
         markers = task.observations[0][0]
         self.sampler = FieldSampler.of(mesh, markers.points, markers.marker_radius)
-        self._body = Body(mesh)
+        self._body = DeformedBody(mesh)
         self._truths = [TrueField.load(path) for path in task.truths]
         self._unassimilated: dict[int, tuple[Solution, SampledField]] = {}
         self._refit: Callable[[Observations], Solution] | None = None

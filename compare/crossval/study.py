@@ -159,14 +159,12 @@ class Study:
     def check(self) -> None:
         """Raise a `UserError` for what cannot be done, before anything is computed."""
         if self.layouts and self.measurements:
-            raise UserError(
-                "--layouts: the markers of --measurements are where they are; leave out --layouts"
-            )
+            raise UserError("layouts: markers that were measured are where they are; leave out layouts")
         if tuple(self.truths) != (SLIDING.name,) and self.measurements:
-            raise UserError("--truth is for a simulated experiment; with --measurements leave it out")
+            raise UserError("a truth is for a simulated experiment; with measurements leave it out")
         check_truths(self._truth_names, self.design)
         if len(set(self.layouts)) < len(self.layouts):
-            raise UserError(f"--layouts: a layout is named twice: {', '.join(self.layouts)}")
+            raise UserError(f"layouts: a layout is named twice: {', '.join(self.layouts)}")
         if too_few := next((name for name, points in self.markers.items() if len(points) < FEWEST), None):
             raise UserError(
                 f"cross-validation needs {FEWEST} markers, not the {len(self.markers[too_few])} of the "
@@ -179,14 +177,14 @@ class Study:
             raise UserError(f"a solver is named twice: {', '.join(labels)}")
         known = [scheme for scheme in SCHEMES if scheme != ALL]
         if unknown := next((scheme for scheme in self.schemes if scheme not in known), None):
-            raise UserError(f"--schemes: there is no scheme {unknown!r}; there are {', '.join(known)}")
+            raise UserError(f"schemes: there is no scheme {unknown!r}; there are {', '.join(known)}")
         if not self.schemes or len(set(self.schemes)) < len(self.schemes):
-            raise UserError(f"--schemes: name at least one of {', '.join(known)}, none twice")
+            raise UserError(f"schemes: name at least one of {', '.join(known)}, none twice")
         if self.seeds < 1:
-            raise UserError(f"--seeds {self.seeds}: give a whole number from 1")
+            raise UserError(f"seeds {self.seeds}: give a whole number from 1")
         if not 0 <= self.noise <= LARGEST_NOISE:
             raise UserError(
-                f"--noise {self.noise:g}: give a standard deviation of zero or more, "
+                f"noise {self.noise:g}: give a standard deviation of zero or more, "
                 f"at most {LARGEST_NOISE:g} mm"
             )
         for variant in self.variants:
@@ -198,7 +196,7 @@ class Study:
             raise UserError("the virtual experiment presses on the finger: prescribe v")
         for name, truth in self.chosen_truths.items():
             if truth.radius is not None and (normal or 0.0) >= 0:
-                raise UserError(f"--truth {name}: a cylinder presses on the finger: prescribe a v below zero")
+                raise UserError(f"truth {name}: a cylinder presses on the finger: prescribe a v below zero")
 
     def _laid_out(self, layout: str) -> Finger:
         """The finger with the markers of a layout."""
@@ -206,7 +204,7 @@ class Study:
             return self.design
         if not isinstance(self.design, Design):
             raise UserError(
-                f"--layouts: {self.design.name} has no layout {layout!r}; its markers are those of its "
+                f"layouts: {self.design.name} has no layout {layout!r}; its markers are those of its "
                 f"drawing, {self.design.marker_layout!r}"
             )
         return self.design.replaced(marker_layout=layout)

@@ -30,7 +30,7 @@ ADVICE = {
 """What follows from a fault, and what to do."""
 
 
-class Body:
+class DeformedBody:
     """A body at rest, and what is impossible about its deformations."""
 
     def __init__(self, mesh: TriangleMesh) -> None:
@@ -102,7 +102,7 @@ class Body:
         return judged, [f"{solution.solver}: {fault}; {ADVICE[fault]}" for fault in faults]
 
 
-def _faults(body: Body, evaluation: Evaluation) -> dict[str, str]:
+def _faults(body: DeformedBody, evaluation: Evaluation) -> dict[str, str]:
     if not evaluation.finite:
         return {NOT_FINITE: ""}
     return body.faults(np.concatenate([evaluation.node_displacement, evaluation.edge_displacement]))
@@ -129,7 +129,7 @@ def with_body_checks(
         mesh: The body at rest.
         truth: The simulated finger, if there is one, of which there is a remark only.
     """
-    body, checked = Body(mesh), []
+    body, checked = DeformedBody(mesh), []
     having: dict[str, list[str]] = {}
     for evaluation in evaluations:
         faults = _faults(body, evaluation)

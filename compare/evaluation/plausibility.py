@@ -166,7 +166,7 @@ def _compared(
         raise UserError(f"{sized}; these look like {unit}; give mm")
     remarks = []
     if not 1 / SIZES < ratio < SIZES:
-        looks = f"these look like {unit}, or --stroke was another" if unit else "check unit and --stroke"
+        looks = f"these look like {unit}, or the stroke was another" if unit else "check unit and stroke"
         remarks.append(f"{sized}; {looks}")
     elif (far := np.linalg.norm(moved, axis=1).max()) > SIZES * np.linalg.norm(expected, axis=1).max():
         remarks.append(f"marker {number} moved by {far:.4g} mm, {SIZES:g} times farther than any in fem")

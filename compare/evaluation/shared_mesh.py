@@ -86,8 +86,8 @@ def write_rounds(path: Path, adaptation: Adaptation) -> None:
 
 
 def tolerance_reached(adaptation: Adaptation | None) -> bool:
-    """True if --adapt was not given or its tolerance was reached; else a line on standard error."""
+    """True if no tolerance was given or it was reached; else a line on standard error."""
     if adaptation is None or adaptation.reached:
         return True
-    say(f"error: --adapt {adaptation.tolerance:g}: {adaptation.message}")
+    say(f"error: tolerance of {adaptation.tolerance:g} mm: {adaptation.message}")
     return False

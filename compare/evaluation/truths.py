@@ -73,7 +73,7 @@ class Truth:
         if not isinstance(drawn, Design):
             possible = ", ".join(name for name, truth in TRUTHS.items() if truth.keeps_walls)
             raise UserError(
-                f"--truth {self.name}: {drawn.name} is a drawing, whose walls have no parameters to change; "
+                f"truth {self.name}: {drawn.name} is a drawing, whose walls have no parameters to change; "
                 f"it can have {possible}"
             )
         return {
@@ -98,7 +98,7 @@ class Truth:
         try:
             return drawn.replaced(**values)
         except UserError as error:
-            raise UserError(f"--truth {self.name}: {error}") from None
+            raise UserError(f"truth {self.name}: {error}") from None
 
     def material(self, material: Material) -> Material:
         """The material with its law and Poisson's ratio."""
@@ -220,9 +220,9 @@ TRUTHS: Mapping[str, Truth] = {
 def check_truths(names: Sequence[str], drawn: Finger) -> None:
     """Raise a `UserError` if a truth does not exist, is named twice, or is not for a finger."""
     if unknown := next((name for name in names if name not in TRUTHS), None):
-        raise UserError(f"--truth: there is no truth {unknown!r}; there are all, {', '.join(TRUTHS)}")
+        raise UserError(f"there is no truth {unknown!r}; there are all, {', '.join(TRUTHS)}")
     if not names or len(set(names)) < len(names):
-        raise UserError(f"--truth: name at least one of {', '.join(TRUTHS)}, none twice")
+        raise UserError(f"truth: name at least one of {', '.join(TRUTHS)}, none twice")
     for name in names:
         TRUTHS[name].finger(drawn)
 
@@ -232,6 +232,6 @@ def check_walls(truth: Truth) -> None:
     if not truth.keeps_walls:
         possible = ", ".join(name for name, each in TRUTHS.items() if each.keeps_walls)
         raise UserError(
-            f"--truth {truth.name}: its walls are not those of the drawing, so that fields cannot be "
-            f"compared point by point; take {possible}, or `pinnray crossval --truth {truth.name}`"
+            f"truth {truth.name}: its walls are not those of the drawing, so that fields cannot be "
+            f"compared point by point; take {possible}, or cross-validate with it"
         )

@@ -91,7 +91,7 @@ def _truth(problem: Problem, progress: Progress, truth: Truth) -> Evaluation:
             return kept
         solution = _solved(solver, richer, progress)
     except UserError as error:
-        raise type(error)(f"{error}; or give --measurements FILE.csv") from None
+        raise type(error)(f"{error}; or give measurements") from None
     evaluation = Evaluation.of(solution, problem.mesh)
     with kept_if_possible(entry.parent, "the virtual experiment"):
         evaluation.save(entry, key)
@@ -165,7 +165,7 @@ def _on_own_mesh(problem: Problem, truth: Truth) -> Problem:
     if not truth.solid:
         return problem
     if problem.finger is None:
-        raise UserError(f"--truth {truth.name}: the problem has to know its finger, which is meshed anew")
+        raise UserError(f"truth {truth.name}: the problem has to know its finger, which is meshed anew")
     return replace(problem, mesh=finger_mesh(problem.finger, settings=MeshSettings(size=SOLID_SIZE)))
 
 

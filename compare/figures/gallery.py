@@ -58,7 +58,7 @@ def overlay(comparison: Comparison) -> Drawing:
     )
 
 
-def marker_errors(comparison: Comparison) -> Drawing | None:
+def marker_chart(comparison: Comparison) -> Drawing | None:
     """Bars of the errors at the markers; none where no displacement is known."""
     observations = comparison.observations
     if not observations.known:
@@ -223,7 +223,7 @@ def mesh(comparison: Comparison) -> Drawing:
 
 DRAWINGS: dict[str, tuple[str, Callable[[Comparison], Drawing | None]]] = {
     "overlay": ("picture of the deformed finger", overlay),
-    "marker_errors": ("chart of the errors at the markers", marker_errors),
+    "marker_errors": ("chart of the errors at the markers", marker_chart),
     **{each.name: (f"picture of {each.name}", partial(field, quantity=each)) for each in QUANTITIES},
     "force_displacement": ("chart of force over displacement", force_displacement),
     "excess": ("picture of the excess energy", excess),

@@ -1,5 +1,6 @@
 """The job of a comparison: what is compared, and whether it can be."""
 
+import sys
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -78,6 +79,11 @@ def checked(job: Job) -> Job:
         check_adaptable(job.adapt, job.load)
     if job.reference is not None and job.reference not in job.names:
         raise UserError(f"the reference {job.reference!r} is not among the solvers {', '.join(job.names)}")
+    if job.resume and (typed := next((each for each in job.solvers if _source_file(each) is None), None)):
+        raise UserError(
+            f"solver {typed.name} has no source file, so that an edit of its class cannot be told; do not "
+            "resume, or move the class from the notebook or shell into a module"
+        )
     check_formats(job.picture_formats)
     check_truths([job.truth], job.design)
     check_walls(TRUTHS[job.truth])
@@ -86,3 +92,8 @@ def checked(job: Job) -> Job:
         radius = job.design.marker_radius
         return replace(job, measurements=read_measurements(job.measurements, marker_radius=radius))
     return job
+
+
+def _source_file(solver: Solver) -> str | None:
+    """File of the package or module that holds a solver's class; None where it was typed in."""
+    return getattr(sys.modules.get(type(solver).__module__.partition(".")[0]), "__file__", None)

@@ -154,7 +154,7 @@ def _in_two_processes(parts: dict[str, _Part], stages: Staged) -> Outcome:
     ) as answers:
         for name, answer in answers:
             if isinstance(answer, ProcessFailed):
-                raise UserError(f"{name}: {answer.message}; --resume goes on from what was finished")
+                raise UserError(f"{name}: {answer.message}; a resumed run goes on from what was finished")
             if isinstance(answer, UserError):
                 raise answer
             shown[name].end()

@@ -4,10 +4,10 @@ from collections.abc import Callable
 from threading import Condition, Thread
 from typing import Generic, Self, TypeVar
 
-Item = TypeVar("Item")
+Newest = TypeVar("Newest")
 
 
-class NewestOnly(Generic[Item]):
+class NewestOnly(Generic[Newest]):
     """Does work on items in a thread: always on the newest one, on none twice; the others are passed over.
 
     A context manager, at whose end the last item is worked on. An error in the work ends the thread and is
@@ -20,16 +20,16 @@ class NewestOnly(Generic[Item]):
         passed_over: Number of items that were not worked on.
     """
 
-    def __init__(self, work: Callable[[Item], None]) -> None:
+    def __init__(self, work: Callable[[Newest], None]) -> None:
         self._work = work
         self._changed = Condition()
-        self._waiting: list[Item] = []
+        self._waiting: list[Newest] = []
         self._ended = False
         self._error: BaseException | None = None
         self._thread = Thread(target=self._run, daemon=True)
         self.passed_over = 0
 
-    def put(self, item: Item) -> None:
+    def put(self, item: Newest) -> None:
         """Leave an item to be worked on, in place of one that waits."""
         with self._changed:
             self.passed_over += len(self._waiting)

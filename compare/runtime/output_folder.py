@@ -33,13 +33,13 @@ def check_output(out: Path) -> None:
     try:
         out.resolve(strict=out.is_symlink())
     except (OSError, RuntimeError):  # Python 3.11 raises the latter for a loop of links
-        raise UserError(f"{out} is a link that leads nowhere; name a folder with --out") from None
+        raise UserError(f"{out} is a link that leads nowhere; name an output folder") from None
     if out.exists() and not out.is_dir():
-        raise UserError(f"{out} is a file; name a folder with --out")
+        raise UserError(f"{out} is a file; name an output folder")
     if Path.cwd().is_relative_to(out.resolve()):
         raise UserError(
             f"the output folder is replaced as a whole, so the program cannot run inside it ({out}); "
-            "name another folder with --out"
+            "name another output folder"
         )
     check_links(out)
     files = [path.relative_to(out) for path in out.rglob("[!.]*") if path.is_file()]
@@ -48,12 +48,12 @@ def check_output(out: Path) -> None:
         state = "its run.json is damaged" if (out / RUN_FILE).exists() else "it has no run.json"
         raise UserError(
             f"{out} holds {min(files)}, and {state}, which lists the files that a run has written, so that "
-            "files of yours could be lost; move the folder, or name another one with --out"
+            "files of yours could be lost; move the folder, or name another output folder"
         )
     if foreign := next((path for path in files if path.as_posix() not in (ours or ())), None):
         raise UserError(
             f"{out} holds {foreign}, which no run has written and which would be lost; "
-            "move it, or name another folder with --out"
+            "move it, or name another output folder"
         )
 
 
@@ -84,7 +84,9 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
     partial = out.with_name(f"{out.name}.partial")
     missing = [folder for folder in partial.parents if not folder.exists()]
     if partial.is_symlink():
-        raise UserError(f"{partial} is a link, which no run has made; remove it, or choose another --out")
+        raise UserError(
+            f"{partial} is a link, which no run has made; remove it, or choose another output folder"
+        )
     check_links(partial)
     try:
         partial.mkdir(parents=True, exist_ok=True)
@@ -95,7 +97,7 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
         if not ours and any(partial.iterdir()):
             raise UserError(
                 f"{partial} would be replaced, but it is not of an unfinished run; move it, or name another "
-                "folder with --out"
+                "output folder"
             )
         (partial / MARK).touch()
         _restore(out)
@@ -238,7 +240,7 @@ def locked(folder: Path) -> Iterator[None]:
 
     Files that a killed run has half written are removed.
     """
-    busy = UserError(f"another run is writing to {folder}; wait for it, or name another folder with --out")
+    busy = UserError(f"another run is writing to {folder}; wait for it, or name another output folder")
     handle = os.open(folder, os.O_RDONLY)
     try:
         with suppress(OSError):  # some network file systems have no locks

@@ -52,22 +52,20 @@ def check_resumable_folder(
     """
     out = file.parent
     if out.exists() and not out.is_dir():
-        raise UserError(f"{out} is a file; name a folder with --out")
+        raise UserError(f"{out} is a file; name an output folder")
     if not out.exists() or all(is_partial(path) for path in out.iterdir()):
         return
     check_links(out)
     try:
         before = _flat(json.loads(file.read_text(encoding="utf-8")))
     except (OSError, ValueError):
-        raise UserError(
-            f"{out} holds files that are not of a {job}; name another folder with --out"
-        ) from None
+        raise UserError(f"{out} holds files that are not of a {job}; name another output folder") from None
     now = _flat(to_jsonable_python(definition))
     names = [name for name in {**before, **now} if name not in free]
     if differing := [name for name in names if before.get(name) != now.get(name)]:
         raise UserError(
             f"{out} holds a {job} with other settings ({', '.join(differing)}); "
-            "name another folder with --out, or remove that one"
+            "name another output folder, or remove that one"
         )
 
 

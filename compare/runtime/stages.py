@@ -23,17 +23,17 @@ from compare.runtime.provenance import machine
 from solvers.solver import Progress as Report
 from solvers.solver import UnsupportedProblemError
 
-_silenced: ContextVar[bool] = ContextVar("silenced", default=False)
+_quiet: ContextVar[bool] = ContextVar("quiet", default=False)
 
 
 @contextmanager
-def silenced() -> Iterator[None]:
+def quiet_stages() -> Iterator[None]:
     """Let `Stages` that are made in the block show nothing."""
-    token = _silenced.set(True)
+    token = _quiet.set(True)
     try:
         yield
     finally:
-        _silenced.reset(token)
+        _quiet.reset(token)
 
 
 class Stages:
@@ -47,7 +47,7 @@ class Stages:
     """
 
     def __init__(self, console: Console | None = None, *, quiet: bool = False) -> None:
-        console, quiet = console or Console(stderr=True), quiet or _silenced.get()
+        console, quiet = console or Console(stderr=True), quiet or _quiet.get()
         self.started = datetime.now(UTC)
         self.seconds: dict[str, float] = {}
         self._console = console

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from compare.runtime.stages import silenced
+from compare.runtime.stages import quiet_stages
 from pinnray.options.shared import OUTPUT
 
 Quiet = Annotated[bool, Parameter(group=OUTPUT, help="Show no progress and print only warnings and errors.")]
@@ -26,7 +26,7 @@ def quietable(command: Callable[..., int]) -> Callable[..., int]:
     def run(*positional: Any, quiet: bool = False, **named: Any) -> int:
         if not quiet:
             return command(*positional, **named)
-        with redirect_stdout(StringIO()), silenced():
+        with redirect_stdout(StringIO()), quiet_stages():
             return command(*positional, **named)
 
     added = Argument("quiet", Argument.KEYWORD_ONLY, default=False, annotation=Quiet)

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from compare.evaluation.deformed_body import THROUGH_ITSELF, Body
+from compare.evaluation.deformed_body import THROUGH_ITSELF, DeformedBody
 from compare.evaluation.plausibility import unit_remarks
 from geometry.cache import finger_mesh
 from geometry.drawing.definition import finger_from
@@ -71,7 +71,7 @@ def measured(task: Task) -> Measurement:
         return ended("refused", str(error))
     except Exception as error:
         return ended("failed", f"{type(error).__name__}: {error}")
-    status, _ = Body(mesh).status(solution)
+    status, _ = DeformedBody(mesh).status(solution)
     said = "; ".join([status.message, *unit_remarks(problem)])
     if unknown := [name for name, value in values.items() if np.isnan(value) and name not in FRACTIONS]:
         return ended("not converged", f"{', '.join(unknown)} cannot be computed; {said}", values)

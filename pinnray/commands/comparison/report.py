@@ -29,7 +29,7 @@ def report(*runs: Path, out: OptionalOutputPath = None) -> int:
     if len(found) > 1:
         folder = Path("out/side-by-side") if out is None else out
         if folder.exists() and not folder.is_dir():
-            raise UserError(f"{folder} is a file; name a folder with --out")
+            raise UserError(f"{folder} is a file; name an output folder")
         page, table = write_runs(folder, found)
         print(f"report: {page}\ntable: {table}")
         return 0

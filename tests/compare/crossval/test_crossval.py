@@ -716,26 +716,26 @@ def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, 
     assert np.isnan(row["from_fem_mean_mm"])  # fem is not in the study
     with pytest.raises(UserError, match="there is no scheme 'two-out'"):
         cross_validate(replace(study, schemes=["two-out"]))
-    with pytest.raises(UserError, match="--truth is for a simulated experiment"):
+    with pytest.raises(UserError, match="a truth is for a simulated experiment"):
         cross_validate(replace(study, truths=["stvk"]))
     pulled = replace(study, measurements=None, truths=["mixed"], load=Load(displacement=(1.0, 0.0)))
-    with pytest.raises(UserError, match="--truth mixed: a cylinder presses on the finger: prescribe a v"):
+    with pytest.raises(UserError, match="truth mixed: a cylinder presses on the finger: prescribe a v"):
         cross_validate(pulled)
 
 
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("--seeds 0", "--seeds 0: give a whole number from 1"),
-        ("--noise -1", "--noise -1: give a standard deviation of zero or more"),
+        ("--seeds 0", "seeds 0: give a whole number from 1"),
+        ("--noise -1", "noise -1: give a standard deviation of zero or more"),
         ("--schemes tip", "there is no scheme 'tip'; there are one-out, tip-out, random, load-out"),
         ("--load patch --solvers fem,gp", "load-out presses elsewhere on the same mesh"),
         ("--solvers fem,fem", "a solver is named twice: fem, fem"),
         ("--measurements nowhere.csv", "there is no file nowhere.csv"),
         ("--layouts front,back", "marker_layout = 'back': input should be 'front' or 'joints'"),
         ("--truth tip", "there is no truth 'tip'; there are all, sliding, stvk, gent, print, base, cylinder"),
-        ("--truth base,base", "--truth: name at least one of sliding, stvk, gent, print, base, cylinder"),
-        ("--layouts front,front", "--layouts: a layout is named twice: front, front"),
+        ("--truth base,base", "truth: name at least one of sliding, stvk, gent, print, base, cylinder"),
+        ("--layouts front,front", "layouts: a layout is named twice: front, front"),
         ("--layouts joints --set rib_count=0 --set name=plain", "needs 3 markers, not the 1 of the layout"),
     ],
 )

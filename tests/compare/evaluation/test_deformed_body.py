@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from compare.evaluation.comparison import Comparison
-from compare.evaluation.deformed_body import Body, with_body_checks
+from compare.evaluation.deformed_body import DeformedBody, with_body_checks
 from compare.evaluation.evaluation import Evaluation
 from compare.report.html_report import render
 from compare.report.metrics_json import metrics
@@ -49,14 +49,14 @@ def moved(
 def test_a_strip_rolled_by_more_than_a_turn_goes_through_itself(
     turns: float, through: bool, mesh: TriangleMesh
 ) -> None:
-    assert bool(len(Body(mesh).crossings(rolled(mesh.points, turns)))) is through
+    assert bool(len(DeformedBody(mesh).crossings(rolled(mesh.points, turns)))) is through
 
 
 def test_places_of_crossings_are_where_the_outline_meets(mesh: TriangleMesh) -> None:
     """A node of the upper face is pushed through the lower one, y = -4: its edges of 0.5 mm cross it."""
     pushed = np.zeros_like(mesh.points)
     pushed[np.isclose(mesh.points, [6.0, 0.0]).all(axis=1), 1] = -6.0
-    places = Body(mesh).crossings(pushed)
+    places = DeformedBody(mesh).crossings(pushed)
     np.testing.assert_allclose(places, [[6 - 0.5 / 3, -4.0], [6 + 0.5 / 3, -4.0]], rtol=1e-12)
 
 
@@ -71,7 +71,7 @@ def test_a_slit_that_is_closed_at_rest_is_no_crossing() -> None:
         marker_nodes=np.array([0]),
         contact_node=0,
     )
-    assert len(Body(slit).crossings(np.zeros_like(points))) == 0
+    assert len(DeformedBody(slit).crossings(np.zeros_like(points))) == 0
 
 
 @pytest.mark.parametrize(
@@ -97,8 +97,8 @@ def test_one_quarter_of_a_quadratic_triangle_can_be_inside_out(fem: Evaluation, 
         np.bincount(mesh.edges.ravel(), minlength=len(mesh.points))[mesh.edges].min(axis=1) >= 6
     )[0]
     bent[inner] += [0.0, 0.6]  # the middle of an edge of 0.5 mm
-    assert Body(mesh).inside_out(np.concatenate([fem.node_displacement, bent])).any()
-    assert not Body(mesh).inside_out(np.zeros((len(mesh.points) + len(mesh.edges), 2))).any()
+    assert DeformedBody(mesh).inside_out(np.concatenate([fem.node_displacement, bent])).any()
+    assert not DeformedBody(mesh).inside_out(np.zeros((len(mesh.points) + len(mesh.edges), 2))).any()
 
 
 @pytest.mark.parametrize("field", ["node_displacement", "edge_displacement", "marker_displacement", "stress"])

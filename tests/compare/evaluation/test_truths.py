@@ -95,7 +95,7 @@ def test_a_drawing_has_the_truths_that_keep_its_walls():
 
 def test_walls_that_a_design_cannot_have_are_refused_with_the_name_of_the_truth():
     tight = Design(rib_count=0, marker_layout="front", tip_length=87.0)
-    with pytest.raises(UserError, match=r"^--truth base: no room for a cavity"):
+    with pytest.raises(UserError, match=r"^truth base: no room for a cavity"):
         TRUTHS["base"].finger(tight)
 
 

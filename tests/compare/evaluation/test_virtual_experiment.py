@@ -173,7 +173,7 @@ def test_an_experiment_that_stops_halfway_is_refused_and_not_kept(problem, cache
         return replace(solve(self, *arguments), status=Status(False, "stopped at 50% of the load"))
 
     monkeypatch.setattr(FemNonlinearSolver, "solve", stops)
-    with pytest.raises(UserError, match=r"experiment stopped at 50% of the load; or give --measurements"):
+    with pytest.raises(UserError, match=r"experiment stopped at 50% of the load; or give measurements"):
         virtual_experiment(problem, 0.8)
     assert not cache.exists()
 
@@ -203,15 +203,15 @@ def test_a_truth_in_three_dimensions_is_that_of_the_side_face(problem, cache, mo
 
 
 def test_truths_that_the_problem_cannot_have_are_refused(problem, solutions):
-    with pytest.raises(UserError, match=r"--truth print: its walls are not those of the drawing"):
+    with pytest.raises(UserError, match=r"truth print: its walls are not those of the drawing"):
         virtual_experiment(problem, 0.8, truth=TRUTHS["print"])
-    with pytest.raises(UserError, match=r"--truth 3d: the problem has to know its finger"):
+    with pytest.raises(UserError, match=r"truth 3d: the problem has to know its finger"):
         virtual_experiment(problem, 0.8, truth=TRUTHS["3d"])
     assert not solutions
 
 
 def test_without_a_prescribed_v_there_is_no_experiment(problem, solutions):
-    with pytest.raises(UserError, match="prescribe v; or give --measurements"):
+    with pytest.raises(UserError, match="prescribe v; or give measurements"):
         virtual_experiment(replace(problem, load=Load(displacement=(1.0, None))), 0.8)
     assert not solutions
 

@@ -447,6 +447,16 @@ def test_another_version_of_the_code_is_not_resumed_from(job, monkeypatch, what)
     assert first.calls == 2
 
 
+def test_a_solver_that_was_typed_into_a_notebook_is_not_resumed(job, monkeypatch):
+    """Its class has no source file, so that an edit would bring the old result back."""
+    monkeypatch.setattr(Scripted, "__module__", "notebook")
+    first = Scripted("first")
+    compare(job(first))
+    with pytest.raises(UserError, match=r"^solver first has no source file, .*; do not resume, or move"):
+        compare(job(first, resume=True))
+    assert first.calls == 1
+
+
 def test_other_measured_displacements_need_no_new_solution(job, measured):
     first = Scripted("first")
     before = metrics(compare(job(first)))["solvers"]["first"]

@@ -120,7 +120,11 @@ def test_the_fault_of_a_solver_in_the_second_process_is_kept_for_the_reader(solv
         ("refusing", {}, r"^refusing: the weight is negative$"),
         ("unsupporting", {}, r"^unsupporting: no markers here$"),
         ("faulty", {"reference": "faulty"}, r"^solver faulty raised ZeroDivisionError"),
-        ("killed", {}, r"^solvers of finite strain: its process ended with exit code -9; --resume goes on"),
+        (
+            "killed",
+            {},
+            r"^solvers of finite strain: its process ended with exit code -9; a resumed run goes on",
+        ),
     ],
 )
 def test_a_refusal_in_the_second_process_is_one_line_of_the_first(solve, name, changes, message):

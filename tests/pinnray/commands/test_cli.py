@@ -144,9 +144,9 @@ BAD = [
     ("solve fem --law neo-hookean", r"--law neo-hookean: none of the solvers has it \(fem has linear\)"),
     ("gridsearch --law neo-hookean", r"--law neo-hookean: none of the solvers has it \(pinn-std has linear"),
     ("compare --plane stress --law neo-hookean", "the neo-hookean law is given for plane strain only"),
-    ("compare --truth none", "--truth: there is no truth 'none'"),
-    ("compare --truth print", "--truth print: its walls are not those of the drawing"),
-    ("compare --truth stvk --measurements markers.csv", "--truth is for a simulated experiment"),
+    ("compare --truth none", "there is no truth 'none'"),
+    ("compare --truth print", "truth print: its walls are not those of the drawing"),
+    ("compare --truth stvk --measurements markers.csv", "a truth is for a simulated experiment"),
     # solvers and their settings
     ("compare --solvers fem,fem", "named twice: fem, fem"),
     ("compare --solvers fem --reference pinn-std", "reference 'pinn-std' is not among the solvers fem"),
@@ -203,7 +203,7 @@ BAD = [
     ("solve fem-asm --mesh-size 1 --measurements outside.csv", "not of this finger: .* outside the body"),
     # where to write
     ("compare --out foreign", "foreign holds thesis.txt, and it has no run.json"),
-    ("compare --out file", "file is a file; name a folder with --out"),
+    ("compare --out file", "file is a file; name an output folder"),
     ("compare --out file/below", "cannot write to .*: Not a directory"),
     ("compare --out /proc/absent/run", "cannot write to /proc/absent/run.partial"),  # whoever runs this
     ("compare --out .", "cannot run inside it"),
@@ -236,7 +236,7 @@ BAD = [
     ("gridsearch --solver-set pinn-asm.neurons=3", "'pinn-asm', which is not among the solvers pinn-std"),
     ("gridsearch --load patch", "pinn-std takes the loads mean, point, not 'patch'"),
     ("gridsearch --out foreign", "foreign holds files that are not of a grid search"),
-    ("gridsearch --out file", "file is a file; name a folder with --out"),
+    ("gridsearch --out file", "file is a file; name an output folder"),
     ("design --formats step,dwg", "unknown CAD format 'dwg'; there are step, stl, dxf, svg"),
     ("mesh --mesh-size 1 --out file", "--out file: this is a file; name a folder"),
 ]
@@ -264,7 +264,7 @@ def test_a_read_only_folder_is_one_line(folder, capsys):
 def test_a_link_to_itself_is_no_output_folder(folder, capsys):
     Path("loop").symlink_to("loop")
     assert main([*SMALL, "--out", "loop"]) == BAD_INPUT
-    assert capsys.readouterr().err == "error: loop is a link that leads nowhere; name a folder with --out\n"
+    assert capsys.readouterr().err == "error: loop is a link that leads nowhere; name an output folder\n"
 
 
 def test_a_drawing_is_not_replaced_by_what_is_drawn_from_it(folder, capsys):
@@ -751,7 +751,7 @@ def test_a_tolerance_that_is_not_reached_ends_with_its_own_code(monkeypatch, tmp
     monkeypatch.setattr(adapt, "adapted", partial(adapt.adapted, most_rounds=2))
     options = ["--mesh-size", "1", "--adapt", "1e-6", "--out", str(tmp_path / "mesh")]
     assert main(["mesh", *options]) == NOT_CONVERGED
-    progress, error = capsys.readouterr().err.split("error: --adapt 1e-06: ")
+    progress, error = capsys.readouterr().err.split("error: tolerance of 1e-06 mm: ")
     assert "s, the markers are known to 0.00" in progress
     assert error.startswith("the markers are known to 0.00")
     assert len((tmp_path / "mesh" / "adapt.csv").read_text(encoding="utf-8").splitlines()) == 3

@@ -83,7 +83,7 @@ def test_a_pipe_is_recorded_even_if_its_film_is_refused(film, tmp_path, monkeypa
 
 def test_a_file_is_not_recorded_again(film, tmp_path, capsys):
     assert main(["track", str(film / "video.mkv"), "--record", str(tmp_path / "run.mkv")]) == BAD_INPUT
-    assert "--record keeps the frames of a camera or a pipe" in capsys.readouterr().err
+    assert "a recording keeps the frames of a camera or a pipe" in capsys.readouterr().err
     assert not (tmp_path / "run.mkv").exists()
 
 
