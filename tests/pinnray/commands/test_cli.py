@@ -146,7 +146,7 @@ BAD = [
     ("compare --plane stress --law neo-hookean", "the neo-hookean law is given for plane strain only"),
     ("compare --truth none", "there is no truth 'none'"),
     ("compare --truth print", "truth print: its walls are not those of the drawing"),
-    ("compare --truth stvk --measurements markers.csv", "a truth is for a simulated experiment"),
+    ("compare --truth stvk --measurements markers.csv", "is for a simulated experiment"),
     # solvers and their settings
     ("compare --solvers fem,fem", "named twice: fem, fem"),
     ("compare --solvers fem --reference pinn-std", "reference 'pinn-std' is not among the solvers fem"),
@@ -222,7 +222,7 @@ BAD = [
     ("fiducials --marker-plane nan", "workspace: marker_plane: Input should be a finite number"),
     ("fiducials --marker-plane 1e9", "workspace: marker_plane: Input should be less than or equal to 1000"),
     ("fiducials --square 1e9", "a square of 1e[+]09 mm; its side must be 0.2 to 1000 mm"),
-    ("crossval --solvers fem --noise 1e6", "--noise 1e[+]06: .* zero or more, at most 100 mm"),  # a kilometre
+    ("crossval --solvers fem --noise 1e6", "noise 1e[+]06: .* zero or more, at most 100 mm"),  # a kilometre
     ("solve fem --out fields.csv", "give a name that ends in .vtu"),
     ("gridsearch --learning-rates 1e-3;1e-2", "--learning-rates 1e-3;1e-2: give numbers with commas"),
     ("gridsearch --bc-weights 1,1.0", "--bc-weights 1,1.0: give different numbers above 0"),
