@@ -54,8 +54,12 @@ def parameters():
 
 
 def dense_jacobian(squares, parameters, sample):
-    """Derivatives of all residuals by all parameters, by torch, shape (3 n + 2 m, 2 p)."""
-    return torch.func.jacrev(lambda values: squares.residuals(values, sample))(parameters).flatten(1)
+    """Derivatives of all residuals by all parameters, by torch, shape (3 n + 2 m, 2 p).
+
+    All rows at once would take 4 GB.
+    """
+    by_rows = torch.func.jacrev(lambda values: squares.residuals(values, sample), chunk_size=64)
+    return by_rows(parameters).flatten(1)
 
 
 def apart(solution, other):
