@@ -7,8 +7,7 @@ is rigid. With the free solution K⁻¹ r and the responses K⁻¹ Cᵀ to unit 
 
     (C K⁻¹ Cᵀ + S) f = g - C K⁻¹ r        x = K⁻¹ r + K⁻¹ Cᵀ f
 
-Source: M. Benzi, G. H. Golub, J. Liesen, Numerical solution of saddle point problems, Acta Numerica 14 (2005)
-1-137, section 5 (Schur complement reduction, for the multipliers -f).
+Source: M. Benzi, G. H. Golub, J. Liesen, Acta Numerica 14 (2005) 1-137, section 5, for the multipliers -f.
 """
 
 from dataclasses import dataclass
@@ -38,13 +37,10 @@ class ConstrainedElimination:
         return self.flexibility + self.compliance * np.eye(len(self.rows))
 
     def unstable(self, negative: int) -> int:
-        """Number of directions that keep the constraints and in which the energy falls, with that of springs.
+        """Number of directions that keep the constraints and in which the energy, springs included, falls.
 
-        The inertia of the whole system is that of K and that of its Schur complement together (Haynsworth),
-        and that of S and of K with the springs, whose compliance may be negative.
-
-        Args:
-            negative: Number of negative eigenvalues of K.
+        By Haynsworth's inertia of the whole system: that of K plus that of its Schur complement, and that of S plus
+        that of K with the springs, whose compliance may be negative. `negative` counts K's negative eigenvalues.
         """
         schur = np.linalg.eigvalsh(self.schur_complement)
         springs = np.broadcast_to(self.compliance, len(self.rows))
@@ -63,7 +59,7 @@ class ConstrainedElimination:
         return np.linalg.solve(self.schur_complement, gaps)
 
     def solution(self, free: FloatArray, values: FloatArray | float = 0.0) -> tuple[FloatArray, FloatArray]:
-        """X and f, shape (k,), from the free solution K⁻¹ r and the values g, shape (k,), or one for all."""
+        """x and f, shape (k,), from the free solution K⁻¹ r and the values g, shape (k,), or one for all."""
         forces = self.forces(values - self.values(free))
         return free + (forces @ _flat(self.responses)).reshape(free.shape), forces
 

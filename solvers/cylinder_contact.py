@@ -1,12 +1,10 @@
 """A rigid cylinder pressed on the front face without friction: gaps, forces and their tangent.
 
-The gap is collocated at the nodes of the boundary `front`, which are the points of Simpson's rule on the
-edges of quadratic elements (of the trapezium rule on linear ones). With g the gap of a node, positive outside
-the cylinder, and λ its multiplier, the nodal force is q = max(0, λ - k g): the augmented Lagrangian of
-J. C. Simo, T. A. Laursen, An augmented Lagrangian treatment of contact problems involving friction, Computers
-& Structures 42 (1992) 97-116, without friction. The contact is found, not given.
-
-In three dimensions the axis is along z, and k of a node is in proportion to its level's share of the depth.
+The gap is collocated at the nodes of the boundary `front`, which are the points of Simpson's rule on the edges
+of quadratic elements. With g the gap of a node, positive outside the cylinder, and λ its multiplier, the nodal
+force is q = max(0, λ - k g): the augmented Lagrangian of J. C. Simo, T. A. Laursen, Computers & Structures 42
+(1992) 97-116, without friction. In three dimensions the axis is along z, and k of a node is in proportion to
+its level's share of the depth.
 """
 
 from dataclasses import dataclass
@@ -104,7 +102,7 @@ class CylinderContact:
         return -self.forces(state)[:, None] * self.gaps(state)[1]
 
     def tangent(self, state: ContactState) -> FloatArray:
-        """Derivative of the gradient, a block k n n^T - q (I - n n^T) / (g + radius) a node, (l m, 2, 2)."""
+        """Derivative of the gradient, blocks k n n^T - q (I - n n^T) / (g + radius), (l m, 2, 2)."""
         (gap, normal), force = self.gaps(state), self.forces(state)
         across = np.einsum("mi,mj->mij", normal, normal)
         turning = (force / (gap + self.radius))[:, None, None] * (np.eye(2) - across)
@@ -116,7 +114,7 @@ class CylinderContact:
         return np.repeat(self.stiffness * self.shares, len(self.positions))
 
     def _places(self, nodal: FloatArray) -> FloatArray:
-        """Places of the nodes in the plane, shape (l m, 2), mm."""
+        """Positions of the deformed nodes in the plane, shape (l m, 2), mm."""
         return np.tile(self.positions, (len(self.shares), 1)) + nodal[self.nodes, :2]
 
     def front(self, nodal: FloatArray) -> FloatArray:
@@ -174,10 +172,10 @@ class ContactRegion:
 
     @classmethod
     def of(cls, contact: CylinderContact, state: ContactState) -> "ContactRegion | None":
-        """The region in a state of equilibrium; none where the cylinder does not touch the finger.
+        """The region in equilibrium; None where the cylinder does not touch the finger.
 
-        Its ends are taken half way between a point that touches and the next one that does not. In three
-        dimensions a point touches if it does so anywhere along z, and the pressure is a mean over the depth.
+        Its ends lie half way between a point that touches and the next one that does not. In three dimensions a
+        point touches if it does so anywhere along z, and the pressure is a mean over the depth.
         """
         gap, normal = contact.gaps(state)
         nodal, force = state.nodal, contact.over_depth(state.contact)
@@ -204,13 +202,7 @@ class ContactRegion:
 
 
 def contact_of(problem: Problem, position: float | None, region: ContactRegion | None) -> Contact | None:
-    """The contact of a solution, from the abscissa of its force, mm; None where the indenter does not touch.
-
-    Args:
-        problem: With the load.
-        position: None without a force.
-        region: Where a cylinder touches; None for another load.
-    """
+    """The contact of a solution by the abscissa of its force, mm; None without force or contact region."""
     if position is None or (problem.load.kind == "cylinder" and region is None):
         return None
     start, end = contact_ends(problem) if region is None else (region.start, region.end)

@@ -1,12 +1,11 @@
 """Constitutive laws for NumPy arrays, torch tensors and UFL expressions alike.
 
 Every function takes the displacement gradient `H[..., i, j] = du_i/dx_j` and uses only arithmetic and
-indexing on it, so that it works with all three libraries. Linear elasticity is Hooke's law for the
-plane states (Timoshenko and Goodier, Theory of Elasticity, 3rd ed., chapter 2). The finite-strain laws are
-those of Bonet and Wood (Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed.), in plane strain:
-the compressible neo-Hookean (section 6.4.3) and the St Venant-Kirchhoff law (chapter 6); and that of
-A. N. Gent (Rubber Chem. Technol. 69 (1996) 59-61), which stiffens as chains are stretched out, with the
-volumetric part of the neo-Hookean.
+indexing on it. Linear elasticity is Hooke's law for the plane states (Timoshenko and Goodier, Theory of
+Elasticity, 3rd ed., chapter 2). The finite-strain laws are in plane strain: compressible neo-Hookean and
+St Venant-Kirchhoff (Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed.,
+section 6.4.3 and chapter 6), and A. N. Gent's (Rubber Chem. Technol. 69 (1996) 59-61), which stiffens as
+chains are stretched out, with the volumetric part of the neo-Hookean.
 """
 
 from collections.abc import Callable
@@ -109,7 +108,7 @@ def green_lagrange_strain(gradient: Field) -> PlaneTensor:
 
 
 def neo_hookean_energy_density(gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> Field:
-    """ψ = μ/2 (tr C - 3) - μ ln J + λ/2 (ln J)^2 per reference volume, MPa; `log` is that of the library."""
+    """ψ = μ/2 (tr C - 3) - μ ln J + λ/2 (ln J)^2 per reference volume, MPa."""
     strain = green_lagrange_strain(gradient)
     log_j = log(deformation_jacobian(gradient))
     return lame.μ * (strain.xx + strain.yy) - lame.μ * log_j + 0.5 * lame.λ * log_j * log_j
@@ -174,10 +173,10 @@ def strain_of(law: LawName, gradient: Field, lame: Lame) -> PlaneTensor:
 
 
 def energy_density_of(law: LawName, gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> Field:
-    """Strain energy of a law per reference volume, MPa; `log` is that of the library.
+    """Strain energy of a law per reference volume, MPa; `log` is the library's logarithm.
 
-    St Venant-Kirchhoff's is ψ = λ/2 (tr E)^2 + μ E : E with the Green-Lagrange strain E. It is unsuitable for
-    strong compression: it stays finite as J tends to zero.
+    St Venant-Kirchhoff: ψ = λ/2 (tr E)^2 + μ E : E with the Green-Lagrange strain E; it stays finite as J tends
+    to zero, and so is unsuitable for strong compression.
     """
     if law == "neo-hookean":
         return neo_hookean_energy_density(gradient, lame, log)
@@ -187,7 +186,7 @@ def energy_density_of(law: LawName, gradient: Field, lame: Lame, log: Callable[[
 
 
 def stress_of(law: LawName, gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> PlaneTensor:
-    """Cauchy stress of a law, MPa; `log` is that of the library."""
+    """Cauchy stress of a law, MPa; `log` is the library's logarithm."""
     if law == "linear":
         return linear_stress(gradient, lame)
     if law == "st-venant-kirchhoff":

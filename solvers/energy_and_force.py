@@ -20,14 +20,9 @@ PLATEAU = 0.1
 def energy_and_force(problem: Problem, field: DisplacementField, degree: int = 2) -> tuple[float, FloatArray]:
     """Energy per depth, N mm/mm, and the indenter's force per depth, shape (2,), N/mm.
 
-    The force is the mean of those on sections between base and contact, each of which transmits the
-    indenter's in equilibrium: the work of the stress on a virtual displacement that grows from zero at the
-    base to a unit translation at the contact. It is zero for a component that is free.
-
-    Args:
-        problem: Its law gives the stress.
-        field: The displacement.
-        degree: Of the quadrature.
+    The force is the mean of those on sections between base and contact, each of which transmits the indenter's in
+    equilibrium: the work of the stress on a virtual displacement that grows from zero at the base to a unit
+    translation at the contact. It is zero for a component that is free. `degree` is of the quadrature.
     """
     rule = body_quadrature(problem.mesh, degree)
     gradient = field.gradient(rule.location)
@@ -47,8 +42,8 @@ def energy_and_force(problem: Problem, field: DisplacementField, degree: int = 2
 def section_slope(problem: Problem, location: LocatedPoints) -> FloatArray:
     """Gradient of a function that is zero at the base and one at the contact, shape (n, 2), 1/mm.
 
-    It grows linearly with x where the base ends by a wall's thickness before the contact begins, so that the
-    sections x = constant between them separate the two. Elsewhere, as in a ring, it is harmonic.
+    It grows linearly with x if base and contact are at least a wall's thickness apart, so that sections of
+    constant x separate them. Elsewhere, as in a ring, it is harmonic.
     """
     start = float(problem.mesh.points[problem.mesh.boundary("base").ravel(), 0].max())
     end, _ = contact_ends(problem)
@@ -59,7 +54,7 @@ def section_slope(problem: Problem, location: LocatedPoints) -> FloatArray:
 
 
 def harmonic_slope(problem: Problem, location: LocatedPoints) -> FloatArray:
-    """Gradient of the harmonic function of linear elements, cut off at `PLATEAU`, shape (n, 2), 1/mm."""
+    """Gradient of a harmonic function of linear elements, cut off near its ends, shape (n, 2), 1/mm."""
     mesh = problem.mesh
     space = LagrangeSpace(mesh, 1)
     along = space.shape_gradients(mesh.at_centroids())

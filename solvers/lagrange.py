@@ -1,7 +1,7 @@
 """Continuous Lagrange elements on the shared mesh, in NumPy: nodes, shape functions, functionals, evaluation.
 
-DOLFINx assembles and PETSc solves; nodes here are matched to its degrees of freedom by position, so that a
-finite-element solution is an array that outlives both, and no code depends on how they number things.
+DOLFINx assembles and PETSc solves; nodes here are matched to their degrees of freedom by position, so that a
+finite-element solution is an array that does not depend on how they number things.
 """
 
 from dataclasses import dataclass
@@ -70,7 +70,7 @@ class NodalSpace(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class LagrangeSpace:
-    """Scalar Lagrange elements of degree 1 or 2 on a triangle mesh."""
+    """Scalar Lagrange elements of degree 1 or 2: the mesh's nodes first, then the middles of `mesh.edges`."""
 
     # The mesh; its nodes come first in `nodes`, the middles of `mesh.edges` follow for degree 2
     mesh: TriangleMesh

@@ -1,7 +1,7 @@
-"""PETSc, started without the files of options that it reads from the working folder and from the home.
+"""PETSc, started without the option files that it reads from the working folder and from home.
 
-A `.petscrc` or `petscrc` of others in the working folder could have it load a library or write any file. The
-variable `PETSC_OPTIONS` counts.
+A `.petscrc` of others in the working folder could make it load a library or write any file. The variable
+`PETSC_OPTIONS` counts.
 """
 
 import petsc4py

@@ -27,12 +27,7 @@ class SharedWork:
 
 
 def shared(key: Hashable, make: Callable[[], Work]) -> Work:
-    """The result under a key, made if it is not there; outside of `SharedWork.used` it is not kept.
-
-    Args:
-        key: Everything that the result depends on, and its kind.
-        make: Makes it; nobody may change it later.
-    """
+    """The result under a key that holds all it depends on, made if absent; kept inside `SharedWork.used` only."""
     kept = _KEPT.get()
     if kept is None:
         return make()

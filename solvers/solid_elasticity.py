@@ -1,9 +1,7 @@
 """Constitutive laws in three dimensions, for NumPy arrays and UFL expressions alike.
 
-The laws of `elasticity` without an assumption on the third direction: Hooke's, and of finite strain the
-compressible neo-Hookean and the St Venant-Kirchhoff law (Bonet and Wood, Nonlinear Continuum Mechanics for
-Finite Element Analysis, 2nd ed., section 6.4.3 and chapter 6). Where u_z is zero and nothing depends on z,
-they are the laws of plane strain.
+The laws of `elasticity` without an assumption on the third direction (Bonet and Wood, 2nd ed., section 6.4.3
+and chapter 6). Where u_z is zero and nothing depends on z, they are the laws of plane strain.
 """
 
 from collections.abc import Callable
@@ -39,7 +37,7 @@ def solid_strain(law: LawName, gradient: Field) -> list[list[Field]]:
 
 
 def solid_energy_density(law: LawName, gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> Field:
-    """Strain energy of a law per reference volume, MPa; `log` is that of the library.
+    """Strain energy of a law per reference volume, MPa; `log` is the library's logarithm.
 
     λ/2 (tr E)^2 + μ E : E; for the neo-Hookean law μ/2 (tr C - 3) - μ ln J + λ/2 (ln J)^2.
     """

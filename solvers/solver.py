@@ -39,12 +39,7 @@ class UnsupportedProblemError(UserError):
 
 
 class SolverFailedError(UserError):
-    """A solver raised an exception, the cause of this one.
-
-    Args:
-        solver: The solver.
-        cause: Its exception, with its traceback.
-    """
+    """A solver raised an exception, the cause of this one."""
 
     def __init__(self, solver: "Solver", cause: Exception) -> None:
         kind, place = type(cause).__name__, _place(solver, cause)
@@ -64,8 +59,8 @@ def _place(solver: "Solver", cause: Exception) -> str:
 class Solver(Protocol):
     """A method that solves a `Problem`.
 
-    A solver is made without arguments for its defaults; the three properties may be plain class attributes.
-    It may also have the attributes of `Traits`.
+    A solver is made without arguments for its defaults; its properties may be plain class attributes. It may also
+    have the attributes of `Traits`.
     """
 
     @property
@@ -149,7 +144,7 @@ class Traits:
 
 
 def check_name(name: str) -> None:
-    """Raise a `UserError` unless a solver's name can be that of a file and of a row beside the truth."""
+    """Raise a `UserError` unless a name can name a file and is not reserved for the truth."""
     if not (isinstance(name, str) and NAME.fullmatch(name)) or name == RESERVED:
         taken = f"{RESERVED} is the simulated finger's" if name == RESERVED else "files are called so"
         raise UserError(

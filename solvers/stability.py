@@ -34,7 +34,7 @@ def descended(
     energy: Callable[[FloatArray], float],
     step: Callable[[FloatArray, float], Step | None],
 ) -> FloatArray | None:
-    """A state of least energy below a start, which must fulfil the constraints; None if none is reached.
+    """State of least energy reached by descent from a start that fulfils the constraints; None if none is reached.
 
     Args:
         start: Of any shape.
@@ -66,7 +66,7 @@ def descended(
 def aside(
     state: FloatArray, direction: FloatArray, energy: Callable[[FloatArray], float]
 ) -> list[FloatArray]:
-    """The state to either side along a direction, of the same shape, as far as the energy falls."""
+    """States to both sides of a state along a direction, each as far as the energy falls."""
     found = []
     for side in (1.0, -1.0):
         step = side * SIDEWAYS * np.abs(state).max() / np.abs(direction).max() * direction
