@@ -39,8 +39,8 @@ class ConstrainedElimination:
     def unstable(self, negative: int) -> int:
         """Number of directions that keep the constraints and in which the energy, springs included, falls.
 
-        By Haynsworth's inertia of the whole system: that of K plus that of its Schur complement, and that of S plus
-        that of K with the springs, whose compliance may be negative. `negative` counts K's negative eigenvalues.
+        K has `negative` negative eigenvalues. The whole system's inertia is K's plus its Schur complement's,
+        and also S's plus that of K with the springs, whose compliance may be negative (Haynsworth).
         """
         schur = np.linalg.eigvalsh(self.schur_complement)
         springs = np.broadcast_to(self.compliance, len(self.rows))
@@ -59,7 +59,7 @@ class ConstrainedElimination:
         return np.linalg.solve(self.schur_complement, gaps)
 
     def solution(self, free: FloatArray, values: FloatArray | float = 0.0) -> tuple[FloatArray, FloatArray]:
-        """x and f, shape (k,), from the free solution K⁻¹ r and the values g, shape (k,), or one for all."""
+        """Solution x and forces f, from the free solution K⁻¹ r and values g, shape (k,) or one for all."""
         forces = self.forces(values - self.values(free))
         return free + (forces @ _flat(self.responses)).reshape(free.shape), forces
 

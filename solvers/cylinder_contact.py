@@ -1,25 +1,20 @@
 """A rigid cylinder pressed on the front face without friction: gaps, forces and their tangent.
 
-The gap is collocated at the nodes of the boundary `front`, which are the points of Simpson's rule on the edges
-of quadratic elements. With g the gap of a node, positive outside the cylinder, and λ its multiplier, the nodal
-force is q = max(0, λ - k g): the augmented Lagrangian of J. C. Simo, T. A. Laursen, Computers & Structures 42
-(1992) 97-116, without friction. In three dimensions the axis is along z, and k of a node is in proportion to
-its level's share of the depth.
+The gap is collocated at the nodes of the boundary `front`, which are the points of Simpson's rule on the
+edges of quadratic elements. With g the gap of a node, positive outside the cylinder, and λ its multiplier,
+the nodal force is q = max(0, λ - k g): the augmented Lagrangian of J. C. Simo, T. A. Laursen, Computers &
+Structures 42 (1992) 97-116, without friction. In three dimensions the axis is along z, and k of a node is in
+proportion to its level's share of the depth.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
-from solvers.lagrange import NodalSpace
+from solvers.extrusion import NodalSpace
 from solvers.problem import Problem, contact_ends, front_points
 from solvers.solution import Contact
-
-STIFFNESS = 10.0
-"""k over Young's modulus: a larger one needs fewer updates of the multipliers but more Newton iterations."""
-
 
 CONTACT_AT_END = (
     "the contact reaches an end of the front face, beyond which none is looked for; "
@@ -27,20 +22,14 @@ CONTACT_AT_END = (
 )
 
 
-class ContactState(Protocol):
+@dataclass(frozen=True, eq=False)
+class ContactState:
     """A stage of the load; of the displacements only those of the front's nodes are read."""
 
-    @property
-    def fraction(self) -> float:
-        """Fraction of the load."""
-
-    @property
-    def nodal(self) -> FloatArray:
-        """Displacements, shape (N, d), mm."""
-
-    @property
-    def contact(self) -> FloatArray:
-        """Multipliers λ: in equilibrium the forces on the nodes of the front, shape (l m,), N/mm."""
+    fraction: float  # Fraction of the load
+    nodal: FloatArray  # Displacements, shape (N, d), mm
+    # Multipliers λ: in equilibrium the forces on the nodes of the front, shape (l m,), N/mm
+    contact: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +37,8 @@ class CylinderContact:
     """The cylinder and the m nodes of the front, by x, at each of l levels; l = 1 in the plane."""
 
     nodes: IntArray  # Numbers of the nodes, level by level, shape (l m,)
-    # Their positions in the plane before the load, the same at every level, shape (m, 2), mm
-    positions: FloatArray
-    # Centre of the cylinder before the load, above the contact's middle, where it touches the front from
-    # outside, shape (2,), mm
-    centre: FloatArray
+    positions: FloatArray  # Positions in the plane before the load, shape (m, 2), mm
+    centre: FloatArray  # Centre of the cylinder before the load, where it touches the front, shape (2,), mm
     travel: FloatArray  # Displacement of the cylinder under the full load, shape (2,), mm
     radius: float  # mm
     stiffness: float  # k of a node, N/mm per mm, times its level's share
@@ -77,7 +63,8 @@ class CylinderContact:
             centre=_touching_centre(problem),
             travel=load.values,
             radius=float(load.radius or 0),
-            stiffness=STIFFNESS * problem.material.young,
+            # More would need fewer updates of the multipliers but more Newton iterations.
+            stiffness=10.0 * problem.material.young,
             edges=order[np.searchsorted(nodes[order], np.concatenate(columns, axis=1))],
             shares=space.shares,
         )
@@ -89,7 +76,7 @@ class CylinderContact:
 
     def gaps(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
         """Distances g from the cylinder, shape (l m,), mm, and its outer normals n there, shape (l m, 2)."""
-        away = self._places(state.nodal) - self.centre - state.fraction * self.travel
+        away = self._moved(state.nodal) - self.centre - state.fraction * self.travel
         distance = np.linalg.norm(away, axis=1)
         return distance - self.radius, away / distance[:, None]
 
@@ -113,17 +100,13 @@ class CylinderContact:
     def _stiffness(self) -> FloatArray:
         return np.repeat(self.stiffness * self.shares, len(self.positions))
 
-    def _places(self, nodal: FloatArray) -> FloatArray:
+    def _moved(self, nodal: FloatArray) -> FloatArray:
         """Positions of the deformed nodes in the plane, shape (l m, 2), mm."""
         return np.tile(self.positions, (len(self.shares), 1)) + nodal[self.nodes, :2]
 
     def front(self, nodal: FloatArray) -> FloatArray:
         """The deformed front, meant over the depth, shape (m, 2), mm."""
-        return np.tensordot(self.shares, self._places(nodal).reshape(len(self.shares), -1, 2), axes=1)
-
-    def over_depth(self, forces: FloatArray) -> FloatArray:
-        """Sums over the levels, shape (m,), of forces of the nodes, shape (l m,), N/mm."""
-        return np.asarray(forces.reshape(len(self.shares), -1).sum(axis=0))
+        return np.tensordot(self.shares, self._moved(nodal).reshape(len(self.shares), -1, 2), axes=1)
 
     def lengths(self, nodal: FloatArray) -> FloatArray:
         """Weights of the m places in an integral along the deformed front, shape (m,), mm."""
@@ -174,11 +157,11 @@ class ContactRegion:
     def of(cls, contact: CylinderContact, state: ContactState) -> "ContactRegion | None":
         """The region in equilibrium; None where the cylinder does not touch the finger.
 
-        Its ends lie half way between a point that touches and the next one that does not. In three dimensions a
-        point touches if it does so anywhere along z, and the pressure is a mean over the depth.
+        Its ends lie half way between a point that touches and the next one that does not. In three
+        dimensions a point touches if it does so anywhere along z, and the pressure is a mean over the depth.
         """
         gap, normal = contact.gaps(state)
-        nodal, force = state.nodal, contact.over_depth(state.contact)
+        nodal, force = state.nodal, state.contact.reshape(len(contact.shares), -1).sum(axis=0)
         touching = np.flatnonzero(force > 0)
         if not len(touching):
             return None

@@ -1,15 +1,19 @@
-"""Constitutive laws for NumPy arrays, torch tensors and UFL expressions alike.
+"""Constitutive laws, in the plane and in space, for NumPy arrays, torch tensors and UFL expressions alike.
 
-Every function takes the displacement gradient `H[..., i, j] = du_i/dx_j` and uses only arithmetic and
-indexing on it. Linear elasticity is Hooke's law for the plane states (Timoshenko and Goodier, Theory of
-Elasticity, 3rd ed., chapter 2). The finite-strain laws are in plane strain: compressible neo-Hookean and
-St Venant-Kirchhoff (Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed.,
-section 6.4.3 and chapter 6), and A. N. Gent's (Rubber Chem. Technol. 69 (1996) 59-61), which stiffens as
-chains are stretched out, with the volumetric part of the neo-Hookean.
+Gradients are those of the displacement, `H[..., i, j] = du_i/dx_j`, of 2 by 2 or 3 by 3. Linear elasticity is
+Hooke's law (Timoshenko and Goodier, Theory of Elasticity, 3rd ed., chapter 2). The laws of finite strain, for
+plane strain or three dimensions, are compressible neo-Hookean and St Venant-Kirchhoff (Bonet and Wood,
+Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed., section 6.4.3 and chapter 6), and
+A. N. Gent's (Rubber Chem. Technol. 69 (1996) 59-61), which stiffens as chains are stretched out, with the
+volumetric part of the neo-Hookean.
 """
 
 from collections.abc import Callable
 from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from geometry.arrays import FloatArray
 
 LawName = Literal["linear", "neo-hookean", "st-venant-kirchhoff", "gent"]
 
@@ -24,26 +28,11 @@ Field = Any
 
 
 class Lame(NamedTuple):
-    """Lamé constants of a plane problem, MPa.
+    """Lamé constants, MPa."""
 
-    Attributes:
-        λ: First constant as it stands in the plane law; in plane stress the reduced one, 2 λ μ / (λ + 2 μ).
-        μ: Shear modulus.
-        λ_out: sigma_zz over the trace of the in-plane strain: λ in plane strain, 0 in plane stress.
-    """
-
-    λ: float
-    μ: float
-    λ_out: float
-
-
-class PlaneTensor(NamedTuple):
-    """Components of a symmetric tensor of a plane state."""
-
-    xx: Field
-    yy: Field
-    xy: Field
-    zz: Field
+    λ: float  # As it stands in the law; in plane stress the reduced one, 2 λ μ / (λ + 2 μ)
+    μ: float  # Shear modulus
+    λ_out: float  # σ_zz over the trace of the in-plane strain: λ in plane strain, 0 in plane stress
 
 
 def lame_constants(young: float, poisson: float, plane: str) -> Lame:
@@ -56,7 +45,7 @@ def lame_constants(young: float, poisson: float, plane: str) -> Lame:
 
 
 def lame_derivatives(young: float, poisson: float, plane: str) -> Lame:
-    """Derivatives of the Lamé constants by Poisson's ratio, MPa; λ_out's is λ's, or 0 in plane stress."""
+    """Derivatives of the Lamé constants by Poisson's ratio, MPa."""
     μ = -young / (2 * (1 + poisson) ** 2)
     if plane == "stress":
         return Lame(λ=young * (1 + poisson**2) / (1 - poisson**2) ** 2, μ=μ, λ_out=0.0)
@@ -64,139 +53,110 @@ def lame_derivatives(young: float, poisson: float, plane: str) -> Lame:
     return Lame(λ=λ, μ=μ, λ_out=λ)
 
 
-def small_strain(gradient: Field, lame: Lame) -> PlaneTensor:
-    """Infinitesimal strain, tensor components (the shear is half the engineering shear)."""
-    xx, yy = gradient[..., 0, 0], gradient[..., 1, 1]
-    xy = 0.5 * (gradient[..., 0, 1] + gradient[..., 1, 0])
-    # Plane stress: sigma_zz = 0 fixes eps_zz; there the reduced λ = 2 λ3 μ/(λ3 + 2 μ) gives eps_zz = -λ/(2 μ)
-    # (xx + yy).
-    zz = 0 * xx if lame.λ_out else (-lame.λ / (2 * lame.μ)) * (xx + yy)
-    return PlaneTensor(xx, yy, xy, zz)
-
-
-def linear_energy_density(gradient: Field, lame: Lame) -> Field:
-    """Strain energy density 1/2 sigma : eps, MPa (= N mm / mm^3)."""
-    return _quadratic_energy_density(small_strain(gradient, lame), lame)
-
-
-def linear_stress(gradient: Field, lame: Lame) -> PlaneTensor:
-    """Cauchy stress of Hooke's law, MPa."""
-    strain = small_strain(gradient, lame)
-    trace = strain.xx + strain.yy
-    return PlaneTensor(
-        xx=lame.λ * trace + 2 * lame.μ * strain.xx,
-        yy=lame.λ * trace + 2 * lame.μ * strain.yy,
-        xy=2 * lame.μ * strain.xy,
-        zz=lame.λ_out * trace,
-    )
+def _dimension(gradient: Field) -> int:
+    shape = gradient.ufl_shape if hasattr(gradient, "ufl_shape") else gradient.shape
+    return int(shape[-1])
 
 
 def deformation_jacobian(gradient: Field) -> Field:
     """J = det(I + H); positive unless the material is turned inside out."""
-    return (1 + gradient[..., 0, 0]) * (1 + gradient[..., 1, 1]) - gradient[..., 0, 1] * gradient[..., 1, 0]
-
-
-def green_lagrange_strain(gradient: Field) -> PlaneTensor:
-    """E = (F^T F - I) / 2 of a plane-strain deformation."""
-    a, b, c, d = gradient[..., 0, 0], gradient[..., 0, 1], gradient[..., 1, 0], gradient[..., 1, 1]
-    return PlaneTensor(
-        xx=a + 0.5 * (a * a + c * c),
-        yy=d + 0.5 * (b * b + d * d),
-        xy=0.5 * (b + c + a * b + c * d),
-        zz=0 * a,
+    if _dimension(gradient) == 2:
+        xx, yy = 1 + gradient[..., 0, 0], 1 + gradient[..., 1, 1]
+        return xx * yy - gradient[..., 0, 1] * gradient[..., 1, 0]
+    f = [[gradient[..., i, j] + (1.0 if i == j else 0.0) for j in range(3)] for i in range(3)]
+    return (
+        f[0][0] * (f[1][1] * f[2][2] - f[1][2] * f[2][1])
+        - f[0][1] * (f[1][0] * f[2][2] - f[1][2] * f[2][0])
+        + f[0][2] * (f[1][0] * f[2][1] - f[1][1] * f[2][0])
     )
 
 
-def neo_hookean_energy_density(gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> Field:
-    """ψ = μ/2 (tr C - 3) - μ ln J + λ/2 (ln J)^2 per reference volume, MPa."""
-    strain = green_lagrange_strain(gradient)
-    log_j = log(deformation_jacobian(gradient))
-    return lame.μ * (strain.xx + strain.yy) - lame.μ * log_j + 0.5 * lame.λ * log_j * log_j
+def strain_of(law: LawName, gradient: Field) -> list[list[Field]]:
+    """Components of the infinitesimal strain for the linear law, else of Green-Lagrange's (F^T F - I) / 2."""
+    axes = range(_dimension(gradient))
+
+    def component(i: int, j: int) -> Field:
+        linear = gradient[..., i, j] + gradient[..., j, i]
+        if law == "linear":
+            return 0.5 * linear
+        return 0.5 * (linear + sum(gradient[..., k, i] * gradient[..., k, j] for k in axes))
+
+    return [[component(i, j) for j in axes] for i in axes]
 
 
-def neo_hookean_stress(gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> PlaneTensor:
-    """Cauchy stress μ/J (B - I) + λ ln(J)/J I, MPa, with B = F F^T."""
-    a, b, c, d = gradient[..., 0, 0], gradient[..., 0, 1], gradient[..., 1, 0], gradient[..., 1, 1]
-    jacobian = deformation_jacobian(gradient)
-    pressure = lame.λ * log(jacobian) / jacobian
-    return PlaneTensor(
-        xx=lame.μ / jacobian * (2 * a + a * a + b * b) + pressure,
-        yy=lame.μ / jacobian * (2 * d + c * c + d * d) + pressure,
-        xy=lame.μ / jacobian * (b + c + a * c + b * d),
-        zz=pressure,
-    )
-
-
-def _stretched(gradient: Field, log: Callable[[Field], Field]) -> Field:
-    """Tr C - 3 - 2 ln J: zero at rest, with its derivative."""
-    strain = green_lagrange_strain(gradient)
-    return 2 * (strain.xx + strain.yy) - 2 * log(deformation_jacobian(gradient))
-
-
-def gent_energy_density(gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> Field:
-    """ψ = -μ/2 I_m ln(1 - (tr C - 3 - 2 ln J) / I_m) + λ/2 (ln J)^2 per reference volume, MPa."""
-    log_j = log(deformation_jacobian(gradient))
-    left = log(1 - _stretched(gradient, log) / LIMIT)
-    return -0.5 * lame.μ * LIMIT * left + 0.5 * lame.λ * log_j * log_j
-
-
-def gent_stress(gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> PlaneTensor:
-    """Cauchy stress, MPa: neo-Hookean with μ over 1 - (tr C - 3 - 2 ln J) / I_m in the place of μ."""
-    stiffened = lame.μ / (1 - _stretched(gradient, log) / LIMIT)
-    return neo_hookean_stress(gradient, lame._replace(μ=stiffened), log)
-
-
-def _quadratic_energy_density(strain: PlaneTensor, lame: Lame) -> Field:
-    """λ/2 (tr ε)^2 + μ ε : ε of an in-plane strain ε, MPa."""
-    trace = strain.xx + strain.yy
-    squares = strain.xx * strain.xx + strain.yy * strain.yy + 2 * strain.xy * strain.xy
-    return 0.5 * lame.λ * trace * trace + lame.μ * squares
-
-
-def st_venant_kirchhoff_stress(gradient: Field, lame: Lame) -> PlaneTensor:
-    """Cauchy stress F S F^T / J, MPa, of the second Piola-Kirchhoff stress S = λ tr(E) I + 2 μ E."""
-    a, b, c, d = 1 + gradient[..., 0, 0], gradient[..., 0, 1], gradient[..., 1, 0], 1 + gradient[..., 1, 1]
-    strain, jacobian = green_lagrange_strain(gradient), deformation_jacobian(gradient)
-    trace = lame.λ * (strain.xx + strain.yy)
-    xx, yy, xy = trace + 2 * lame.μ * strain.xx, trace + 2 * lame.μ * strain.yy, 2 * lame.μ * strain.xy
-    return PlaneTensor(
-        xx=(a * a * xx + 2 * a * b * xy + b * b * yy) / jacobian,
-        yy=(c * c * xx + 2 * c * d * xy + d * d * yy) / jacobian,
-        xy=(a * c * xx + (a * d + b * c) * xy + b * d * yy) / jacobian,
-        zz=trace / jacobian,
-    )
-
-
-def strain_of(law: LawName, gradient: Field, lame: Lame) -> PlaneTensor:
-    """The strain of a law: infinitesimal for the linear one, else Green-Lagrange."""
-    return small_strain(gradient, lame) if law == "linear" else green_lagrange_strain(gradient)
-
-
-def energy_density_of(law: LawName, gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> Field:
+def energy_density_of(
+    law: LawName, gradient: Field, lame: Lame, log: Callable[[Field], Field] = np.log
+) -> Field:
     """Strain energy of a law per reference volume, MPa; `log` is the library's logarithm.
 
-    St Venant-Kirchhoff: ψ = λ/2 (tr E)^2 + μ E : E with the Green-Lagrange strain E; it stays finite as J tends
-    to zero, and so is unsuitable for strong compression.
+    With the law's strain E, ψ is λ/2 (tr E)^2 + μ E : E for the linear and the St Venant-Kirchhoff law, which
+    is unsuitable for strong compression: it stays finite as J tends to zero. Neo-Hookean it is
+    μ tr E - μ ln J + λ/2 (ln J)^2, and Gent's -μ/2 I_m ln(1 - (2 tr E - 2 ln J) / I_m) + λ/2 (ln J)^2.
     """
-    if law == "neo-hookean":
-        return neo_hookean_energy_density(gradient, lame, log)
+    strain = strain_of(law, gradient)
+    axes = range(len(strain))
+    trace = sum(strain[i][i] for i in axes)
+    if law in ("linear", "st-venant-kirchhoff"):
+        squares = sum(strain[i][i] * strain[i][i] for i in axes)
+        shears = sum(strain[i][j] * strain[i][j] for i in axes for j in axes if i < j)
+        return 0.5 * lame.λ * trace * trace + lame.μ * (squares + 2 * shears)
+    log_j = log(deformation_jacobian(gradient))
     if law == "gent":
-        return gent_energy_density(gradient, lame, log)
-    return _quadratic_energy_density(strain_of(law, gradient, lame), lame)
+        isochoric = -0.5 * lame.μ * LIMIT * log(1 - 2 * (trace - log_j) / LIMIT)
+    else:
+        isochoric = lame.μ * trace - lame.μ * log_j
+    return isochoric + 0.5 * lame.λ * log_j * log_j
 
 
-def stress_of(law: LawName, gradient: Field, lame: Lame, log: Callable[[Field], Field]) -> PlaneTensor:
-    """Cauchy stress of a law, MPa; `log` is the library's logarithm."""
+def stress_of(law: LawName, gradient: FloatArray, lame: Lame) -> tuple[FloatArray, FloatArray]:
+    """Cauchy stress of gradients (n, d, d), MPa: shape (n, d, d), and its component σ_zz, shape (n,).
+
+    Hooke's σ = λ tr E I + 2 μ E; F σ F^T / J for the St Venant-Kirchhoff law. Neo-Hookean it is
+    (μ (F F^T - I) + λ ln J I) / J; Gent's law has μ / (1 - (2 tr E - 2 ln J) / I_m) in the place of μ.
+    """
+    strain: FloatArray = np.moveaxis(np.array(strain_of(law, gradient)), -1, 0)
+    trace, unit, transposed = (
+        np.trace(strain, axis1=1, axis2=2),
+        np.eye(len(strain[0])),
+        gradient.swapaxes(1, 2),
+    )
+    volume = lame.λ * trace
+    across = lame.λ_out * trace
+    if law in ("linear", "st-venant-kirchhoff"):
+        stress = volume[:, None, None] * unit + 2 * lame.μ * strain
+        if law == "st-venant-kirchhoff":
+            jacobian = deformation_jacobian(gradient)
+            stress = (unit + gradient) @ stress @ (unit + transposed) / jacobian[:, None, None]
+            across = across / jacobian
+    else:
+        jacobian = deformation_jacobian(gradient)
+        log_j = np.log(jacobian)
+        μ = lame.μ / (1 - 2 * (trace - log_j) / LIMIT) if law == "gent" else np.full(len(trace), lame.μ)
+        left = gradient + transposed + gradient @ transposed
+        across = lame.λ * log_j / jacobian
+        stress = (μ / jacobian)[:, None, None] * left + across[:, None, None] * unit
+    return stress, across if len(unit) == 2 else stress[:, 2, 2]
+
+
+def piola_stress(law: LawName, gradient: FloatArray, stress: FloatArray) -> FloatArray:
+    """First Piola-Kirchhoff stress J σ F^-T of plane states, (n, 2, 2), MPa; σ itself at small strain."""
     if law == "linear":
-        return linear_stress(gradient, lame)
-    if law == "st-venant-kirchhoff":
-        return st_venant_kirchhoff_stress(gradient, lame)
-    if law == "gent":
-        return gent_stress(gradient, lame, log)
-    return neo_hookean_stress(gradient, lame, log)
+        return stress
+    trace = np.trace(gradient, axis1=1, axis2=2)[:, None, None] + 1
+    return np.asarray(stress @ (trace * np.eye(2) - gradient.swapaxes(1, 2)))  # cofactors of two by two
 
 
-def von_mises(stress: PlaneTensor, sqrt: Callable[[Field], Field]) -> Field:
-    """Von Mises stress, MPa, with the out-of-plane stress that plane strain needs."""
-    xx, yy, xy, zz = stress
-    return sqrt(0.5 * ((xx - yy) * (xx - yy) + (yy - zz) * (yy - zz) + (zz - xx) * (zz - xx)) + 3 * xy * xy)
+def von_mises(stress: FloatArray, *, stress_zz: FloatArray) -> FloatArray:
+    """Von Mises stress sqrt(3/2 s : s) with the deviator s of stresses (n, d, d), MPa: shape (n,).
+
+    Args:
+        stress: Cauchy stress, in the plane or in space.
+        stress_zz: Out-of-plane stress, shape (n,), which a plane state needs, too.
+    """
+    across = stress_zz if stress.shape[-1] == 2 else np.zeros(len(stress))
+    mean = (np.trace(stress, axis1=1, axis2=2) + across) / 3
+    deviator = stress - mean[:, None, None] * np.eye(stress.shape[-1])
+    squares = np.einsum("nij,nij->n", deviator, deviator)
+    if stress.shape[-1] == 2:
+        squares = squares + (stress_zz - mean) ** 2
+    return np.asarray(np.sqrt(1.5 * squares))

@@ -8,31 +8,24 @@ from geometry.arrays import FloatArray
 from geometry.mesh.boundary import mean_thickness
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
-from solvers.elasticity import deformation_jacobian
+from solvers.elasticity import piola_stress
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem, contact_ends, contact_nodes
 from solvers.solution import DisplacementField, State
-
-PLATEAU = 0.1
-"""Part of the harmonic function's range that is cut off at base and contact, where the stress is singular."""
 
 
 def energy_and_force(problem: Problem, field: DisplacementField, degree: int = 2) -> tuple[float, FloatArray]:
     """Energy per depth, N mm/mm, and the indenter's force per depth, shape (2,), N/mm.
 
-    The force is the mean of those on sections between base and contact, each of which transmits the indenter's in
-    equilibrium: the work of the stress on a virtual displacement that grows from zero at the base to a unit
-    translation at the contact. It is zero for a component that is free. `degree` is of the quadrature.
+    The force is the work of the stress on a virtual displacement that grows from zero at the base to a unit
+    translation at the contact: a mean over sections, each of which transmits the indenter's force in
+    equilibrium. It is zero for a component that is free. `degree` is the quadrature's.
     """
     rule = body_quadrature(problem.mesh, degree)
     gradient = field.gradient(rule.location)
     state = State.from_gradient(gradient, problem)
     energy = float((rule.weights * state.energy_density).sum())
-    stress = state.stress
-    if problem.material.law != "linear":  # per undeformed area: P = J σ F⁻ᵀ
-        deformation = np.eye(2) + gradient
-        jacobian = deformation_jacobian(gradient)[:, None, None]
-        stress = jacobian * stress @ np.linalg.inv(deformation).transpose(0, 2, 1)
+    stress = piola_stress(problem.material.law, gradient, state.stress)
     traction = np.einsum("nij,nj->ni", stress, section_slope(problem, rule.location))
     force = np.zeros(2)
     force[problem.load.prescribed] = (rule.weights @ traction)[problem.load.prescribed]
@@ -64,5 +57,5 @@ def harmonic_slope(problem: Problem, location: LocatedPoints) -> FloatArray:
     free = np.ones(len(values), dtype=bool)
     free[np.concatenate([contact_nodes(problem), mesh.boundary("base").ravel()])] = False
     values[free] = spsolve(stiffness[free][:, free].tocsc(), -stiffness[free] @ values)
-    values = np.clip((values - PLATEAU) / (1 - 2 * PLATEAU), 0.0, 1.0)
+    values = np.clip((values - 0.1) / 0.8, 0.0, 1.0)  # flat near base and contact, where stress is singular
     return np.column_stack([matrix @ values for matrix in space.shape_gradients(location)])

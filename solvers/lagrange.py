@@ -6,7 +6,6 @@ finite-element solution is an array that does not depend on how they number thin
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -19,60 +18,13 @@ from geometry.mesh.triangle_mesh import TriangleMesh
 EDGES = np.array([[0, 1], [1, 2], [2, 0]])
 
 
-class NodalSpace(Protocol):
-    """Scalar Lagrange elements on simplices in d = 2 or 3 dimensions, for a section or its extrusion."""
-
-    @property
-    def mesh(self) -> TriangleMesh:
-        """The mesh of the section."""
-
-    @property
-    def degree(self) -> int:
-        """Degree of the elements, 1 or 2."""
-
-    @property
-    def nodes(self) -> FloatArray:
-        """Node positions, shape (N, d), mm."""
-
-    @property
-    def cells(self) -> IntArray:
-        """Rows of `vertices` at the corners of every simplex, shape (c, d + 1)."""
-
-    @property
-    def vertices(self) -> IntArray:
-        """The nodes that are corners of simplices, shape (V,)."""
-
-    @property
-    def thickness(self) -> float:
-        """Extent out of the plane by which integrals are divided, mm; 1 for a section."""
-
-    @property
-    def section(self) -> "LagrangeSpace":
-        """The elements of the section."""
-
-    @property
-    def shares(self) -> FloatArray:
-        """Weights in a mean over the levels of an extrusion, shape (l,); the nodes come level by level."""
-
-    @property
-    def mirrored(self) -> BoolArray:
-        """Components that symmetry holds at zero, mask of shape (N, d)."""
-
-    def boundary_nodes(self, name: str) -> IntArray:
-        """Nodes on a named boundary, each once."""
-
-    def edge_nodes(self, edges: IntArray) -> IntArray:
-        """Nodes in the middles of edges given as pairs of nodes, shape (..., 2), for degree 2."""
-
-    def mean_value(self, points: FloatArray, weights: FloatArray) -> FloatArray:
-        """Weights of the nodes in a weighted sum over points (q, 2) of the section, shape (N,)."""
-
-
 @dataclass(frozen=True, eq=False)
 class LagrangeSpace:
-    """Scalar Lagrange elements of degree 1 or 2: the mesh's nodes first, then the middles of `mesh.edges`."""
+    """Scalar elements of degree 1 or 2; the mesh's nodes come first, then the middles of `mesh.edges`.
 
-    # The mesh; its nodes come first in `nodes`, the middles of `mesh.edges` follow for degree 2
+    `section`, `thickness`, `shares` and `mirrored` are what it has in common with `ExtrudedSpace`.
+    """
+
     mesh: TriangleMesh
     degree: int  # 1 or 2
 
@@ -85,7 +37,7 @@ class LagrangeSpace:
 
     @property
     def cells(self) -> IntArray:
-        """Corners of every triangle, shape (t, 3)."""
+        """Rows of `vertices` at the corners of every triangle, shape (t, 3)."""
         return self.mesh.triangles
 
     @property
@@ -95,7 +47,7 @@ class LagrangeSpace:
 
     @property
     def thickness(self) -> float:
-        """One: integrals over the section are per depth, mm."""
+        """Extent out of the plane by which integrals are divided: 1 mm, as they are per depth."""
         return 1.0
 
     @property
@@ -105,12 +57,12 @@ class LagrangeSpace:
 
     @property
     def shares(self) -> FloatArray:
-        """One level, shape (1,)."""
+        """Weights in a mean over the levels of an extrusion: one level, shape (1,)."""
         return np.ones(1)
 
     @property
     def mirrored(self) -> BoolArray:
-        """Components that symmetry holds: none, mask of shape (N, 2)."""
+        """Components that symmetry holds at zero: none, mask of shape (N, 2)."""
         return np.zeros((len(self.nodes), 2), dtype=bool)
 
     @cached_property

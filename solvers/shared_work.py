@@ -27,7 +27,7 @@ class SharedWork:
 
 
 def shared(key: Hashable, make: Callable[[], Work]) -> Work:
-    """The result under a key that holds all it depends on, made if absent; kept inside `SharedWork.used` only."""
+    """The result under a key, which holds all it depends on; it is kept only inside `SharedWork.used`."""
     kept = _KEPT.get()
     if kept is None:
         return make()

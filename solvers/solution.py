@@ -11,9 +11,8 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints
 from geometry.notebook import fact_table
-from solvers.elasticity import PlaneTensor, energy_density_of, strain_of, stress_of, von_mises
+from solvers.elasticity import energy_density_of, strain_of, stress_of, von_mises
 from solvers.problem import Problem
-from solvers.solid_elasticity import solid_energy_density, solid_strain, solid_stress, solid_von_mises
 
 if TYPE_CHECKING:
     from geometry.figure import Figure
@@ -214,7 +213,7 @@ class Solution:
         """Strain, stress and energy density at points of shape (n, 2), mm."""
         location = self._locate(points)
         if isinstance(self.field, SolidField):
-            return State.from_solid_gradient(self.field.solid_gradient(location), self.problem)
+            return State.from_gradient(self.field.solid_gradient(location), self.problem)
         return State.from_gradient(self.field.gradient(location), self.problem)
 
     def plot(
@@ -283,32 +282,15 @@ class State:
 
     @classmethod
     def from_gradient(cls, gradient: FloatArray, problem: Problem) -> "State":
-        """The state that the problem's material has at displacement gradients of shape (n, 2, 2)."""
-        law, lame = problem.material.law, problem.material.lame
-        stress = stress_of(law, gradient, lame, np.log)
-        return cls(
-            strain=_in_plane(strain_of(law, gradient, lame)),
-            stress=_in_plane(stress),
-            stress_zz=np.asarray(stress.zz, dtype=np.float64),
-            von_mises=von_mises(stress, np.sqrt),
-            energy_density=energy_density_of(law, gradient, lame, np.log),
-        )
-
-    @classmethod
-    def from_solid_gradient(cls, gradient: FloatArray, problem: Problem) -> "State":
-        """The state at displacement gradients in three dimensions, shape (n, 3, 3); all of it counts."""
-        law, lame = problem.material.law, problem.material.solid_lame
-        stress = solid_stress(law, gradient, lame)
-        strain: FloatArray = np.moveaxis(np.array(solid_strain(law, gradient)), -1, 0)
+        """The state of the problem's material at displacement gradients, shape (n, 2, 2) or (n, 3, 3)."""
+        material, solid = problem.material, gradient.shape[-1] == 3
+        law, lame = material.law, material.solid_lame if solid else material.lame
+        stress, stress_zz = stress_of(law, gradient, lame)
+        strain: FloatArray = np.moveaxis(np.array(strain_of(law, gradient)), -1, 0)
         return cls(
             strain=strain[:, :2, :2],
             stress=stress[:, :2, :2],
-            stress_zz=stress[:, 2, 2],
-            von_mises=solid_von_mises(stress),
-            energy_density=np.asarray(solid_energy_density(law, gradient, lame, np.log)),
+            stress_zz=stress_zz,
+            von_mises=von_mises(stress, stress_zz=stress_zz),
+            energy_density=np.asarray(energy_density_of(law, gradient, lame)),
         )
-
-
-def _in_plane(tensor: PlaneTensor) -> FloatArray:
-    rows = [np.stack([tensor.xx, tensor.xy], axis=-1), np.stack([tensor.xy, tensor.yy], axis=-1)]
-    return np.stack(rows, axis=-2)

@@ -59,8 +59,8 @@ def _place(solver: "Solver", cause: Exception) -> str:
 class Solver(Protocol):
     """A method that solves a `Problem`.
 
-    A solver is made without arguments for its defaults; its properties may be plain class attributes. It may also
-    have the attributes of `Traits`.
+    It can be made without arguments; its properties may be plain class attributes. It may also have the
+    attributes of `Traits`.
     """
 
     @property

@@ -54,8 +54,7 @@ class SampledField:
 
     def state(self, problem: Problem) -> State:
         """Strain and stress by the law of a problem."""
-        solid = self.gradient.shape[-1] == 3
-        return (State.from_solid_gradient if solid else State.from_gradient)(self.gradient, problem)
+        return State.from_gradient(self.gradient, problem)
 
     def distances(
         self, truth: "SampledField", own: Problem, finite: Problem, weights: FloatArray

@@ -8,7 +8,7 @@ from compare.evaluation.evaluation import QUADRATURE_DEGREE, Evaluation
 from compare.evaluation.regions import body_regions
 from geometry.arrays import FloatArray
 from geometry.mesh.quadrature import body_quadrature
-from solvers.elasticity import linear_energy_density
+from solvers.elasticity import energy_density_of
 from solvers.fem.boundary_conditions import reaction_by_residual_work
 from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium
 from solvers.lagrange import LagrangeField, LagrangeSpace
@@ -52,7 +52,7 @@ class Certifier:
             )
         balance, weak_residual = self._imbalance(evaluation.stress)
         reaction = reaction_by_residual_work(self._space, self._elasticity.internal_force(self._solution))
-        density = linear_energy_density(self._gradient(rest), self._problem.material.lame)
+        density = energy_density_of("linear", self._gradient(rest), self._problem.material.lame)
         return Certificate(
             energy=energy,
             fem_energy=fem_energy,

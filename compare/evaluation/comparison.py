@@ -17,7 +17,7 @@ from geometry.errors import UserError
 from geometry.finger.finger import Finger
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
-from solvers.adaptation import Adaptation
+from solvers.fem.adaptive_refinement import Adaptation
 from solvers.problem import Load, Material
 from solvers.solver import Solver, UnsupportedProblemError, check_load, with_law
 

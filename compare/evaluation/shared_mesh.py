@@ -10,7 +10,7 @@ from geometry.cache import finger_mesh
 from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.adaptation import Adaptation, check_adaptable
+from solvers.fem.adaptive_refinement import Adaptation, check_adaptable
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
 from solvers.solver import Solver

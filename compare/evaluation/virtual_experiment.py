@@ -37,7 +37,6 @@ SOURCES = (
     "solvers.elasticity",
     "solvers.fem",
     "solvers.problem",
-    "solvers.solid_elasticity",
     "solvers.solution",
 )
 """Modules whose change makes a new simulation."""

@@ -13,7 +13,7 @@ from geometry.errors import UserError
 from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
 from geometry.observations import Observations
-from solvers.adaptation import check_adaptable
+from solvers.fem.adaptive_refinement import check_adaptable
 from solvers.problem import Load, Material
 from solvers.solver import Solver, check_name
 from vision.measurements import read_measurements

@@ -7,26 +7,70 @@ Source: W. Dörfler, A convergent adaptive algorithm for Poisson's equation, SIA
 1106-1124, section 4.2 (the share); R. Becker, R. Rannacher, Acta Numerica 10 (2001) 1-102, section 4.
 """
 
-from dataclasses import replace
-from math import log
+from dataclasses import dataclass, replace
+from math import inf, log
+from typing import NamedTuple
 
 import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
+from geometry.errors import UserError
 from geometry.mesh.refinement import refined
+from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.section.section import Section
-from solvers.adaptation import Adaptation, RefinementRound, check_adaptable
 from solvers.fem.error_estimate import ErrorEstimator
-from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium
 from solvers.lagrange import LagrangeSpace
-from solvers.problem import Problem
+from solvers.problem import Load, Problem
 from solvers.solver import Progress, silent
 
-SHARE = 0.6
-"""Share of the error whose triangles are refined in a round."""
 
-MOST_TRIANGLES = 200_000
-MOST_ROUNDS = 30
+class RefinementRound(NamedTuple):
+    """One mesh of the sequence."""
+
+    triangles: int  # Number of triangles
+    nodes: int  # Number of nodes
+    at_markers: float  # Largest estimated error of u or v at a marker, mm
+    energy_norm: float  # Estimated relative error in the energy norm
+
+
+@dataclass(frozen=True, eq=False)
+class Adaptation:
+    """A refined mesh and the rounds that led to it."""
+
+    tolerance: float  # Tolerance of u and v at the markers, mm
+    rounds: tuple[RefinementRound, ...]  # From the first mesh to the refined one
+    mesh: TriangleMesh  # The refined mesh
+
+    @property
+    def reached(self) -> bool:
+        """True if the estimate is within the tolerance."""
+        return self.rounds[-1].at_markers <= self.tolerance
+
+    @property
+    def message(self) -> str:
+        """The outcome, in a sentence without its full stop."""
+        first, last = self.rounds[0], self.rounds[-1]
+        if not self.reached:
+            return (
+                f"the markers are known to {last.at_markers:.2g} mm, not to the {self.tolerance:g} mm asked "
+                f"for: refinement stopped at {last.triangles} triangles; take a larger tolerance"
+            )
+        return (
+            f"the markers are known to {last.at_markers:.2g} mm (asked for: {self.tolerance:g} mm); "
+            f"{first.triangles} triangles became {last.triangles}"
+        )
+
+
+def check_adaptable(tolerance: float, load: Load) -> None:
+    """Raise a `UserError` if the tolerance is no length, mm, or refinement cannot adapt to the load."""
+    if not 0 < tolerance < inf:
+        raise UserError(f"a tolerance of {tolerance:g} mm at the markers: give a length above 0 mm")
+    if load.kind == "point":
+        raise UserError("a point load has no limit under refinement to adapt a mesh to; take mean or patch")
+    if load.kind not in ("mean", "patch"):
+        raise UserError(
+            f"the mesh is adapted by the estimate of fem, which has no load {load.kind}; take mean or patch"
+        )
 
 
 def adapted(
@@ -35,8 +79,8 @@ def adapted(
     *,
     degree: int = 2,
     section: Section | None = None,
-    most_triangles: int = MOST_TRIANGLES,
-    most_rounds: int = MOST_ROUNDS,
+    most_triangles: int = 200_000,
+    most_rounds: int = 30,
     progress: Progress = silent,
 ) -> Adaptation:
     """Refine the mesh of a linear problem until the estimated error at its markers is within a tolerance.
@@ -51,7 +95,7 @@ def adapted(
         progress: Called after every round.
 
     Raises:
-        UserError: As `solvers.adaptation.check_adaptable`.
+        UserError: As `check_adaptable`.
     """
     check_adaptable(tolerance, problem.load)
     rounds: list[RefinementRound] = []
@@ -64,7 +108,7 @@ def adapted(
         )
         if found.at_markers <= tolerance or len(rounds) == most_rounds:
             break
-        finer = refined(mesh, largest(shares, SHARE), section)
+        finer = refined(mesh, largest(shares, 0.6), section)
         if len(finer.triangles) > most_triangles:
             break
         problem = replace(problem, mesh=finer)
@@ -82,6 +126,8 @@ def largest(shares: FloatArray, part: float) -> BoolArray:
 
 def _solve(problem: Problem, degree: int, tolerance: float) -> tuple[RefinementRound, FloatArray]:
     """One solution: its estimate, and every triangle's contribution to the functional's error, shape (t,)."""
+    from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium  # needs DOLFINx
+
     mesh, space = problem.mesh, LagrangeSpace(problem.mesh, degree)
     equilibrium = LinearEquilibrium.of(LinearElasticity.of(problem, space))
     nodal, estimator = equilibrium.solution(), ErrorEstimator(problem, space)

@@ -4,7 +4,8 @@ import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
 from solvers.assimilation.misfit import Misfit
-from solvers.lagrange import LagrangeSpace, NodalSpace
+from solvers.extrusion import NodalSpace
+from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem, contact_functional
 
 

@@ -21,8 +21,9 @@ from mpi4py import MPI
 
 from geometry.arrays import BoolArray, FloatArray, IntArray
 from solvers.elasticity import Lame
+from solvers.extrusion import NodalSpace
 from solvers.fem.ranks import communicator
-from solvers.lagrange import LagrangeSpace, NodalSpace
+from solvers.lagrange import LagrangeSpace
 
 
 def _read_options() -> None:

@@ -28,7 +28,7 @@ from scipy.sparse import csr_matrix
 from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import Quadrature, body_quadrature
-from solvers.elasticity import deformation_jacobian, lame_constants
+from solvers.elasticity import deformation_jacobian, lame_constants, piola_stress
 from solvers.fem.gradient_recovery import GradientRecovery
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Material, Problem
@@ -139,13 +139,9 @@ class ErrorEstimator:
         return (after[0] - before[0]) / step, (after[1] - before[1]) / step
 
     def _stresses(self, gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """First Piola-Kirchhoff stress J σ F^-T, which is σ at small strain, and von Mises stress, MPa."""
+        """First Piola-Kirchhoff and von Mises stress, MPa."""
         state = State.from_gradient(gradient, self.problem)
-        if self.problem.material.law == "linear":
-            return state.stress, state.von_mises
-        trace = np.trace(gradient, axis1=1, axis2=2)[:, None, None] + 1
-        cofactors = trace * np.eye(2) - gradient.swapaxes(1, 2)  # J F^-T of two by two
-        return state.stress @ cofactors, state.von_mises
+        return piola_stress(self.problem.material.law, gradient, state.stress), state.von_mises
 
     def shares(self, nodal: FloatArray, dual: FloatArray) -> FloatArray:
         """Contribution of every triangle to the error of a functional, shape (t,).

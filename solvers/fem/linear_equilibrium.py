@@ -8,7 +8,7 @@ import ufl
 
 from geometry.arrays import BoolArray, FloatArray
 from solvers.constrained_elimination import ConstrainedElimination
-from solvers.elasticity import linear_energy_density
+from solvers.elasticity import energy_density_of
 from solvers.fem.boundary_conditions import (
     dirichlet_displacement,
     dirichlet_mask,
@@ -48,7 +48,7 @@ class LinearElasticity:
         """Compile the forms of a problem."""
         distributed = DistributedSpace(space)
         moduli = distributed.moduli(problem.material.lame)
-        energy = linear_energy_density(ufl.grad(distributed.function), moduli) * ufl.dx
+        energy = energy_density_of("linear", ufl.grad(distributed.function), moduli) * ufl.dx
         iterative = linear_solver == "iterative"
         if linear_solver == "auto":
             iterative = 2 * len(space.nodes) > ITERATIVE_BEYOND

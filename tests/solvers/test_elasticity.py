@@ -1,25 +1,36 @@
-"""The constitutive laws against closed forms and finite differences."""
+"""The constitutive laws against closed forms and differences of the energy."""
 
 import numpy as np
 import pytest
 import torch
 
 from solvers.elasticity import (
-    PlaneTensor,
+    deformation_jacobian,
     energy_density_of,
     lame_constants,
     lame_derivatives,
-    linear_energy_density,
-    linear_stress,
-    small_strain,
+    piola_stress,
     strain_of,
     stress_of,
     von_mises,
 )
-from solvers.problem import Material
+from solvers.problem import Material, Problem
+from solvers.solution import State
 
 YOUNG, POISSON = 11.4, 0.45
+LAME = lame_constants(YOUNG, POISSON, "strain")
 FINITE = ("neo-hookean", "st-venant-kirchhoff", "gent")
+
+
+@pytest.fixture(params=[2, 3], ids=["plane", "solid"])
+def gradients(request):
+    """Twenty gradients with strains and rotations of up to 0.2, within Gent's limit."""
+    return np.random.default_rng(3).uniform(-0.2, 0.2, (20, request.param, request.param))
+
+
+@pytest.fixture
+def flat():
+    return np.random.default_rng(0).uniform(-0.2, 0.2, (5, 2, 2))
 
 
 def rotation(angle: float) -> np.ndarray:
@@ -28,7 +39,7 @@ def rotation(angle: float) -> np.ndarray:
 
 def test_printed_constants_of_the_paper_are_plane_stress():
     assert lame_constants(YOUNG, POISSON, "stress").λ == pytest.approx(6.43, abs=5e-3)
-    assert lame_constants(YOUNG, POISSON, "strain").λ == pytest.approx(35.38, abs=5e-3)
+    assert pytest.approx(35.38, abs=5e-3) == LAME.λ
 
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
@@ -41,134 +52,124 @@ def test_derivatives_of_the_lame_constants_are_those_by_a_complex_step(plane):
 
 def test_gents_stiffness_has_grown_by_a_third_at_a_quarter_of_its_limit():
     """In simple shear J = 1 and tr C - 3 = γ^2: the shear stress is μ γ / (1 - γ^2 / LIMIT)."""
-    shear = np.array([[[0.0, 0.5], [0.0, 0.0]]])
-    lame = lame_constants(YOUNG, POISSON, "strain")
-    stress = stress_of("gent", shear, lame, np.log)
-    assert stress.xy[0] == pytest.approx(4 / 3 * lame.μ * 0.5, rel=1e-12)
+    stress, _ = stress_of("gent", np.array([[[0.0, 0.5], [0.0, 0.0]]]), LAME)
+    assert stress[0, 0, 1] == pytest.approx(4 / 3 * LAME.μ * 0.5, rel=1e-12)
 
 
 @pytest.mark.parametrize(
-    ("plane", "modulus", "stress_zz"),
+    ("plane", "modulus", "across"),
     [
         ("stress", YOUNG, 0.0),  # sigma = E eps, nothing out of plane
         ("strain", YOUNG / (1 - POISSON**2), POISSON),  # E / (1 - nu^2), sigma_zz = nu sigma_xx
     ],
 )
-def test_uniaxial_tension(plane, modulus, stress_zz):
-    lame = lame_constants(YOUNG, POISSON, plane)
+def test_uniaxial_tension(plane, modulus, across):
     contraction = POISSON if plane == "stress" else POISSON / (1 - POISSON)
-    stress = linear_stress(np.array([[[0.01, 0.0], [0.0, -contraction * 0.01]]]), lame)
-    assert stress.xx[0] == pytest.approx(modulus * 0.01, rel=1e-12)
-    assert stress.yy[0] == pytest.approx(0.0, abs=1e-14)
-    assert stress.zz[0] == pytest.approx(stress_zz * stress.xx[0], abs=1e-14)
-
-
-def test_plane_stress_thickness_strain_is_that_of_uniaxial_tension():
-    lame = lame_constants(YOUNG, POISSON, "stress")
-    strain = small_strain(np.array([[[0.01, 0.0], [0.0, -POISSON * 0.01]]]), lame)
-    assert strain.zz[0] == pytest.approx(-POISSON * 0.01, rel=1e-12)
-
-
-@pytest.mark.parametrize("law", ["linear", *FINITE])
-def test_plane_strain_has_no_strain_along_the_thickness(law):
-    lame = lame_constants(YOUNG, POISSON, "strain")
-    assert strain_of(law, np.array([[[0.01, 0.0], [0.0, 0.02]]]), lame).zz[0] == 0.0
-
-
-def test_the_linear_law_has_small_strain_and_hookes_stress():
-    gradient = np.random.default_rng(1).normal(size=(5, 2, 2))
-    lame = lame_constants(YOUNG, POISSON, "strain")
-    for found, expected in (
-        (strain_of("linear", gradient, lame), small_strain(gradient, lame)),
-        (stress_of("linear", gradient, lame, np.log), linear_stress(gradient, lame)),
-    ):
-        np.testing.assert_array_equal(found, expected)
+    gradient = np.diag([0.01, -contraction * 0.01])[None]
+    stress, stress_zz = stress_of("linear", gradient, lame_constants(YOUNG, POISSON, plane))
+    assert stress[0, 0, 0] == pytest.approx(modulus * 0.01, rel=1e-12)
+    assert stress[0, 1, 1] == pytest.approx(0.0, abs=1e-14)
+    assert stress_zz[0] == pytest.approx(across * stress[0, 0, 0], abs=1e-14)
 
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
-def test_linear_energy_is_half_stress_times_strain(plane):
-    gradient = np.random.default_rng(0).normal(size=(50, 2, 2))
+def test_linear_energy_is_half_stress_times_strain(plane, flat):
     lame = lame_constants(YOUNG, POISSON, plane)
-    stress, strain = linear_stress(gradient, lame), small_strain(gradient, lame)
-    work = 0.5 * (stress.xx * strain.xx + stress.yy * strain.yy + 2 * stress.xy * strain.xy)
-    np.testing.assert_allclose(linear_energy_density(gradient, lame), work, rtol=1e-12)
+    strain = np.moveaxis(strain_of("linear", flat), -1, 0)
+    np.testing.assert_allclose(strain, (flat + flat.swapaxes(1, 2)) / 2)
+    work = 0.5 * np.einsum("nij,nij->n", stress_of("linear", flat, lame)[0], strain)
+    np.testing.assert_allclose(energy_density_of("linear", flat, lame), work, rtol=1e-12)
 
 
 def test_infinitesimal_rotation_has_no_stress():
-    stress = linear_stress(np.array([[[0.0, -0.3], [0.3, 0.0]]]), lame_constants(YOUNG, POISSON, "strain"))
-    assert max(abs(component).max() for component in stress) == 0.0
+    stress, stress_zz = stress_of("linear", np.array([[[0.0, -0.3], [0.3, 0.0]]]), LAME)
+    assert not stress.any()
+    assert not stress_zz.any()
 
 
 @pytest.mark.parametrize("law", FINITE)
 @pytest.mark.parametrize("angle", [0.3, 2.0, 3.1])
 def test_finite_rotation_has_no_stress(law, angle):
-    lame = lame_constants(YOUNG, POISSON, "strain")
-    stress = stress_of(law, rotation(angle)[None] - np.eye(2), lame, np.log)
-    assert max(abs(component).max() for component in stress) < 1e-13
+    stress, stress_zz = stress_of(law, rotation(angle)[None] - np.eye(2), LAME)
+    assert max(abs(stress).max(), abs(stress_zz).max()) < 1e-13
 
 
 @pytest.mark.parametrize("law", FINITE)
-def test_rotated_state_has_the_same_energy_and_the_rotated_stress(law):
+def test_rotated_state_has_the_same_energy_and_the_rotated_stress(law, gradients):
     """Objectivity: F -> Q F leaves ψ as it is and makes σ into Q σ Q^T."""
-    lame, q = lame_constants(YOUNG, POISSON, "strain"), rotation(0.7)
-    deformation = np.eye(2) + np.random.default_rng(3).uniform(-0.2, 0.2, (20, 2, 2))  # within Gent's limit
-    before, after = deformation - np.eye(2), q @ deformation - np.eye(2)
-    np.testing.assert_allclose(
-        energy_density_of(law, after, lame, np.log), energy_density_of(law, before, lame, np.log), rtol=1e-12
-    )
-    tensors = []
-    for gradient in (before, after):
-        xx, yy, xy, zz = stress_of(law, gradient, lame, np.log)
-        tensors.append((np.array([[xx, xy], [xy, yy]]).transpose(2, 0, 1), zz))
-    np.testing.assert_allclose(tensors[1][0], q @ tensors[0][0] @ q.T, atol=1e-12)
-    np.testing.assert_allclose(tensors[1][1], tensors[0][1], rtol=1e-12)
+    one = np.eye(gradients.shape[-1])
+    q = one.copy()
+    q[:2, :2] = rotation(0.7)
+    after = q @ (one + gradients) - one
+    energies = [energy_density_of(law, each, LAME) for each in (gradients, after)]
+    np.testing.assert_allclose(*energies, rtol=1e-12)
+    (stress, stress_zz), (turned, turned_zz) = (stress_of(law, each, LAME) for each in (gradients, after))
+    np.testing.assert_allclose(turned, q @ stress @ q.T, atol=1e-12)
+    np.testing.assert_allclose(turned_zz, stress_zz, rtol=1e-11)
 
 
-@pytest.mark.parametrize("law", FINITE)
-def test_stress_is_the_derivative_of_the_energy(law):
-    lame = lame_constants(YOUNG, POISSON, "strain")
-    gradient = torch.tensor(np.random.default_rng(1).uniform(-0.2, 0.2, (20, 2, 2)), requires_grad=True)
-    energy_density_of(law, gradient, lame, torch.log).sum().backward()
-    deformation = np.eye(2) + gradient.detach().numpy()
+@pytest.mark.parametrize("law", ["linear", *FINITE])
+def test_stress_is_the_derivative_of_the_energy(law, gradients):
+    tensor = torch.tensor(gradients, requires_grad=True)
+    energy_density_of(law, tensor, LAME, torch.log).sum().backward()
+    cauchy, piola = stress_of(law, gradients, LAME)[0], tensor.grad.numpy()
+    if law == "linear":
+        np.testing.assert_allclose(cauchy, piola, rtol=1e-10)
+        return
+    deformation = np.eye(gradients.shape[-1]) + gradients
+    jacobian = np.linalg.det(deformation)[:, None, None]
+    np.testing.assert_allclose(deformation_jacobian(gradients), jacobian[:, 0, 0], rtol=1e-13)
     # Cauchy stress = P F^T / J with the first Piola stress P = dψ/dF.
-    cauchy = gradient.grad.numpy() @ deformation.transpose(0, 2, 1)
-    cauchy /= np.linalg.det(deformation)[:, None, None]
-    stress = stress_of(law, gradient.detach().numpy(), lame, np.log)
-    np.testing.assert_allclose(stress.xx, cauchy[:, 0, 0], rtol=1e-10, atol=1e-12)
-    np.testing.assert_allclose(stress.yy, cauchy[:, 1, 1], rtol=1e-10, atol=1e-12)
-    np.testing.assert_allclose(stress.xy, cauchy[:, 0, 1], rtol=1e-10, atol=1e-12)
-    np.testing.assert_allclose(stress.xy, cauchy[:, 1, 0], rtol=1e-10, atol=1e-12)
+    expected = piola @ deformation.transpose(0, 2, 1) / jacobian
+    np.testing.assert_allclose(cauchy, expected, rtol=1e-10, atol=1e-12)
+    if gradients.shape[-1] == 2:
+        np.testing.assert_allclose(piola_stress(law, gradients, cauchy), piola, rtol=1e-10, atol=1e-12)
 
 
 @pytest.mark.parametrize("law", FINITE)
-def test_finite_strain_tends_to_hooke(law):
-    lame = lame_constants(YOUNG, POISSON, "strain")
-    gradient = 1e-6 * np.random.default_rng(2).normal(size=(20, 2, 2))
-    linear, finite = linear_stress(gradient, lame), stress_of(law, gradient, lame, np.log)
+def test_finite_strain_tends_to_hooke(law, flat):
+    linear, finite = stress_of("linear", 1e-6 * flat, LAME), stress_of(law, 1e-6 * flat, LAME)
     for a, b in zip(linear, finite, strict=True):
         np.testing.assert_allclose(b, a, atol=1e-9)
 
 
 def test_st_venant_kirchhoff_stretch_has_the_stress_of_the_closed_form():
     """Stretch s along x: E_xx = (s^2 - 1) / 2, σ_xx = (λ + 2 μ) E_xx s, σ_yy = σ_zz = λ E_xx / s."""
-    lame, s = lame_constants(YOUNG, POISSON, "strain"), 1.4
-    stress = stress_of("st-venant-kirchhoff", np.array([[[s - 1, 0.0], [0.0, 0.0]]]), lame, np.log)
+    s = 1.4
     strain = 0.5 * (s * s - 1)
-    assert stress.xx[0] == pytest.approx((lame.λ + 2 * lame.μ) * strain * s, rel=1e-12)
-    assert stress.yy[0] == pytest.approx(lame.λ * strain / s, rel=1e-12)
-    assert stress.zz[0] == pytest.approx(lame.λ * strain / s, rel=1e-12)
-    assert stress.xy[0] == 0.0
+    stress, stress_zz = stress_of("st-venant-kirchhoff", np.diag([s - 1, 0.0])[None], LAME)
+    expected = np.diag([(LAME.λ + 2 * LAME.μ) * strain * s, LAME.λ * strain / s])
+    np.testing.assert_allclose(stress[0], expected, rtol=1e-12)
+    assert stress_zz[0] == pytest.approx(LAME.λ * strain / s, rel=1e-12)
 
 
-def test_von_mises_needs_the_out_of_plane_stress():
-    xx, yy, xy = 2.0, 0.5, 0.7
-    zz = POISSON * (xx + yy)
-    tensor = np.array([[xx, xy, 0], [xy, yy, 0], [0, 0, zz]])
-    deviator = tensor - np.trace(tensor) / 3 * np.eye(3)
-    expected = np.sqrt(1.5 * (deviator**2).sum())
-    assert von_mises(PlaneTensor(*map(np.array, (xx, yy, xy, zz))), np.sqrt) == pytest.approx(
-        expected, rel=1e-12
-    )
+@pytest.mark.parametrize("law", ["linear", *FINITE])
+def test_a_plane_deformation_of_a_solid_has_the_state_of_plane_strain(law, flat, coarse_mesh):
+    problem = Problem(coarse_mesh, Material(law=law))
+    solid = State.from_gradient(np.pad(flat, ((0, 0), (0, 1), (0, 1))), problem)
+    plane = State.from_gradient(flat, problem)
+    for name in ("strain", "stress", "stress_zz", "von_mises", "energy_density"):
+        np.testing.assert_allclose(getattr(solid, name), getattr(plane, name), rtol=1e-11, atol=1e-13)
+
+
+def test_plane_stress_is_a_state_without_stress_across(flat, coarse_mesh):
+    plane = Problem(coarse_mesh, Material(plane="stress"))
+    lame = plane.material.solid_lame
+    thinned = np.pad(flat, ((0, 0), (0, 1), (0, 1)))
+    thinned[:, 2, 2] = -lame.λ / (lame.λ + 2 * lame.μ) * (flat[:, 0, 0] + flat[:, 1, 1])
+    solid, expected = State.from_gradient(thinned, plane), State.from_gradient(flat, plane)
+    np.testing.assert_allclose(solid.stress_zz, 0, atol=1e-13)
+    assert not expected.stress_zz.any()
+    np.testing.assert_allclose(solid.von_mises, expected.von_mises, rtol=1e-12)
+
+
+def test_von_mises_stress_of_pulling_and_of_shearing_across():
+    states = np.zeros((2, 3, 3))
+    states[0, 2, 2] = -4.0
+    states[1, 0, 2] = states[1, 2, 0] = 1.0
+    found = von_mises(states, stress_zz=states[:, 2, 2])
+    np.testing.assert_allclose(found, [4.0, np.sqrt(3)])
+    np.testing.assert_allclose(von_mises(np.zeros((1, 2, 2)), stress_zz=np.array([-4.0])), [4.0])
 
 
 @pytest.mark.parametrize("law", FINITE)

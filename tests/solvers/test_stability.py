@@ -20,7 +20,7 @@ from solvers.pinn.finite_basis import newton
 from solvers.pinn.finite_basis.presets import PinnLocalSolver
 from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
 from solvers.problem import Load, Material, Problem
-from solvers.stability import Step, aside, descended
+from solvers.stability import ShiftedStep, aside, descended
 from tests.solvers.bodies import column, mesh_of
 
 HEIGHT, WIDTH, STROKE = 40.0, 2.0, 1.0
@@ -141,7 +141,7 @@ def newton_step(state, shift):
     x, y = state
     slope = np.array([4 * x * (x**2 - 1) - 0.1, 2 * y])
     curvature = np.array([12 * x**2 - 4, 2.0]) + shift
-    return Step(-slope / curvature, int((curvature < 0).sum()))
+    return ShiftedStep(-slope / curvature, int((curvature < 0).sum()))
 
 
 def test_from_a_saddle_both_wells_are_found():
@@ -160,4 +160,4 @@ def test_no_step_is_no_descent():
 
 def replace_step(step):
     """Uphill, with a shift that the descent has to keep."""
-    return lambda state, shift: Step(-step(state, 10.0).change, 0 if shift else 1)
+    return lambda state, shift: ShiftedStep(-step(state, 10.0).change, 0 if shift else 1)

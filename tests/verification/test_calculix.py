@@ -10,8 +10,8 @@ from benchmarks.verification.document import PAGE, page
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
+from solvers.extrusion import ExtrudedSpace
 from solvers.fem.finite_strain import equilibrium
-from solvers.fem.solid.extrusion import ExtrudedSpace
 from solvers.problem import Load, Material, Problem
 
 SHORT = Design(height=50, rib_count=1, tip_length=12, contact_position=20, depth=6.0)

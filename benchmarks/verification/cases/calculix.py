@@ -13,10 +13,10 @@ from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
+from solvers.extrusion import ExtrudedSpace
 from solvers.fem.boundary_conditions import dirichlet_displacement, dirichlet_mask
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
-from solvers.fem.solid.extrusion import ExtrudedSpace
 from solvers.fem.solid.solver import Fem3dSolver
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem

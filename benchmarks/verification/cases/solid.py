@@ -10,13 +10,13 @@ from benchmarks.verification.meshes import mapped_mesh, quadrilateral
 from benchmarks.verification.record import Case, Row, about, at_most, slope_rows
 from geometry.arrays import FloatArray
 from geometry.mesh.triangle_mesh import TriangleMesh
+from solvers.elasticity import energy_density_of
+from solvers.extrusion import ExtrudedSpace
 from solvers.fem.dolfinx_compat import DistributedSpace
 from solvers.fem.linear import FemSolver
 from solvers.fem.linear_solvers import Factorisation
-from solvers.fem.solid.extrusion import ExtrudedSpace
 from solvers.fem.solid.solver import Fem3dSolver
 from solvers.problem import Load, Material, Problem
-from solvers.solid_elasticity import solid_energy_density
 
 LENGTH, HEIGHT, DEPTH = 4.0, 2.0, 2.0
 CURVATURE = 0.01
@@ -101,7 +101,7 @@ def harmonic_errors(cells: int) -> tuple[float, float]:
     moduli = Material().solid_lame
 
     def sizes(field: Any) -> FloatArray:
-        density = solid_energy_density("linear", ufl.grad(field), moduli, ufl.ln)
+        density = energy_density_of("linear", ufl.grad(field), moduli)
         parts = (ufl.inner(field, field), density)
         return np.sqrt([distributed.assemble_scalar(distributed.form(part * measure)) for part in parts])
 
@@ -115,7 +115,7 @@ def solved(
     """The elements, and nodal displacements, (N, 3), mm: those given where a mask (N, 3) holds them."""
     distributed = DistributedSpace(space)
     moduli = distributed.moduli(material.solid_lame)
-    energy = solid_energy_density("linear", ufl.grad(distributed.function), moduli, ufl.ln) * ufl.dx
+    energy = energy_density_of("linear", ufl.grad(distributed.function), moduli) * ufl.dx
     force, stiffness = distributed.derivatives(energy)
     matrix = distributed.assemble_matrix(stiffness, distributed.clamp(held))
     factors = Factorisation(distributed, matrix, held, positive_definite=True)

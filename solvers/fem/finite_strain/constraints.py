@@ -6,20 +6,18 @@ import numpy as np
 
 from geometry.arrays import BoolArray, FloatArray
 from solvers.assimilation.misfit import Misfit
+from solvers.cylinder_contact import ContactState
+from solvers.extrusion import NodalSpace
 from solvers.fem.boundary_conditions import load_functionals, load_targets, marker_functionals
-from solvers.lagrange import LagrangeSpace, NodalSpace
+from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)
-class LoadState:
-    """A state of the finger, in equilibrium or a guess."""
+class LoadState(ContactState):
+    """A state of the finger, in equilibrium or a guess; `contact` is empty without a cylinder."""
 
-    fraction: float  # Fraction of the load
-    nodal: FloatArray  # Displacements, shape (N, d), mm
     forces: FloatArray  # Multipliers of the constraints, shape (k,), N/mm
-    # Forces of the cylinder on the nodes of the front, shape (l m,), N/mm; empty without one
-    contact: FloatArray
 
 
 @dataclass(frozen=True, eq=False)

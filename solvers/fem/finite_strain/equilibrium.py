@@ -16,14 +16,13 @@ from geometry.arrays import BoolArray, FloatArray
 from solvers.constrained_elimination import ConstrainedElimination
 from solvers.cylinder_contact import CylinderContact
 from solvers.elasticity import deformation_jacobian, energy_density_of
+from solvers.extrusion import NodalSpace
 from solvers.fem.boundary_conditions import dirichlet_displacement, dirichlet_mask
 from solvers.fem.dolfinx_compat import DistributedSpace
 from solvers.fem.finite_strain.constraints import DisplacementConstraints, LoadState
 from solvers.fem.linear_solvers import TOLERANCE, Factorisation, Multigrid
-from solvers.lagrange import NodalSpace
 from solvers.problem import Problem
-from solvers.solid_elasticity import solid_energy_density, solid_jacobian
-from solvers.stability import Step
+from solvers.stability import ShiftedStep
 
 QUADRATURE_DEGREE = 4
 """Exact for the quadratic part of the law on quadratic elements."""
@@ -72,16 +71,12 @@ class FiniteStrainEquilibrium:
         self.contact = CylinderContact.of(problem, space) if problem.load.kind == "cylinder" else None
         self._young = problem.material.young
         material, gradient = problem.material, ufl.grad(self.distributed.function)
-        solid = self.distributed.dimension == 3
-        constants = self.distributed.moduli(material.solid_lame if solid else material.lame)
-        density = (solid_energy_density if solid else energy_density_of)(
-            material.law, gradient, constants, ufl.ln
-        )
+        lame = material.solid_lame if self.distributed.dimension == 3 else material.lame
+        density = energy_density_of(material.law, gradient, self.distributed.moduli(lame), ufl.ln)
         measure = ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
         energy = density / space.thickness * measure
         self._energy = self.distributed.form(energy)
-        jacobian = (solid_jacobian if solid else deformation_jacobian)(gradient)
-        inverted = ufl.conditional(ufl.gt(jacobian, 0), 0.0, 1.0)
+        inverted = ufl.conditional(ufl.gt(deformation_jacobian(gradient), 0), 0.0, 1.0)
         self._inverted = self.distributed.form(inverted * measure)
         self._force, self._tangent = self.distributed.derivatives(energy)
         self._conditions = self.distributed.clamp(self.clamped)
@@ -155,15 +150,15 @@ class FiniteStrainEquilibrium:
             direction /= np.abs(direction).max()
         return direction
 
-    def step_at(self, about: LoadState) -> Callable[[FloatArray, float], Step | None]:
+    def step_at(self, about: LoadState) -> Callable[[FloatArray, float], ShiftedStep | None]:
         """Newton's step at displacements, the load that of a state, and a shift over Young's modulus."""
 
-        def step(nodal: FloatArray, shift: float) -> Step | None:
+        def step(nodal: FloatArray, shift: float) -> ShiftedStep | None:
             self.factorise(replace(about, nodal=nodal), shift * self._young)
             force = np.where(self.clamped, 0.0, -self.internal_force(nodal))
             gaps = about.fraction * self.constraints.targets - self.constraints.values(nodal)
             change, _ = self.elimination.solution(self.factors.solve(force), gaps)
-            return Step(change, self.unstable or 0)
+            return ShiftedStep(change, self.unstable or 0)
 
         return step
 
@@ -191,7 +186,7 @@ class FiniteStrainEquilibrium:
         """The state without load."""
         contact = 0 if self.contact is None else len(self.contact.nodes)
         forces = np.zeros(len(self.constraints.targets))
-        return LoadState(0.0, np.zeros(self.clamped.shape), forces, np.zeros(contact))
+        return LoadState(0.0, np.zeros(self.clamped.shape), np.zeros(contact), forces)
 
     def linear_guess(self, fraction: float) -> LoadState:
         """The linear solution at a fraction of the load, by the undeformed tangent, which must be factorised.
@@ -206,7 +201,7 @@ class FiniteStrainEquilibrium:
             stiffness = (self.internal_force(step) - self.internal_force(-step)) / (2 * PROBE)
             nodal = nodal + self.factors.solve(-fraction * stiffness)
         nodal, forces = self.elimination.solution(nodal, fraction * self.constraints.targets)
-        return LoadState(fraction, nodal, forces, np.zeros(0))
+        return LoadState(fraction, nodal, np.zeros(0), forces)
 
     def _pressed_at_one_node(self, contact: CylinderContact, fraction: float) -> LoadState:
         rest = replace(self.rest, fraction=fraction)

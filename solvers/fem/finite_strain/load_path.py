@@ -10,11 +10,11 @@ import numpy as np
 from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
 from solvers.cylinder_contact import ContactRegion
+from solvers.extrusion import NodalSpace
 from solvers.fem.boundary_conditions import reaction_by_residual_work
 from solvers.fem.finite_strain.constraints import DisplacementConstraints, LoadState
 from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
 from solvers.fem.finite_strain.newton import ConstrainedNewton
-from solvers.lagrange import NodalSpace
 from solvers.problem import Problem
 from solvers.solver import Progress
 from solvers.stability import aside, descended
@@ -184,7 +184,7 @@ class LoadPath:
         if self._guide is not None:
             before, after = self._guide(last.fraction), self._guide(fraction)
             nodal, forces = after.nodal - before.nodal, after.forces - before.forces
-            return LoadState(fraction, last.nodal + nodal, last.forces + forces, after.contact)
+            return LoadState(fraction, last.nodal + nodal, after.contact, last.forces + forces)
         if len(self.points) == 1:
             return self.equilibrium.linear_guess(fraction)
         known = self.points[-3 if self.equilibrium.contact is None else -2 :]  # contact starts with a kink
@@ -192,7 +192,7 @@ class LoadPath:
         shares = [np.prod((fraction - (rest := np.delete(at, k))) / (at[k] - rest)) for k in range(len(at))]
         nodal = sum(share * point.nodal for share, point in zip(shares, known, strict=True))
         forces = sum(share * point.forces for share, point in zip(shares, known, strict=True))
-        return LoadState(fraction, nodal, forces, last.contact)
+        return LoadState(fraction, nodal, last.contact, forces)
 
     def reaction(self, point: LoadState) -> FloatArray:
         """Force of the indenter on the finger, shape (2,), N/mm."""

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from solvers.extrusion import ExtrudedSpace
 from solvers.fem.finite_strain.constraints import LoadState
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.solid.extrusion import ExtrudedSpace
 from solvers.problem import Problem
 from solvers.solver import Progress
 

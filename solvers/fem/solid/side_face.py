@@ -8,7 +8,7 @@ import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
-from solvers.fem.solid.extrusion import ExtrudedSpace
+from solvers.extrusion import ExtrudedSpace
 
 Face = Literal["side", "middle"]
 

@@ -9,10 +9,10 @@ import numpy as np
 from geometry.errors import UserError
 from geometry.machine_memory import free_memory_gb
 from solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
+from solvers.extrusion import ExtrudedSpace
 from solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
 from solvers.fem.ranks import communicator, on_all_ranks
 from solvers.fem.solid.cost import Cost, LinearSolver, affordable
-from solvers.fem.solid.extrusion import ExtrudedSpace
 from solvers.fem.solid.plane_guide import PlaneGuide
 from solvers.fem.solid.side_face import Face, FaceField
 from solvers.problem import Problem

@@ -10,7 +10,7 @@ from solvers.cylinder_contact import ContactRegion
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
 from solvers.pinn.finite_basis.energy import REGULARISATION
 from solvers.solver import Progress
-from solvers.stability import Step, aside, descended
+from solvers.stability import ShiftedStep, aside, descended
 
 FIRST_STEP, MAX_STEP, MIN_STEP = 0.1, 0.25, 1e-3
 """Fractions of the load in one step."""
@@ -85,9 +85,9 @@ def least_energy(network: ConstrainedNetwork, start: FloatArray, fraction: float
         fraction: Of the load.
     """
 
-    def step(output: FloatArray, shift: float) -> Step | None:
+    def step(output: FloatArray, shift: float) -> ShiftedStep | None:
         taken = network.step(torch.from_numpy(output), fraction, max(shift, REGULARISATION))
-        return None if taken is None else Step(taken.output.numpy() - output, taken.unstable)
+        return None if taken is None else ShiftedStep(taken.output.numpy() - output, taken.unstable)
 
     def energy(output: FloatArray) -> float:
         return network.energy_with_springs(torch.from_numpy(output), fraction)

@@ -14,7 +14,7 @@ from scipy.sparse import csr_matrix
 
 from geometry.arrays import FloatArray, IntArray
 from solvers.constrained_elimination import ConstrainedElimination
-from solvers.cylinder_contact import ContactRegion, CylinderContact
+from solvers.cylinder_contact import ContactRegion, ContactState, CylinderContact
 from solvers.lagrange import LagrangeSpace
 from solvers.pinn.finite_basis.constrained_network import ConstrainedNetwork, NewtonIterate
 from solvers.pinn.finite_basis.energy import REGULARISATION, piola_stress_and_tangent
@@ -38,14 +38,6 @@ ROUNDING = 1e-12
 """The same below which the potential may rise by rounding."""
 SHORTEST = 2.0**-9
 """Shortest share of a Newton step that is tried; of one by an older tangent it is the whole."""
-
-
-class Stage(NamedTuple):
-    """A `ContactState` of a network."""
-
-    fraction: float
-    nodal: FloatArray
-    contact: FloatArray
 
 
 class Tangent(NamedTuple):
@@ -151,11 +143,11 @@ class PressedNetwork:
             step = min(self.contact.longest_step, 2 * step)
         return last
 
-    def stage(self, output: torch.Tensor, fraction: float, multipliers: FloatArray) -> Stage:
+    def stage(self, output: torch.Tensor, fraction: float, multipliers: FloatArray) -> ContactState:
         """The contact at an output layer."""
         nodal = np.zeros((self.count, 2))
         nodal[self.contact.nodes] = self.values @ output.permute(0, 2, 1).reshape(-1, 2).numpy()
-        return Stage(fraction, nodal, multipliers)
+        return ContactState(fraction, nodal, multipliers)
 
     def _load_step(self, fraction: float, state: NewtonIterate, iterations: int) -> LoadStep:
         stage = self.stage(state.output, fraction, state.forces)
@@ -253,7 +245,12 @@ class PressedNetwork:
         return None, ITERATIONS
 
     def _taken(
-        self, stage: Stage, output: torch.Tensor, tangent: Tangent, least: float, shortest: float = SHORTEST
+        self,
+        stage: ContactState,
+        output: torch.Tensor,
+        tangent: Tangent,
+        least: float,
+        shortest: float = SHORTEST,
     ) -> Taken | None:
         """So much of a step that the potential falls; None if a point is turned inside out."""
         step = self._step(stage, output, np.flatnonzero(self.contact.forces(stage) > 0), tangent)
@@ -288,7 +285,9 @@ class PressedNetwork:
         output = factors.solve(forces.numpy().reshape(1, -1))
         return Tangent(factors, torch.from_numpy(output).view_as(self.network.zero_output))
 
-    def _step(self, stage: Stage, output: torch.Tensor, touching: IntArray, tangent: Tangent) -> Step | None:
+    def _step(
+        self, stage: ContactState, output: torch.Tensor, touching: IntArray, tangent: Tangent
+    ) -> Step | None:
         """Newton's step with given multipliers and nodes that touch; None if a point is turned inside out."""
         gradient = self.network.energy.gradient(output)
         if not torch.isfinite(gradient).all():

@@ -15,7 +15,7 @@ import torch
 import torch.distributed
 
 from geometry.arrays import FloatArray
-from solvers.elasticity import Lame, linear_stress
+from solvers.elasticity import Lame, stress_of
 from solvers.pinn.paper.mlp_passes import MlpPass
 from solvers.pinn.paper.modified_mlp import ModifiedMlp, Weights
 from solvers.pinn.threading import map_in_threads, slices
@@ -74,9 +74,8 @@ LossTerm = EnergyTerm | DisplacementTerm
 
 
 def stiffness_matrix(lame: Lame) -> FloatArray:
-    """`linear_stress` as a matrix on (du/dx, du/dy, dv/dx, dv/dy), shape (4, 4), MPa; it is symmetric."""
-    stress = linear_stress(np.eye(4).reshape(4, 2, 2), lame)
-    return np.stack([stress.xx, stress.xy, stress.xy, stress.yy], axis=1)
+    """Hooke's law as a matrix on (du/dx, du/dy, dv/dx, dv/dy), shape (4, 4), MPa; it is symmetric."""
+    return stress_of("linear", np.eye(4).reshape(4, 2, 2), lame)[0].reshape(4, 4)
 
 
 @dataclass(frozen=True)

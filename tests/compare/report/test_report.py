@@ -17,7 +17,7 @@ from compare.report import html_report
 from compare.report.text import record, sentence, stat
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
-from solvers.adaptation import Adaptation, RefinementRound
+from solvers.fem.adaptive_refinement import Adaptation, RefinementRound
 from solvers.problem import Load, Problem
 
 VOID = {"meta", "img", "br", "link", "hr", "input"}

@@ -61,7 +61,7 @@ def test_balance_with_a_cylinder_has_its_tangent_as_derivative():
     load = Load(kind="cylinder", radius=3.0, displacement=(0.1, -0.2))
     problem = equilibrium("neo-hookean", load)
     nodal, direction = fields(problem, 0, 1, size=0.01)
-    start = LoadState(1.0, nodal, np.zeros(0), np.full(len(problem.contact.nodes), 0.05))
+    start = LoadState(1.0, nodal, np.full(len(problem.contact.nodes), 0.05), np.zeros(0))
     pressed = problem.contact.forces(start) > 0
     assert 0 < pressed.sum() < len(pressed)
     balance, _ = problem.residual(start)

@@ -10,7 +10,6 @@ from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
-from solvers.elasticity import PlaneTensor, linear_stress
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 
@@ -118,11 +117,3 @@ def test_part_without_support_is_reported(coarse_mesh):
     )
     with pytest.raises(UserError, match="not connected to the base"):
         Problem(twice)
-
-
-def test_stress_helper_is_the_one_law():
-    """The tensor components of a known state, so that a change of the law cannot go unseen."""
-    lame = Material(young=1.0, poisson=0.25).lame
-    assert linear_stress(np.array([[0.0, 0.2], [0.0, 0.0]]), lame) == PlaneTensor(
-        0.0, 0.0, pytest.approx(0.08), 0.0
-    )

@@ -11,12 +11,12 @@ from compare.evaluation.convergence import with_certificates
 from compare.evaluation.evaluation import Evaluation
 from compare.report.sentences import certificate_sentences
 from geometry.errors import UserError
+from solvers.extrusion import ExtrudedSpace
 from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.fem.linear_solvers import Multigrid
 from solvers.fem.solid.cost import affordable
-from solvers.fem.solid.extrusion import ExtrudedSpace
 from solvers.fem.solid.side_face import FaceField
 from solvers.fem.solid.solver import Fem3dSolver
 from solvers.problem import Load, Material, Problem
@@ -76,7 +76,7 @@ def test_pure_bending_is_exact():
     location = mesh.at_centroids()
     for face in ("side", "middle"):
         gradient = FaceField(space, nodal, face).solid_gradient(location)
-        state = State.from_solid_gradient(gradient, Problem(mesh, material))
+        state = State.from_gradient(gradient, Problem(mesh, material))
         expected = 11.4 * curvature * location.points[:, 1]
         np.testing.assert_allclose(state.stress[:, 0, 0], expected, atol=1e-12)
         np.testing.assert_allclose(state.von_mises, np.abs(expected), atol=1e-12)

@@ -111,7 +111,7 @@ def test_energy_plus_misfit_has_balance_and_tangent_as_derivatives(law):
 
     def gradient(nodal):
         forces = constraints.residual(nodal, np.zeros(len(constraints.targets)), 1.0) / constraints.slacks
-        return equilibrium.residual(LoadState(1.0, nodal, forces, np.zeros(0)))[0]
+        return equilibrium.residual(LoadState(1.0, nodal, np.zeros(0), forces))[0]
 
     steps = 0.02 * 0.5 ** np.arange(4)
     first = (gradient(start) * direction).sum()

@@ -28,19 +28,14 @@ class ExtrudedSpace:
     """
 
     section: LagrangeSpace  # Quadratic elements on the shared mesh
-    # Places of the layers' faces, from 0 to half of the depth, rising, shape (layers + 1,), mm
-    faces: FloatArray
+    faces: FloatArray  # Places of the layers' faces, from 0 to half of the depth, shape (layers + 1,), mm
     held: bool = False  # Whether the side faces cannot move along z, so that the body is in plane strain
 
     @classmethod
     def of(cls, mesh: TriangleMesh, layers: int, grading: float, held: bool = False) -> "ExtrudedSpace":
-        """The half body of a mesh.
+        """The half body of a mesh in layers.
 
-        Args:
-            mesh: The section, and the depth.
-            layers: Number of layers in half of the depth.
-            grading: Thickness of the layer at the side face over that at the middle plane.
-            held: Whether the side faces cannot move along z.
+        `grading` is the thickness of the layer at the side face over the thickness at the middle plane.
         """
         thickness = np.geomspace(1.0, grading, layers)
         faces = np.concatenate([[0.0], np.cumsum(thickness)])
@@ -53,12 +48,12 @@ class ExtrudedSpace:
 
     @property
     def degree(self) -> int:
-        """Two."""
+        """Degree of the elements, 2."""
         return self.section.degree
 
     @property
     def thickness(self) -> float:
-        """Half of the depth, mm: integrals are means over the depth."""
+        """Extent by which integrals are divided: half of the depth, mm, so that they are per depth."""
         return float(self.faces[-1])
 
     @cached_property
@@ -76,7 +71,7 @@ class ExtrudedSpace:
 
     @cached_property
     def vertices(self) -> IntArray:
-        """The corners of the tetrahedra: those of the triangles on the layers' faces, shape (V,)."""
+        """The nodes that are corners, which lie on the layers' faces, shape (V,)."""
         starts = 2 * len(self.section.nodes) * np.arange(len(self.faces))
         return np.asarray((starts[:, None] + np.arange(len(self.mesh.points))).ravel(), dtype=np.int64)
 
@@ -128,13 +123,17 @@ class ExtrudedSpace:
         return shares / self.thickness
 
     def mean_value(self, points: FloatArray, weights: FloatArray) -> FloatArray:
-        """Weights of the nodes in a weighted sum over points (q, 2) of the section, meant over z, (N,)."""
+        """Weights of the nodes in a weighted sum over points (q, 2), meant over z, shape (N,)."""
         return np.asarray(np.kron(self.shares, self.section.mean_value(points, weights)))
 
     def extruded(self, values: FloatArray) -> FloatArray:
-        """Nodal values, shape (N, 3), of a displacement (P, 2) of the section, the same at every level."""
+        """Nodal values, shape (N, 3), that repeat a displacement (P, 2) of the section at every level."""
         return np.tile(np.column_stack([values, np.zeros(len(values))]), (len(self.levels), 1))
 
     def at_level(self, nodal: FloatArray, level: int) -> FloatArray:
         """The values of one level, shape (P, 3), of nodal values of shape (N, 3); -1 is the side face."""
         return np.asarray(nodal.reshape(len(self.levels), -1, 3)[level])
+
+
+NodalSpace = LagrangeSpace | ExtrudedSpace
+"""Scalar Lagrange elements on simplices, for a section or its extrusion."""
