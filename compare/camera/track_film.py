@@ -12,9 +12,8 @@ from rich.text import Text
 
 from compare.camera.film import Film
 from compare.camera.force_estimate import LiveForce
-from compare.evaluation.number_format import NONE, significant
 from compare.figures import Picture
-from compare.runtime.tables import Cell, terminal_table, write_csv
+from compare.runtime.tables import NONE, Cell, significant, terminal_table, write_csv
 from geometry.arrays import FloatArray
 from geometry.atomic import write_json
 from geometry.errors import UserError

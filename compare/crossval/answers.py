@@ -6,7 +6,7 @@ from compare.crossval.folds import ALL
 from compare.crossval.result import BASELINES, CrossvalResult, LayoutResult
 from compare.crossval.scores import FIELD_NAMES
 from compare.crossval.truth_summary import held_out_scheme, verdict_sentences
-from compare.evaluation.number_format import percent
+from compare.runtime.tables import percent
 from solvers.solver import Traits
 
 

@@ -12,8 +12,7 @@ from compare.crossval.grid import Grid
 from compare.crossval.result import Case, CrossvalResult, LayoutResult
 from compare.crossval.scores import FIELDS, LEVEL, Difference, Interval
 from compare.crossval.truth_summary import truth_grids, truth_rows
-from compare.evaluation.number_format import NONE, percent, significant
-from compare.runtime.tables import Cell, terminal_table, write_csv
+from compare.runtime.tables import NONE, Cell, percent, significant, terminal_table, write_csv
 
 SHORT = {"not told apart": "≈"}
 """Short forms of verdicts."""

@@ -7,9 +7,8 @@ from compare.crossval.grid import Grid
 from compare.crossval.result import CrossvalResult, LayoutResult, interval_cells
 from compare.crossval.scores import LEVEL, Score
 from compare.crossval.study import Study
-from compare.evaluation.number_format import NONE, distance, percent
 from compare.evaluation.truths import Truth
-from compare.runtime.tables import Cell
+from compare.runtime.tables import NONE, Cell, distance, percent
 from solvers.solver import with_law
 
 NULL_MODELS = ("gp", "statfem")

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from compare.evaluation.number_format import percent
+from compare.runtime.tables import percent
 from geometry.arrays import FloatArray
 
 ENERGY_LIMIT = 0.02
@@ -78,7 +78,7 @@ class Certificate:
         load: Largest deviation from the prescribed value of u and v, shape (2,), mm; NaN where free.
         work: Of the solver's own reaction on the prescribed displacement; twice the energy in equilibrium.
         stroke: Largest prescribed displacement, mm.
-        regions: The error by region, see `compare.evaluation.regions`.
+        regions: The error by region, see `compare.evaluation.certification`.
         density: Energy density of the rest, its mean over each triangle, shape (t,), MPa.
     """
 

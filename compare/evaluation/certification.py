@@ -1,25 +1,92 @@
 """Certificates of solutions of the linear problem, from one factorisation of the finite-element stiffness."""
 
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
+from scipy.spatial import cKDTree
 
 from compare.evaluation.certificate import ROUNDING, Certificate, Region
 from compare.evaluation.differences import field_difference
 from compare.evaluation.evaluation import QUADRATURE_DEGREE, Evaluation
-from compare.evaluation.regions import body_regions
-from geometry.arrays import FloatArray
+from geometry.arrays import BoolArray, FloatArray
+from geometry.mesh.boundary import boundary_edges, boundary_loops, mean_thickness, singular_points
 from geometry.mesh.quadrature import body_quadrature
 from solvers.elasticity import energy_density_of
 from solvers.fem.boundary_conditions import reaction_by_residual_work
-from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium
 from solvers.lagrange import LagrangeField, LagrangeSpace
-from solvers.problem import Problem
+from solvers.problem import Problem, contact_nodes
+from solvers.registry import MissingLibraryError, make_solver
 from solvers.solution import State
+
+NOT_FINITE = "its displacement or stress is not finite everywhere"
+"""Fault of a result with NaN or infinity in a field."""
+
+REGION_RADIUS = 0.5
+"""Radius of the regions around corners and contact, in mean wall thicknesses."""
+
+REGIONS = {
+    "corners": "at re-entrant corners and base ends",
+    "contact": "at the contact",
+    "tip": "in the tip",
+    "walls": "in the walls",
+    "rest": "in the rest of the body",
+}
+"""Every region by which errors are told apart, and how to say in words what is there."""
+
+
+def with_certificates(evaluations: Sequence[Evaluation], problem: Problem) -> list[Evaluation]:
+    """Certify the evaluations of the linear law and judge their convergence.
+
+    The least energy settles the question for the linear law only, whose energy is quadratic. It does not
+    judge a solver that was given observations, which pays energy for them, a body in three dimensions, nor a
+    found contact. Without DOLFINx there are no certificates, and a warning says so.
+
+    Args:
+        evaluations: Sampled on the problem's mesh.
+        problem: What was solved; each evaluation knows its own law.
+    """
+
+    def certifiable(evaluation: Evaluation) -> bool:
+        return evaluation.law == "linear" and not evaluation.in_sample and not evaluation.solid
+
+    if problem.load.kind == "cylinder" or not any(map(certifiable, evaluations)):
+        return list(evaluations)
+    try:
+        make_solver("fem")
+    except MissingLibraryError as error:
+        warnings.warn(f"no result is certified: {error}", stacklevel=2)
+        return list(evaluations)
+    certifier = Certifier(replace(problem, material=problem.material.model_copy(update={"law": "linear"})))
+    return [
+        with_certificate(evaluation, certifier.certificate(evaluation) if evaluation.finite else None)
+        if certifiable(evaluation)
+        else evaluation
+        for evaluation in evaluations
+    ]
+
+
+def with_certificate(evaluation: Evaluation, certificate: Certificate | None) -> Evaluation:
+    """Attach a certificate; the evaluation does not count as converged if the certificate finds a fault.
+
+    A result that is not finite has no certificate, which is a fault of its own.
+    """
+    faults = [NOT_FINITE] if certificate is None else certificate.faults
+    return replace(
+        evaluation,
+        converged=evaluation.converged and not faults,
+        message="; ".join([evaluation.message.rstrip(". "), *faults]),
+        certificate=certificate,
+    )
 
 
 class Certifier:
     """Finite elements of degree 2 on a problem's mesh, by which any displacement is measured."""
 
     def __init__(self, problem: Problem) -> None:
+        from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium  # it needs DOLFINx
+
         self._problem = problem
         self._space = LagrangeSpace(problem.mesh, 2)
         self._elasticity = LinearElasticity.of(problem, self._space)
@@ -53,6 +120,7 @@ class Certifier:
         balance, weak_residual = self._imbalance(evaluation.stress)
         reaction = reaction_by_residual_work(self._space, self._elasticity.internal_force(self._solution))
         density = energy_density_of("linear", self._gradient(rest), self._problem.material.lame)
+        load = self._problem.load
         return Certificate(
             energy=energy,
             fem_energy=fem_energy,
@@ -63,8 +131,8 @@ class Certifier:
             imbalance=float(np.linalg.norm(balance, axis=1).max() / np.linalg.norm(reaction)),
             base=float(np.linalg.norm(nodal[self._space.boundary_nodes("base")], axis=1).max()),
             load=self._load_missed(nodal, values),
-            work=float(evaluation.reaction[self._problem.load.prescribed] @ self._problem.load.values),
-            stroke=float(np.abs(self._problem.load.values).max()),
+            work=float(evaluation.reaction[load.prescribed] @ load.values),
+            stroke=float(np.abs(load.values).max()),
             regions=self._by_region(evaluation, density),
             density=evaluation.per_triangle(density),
         )
@@ -78,10 +146,7 @@ class Certifier:
         return np.stack([derivative @ nodal for derivative in self._derivatives], axis=-1)
 
     def _imbalance(self, stress: FloatArray) -> tuple[FloatArray, float]:
-        """Residual of the internal forces of a stress, with the reactions that balance it best.
-
-        Args:
-            stress: At the quadrature points, shape (q, 2, 2), MPa.
+        """Residual of the internal forces of a stress (q, 2, 2), MPa, balanced best by the reactions.
 
         Returns:
             Nodal forces, shape (N, 2), N/mm, zero where displacements are given; and their dual norm over
@@ -121,3 +186,31 @@ class Certifier:
             area = weights[here].sum() / weights.sum()
             regions[name] = Region(float(area), float(share), displacement, von_mises)
         return regions
+
+
+def body_regions(problem: Problem) -> dict[str, BoolArray]:
+    """Split the triangles into the `REGIONS` that the mesh has: masks of shape (t,) by name.
+
+    A triangle with its centroid within `REGION_RADIUS` of a re-entrant corner or an end of the base belongs
+    to the corners; of the others, one within that radius of the contact's nodes to the contact; of the
+    others, one beyond the last cavity to the tip, if the body is as thick there as two walls. All others are
+    walls, ribs included, or the rest of a body without cavities.
+    """
+    mesh = problem.mesh
+    centroids, thickness = mesh.at_centroids().points, mean_thickness(mesh)
+    cavities = boundary_loops(mesh)[1:]
+    beyond = centroids[:, 0] > max((mesh.points[cavity, 0].max() for cavity in cavities), default=np.inf)
+    boundary = mesh.points[np.unique(boundary_edges(mesh.triangles))]
+    depth = cKDTree(boundary).query(centroids[beyond])[0].max(initial=0.0)
+    near = REGION_RADIUS * thickness
+    belongs = {
+        "corners": cKDTree(singular_points(mesh)).query(centroids)[0] <= near,
+        "contact": cKDTree(mesh.points[contact_nodes(problem)]).query(centroids)[0] <= near,
+        "tip": beyond & (depth > thickness),
+        "walls" if cavities else "rest": np.ones(len(centroids), dtype=bool),
+    }
+    regions, left = {}, np.ones(len(centroids), dtype=bool)
+    for name, here in belongs.items():
+        regions[name] = here & left
+        left &= ~here
+    return {name: here for name, here in regions.items() if here.any()}

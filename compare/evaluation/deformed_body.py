@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 import shapely
 
-from compare.evaluation.convergence import CERTIFIED_LAW, NOT_FINITE
+from compare.evaluation.certification import NOT_FINITE
 from compare.evaluation.evaluation import Evaluation
 from geometry.arrays import BoolArray, FloatArray, IntArray
 from geometry.mesh.boundary import boundary_edges
@@ -110,7 +110,7 @@ def _faults(body: DeformedBody, evaluation: Evaluation) -> dict[str, str]:
 
 def _judged(converged: bool, message: str, law: str, faults: dict[str, str]) -> tuple[bool, str]:
     """Whether a result counts as converged, and its message with the faults that it does not say yet."""
-    fatal = NOT_FINITE in faults or (INSIDE_OUT in faults and law != CERTIFIED_LAW)
+    fatal = NOT_FINITE in faults or (INSIDE_OUT in faults and law != "linear")
     said = [f"{fault}{place}" for fault, place in faults.items() if fault not in message]
     return converged and not fatal, "; ".join([message.rstrip(". "), *said]) if said else message
 

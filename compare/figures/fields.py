@@ -10,11 +10,11 @@ from compare.evaluation.comparison import TRUTH, Comparison
 from compare.evaluation.differences import field_difference, weighted_percentile
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import COMPONENTS
-from compare.evaluation.number_format import percent, significant
 from compare.figures import body
 from compare.figures.canvas import Canvas
 from compare.figures.colours import PERCENT, Scale, diverging, sequential, symmetric
 from compare.figures.style import axes_at, heading
+from compare.runtime.tables import percent, significant
 from geometry.arrays import FloatArray
 from geometry.figure import MUTED, SMALL, WIDTH, Figure, figure
 from geometry.mesh.triangle_mesh import TriangleMesh

@@ -5,16 +5,16 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from compare.camera.film import Film
 from compare.evaluation.branches import with_branches
+from compare.evaluation.certification import with_certificates
 from compare.evaluation.comparison import Comparison, supported_solvers
-from compare.evaluation.convergence import with_certificates
 from compare.evaluation.deformed_body import with_body_checks
 from compare.evaluation.force_displacement import force_curves, write_force_displacement
 from compare.evaluation.metrics import pick_reference
 from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
-from compare.evaluation.shared_mesh import shared_mesh, write_rounds
 from compare.evaluation.truths import TRUTHS
 from compare.evaluation.virtual_experiment import (
     UnfinishedExperimentError,
@@ -23,15 +23,17 @@ from compare.evaluation.virtual_experiment import (
 )
 from compare.figures import Picture, draw_all
 from compare.pipeline.job import Job, checked
-from compare.pipeline.provenance import provenance
+from compare.pipeline.shared_mesh import shared_mesh, write_rounds
 from compare.pipeline.solving import ERRORS, solve_all
 from compare.report.html_report import write_report
 from compare.report.metrics_json import metrics
 from compare.report.tables import write_markers, write_summary, write_table_one
 from compare.report.vtu_file import write_vtu
 from compare.runtime.output_folder import check_output, replaced_folder, write_run
+from compare.runtime.provenance import package_versions
 from compare.runtime.stages import Stages
 from geometry.atomic import write_json
+from geometry.content_hash import file_digest
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.problem import Problem
@@ -189,6 +191,30 @@ def write(
             )
         numbers = metrics(comparison)
         write_json(folder / "metrics.json", numbers)
-        record = provenance(folder, job, comparison, stages)
+        record = _provenance(folder, job, comparison, stages)
         write_report(folder / "report.html", comparison, [*pictures, *photographs], record, numbers)
         write_run(folder, record)
+
+
+def _provenance(folder: Path, job: Job, comparison: Comparison, stages: Stages) -> dict[str, Any]:
+    """Times, and what the numbers depend on: hashes, settings, seeds, devices, versions, machine."""
+    adaptation, settings = comparison.adaptation, comparison.settings
+    return {
+        **stages.record(),
+        "options": dict(job.options),
+        "design_sha256": job.design.digest,
+        "mesh_sha256": comparison.mesh.digest,
+        "problem_sha256": Problem(comparison.mesh, job.material, job.load).digest,
+        "mesh": job.mesh.model_dump(),
+        "adapt": adaptation and {"tolerance_mm": adaptation.tolerance, "end": adaptation.message},
+        "material": job.material.model_dump(),
+        "load": job.load.model_dump(),
+        "measurements_sha256": file_digest(folder / "observations.csv"),
+        "film": job.measurements.provenance() if isinstance(job.measurements, Film) else None,
+        "solvers": settings,
+        "left_out": comparison.unsupported,
+        "failed": comparison.failed,
+        "seed": {name: own["seed"] for name, own in settings.items() if "seed" in own},
+        "device": {each.solver: each.stats.get("device", "cpu") for each in comparison.evaluations},
+        "versions": package_versions(),
+    }

@@ -7,11 +7,10 @@ from typing import Any
 
 from jinja2 import Template
 
+from compare.evaluation.certification import REGION_RADIUS
 from compare.evaluation.comparison import Comparison, unsupported_remarks
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import force_error, indistinct, reference_differences, truth_differences
-from compare.evaluation.number_format import distance, number, percent
-from compare.evaluation.regions import NEAR
 from compare.figures import Picture
 from compare.figures.fields import QUANTITIES
 from compare.report import text
@@ -21,6 +20,7 @@ from compare.report.sentences import certificate_sentences, truth_sentences
 from compare.report.summary import answers
 from compare.report.tables import millimetres, printed_rows, seconds, table_one
 from compare.runtime.html import picture_urls, template_environment
+from compare.runtime.tables import distance, number, percent
 from geometry.atomic import write_text
 
 FIELDS = {quantity.name for quantity in QUANTITIES}
@@ -81,7 +81,7 @@ def render(
             comparison.material,
             {evaluation.label: evaluation.law for evaluation in comparison.evaluations},
         ),
-        near=NEAR,
+        near=REGION_RADIUS,
         load_sentence=text.load_sentence(comparison.load, design),
         source=text.source_sentence(comparison.observations),
         viewer=viewer(comparison),

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from compare.evaluation.metrics import MEANS
-from compare.evaluation.number_format import NONE, number, percent
 from compare.report.metrics_json import SCHEMA
 from compare.report.summary import Answer, answers
 from compare.runtime.html import picture_urls, template_environment
 from compare.runtime.output_folder import RUN_FILE, check_links
-from compare.runtime.tables import Cell, write_csv
+from compare.runtime.tables import NONE, Cell, number, percent, write_csv
 from geometry.atomic import write_text
 from geometry.errors import UserError
 

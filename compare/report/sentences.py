@@ -1,19 +1,18 @@
 """Sentences of the report: the certificate of a result, and the effect of the markers on the stress."""
 
 from compare.evaluation.certificate import Certificate
+from compare.evaluation.certification import REGIONS
 from compare.evaluation.comparison import Comparison
-from compare.evaluation.convergence import CERTIFIED_LAW
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import force_error, truth_differences
-from compare.evaluation.number_format import distance, percent
-from compare.evaluation.regions import REGIONS
+from compare.runtime.tables import distance, percent
 
 
 def certificate_sentences(evaluation: Evaluation, load: str = "mean") -> str:
     """Sentences on the certificate of a result under a kind of load, or the reason why there is none."""
     label, certificate = evaluation.label, evaluation.certificate
-    if evaluation.law != CERTIFIED_LAW:
-        return f"{label} has no certificate: there is one for the {CERTIFIED_LAW} law only."
+    if evaluation.law != "linear":
+        return f"{label} has no certificate: there is one for the linear law only."
     if evaluation.in_sample:
         return f"{label} has no certificate: it pays energy for the markers that it was given."
     if evaluation.solid:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from math import hypot, isfinite, nan
 from typing import Any, NamedTuple
 
-from compare.evaluation.number_format import NONE, number, percent
+from compare.runtime.tables import NONE, number, percent
 
 Numbers = Mapping[str, Any]
 """A part of `metrics.json`, or of what `metrics` gives."""

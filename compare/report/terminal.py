@@ -6,8 +6,8 @@ from rich.table import Table
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import force_error, reference_differences, truth_differences
-from compare.evaluation.number_format import NONE, percent
 from compare.report.tables import PAPER, Row, millimetres, printed_rows, seconds, table_one
+from compare.runtime.tables import NONE, percent
 
 
 def marker_table(comparison: Comparison) -> Table:

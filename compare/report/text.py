@@ -6,7 +6,7 @@ import numpy as np
 from markupsafe import Markup
 
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.number_format import distance, number, percent
+from compare.runtime.tables import distance, number, percent
 from geometry.arrays import FloatArray
 from geometry.finger.finger import Finger
 from geometry.observations import Observations

@@ -7,8 +7,7 @@ from pathlib import Path
 
 from rich.table import Table
 
-from compare.evaluation.number_format import NONE
-from compare.runtime.tables import Cell, terminal_table, write_csv
+from compare.runtime.tables import NONE, Cell, terminal_table, write_csv
 from studies.gridsearch.training_run import TrainingMetrics, TrainingRun
 
 UNITS = {

@@ -50,7 +50,7 @@ def track(
         write_forces,
     )
     from compare.camera.track_film import displacement_line, track_film, track_table
-    from compare.evaluation.shared_mesh import shared_mesh
+    from compare.pipeline.shared_mesh import shared_mesh
     from compare.runtime.output_folder import check_output, replaced_folder, write_run
     from compare.runtime.provenance import machine, package_versions
     from compare.runtime.stages import Stages

@@ -77,9 +77,9 @@ def compare(
         quiet: Show no progress and no table.
         json_: Print metrics.json and nothing else.
     """
-    from compare.evaluation.shared_mesh import tolerance_reached
     from compare.pipeline.job import Job
     from compare.pipeline.pipeline import run
+    from compare.pipeline.shared_mesh import tolerance_reached
     from compare.report.terminal import body_table, marker_table
     from compare.runtime.stages import Stages
     from pinnray.commands.launch import on_ranks

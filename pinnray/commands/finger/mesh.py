@@ -22,8 +22,8 @@ def mesh(
         adapt: Refine the mesh until the estimated error of fem at the markers is below this, mm.
         out: Output folder.
     """
-    from compare.evaluation.shared_mesh import shared_mesh, tolerance_reached, write_rounds
     from compare.figures.mesh_drawing import draw_mesh
+    from compare.pipeline.shared_mesh import shared_mesh, tolerance_reached, write_rounds
     from compare.report.vtu_file import write_mesh
     from compare.runtime.stages import Stages
 

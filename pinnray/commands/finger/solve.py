@@ -33,13 +33,13 @@ def solve(
         measurements: CSV file of marker displacements, for an assimilating solver.
         out: VTU file of the fields.
     """
-    from compare.evaluation.convergence import with_certificates
+    from compare.evaluation.certification import with_certificates
     from compare.evaluation.deformed_body import with_body_checks
     from compare.evaluation.force_displacement import force_curves, write_force_displacement
     from compare.evaluation.metrics import evaluated
     from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
-    from compare.evaluation.shared_mesh import shared_mesh, tolerance_reached
     from compare.figures.force_chart import draw_force_displacement
+    from compare.pipeline.shared_mesh import shared_mesh, tolerance_reached
     from compare.report.vtu_file import write_vtu
     from compare.runtime.stages import Stages
     from solvers.problem import Problem

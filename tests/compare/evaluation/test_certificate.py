@@ -16,11 +16,9 @@ from compare.evaluation.certificate import (
     WORK_LIMIT,
     Certificate,
 )
-from compare.evaluation.certification import Certifier
-from compare.evaluation.convergence import with_certificate, with_certificates
+from compare.evaluation.certification import Certifier, body_regions, with_certificate, with_certificates
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import reference_differences
-from compare.evaluation.regions import body_regions
 from compare.report.sentences import certificate_sentences
 from geometry.arrays import FloatArray, IntArray
 from geometry.cache import finger_mesh

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from compare.evaluation.certificate import Certificate, Region
+from compare.evaluation.certification import with_certificate
 from compare.evaluation.comparison import Comparison
-from compare.evaluation.convergence import with_certificate
 from compare.evaluation.evaluation import Evaluation
 from compare.figures.fields import DECADES, draw_excess, excess_scale
 from compare.report.sentences import certificate_sentences

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from compare.evaluation.certification import with_certificates
 from compare.evaluation.comparison import Comparison
-from compare.evaluation.convergence import with_certificates
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import held_out_errors, marker_errors
 from compare.figures import FORMATS, draw_all

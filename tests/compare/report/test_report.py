@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from compare.evaluation.certification import with_certificates
 from compare.evaluation.comparison import Comparison
-from compare.evaluation.convergence import with_certificates
 from compare.evaluation.evaluation import Evaluation
-from compare.evaluation.number_format import distance, number, percent
 from compare.figures import Picture
 from compare.report import html_report
 from compare.report.text import record, sentence, stat
+from compare.runtime.tables import distance, number, percent
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.fem.adaptive_refinement import Adaptation, RefinementRound

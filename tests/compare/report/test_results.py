@@ -9,7 +9,7 @@ from numbers import Real
 import numpy as np
 import pytest
 
-from compare.evaluation.convergence import with_certificates
+from compare.evaluation.certification import with_certificates
 from compare.evaluation.metrics import marker_errors, reference_differences
 from compare.report.metrics_json import metrics
 from geometry.finger.design import Design

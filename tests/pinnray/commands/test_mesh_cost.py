@@ -43,7 +43,7 @@ def test_consent_goes_on(tmp_path, monkeypatch):
     def mesh(*_: object, **__: object) -> None:
         raise Began
 
-    monkeypatch.setattr("compare.evaluation.shared_mesh.finger_mesh", mesh)
+    monkeypatch.setattr("compare.pipeline.shared_mesh.finger_mesh", mesh)
     with pytest.raises(Began):
         main(["compare", "--mesh-size", "0.02", "--yes", "--quiet", "--out", str(tmp_path / "out")])
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from compare.crossval.true_fields import FieldSampler
-from compare.evaluation.convergence import with_certificates
+from compare.evaluation.certification import with_certificates
 from compare.evaluation.evaluation import Evaluation
 from compare.report.sentences import certificate_sentences
 from geometry.errors import UserError

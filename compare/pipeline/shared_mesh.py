@@ -1,11 +1,11 @@
-"""The shared mesh, refined first if that is asked for."""
+"""The mesh that the solvers share, refined first if a tolerance asks for it."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from compare.runtime.exits import say
 from compare.runtime.stages import Stages
-from compare.runtime.tables import write_csv
+from compare.runtime.tables import Cell, write_csv
 from geometry.cache import finger_mesh
 from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
@@ -27,14 +27,14 @@ def shared_mesh(
     solvers: Sequence[Solver] = (),
     check: Callable[[TriangleMesh], None] | None = None,
 ) -> tuple[TriangleMesh, Adaptation | None]:
-    """The mesh of a finger, refined until `fem` knows the markers to a tolerance if one is given.
+    """Mesh a finger, and refine until `fem` knows the markers to a tolerance if one is given.
 
     Args:
         design: The finger.
         settings: Element sizes of the first mesh.
-        stages: Told of the progress.
+        stages: Shows the progress.
         tolerance: Largest estimated error of u or v at a marker, mm.
-        material: Its elastic constants; the law is the linear one.
+        material: Elastic constants; the law is the linear one.
         load: What moves the finger.
         solvers: If `fem` is one of them, the degree of its elements is taken.
         check: Raises a `UserError` if the first mesh will not do.
@@ -54,15 +54,10 @@ def shared_mesh(
     from solvers.fem.adaptive_refinement import adapted
 
     degrees = [solver.settings()["degree"] for solver in solvers if solver.name == "fem"]
-    linear = material.model_copy(update={"law": "linear"})
+    problem = Problem(mesh, material.model_copy(update={"law": "linear"}), load)
+    degree = int(str(degrees[0])) if degrees else 2
     with stages.stage("adapt") as progress:
-        adaptation = adapted(
-            Problem(mesh, linear, load),
-            tolerance,
-            degree=int(str(degrees[0])) if degrees else 2,
-            section=design.section,
-            progress=progress,
-        )
+        adaptation = adapted(problem, tolerance, degree=degree, section=design.section, progress=progress)
         if not adaptation.reached:
             progress(1.0, adaptation.message)
     return adaptation.mesh, adaptation
@@ -70,24 +65,22 @@ def shared_mesh(
 
 def write_rounds(path: Path, adaptation: Adaptation) -> None:
     """Write a row for every mesh on the way, the last one the shared mesh."""
-    write_csv(
-        path,
-        [
-            {
-                "round": number,
-                "triangles": step.triangles,
-                "nodes": step.nodes,
-                "markers_mm": step.at_markers,
-                "energy_norm_rel": step.energy_norm,
-            }
-            for number, step in enumerate(adaptation.rounds)
-        ],
-    )
+    rows: list[dict[str, Cell]] = [
+        {
+            "round": number,
+            "triangles": step.triangles,
+            "nodes": step.nodes,
+            "markers_mm": step.at_markers,
+            "energy_norm_rel": step.energy_norm,
+        }
+        for number, step in enumerate(adaptation.rounds)
+    ]
+    write_csv(path, rows)
 
 
 def tolerance_reached(adaptation: Adaptation | None) -> bool:
-    """True if no tolerance was given or it was reached; else a line on standard error."""
+    """True unless a tolerance was missed, on which a line goes to standard error."""
     if adaptation is None or adaptation.reached:
         return True
-    say(f"error: tolerance of {adaptation.tolerance:g} mm: {adaptation.message}")
+    say(f"error: {adaptation.message}")
     return False
