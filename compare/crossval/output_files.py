@@ -11,9 +11,9 @@ from compare.crossval.folds import ONE, SeedResults
 from compare.crossval.result import Case, CrossvalResult
 from compare.crossval.tables import grids, write_tables
 from compare.figures import FORMATS
-from compare.runtime.html import template_environment
+from compare.runtime.html import write_page
 from compare.runtime.tables import Cell, write_csv
-from geometry.atomic import write_json, write_text
+from geometry.atomic import write_json
 from geometry.content_hash import file_digest
 from geometry.figure import Figure
 
@@ -56,16 +56,22 @@ def write_results(
             *out.glob(f"{name}-*.{kind}"),
         } - saved:  # of an earlier study
             path.unlink()
-    template = template_environment().get_template("crossval.html.j2")
-    html = template.render(result=result, answers=answers(result), grids=grids(result), pictures=pictures)
-    write_text(out / "report.html", html)
+    said = answers(result)
+    write_page(
+        out / "report.html",
+        "crossval.html.j2",
+        result=result,
+        answers=said,
+        tables=grids(result),
+        pictures=pictures,
+    )
     written = [path for path in sorted(out.glob("*.*")) if path.suffix in (".csv", ".png", ".html")]
     write_json(
         out / "crossval.json",
         {
             **provenance,
             **result.content(),
-            "answers": answers(result),
+            "answers": said,
             "files_sha256": {path.name: file_digest(path) for path in written},
         },
     )

@@ -8,11 +8,10 @@ from rich.table import Table
 from rich.text import Text
 
 from compare.crossval.folds import ALL, SCHEMES, SeedResults
-from compare.crossval.grid import Grid
 from compare.crossval.result import Case, CrossvalResult, LayoutResult
 from compare.crossval.scores import FIELDS, LEVEL, Difference, Interval
 from compare.crossval.truth_summary import truth_grids, truth_rows
-from compare.runtime.tables import NONE, Cell, percent, significant, terminal_table, write_csv
+from compare.runtime.tables import NONE, Cell, TextTable, percent, significant, terminal_table, write_csv
 
 SHORT = {"not told apart": "≈"}
 """Short forms of verdicts."""
@@ -26,7 +25,7 @@ CAPTION = (
 )
 
 
-def grids(result: CrossvalResult) -> list[Grid]:
+def grids(result: CrossvalResult) -> list[TextTable]:
     """Solvers by truths, one table of the markers for each scheme, and one of the fields."""
     held = [scheme for scheme in result.schemes if scheme != ALL]
     headings = [
@@ -42,7 +41,7 @@ def grids(result: CrossvalResult) -> list[Grid]:
         "with-\nin",
     ]
     markers = [
-        Grid(
+        TextTable(
             f"{scheme}: {SCHEMES[scheme]}; {result.study.label} markers, mm",
             headings,
             _by_case(result, _marker_row, [scheme]),
@@ -124,10 +123,10 @@ def _marker_row(result: LayoutResult, label: str, scheme: str) -> list[str]:
     ]
 
 
-def _field_grid(result: CrossvalResult) -> Grid:
+def _field_grid(result: CrossvalResult) -> TextTable:
     """Relative L2 distances from the truth, a row for each scheme and solver."""
     headings = ["solver", "held out", "displ.", "vs\nfem", "strain", "vs\nfem", "v.\nMises", "vs\nfem"]
-    return Grid(
+    return TextTable(
         "Relative L2 distance from the truth over the body, %",
         [*headings, "truth's\nlaw"],
         _by_case(result, _field_row, result.schemes),

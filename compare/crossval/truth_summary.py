@@ -3,12 +3,11 @@
 from collections.abc import Iterable, Mapping, Sequence
 
 from compare.crossval.folds import ALL, SCHEMES
-from compare.crossval.grid import Grid
 from compare.crossval.result import CrossvalResult, LayoutResult, interval_cells
 from compare.crossval.scores import LEVEL, Score
 from compare.crossval.study import Study
 from compare.evaluation.truths import Truth
-from compare.runtime.tables import NONE, Cell, distance, percent
+from compare.runtime.tables import NONE, Cell, TextTable, distance, percent
 from solvers.solver import with_law
 
 NULL_MODELS = ("gp", "statfem")
@@ -24,7 +23,7 @@ def held_out_scheme(result: CrossvalResult) -> str:
     return next(scheme for scheme in SCHEMES if scheme in result.schemes and scheme != ALL)
 
 
-def truth_grids(result: CrossvalResult) -> list[Grid]:
+def truth_grids(result: CrossvalResult) -> list[TextTable]:
     """Tables of solvers by truths for each layout, as many as fit the truths; none with measurements."""
     if not result.study.chosen_truths:
         return []
@@ -40,12 +39,12 @@ def truth_grids(result: CrossvalResult) -> list[Grid]:
         }
         for part in _parts(labels, columns):
             rows = zip(labels, *(columns[truth] for truth in part), strict=True)
-            grids.append(Grid(title, ["solver", *part], [list(row) for row in rows]))
+            grids.append(TextTable(title, ["solver", *part], [list(row) for row in rows]))
             title = ""
         last = grids[-1]
         sentences = verdict_sentences(by_truth, scheme) if len(by_truth) > 1 else []
         caption = "\n".join([_caption(result.study), *sentences])
-        grids[-1] = Grid(last.title, last.headings, last.rows, caption)
+        grids[-1] = TextTable(last.title, last.headings, last.rows, caption)
     return [*grids, *_stated_grids(result)]
 
 
@@ -180,7 +179,7 @@ def shared_sentence(study: Study, truth: Truth) -> str:
     return f"{truth.name}: {', '.join(parts) or 'other law, walls and load than every solver'}"
 
 
-def _stated_grids(result: CrossvalResult) -> list[Grid]:
+def _stated_grids(result: CrossvalResult) -> list[TextTable]:
     """Shares of stated intervals that hold the truth, %; none where no solver states any."""
 
     def share(value: float | None) -> str:
@@ -198,7 +197,7 @@ def _stated_grids(result: CrossvalResult) -> list[Grid]:
     if not rows:
         return []
     return [
-        Grid(
+        TextTable(
             f"Truth within the intervals of {LEVEL:.0%} that a solver states, every marker given, %",
             ["solver", "truth", "layout", "von Mises", "force", "position"],
             rows,

@@ -10,13 +10,12 @@ from typing import Any
 from compare.evaluation.metrics import MEANS
 from compare.report.metrics_json import SCHEMA
 from compare.report.summary import Answer, answers
-from compare.runtime.html import picture_urls, template_environment
+from compare.runtime.html import picture_urls, write_page
 from compare.runtime.output_folder import RUN_FILE, check_links
-from compare.runtime.tables import NONE, Cell, number, percent, write_csv
-from geometry.atomic import write_text
+from compare.runtime.tables import NONE, Cell, TextTable, number, percent, write_csv
 from geometry.errors import UserError
 
-PAGE, TABLE = "runs.html", "runs.csv"
+TABLE = "runs.csv"
 PICTURES = {"overlay.png": "Deformed finger", "von_mises.png": "Von Mises stress"}
 """Pictures of a run that stand side by side."""
 MOST_PICTURES = 12
@@ -98,7 +97,7 @@ def _read(name: str, folder: Path) -> Run:
         )
     run = Run(name, folder, metrics, record)
     try:  # what is asked of it later
-        _ = run.answers, run.settings, table([run])
+        _ = run.answers, run.settings, run_rows([run])
     except (AttributeError, LookupError, TypeError, ValueError):
         raise UserError(
             f"{folder / 'metrics.json'} is damaged: a number is missing; make the run again"
@@ -114,36 +113,41 @@ def _flat(value: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str
             yield f"{prefix}{key}", NONE if inner is None else str(inner)
 
 
-def differences(runs: Sequence[Run]) -> list[list[str]]:
-    """The settings in which runs differ: a name, and its value in every run."""
+def differing_settings(runs: Sequence[Run]) -> TextTable:
+    """The settings in which runs differ, with their values in every run."""
     settings = [run.settings for run in runs]
     names = dict.fromkeys(name for own in settings for name in own)
     rows = [[name, *(own.get(name, NONE) for own in settings)] for name in names]
-    return [row for row in rows if len(set(row[1:])) > 1]
+    headings = ["Setting", *(run.name for run in runs)]
+    return TextTable(
+        "Settings that are not the same in all runs",
+        headings,
+        [row for row in rows if len(set(row[1:])) > 1],
+        left=headings,
+    )
 
 
-def spread(runs: Sequence[Run]) -> list[list[str]]:
-    """A row for each solver of several runs: how many, and the least and largest of its numbers."""
+def ranges(runs: Sequence[Run]) -> TextTable:
+    """Least and largest numbers of each solver that several runs have."""
     rows = []
     for solver in dict.fromkeys(name for run in runs for name in run.metrics["solvers"]):
-        own = [row for row in table(runs) if row["solver"] == solver]
+        own = [row for row in run_rows(runs) if row["solver"] == solver]
         if len(own) < 2:
             continue
         columns = ("held_out_mae_sum_mm", "to_truth_displacement_rel_l2", "to_truth_von_mises_rel_l2")
-        cells = [[float(row[column]) for row in own if row[column] != ""] for column in columns]
-        held_out, *shares = cells
-        rows.append(
-            [
-                solver,
-                str(len(own)),
-                f"{min(held_out):.3f} to {max(held_out):.3f}" if held_out else NONE,
-                *(f"{percent(min(each), 2)} to {percent(max(each), 2)}" if each else NONE for each in shares),
-            ]
-        )
-    return rows
+        held_out, *shares = [[float(row[column]) for row in own if row[column] != ""] for column in columns]
+        texts = [f"{min(held_out):.3f} to {max(held_out):.3f}" if held_out else NONE]
+        texts += [f"{percent(min(each), 2)} to {percent(max(each), 2)}" if each else NONE for each in shares]
+        rows.append([solver, str(len(own)), *texts])
+    return TextTable(
+        "Least and largest over the runs: mean |Δu| + |Δv| at held-out markers, mm; relative L² distance "
+        "from the simulated finger",
+        ["Solver", "runs", "held out, mm", "displacement", "von Mises stress"],
+        rows,
+    )
 
 
-def table(runs: Sequence[Run]) -> list[dict[str, Cell]]:
+def run_rows(runs: Sequence[Run]) -> list[dict[str, Cell]]:
     """A row for each solver of each run; an empty cell is a number that does not exist.
 
     `given` are errors at markers that the solver was given, `held_out` at markers that it was not.
@@ -211,30 +215,29 @@ GROUPS = {
         "time, s": "seconds_s",
     },
 }
-"""Tables of the page: title, and the columns of `table` under their headings."""
+"""Tables of the page: title, and the columns of `run_rows` under their headings."""
 
 
-def grids(runs: Sequence[Run]) -> list[dict[str, Any]]:
-    """The tables of the page as text; rows without a number are left out."""
+def number_tables(runs: Sequence[Run]) -> list[TextTable]:
+    """The tables of the page; rows without a number are left out."""
     found = []
-    rows = table(runs)
     for title, columns in GROUPS.items():
-        cells = [
+        headings = ["Run", "solver", "markers", *columns]
+        rows = [
             [
                 str(row["run"]),
                 f"{row['solver']}{'' if row['converged'] else ' (not converged)'}",
                 str(row["observations"]),
                 *(_text(row[column], column.startswith("to_")) for column in columns.values()),
             ]
-            for row in rows
+            for row in run_rows(runs)
         ]
-        cells = [row for row in cells if set(row[3:]) != {NONE}]
-        if cells:
-            found.append({"title": title, "heads": ["Run", "solver", "markers", *columns], "rows": cells})
+        if rows := [row for row in rows if set(row[3:]) != {NONE}]:
+            found.append(TextTable(title, headings, rows, left=headings[:3]))
     return found
 
 
-def write_runs(folder: Path, runs: Sequence[Run]) -> tuple[Path, Path]:
+def write_side_by_side(folder: Path, runs: Sequence[Run]) -> tuple[Path, Path]:
     """Write the page and the table of runs into a folder, atomically, and return their paths."""
     pictures = {
         title: {
@@ -245,20 +248,17 @@ def write_runs(folder: Path, runs: Sequence[Run]) -> tuple[Path, Path]:
         for file, title in PICTURES.items()
         if len(runs) <= MOST_PICTURES
     }
-    page = (
-        template_environment()
-        .get_template("runs.html.j2")
-        .render(
-            runs=runs,
-            differences=differences(runs),
-            spread=spread(runs),
-            grids=grids(runs),
-            pictures=pictures,
-            urls=picture_urls([path for paths in pictures.values() for path in paths.values()]),
-            sources={run.metrics["measurements"]["source"] for run in runs},
-            table=TABLE,
-        )
+    page = write_page(
+        folder / "runs.html",
+        "runs.html.j2",
+        runs=runs,
+        differences=differing_settings(runs),
+        ranges=ranges(runs),
+        tables=number_tables(runs),
+        pictures=pictures,
+        urls=picture_urls([path for paths in pictures.values() for path in paths.values()]),
+        sources={run.metrics["measurements"]["source"] for run in runs},
+        file=TABLE,
     )
-    write_text(folder / PAGE, page)
-    write_csv(folder / TABLE, table(runs))
-    return folder / PAGE, folder / TABLE
+    write_csv(folder / TABLE, run_rows(runs))
+    return page, folder / TABLE

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from math import hypot, isfinite, nan
 from typing import Any, NamedTuple
 
-from compare.runtime.tables import NONE, number, percent
+from compare.runtime.tables import NONE, TextTable, number, percent
 
 Numbers = Mapping[str, Any]
 """A part of `metrics.json`, or of what `metrics` gives."""
@@ -33,17 +33,13 @@ class Answer(NamedTuple):
         question: The question.
         verdict: The answer in a sentence.
         sentences: The numbers that it rests on, each in a sentence.
-        heads: Headings of a table of them, if there is one.
-        rows: Its cells.
-        caption: Its caption.
+        table: A table of them, if there is one.
     """
 
     question: str
     verdict: str
     sentences: list[str]
-    heads: Sequence[str] = ()
-    rows: Sequence[Sequence[str]] = ()
-    caption: str = ""
+    table: TextTable | None = None
 
 
 def answers(
@@ -183,7 +179,7 @@ def _markers(metrics: Numbers) -> Answer | None:
     if plain["to_truth"]:
         caption += ", and distance from the simulated finger over the whole body"
     rows = [list(row) for row in zip(*columns, strict=True)]
-    return Answer("Did the markers help?", verdict, sentences, heads, rows, caption)
+    return Answer("Did the markers help?", verdict, sentences, TextTable(caption, heads, rows))
 
 
 def _held_out(own: Numbers) -> tuple[float, float, float]:

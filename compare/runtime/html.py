@@ -1,20 +1,32 @@
-"""The Jinja environment of the HTML pages."""
+"""HTML pages from the templates of `compare/templates`, which all extend the shell `page.html.j2`."""
 
 import base64
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from PIL import Image
 
+from geometry.atomic import write_text
 from geometry.errors import UserError
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
 SMALL = 300_000
 """Bytes up to which a picture, as a rule one of lines, is embedded as it is."""
+
+
+def write_page(path: Path, template: str, **values: Any) -> Path:
+    """Render a template with values and write the page, atomically.
+
+    `designs.html.j2` is a page of tables and pictures: it takes `title`, `sentences`, `tables` (each a
+    `TextTable`), `pictures` (captions by the path of the PNG file) and `note`, its last line.
+    """
+    write_text(path, template_environment().get_template(template).render(**values))
+    return path
 
 
 def template_environment() -> Environment:

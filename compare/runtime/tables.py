@@ -1,7 +1,8 @@
-"""Numbers as text, and tables: as CSV files, written atomically, and for the terminal."""
+"""Numbers as text; tables of texts for the terminal and pages, of cells for CSV files, written atomically."""
 
 import csv
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
 
@@ -43,6 +44,25 @@ def plain(cell: Cell) -> Cell:
     return cell
 
 
+@dataclass(frozen=True)
+class TextTable:
+    """A table of texts; `tables.html.j2` has the macro that puts it on a page.
+
+    Attributes:
+        title: Above the table.
+        headings: Headings of the columns.
+        rows: As many texts as headings.
+        caption: Below the table.
+        left: Headings of the columns that are aligned to the left.
+    """
+
+    title: str
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    caption: str = ""
+    left: Collection[str] = ()
+
+
 def terminal_table(
     title: str,
     headings: Sequence[str],
@@ -52,15 +72,9 @@ def terminal_table(
     left: Collection[str] = (),
     narrow: bool = False,
 ) -> Table:
-    """A table with a title above and a caption below.
+    """A table of texts for the terminal; arguments as the attributes of `TextTable`.
 
-    Args:
-        title: Above the table.
-        headings: Headings of the columns.
-        rows: As many texts as headings.
-        caption: Below the table.
-        left: Headings of the columns that are aligned to the left; the others are aligned to the right.
-        narrow: Whether columns stand as close as they can.
+    `narrow` sets the columns as close as they can stand.
     """
     table = Table(
         title=title or None,

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from compare.runtime.html import template_environment
+from compare.runtime.html import write_page
+from compare.runtime.tables import TextTable
 from geometry.atomic import write_text
 from geometry.cache import finger_mesh
 from geometry.drawing.definition import finger_from
@@ -22,7 +23,6 @@ from studies.optimum.pictures import draw_front, draw_front_fingers, draw_growth
 from studies.optimum.search import Optimum
 from studies.sweep.quantities import QUANTITIES, heading
 from studies.sweep.study import Task, TaskMaker, load_of, material_of, title
-from studies.sweep.tables import Grid
 
 PAGE = "front.html"
 
@@ -79,20 +79,16 @@ def write_front(
         "growth": (draw_growth(optimum), "Hypervolume of the front over the number of runs."),
     }
     pictures = {each.save(folder / f"{name}.png", formats): text for name, (each, text) in drawn.items()}
-    page = (
-        template_environment()
-        .get_template("designs.html.j2")
-        .render(
-            title=f"Front of {optimum.question.study.name}",
-            summary=summary(optimum),
-            grids=[grid],
-            pictures=pictures,
-            files=FILES,
-            provenance=f"Started {record['started']}.",
-        )
+    page = write_page(
+        folder / PAGE,
+        "designs.html.j2",
+        title=f"Front of {optimum.question.study.name}",
+        sentences=summary(optimum),
+        tables=[grid],
+        pictures=pictures,
+        note=f"Files beside this page: {FILES}. Started {record['started']}.",
     )
-    write_text(folder / PAGE, page)
-    return FrontFiles([folder / PAGE, folder / "front.csv", *pictures], designs)
+    return FrontFiles([page, folder / "front.csv", *pictures], designs)
 
 
 def summary(optimum: Optimum) -> list[str]:
@@ -119,7 +115,7 @@ def summary(optimum: Optimum) -> list[str]:
     ]
 
 
-def front_grid(optimum: Optimum) -> Grid:
+def front_grid(optimum: Optimum) -> TextTable:
     """A row for each run on the front: parameters and quantities."""
     varied, first = list(optimum.question.study.varied), optimum.question.names
     others = [name for name in QUANTITIES if name not in first]
@@ -134,7 +130,7 @@ def front_grid(optimum: Optimum) -> Grid:
         texts = (f"{value:.6g}" if isinstance(value, float) else str(value) for value in numbers)
         rows.append((str(place), str(run), *texts))
     headings = ("finger", "run", *map(heading, first), *map(title, varied), *map(heading, others))
-    return Grid("Fingers on the front", headings, rows)
+    return TextTable("Fingers on the front", headings, rows)
 
 
 def spread(optimum: Optimum, count: int = DRAWN) -> list[int]:

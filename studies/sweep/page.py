@@ -4,8 +4,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from compare.runtime.html import template_environment
-from geometry.atomic import write_text
+from compare.runtime import html
 from studies.sweep.pictures import SHOWN, draw_fingers, draw_pairs, draw_sensitivity
 from studies.sweep.sensitivity import TRUSTED, Sensitivity, sensitivities
 from studies.sweep.study import TaskMaker
@@ -48,20 +47,16 @@ def write_page(
             drawn["sensitivity"] = (draw_sensitivity(found), sensitivity_caption(found))
         pictures = {each.save(folder / f"{name}.png", formats): text for name, (each, text) in drawn.items()}
     failures = failure_grid(sweep)
-    page = (
-        template_environment()
-        .get_template("designs.html.j2")
-        .render(
-            title=f"Sweep {sweep.study.name}",
-            summary=summary(sweep),
-            grids=[quantity_grid(sweep), *([failures] if failures.rows else [])],
-            pictures=pictures,
-            files=FILES,
-            provenance=f"Started {record['started']}.",
-        )
+    page = html.write_page(
+        folder / PAGE,
+        "designs.html.j2",
+        title=f"Sweep {sweep.study.name}",
+        sentences=summary(sweep),
+        tables=[quantity_grid(sweep), *([failures] if failures.rows else [])],
+        pictures=pictures,
+        note=f"Files beside this page: {FILES}. Started {record['started']}.",
     )
-    write_text(folder / PAGE, page)
-    return [folder / PAGE, *pictures]
+    return [page, *pictures]
 
 
 def summary(sweep: Sweep) -> list[str]:

@@ -1,14 +1,13 @@
 """The samples of a sweep as a table: Parquet and CSV, with units in the headings."""
 
 import re
-from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from compare.runtime.tables import plain
+from compare.runtime.tables import TextTable, plain
 from geometry.atomic import write_bytes, write_text
 from studies.sweep.quantities import QUANTITIES, heading
 from studies.sweep.study import title
@@ -40,24 +39,7 @@ def write_tables(sweep: Sweep, folder: Path) -> list[Path]:
     return [folder / "samples.parquet", folder / "samples.csv"]
 
 
-@dataclass(frozen=True)
-class Grid:
-    """A table of texts.
-
-    Attributes:
-        title: Above it.
-        headings: Of the columns.
-        rows: Texts, as many as headings.
-        left: Numbers of the columns that are aligned to the left.
-    """
-
-    title: str
-    headings: tuple[str, ...]
-    rows: list[tuple[str, ...]]
-    left: tuple[int, ...] = (0,)
-
-
-def quantity_grid(sweep: Sweep) -> Grid:
+def quantity_grid(sweep: Sweep) -> TextTable:
     """Least, median and largest value of each quantity over the converged samples."""
     rows = []
     for name, quantity in QUANTITIES.items():
@@ -67,10 +49,11 @@ def quantity_grid(sweep: Sweep) -> Grid:
         numbers = [f"{end:.4g}" for end in ends] or ["–"] * 3
         rows.append((name, quantity.unit, *numbers, quantity.meaning))
     headings = ("quantity", "unit", "least", "median", "largest", "meaning")
-    return Grid(f"Quantities of {len(sweep.good)} fingers", headings, rows, (0, 1, 5))
+    title = f"Quantities of {len(sweep.good)} fingers"
+    return TextTable(title, headings, rows, left=("quantity", "unit", "meaning"))
 
 
-def failure_grid(sweep: Sweep) -> Grid:
+def failure_grid(sweep: Sweep) -> TextTable:
     """Samples without a result, and those that did not converge: counts of each reason."""
     reasons: dict[tuple[str, str], list[int]] = {}
     for each in sweep.measurements:
@@ -80,7 +63,8 @@ def failure_grid(sweep: Sweep) -> Grid:
     for (state, reason), numbers in sorted(reasons.items(), key=lambda entry: -len(entry[1])):
         few = ", ".join(map(str, numbers[:FEW])) + (" ..." if numbers[FEW:] else "")
         rows.append((state, str(len(numbers)), reason, few))
-    return Grid("Samples without a result", ("state", "samples", "reason", "numbers"), rows, (0, 2, 3))
+    headings = ("state", "samples", "reason", "numbers")
+    return TextTable("Samples without a result", headings, rows, left=("state", "reason", "numbers"))
 
 
 def _kind_of(message: str) -> str:

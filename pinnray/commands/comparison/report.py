@@ -21,7 +21,7 @@ def report(*runs: Path, out: OptionalOutputPath = None) -> int:
             a page runs.html and a table runs.csv with all of their numbers.
         out: Folder of the page and the table; default out/side-by-side.
     """
-    from compare.report.runs import read_runs, write_runs
+    from compare.report.runs import read_runs, write_side_by_side
 
     if not runs:
         raise UserError("no run was given; name output folders of compare, such as out/default")
@@ -30,7 +30,7 @@ def report(*runs: Path, out: OptionalOutputPath = None) -> int:
         folder = Path("out/side-by-side") if out is None else out
         if folder.exists() and not folder.is_dir():
             raise UserError(f"{folder} is a file; name an output folder")
-        page, table = write_runs(folder, found)
+        page, table = write_side_by_side(folder, found)
         print(f"report: {page}\ntable: {table}")
         return 0
     if out is not None:

@@ -52,8 +52,7 @@ def sweep(
         if grid.rows:
             shown = [row[:5] if grid is quantities else row[:3] for row in grid.rows]
             headings = grid.headings[: len(shown[0])]
-            left = [headings[place] for place in grid.left if place < len(headings)]
-            Console().print(terminal_table(grid.title, headings, shown, left=left))
+            Console().print(terminal_table(grid.title, headings, shown, left=grid.left))
     for path in written:
         print(path)
     for remark in done.remarks:

@@ -16,7 +16,7 @@ from compare.figures import Picture
 from compare.pipeline.job import Job, checked
 from compare.report.html_report import render
 from compare.report.metrics_json import metrics
-from compare.report.runs import read_runs, write_runs
+from compare.report.runs import read_runs, write_side_by_side
 from compare.runtime.html import PNG, SMALL, template_environment
 from geometry import Design, UserError
 from geometry.atomic import write_json
@@ -113,7 +113,7 @@ def test_the_page_of_runs_takes_pictures_alone(
     picture.parent.mkdir()
     picture.write_bytes(content + b"%" * padding)
     with pytest.raises(UserError, match=r"overlay\.png is no PNG picture"):
-        write_runs(tmp_path / "both", read_runs([tmp_path / "one", tmp_path / "two"]))
+        write_side_by_side(tmp_path / "both", read_runs([tmp_path / "one", tmp_path / "two"]))
     assert runs == []
 
 

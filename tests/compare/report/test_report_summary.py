@@ -84,7 +84,7 @@ def test_markers_help_by_what_was_held_out_never_by_what_was_given(
     """The reference is 0.7 mm off; the other one meets its markers, and counts with its 0.1 mm."""
     answer = asked(compared(fem, given))[MARKERS]
     assert answer.verdict == "Nearer than fem: at held-out simulated markers fem-asm."
-    assert [row[:2] for row in answer.rows] == [["fem", "0.700"], ["fem-asm", "0.100"]]
+    assert [row[:2] for row in answer.table.rows] == [["fem", "0.700"], ["fem-asm", "0.100"]]
     worse = replace(given, left_out=given.left_out + np.array([5.0, 0.0]))
     assert (
         asked(compared(fem, worse))[MARKERS].verdict == "Nearer than fem: at held-out simulated markers none."

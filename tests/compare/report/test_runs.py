@@ -13,7 +13,7 @@ from PIL import Image
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.report.metrics_json import metrics
-from compare.report.runs import differences, read_runs
+from compare.report.runs import differing_settings, read_runs
 from geometry.atomic import write_json
 from pinnray.cli import main
 
@@ -79,7 +79,7 @@ def test_held_out_and_given_errors_are_in_tables_of_their_own(save: Save, tmp_pa
 
 def test_what_differs_between_runs_is_named(save: Save) -> None:
     runs = read_runs([save("first"), save("second", seed=7)])
-    assert differences(runs) == [["seed pinn-std", "0", "7"]]
+    assert differing_settings(runs).rows == [["seed pinn-std", "0", "7"]]
 
 
 def test_runs_of_one_name_are_told_apart_by_their_paths(save: Save) -> None:
