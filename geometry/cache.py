@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from geometry.atomic import remove_partials, write_bytes
-from geometry.content_hash import content_hash, file_digest
+from geometry.content_hash import content_hash, file_digest, sources_digest
 from geometry.drawing.description import Description
 from geometry.drawing.drawn_finger import DrawnFinger
 from geometry.errors import UserError
@@ -164,14 +164,13 @@ def kept_if_possible(folder: Path, what: str) -> Iterator[None]:
 
 
 def cache_key(digest: str, task: dict[str, object]) -> str:
-    """SHA-256 over a finger's or file's digest, task, package versions and this package's own sources."""
-    sources = sorted(Path(__file__).parent.rglob("*.py"))
+    """SHA-256 over a finger's or file's digest, task, package versions and the sources that CAD and meshing use."""
     parts = {
         "format": FORMAT,
         "content": digest,
         "task": {key: value for key, value in task.items() if key not in ("what", "finger", "file")},
         "versions": {package: _version(package) for package in MAKERS},
-        "sources": [source.read_text(encoding="utf-8") for source in sources],
+        "sources": sources_digest(cache_key),
     }
     return content_hash(parts)
 

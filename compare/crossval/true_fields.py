@@ -10,13 +10,13 @@ from compare.crossval.folds import LoadCase
 from compare.crossval.study import Study
 from compare.evaluation.differences import field_difference
 from compare.evaluation.truths import Truth
-from compare.evaluation.virtual_experiment import SOURCES, simulate
-from compare.runtime.provenance import package_versions, sources_digest
+from compare.evaluation.virtual_experiment import simulate
+from compare.runtime.provenance import package_versions
 from compare.runtime.tables import Cell
 from geometry.arrays import FloatArray
 from geometry.atomic import write_arrays
 from geometry.cache import cache_folder, finger_mesh, kept_if_possible
-from geometry.content_hash import content_hash
+from geometry.content_hash import content_hash, sources_digest
 from geometry.errors import UserError
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
@@ -239,9 +239,7 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Pa
         truth.load(stroke).model_dump(),
         truth.finer,
         package_versions(),
-        sources_digest(
-            [*SOURCES, __name__, "compare.evaluation.truths", "compare.evaluation.virtual_experiment"]
-        ),
+        sources_digest(simulate_truth),
     ]
     names = {
         layout: f"truth-{content_hash([*parts, points.tolist()])}.npz" for layout, points in markers.items()

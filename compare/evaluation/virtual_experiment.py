@@ -13,9 +13,9 @@ import numpy as np
 
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.truths import SLIDING, Truth, check_walls
-from compare.runtime.provenance import package_versions, sources_digest
+from compare.runtime.provenance import package_versions
 from geometry.cache import cache_folder, finger_mesh, kept_if_possible
-from geometry.content_hash import content_hash
+from geometry.content_hash import content_hash, sources_digest
 from geometry.errors import UserError
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
@@ -30,16 +30,6 @@ SOURCE = "simulated by {} ({}); no camera was involved"
 
 SOLID_SIZE = 0.75
 """Element size of a section in three dimensions, mm: some 170,000 unknowns for the default finger."""
-
-SOURCES = (
-    "compare.evaluation.evaluation",
-    "geometry",
-    "solvers.elasticity",
-    "solvers.fem",
-    "solvers.problem",
-    "solvers.solution",
-)
-"""Modules whose change makes a new simulation."""
 
 
 class UnfinishedExperimentError(UserError):
@@ -176,7 +166,7 @@ def _key(solver: Solver, problem: Problem, shared: TriangleMesh) -> str:
         problem.digest,
         solver.settings(),
         package_versions(),
-        sources_digest(SOURCES),
+        sources_digest(virtual_experiment, type(solver)),
         SOURCE,
     ]
     return content_hash(parts)

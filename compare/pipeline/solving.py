@@ -16,9 +16,9 @@ from compare.evaluation.metrics import evaluated
 from compare.pipeline.job import Job
 from compare.runtime.output_folder import SOLUTIONS, TRAINING, take_training
 from compare.runtime.processes import ProcessFailed, end_with_parent, in_processes
-from compare.runtime.provenance import package_versions, sources_digest
+from compare.runtime.provenance import package_versions
 from geometry.atomic import write_text
-from geometry.content_hash import content_hash
+from geometry.content_hash import content_hash, sources_digest
 from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.problem import Problem
@@ -247,12 +247,11 @@ def _evaluate(part: _Part, solver: Solver, stages: Staged) -> Evaluation:
 
 def _key(solver: Solver, problem: Problem, observations: Observations) -> str:
     """SHA-256 over everything that a solution's samples depend on, the solver's own sources included."""
-    package = type(solver).__module__.partition(".")[0]
     parts = [
         solver.name,
         solver.settings(),
         package_versions(),
-        sources_digest(["compare.evaluation.evaluation", "geometry", "solvers", package]),
+        sources_digest(evaluated, type(solver)),
         problem.digest,
         observations.points,
     ]

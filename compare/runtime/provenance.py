@@ -1,13 +1,10 @@
 """Provenance of a result: versions, machine, hashes."""
 
-import hashlib
 import os
 import platform
 import sys
-from collections.abc import Iterable
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
 PACKAGES = (
     "pinn-ray",
@@ -59,20 +56,3 @@ def machine() -> dict[str, str | int]:
 def cores() -> int:
     """Number of processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def sources_digest(modules: Iterable[str]) -> str:
-    """SHA-256 over the Python sources of loaded packages or single modules, in hexadecimal.
-
-    Code of a notebook has no source file and is left out.
-    """
-    sha = hashlib.sha256()
-    for name in sorted(set(modules)):
-        file = getattr(sys.modules.get(name), "__file__", None)
-        if file is None:
-            continue
-        path = Path(file)
-        sources = sorted(path.parent.rglob("*.py")) if path.name == "__init__.py" else [path]
-        for source in sources:
-            sha.update(os.fsencode(source.relative_to(path.parent)) + b"\0" + source.read_bytes())
-    return sha.hexdigest()

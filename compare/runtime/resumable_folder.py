@@ -1,15 +1,16 @@
 """A folder that keeps the finished parts of a long job, so that the same job can go on from them."""
 
 import json
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 from pydantic_core import to_jsonable_python
 
 from compare.runtime.output_folder import check_links
-from compare.runtime.provenance import package_versions, sources_digest
+from compare.runtime.provenance import package_versions
 from geometry.atomic import is_partial
+from geometry.content_hash import sources_digest
 from geometry.errors import UserError
 from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
@@ -17,7 +18,7 @@ from solvers.problem import Load, Material
 
 
 def job_definition(
-    design: Finger, mesh: MeshSettings, material: Material, load: Load, modules: Iterable[str]
+    design: Finger, mesh: MeshSettings, material: Material, load: Load, *makers: Callable[..., Any]
 ) -> dict[str, Any]:
     """Everything that the result of a job on a finger depends on.
 
@@ -26,7 +27,7 @@ def job_definition(
         mesh: Element sizes.
         material: The elastic law.
         load: The prescribed displacement of the contact.
-        modules: Modules that compute the result, besides `geometry` and `solvers`.
+        makers: Functions and classes that make the result, as for `sources_digest`.
     """
     return {
         "schema": 1,
@@ -35,7 +36,7 @@ def job_definition(
         "material": material.model_dump(),
         "load": load.model_dump(mode="json"),
         "versions": package_versions(),
-        "program_sha256": sources_digest([*modules, "geometry", "solvers"]),
+        "program_sha256": sources_digest(*makers),
     }
 
 

@@ -8,10 +8,9 @@ import numpy as np
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save as to_bytes
 
-from compare.runtime.provenance import sources_digest
 from geometry.arrays import FloatArray
 from geometry.atomic import write_bytes
-from geometry.content_hash import content_hash
+from geometry.content_hash import content_hash, sources_digest
 from geometry.errors import UserError
 from studies.emulator.emulator import Emulator, Learnt
 from studies.emulator.gaussian_process import GaussianProcess
@@ -29,7 +28,7 @@ def digest_of(sweep: Sweep, inputs: Inputs) -> str:
             "study": sweep.study.model_dump(mode="json", exclude={"samples"}),
             "base": inputs.base,
             "samples": [(sweep.samples[each.number], each.values) for each in sweep.good],
-            "program": sources_digest(["studies.emulator", "geometry.finger"]),
+            "program": sources_digest(Emulator),
         }
     )
 

@@ -126,9 +126,8 @@ def search_grid(search: GridSearch, stages: Stages | None = None) -> list[Traini
 
 def _definition(search: GridSearch, solver: Solver) -> dict[str, Any]:
     """Everything that the result of a run depends on, except its point of the grid."""
-    modules = ["studies.gridsearch.training_run"]
     searched = {"learning_rate", "bc_weight"}
-    return job_definition(search.design, search.mesh, search.material, search.load, modules) | {
+    return job_definition(search.design, search.mesh, search.material, search.load, train) | {
         "solver": {key: value for key, value in solver.settings().items() if key not in searched}
     }
 

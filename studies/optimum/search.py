@@ -9,11 +9,12 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from compare.runtime.output_folder import locked
-from compare.runtime.provenance import package_versions, sources_digest
+from compare.runtime.provenance import package_versions
 from compare.runtime.resumable_folder import check_resumable_folder
 from compare.runtime.stages import Stages
 from geometry.arrays import FloatArray
 from geometry.atomic import write_json
+from geometry.content_hash import sources_digest
 from geometry.errors import UserError
 from geometry.finger.parameters import Parameters
 from geometry.finger.validation import broken_rule
@@ -213,8 +214,6 @@ def _optimum(question: Question, fingers: list[dict[str, Value]], journal: Journ
 def _definition(question: Question, maker: TaskMaker) -> dict[str, Any]:
     """The question, and everything else on which its results depend."""
     study: Study = question.study
-    modules = ["studies.sweep.quantities", "studies.sweep.measurement", "studies.sweep.sampling"]
-    sources = ["studies.optimum.proposals", "studies.optimum.search", "studies.emulator"]
     first = maker.task(0, samples(study)[0]).definition
     return {
         "schema": 1,
@@ -224,7 +223,7 @@ def _definition(question: Question, maker: TaskMaker) -> dict[str, Any]:
         "runs": question.runs,
         "finger": {name: value for name, value in first.items() if name not in study.varied},
         "versions": package_versions(),
-        "program_sha256": sources_digest([*modules, *sources, "geometry", "solvers"]),
+        "program_sha256": sources_digest(search_front),
     }
 
 

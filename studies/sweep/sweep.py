@@ -9,10 +9,11 @@ from typing import Any
 from compare.evaluation.deformed_body import ADVICE
 from compare.evaluation.plausibility import LOOKS_LIKE
 from compare.runtime.output_folder import check_links, locked
-from compare.runtime.provenance import package_versions, sources_digest
+from compare.runtime.provenance import package_versions
 from compare.runtime.resumable_folder import check_resumable_folder
 from compare.runtime.stages import Stages
 from geometry.atomic import write_json
+from geometry.content_hash import sources_digest
 from geometry.errors import UserError
 from geometry.text_files import read_json
 from solvers.solver import Progress, silent
@@ -141,13 +142,12 @@ def finish(
 
 def _definition(job: SweepJob, first: dict[str, Any]) -> dict[str, Any]:
     """The study, and everything else on which its results depend."""
-    modules = ["studies.sweep.quantities", "studies.sweep.measurement", "studies.sweep.sampling"]
     return {
         "schema": 1,
         "study": job.study.model_dump(mode="json", by_alias=True, exclude_none=True),
         "finger": {name: value for name, value in first.items() if name not in job.study.varied},
         "versions": package_versions(),
-        "program_sha256": sources_digest([*modules, "geometry", "solvers"]),
+        "program_sha256": sources_digest(run_sweep),
     }
 
 
