@@ -139,7 +139,7 @@ def test_another_version_of_a_package_or_of_our_sources_is_simulated_again(probl
     virtual_experiment(problem, 0.8)
     monkeypatch.setattr("compare.evaluation.virtual_experiment.package_versions", lambda: {"numpy": "9"})
     virtual_experiment(problem, 0.8)
-    monkeypatch.setattr("compare.evaluation.virtual_experiment.sources_digest", lambda _: "other")
+    monkeypatch.setattr("compare.evaluation.virtual_experiment.sources_digest", lambda *_: "other")
     virtual_experiment(problem, 0.8)
     assert len(solutions) == 3
 
