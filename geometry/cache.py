@@ -164,13 +164,13 @@ def kept_if_possible(folder: Path, what: str) -> Iterator[None]:
 
 
 def cache_key(digest: str, task: dict[str, object]) -> str:
-    """SHA-256 over a finger's or file's digest, task, package versions and the sources that CAD and meshing use."""
+    """SHA-256 over a finger's or file's digest, task, package versions and this package's own sources."""
     parts = {
         "format": FORMAT,
         "content": digest,
         "task": {key: value for key, value in task.items() if key not in ("what", "finger", "file")},
         "versions": {package: _version(package) for package in MAKERS},
-        "sources": sources_digest(cache_key),
+        "sources": sources_digest(__name__),
     }
     return content_hash(parts)
 

@@ -2,22 +2,17 @@
 
 import hashlib
 import json
-import re
+import os
 import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 PROGRAM = ("geometry", "solvers", "vision", "compare", "studies", "pinnray")
-"""Packages whose sources count where a module imports them."""
+"""The program's packages, from the lowest up."""
 
 _ROOT = Path(__file__).resolve().parent.parent
-_OURS = rf"(?:{'|'.join(PROGRAM)})"
-_IMPORT = re.compile(rf"^[ \t]*(?:from|import) +({_OURS}\b[\w.]*)(?: +import +(\([^)]*\)|.*))?", re.MULTILINE)
-_PLACE = re.compile(rf"""["']({_OURS}(?:\.\w+)+):\w+["']""")
-"""A class that a table names, such as `solvers.fem.linear:FemSolver`."""
 
 
 def content_hash(content: Any) -> str:
@@ -35,73 +30,26 @@ def file_digest(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def sources_digest(*makers: Callable[..., Any]) -> str:
-    """SHA-256 over the sources that the results of functions and classes depend on, in hexadecimal.
+def sources_digest(*modules: str) -> str:
+    """SHA-256 over the sources of modules' packages and of the program's packages below them, in hexadecimal.
+
+    No package of the program imports one above it, so that nothing a result depends on is left out. Code of
+    a notebook has no source file and does not count.
 
     Args:
-        makers: Functions and classes that make the result, as for `source_files`.
+        modules: Names of the modules that make the result, with a solver's of another package.
     """
+    packages = {module.partition(".")[0] for module in modules}
+    ranks = [PROGRAM.index(package) for package in packages.intersection(PROGRAM)]
     sha = hashlib.sha256()
-    for name, path in sorted(source_files(*makers).items()):
-        sha.update(name.encode() + b"\0" + path.read_bytes())
+    for package in sorted(packages.union(PROGRAM[: max(ranks, default=-1) + 1])):
+        file = getattr(sys.modules.get(package), "__file__", None)
+        start = _ROOT / package / "__init__.py" if package in PROGRAM else Path(file) if file else None
+        if start is not None:
+            sources = sorted(start.parent.rglob("*.py")) if start.name == "__init__.py" else [start]
+            for path in sources:
+                sha.update(os.fsencode(path.relative_to(start.parent.parent)) + b"\0" + path.read_bytes())
     return sha.hexdigest()
-
-
-def source_files(*makers: Callable[..., Any]) -> dict[str, Path]:
-    """The modules of functions and classes with all that these import of the program, directly or not.
-
-    Imports inside functions count, and so do modules that a table names as `module:Class`. Of another
-    package, such as that of a solver of others, every module counts.
-
-    Returns:
-        The files by the names of their modules; none for code of a notebook, which has no file.
-    """
-    found: dict[str, Path] = {}
-    waiting = [module for maker in makers for module in _own_modules(maker.__module__)]
-    while waiting:
-        name, path = waiting.pop()
-        if name in found:
-            continue
-        found[name] = path
-        text = path.read_text(encoding="utf-8")
-        for imported in (*_imported(text), *_PLACE.findall(text)):
-            if (file := _file_of(imported)) is not None:
-                waiting.append((imported, file))
-    for name in list(found):  # what runs before a module is imported
-        parent = name.rpartition(".")[0]
-        while (file := _file_of(parent)) is not None:
-            found.setdefault(parent, file)
-            parent = parent.rpartition(".")[0]
-    return found
-
-
-def _own_modules(name: str) -> list[tuple[str, Path]]:
-    """A module of the program; else a loaded module, or all modules of the package that holds it."""
-    if (file := _file_of(name)) is not None:
-        return [(name, file)]
-    top = name.partition(".")[0]
-    if (text := getattr(sys.modules.get(top), "__file__", None)) is None:
-        return []
-    path = Path(text)
-    if path.name != "__init__.py":
-        return [(top, path)]
-    return [(f"{top}/{each.relative_to(path.parent)}", each) for each in path.parent.rglob("*.py")]
-
-
-def _imported(text: str) -> Iterator[str]:
-    """Modules of the program that a source imports, and names in them, which may be modules too."""
-    for module, names in _IMPORT.findall(text):
-        yield module
-        for name in re.findall(r"\w+", names):
-            yield f"{module}.{name}"
-
-
-def _file_of(module: str) -> Path | None:
-    """The file of a module of the program, or None."""
-    if module.partition(".")[0] not in PROGRAM:
-        return None
-    path = _ROOT.joinpath(*module.split("."))
-    return next((file for file in (path.with_suffix(".py"), path / "__init__.py") if file.is_file()), None)
 
 
 def _array_or_text(value: object) -> object:

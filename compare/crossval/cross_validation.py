@@ -46,7 +46,7 @@ def cross_validate(study: Study, stages: Stages | None = None) -> CrossvalResult
     stages = stages or Stages(quiet=True)
     study.check()
     given = study.measurements and visible_markers(study.measurements)
-    definition = study.definition(given, simulate_truth, run_folds)
+    definition = study.definition(given)
     check_resumable_folder(study.out / DEFINITION, definition, job="cross-validation")
     with stages.stage("mesh"):
         mesh = finger_mesh(study.design, settings=study.mesh)

@@ -17,6 +17,7 @@ from compare.crossval.true_fields import FieldSampler, SampledField, TrueField
 from compare.evaluation.deformed_body import DeformedBody
 from compare.evaluation.truths import SLIDING, Truth
 from geometry.atomic import write_bytes
+from geometry.content_hash import sources_digest
 from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
@@ -126,6 +127,7 @@ class FoldRunner:
         """The results of all folds for a seed."""
         path = self._task.folder / f"seed-{seed}.json"
         settings = to_jsonable_python(self._solver.settings())
+        settings["program_sha256"] = sources_digest(type(self._solver).__module__)
         results = _kept(path, settings)
         self._fit = None
         for number, fold in enumerate(self._task.folds):

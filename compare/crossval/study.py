@@ -1,6 +1,6 @@
 """A cross-validation study: the finger, the solvers, what is held out, and the output folder."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -209,14 +209,9 @@ class Study:
             )
         return self.design.replaced(marker_layout=layout)
 
-    def definition(self, given: Observations | None, *makers: Callable[..., Any]) -> dict[str, Any]:
-        """Everything that finished folds depend on but the solvers' settings, which are kept with them.
-
-        Args:
-            given: The measured markers, or None for simulated ones.
-            makers: Functions that simulate the truth and score the folds.
-        """
-        return job_definition(self.design, self.mesh, self.material, self.load, *makers) | {
+    def definition(self, given: Observations | None) -> dict[str, Any]:
+        """Everything that finished folds depend on but the solvers' settings, which are kept with them."""
+        return job_definition(self.design, self.mesh, self.material, self.load, __name__) | {
             "noise_mm": None if given else self.noise,
             "measurements": given
             and [

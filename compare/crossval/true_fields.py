@@ -239,7 +239,7 @@ def simulate_truth(task: TruthTask, progress: Progress = silent) -> dict[str, Pa
         truth.load(stroke).model_dump(),
         truth.finer,
         package_versions(),
-        sources_digest(simulate_truth),
+        sources_digest(__name__),
     ]
     names = {
         layout: f"truth-{content_hash([*parts, points.tolist()])}.npz" for layout, points in markers.items()

@@ -166,7 +166,7 @@ def _key(solver: Solver, problem: Problem, shared: TriangleMesh) -> str:
         problem.digest,
         solver.settings(),
         package_versions(),
-        sources_digest(virtual_experiment, type(solver)),
+        sources_digest(__name__, type(solver).__module__),
         SOURCE,
     ]
     return content_hash(parts)

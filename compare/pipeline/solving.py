@@ -251,7 +251,7 @@ def _key(solver: Solver, problem: Problem, observations: Observations) -> str:
         solver.name,
         solver.settings(),
         package_versions(),
-        sources_digest(evaluated, type(solver)),
+        sources_digest(__name__, type(solver).__module__),
         problem.digest,
         observations.points,
     ]

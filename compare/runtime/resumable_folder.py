@@ -1,7 +1,7 @@
 """A folder that keeps the finished parts of a long job, so that the same job can go on from them."""
 
 import json
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from solvers.problem import Load, Material
 
 
 def job_definition(
-    design: Finger, mesh: MeshSettings, material: Material, load: Load, *makers: Callable[..., Any]
+    design: Finger, mesh: MeshSettings, material: Material, load: Load, module: str
 ) -> dict[str, Any]:
     """Everything that the result of a job on a finger depends on.
 
@@ -27,7 +27,7 @@ def job_definition(
         mesh: Element sizes.
         material: The elastic law.
         load: The prescribed displacement of the contact.
-        makers: Functions and classes that make the result, as for `sources_digest`.
+        module: Name of the module that makes the result.
     """
     return {
         "schema": 1,
@@ -36,7 +36,7 @@ def job_definition(
         "material": material.model_dump(),
         "load": load.model_dump(mode="json"),
         "versions": package_versions(),
-        "program_sha256": sources_digest(*makers),
+        "program_sha256": sources_digest(module),
     }
 
 

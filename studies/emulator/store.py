@@ -28,7 +28,7 @@ def digest_of(sweep: Sweep, inputs: Inputs) -> str:
             "study": sweep.study.model_dump(mode="json", exclude={"samples"}),
             "base": inputs.base,
             "samples": [(sweep.samples[each.number], each.values) for each in sweep.good],
-            "program": sources_digest(Emulator),
+            "program": sources_digest(__name__),
         }
     )
 

@@ -127,7 +127,7 @@ def search_grid(search: GridSearch, stages: Stages | None = None) -> list[Traini
 def _definition(search: GridSearch, solver: Solver) -> dict[str, Any]:
     """Everything that the result of a run depends on, except its point of the grid."""
     searched = {"learning_rate", "bc_weight"}
-    return job_definition(search.design, search.mesh, search.material, search.load, train) | {
+    return job_definition(search.design, search.mesh, search.material, search.load, __name__) | {
         "solver": {key: value for key, value in solver.settings().items() if key not in searched}
     }
 

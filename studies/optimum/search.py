@@ -223,7 +223,7 @@ def _definition(question: Question, maker: TaskMaker) -> dict[str, Any]:
         "runs": question.runs,
         "finger": {name: value for name, value in first.items() if name not in study.varied},
         "versions": package_versions(),
-        "program_sha256": sources_digest(search_front),
+        "program_sha256": sources_digest(__name__, type(study.made_solver()).__module__),
     }
 
 

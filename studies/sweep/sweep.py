@@ -147,7 +147,7 @@ def _definition(job: SweepJob, first: dict[str, Any]) -> dict[str, Any]:
         "study": job.study.model_dump(mode="json", by_alias=True, exclude_none=True),
         "finger": {name: value for name, value in first.items() if name not in job.study.varied},
         "versions": package_versions(),
-        "program_sha256": sources_digest(run_sweep),
+        "program_sha256": sources_digest(__name__, type(job.study.made_solver()).__module__),
     }
 
 
