@@ -11,22 +11,19 @@ from geometry.finger.section import rib_feet, rib_pitch, rib_slope
 from solvers.elasticity import LawName
 from solvers.problem import Load, Material
 
-FINER, FINER_SOLID = 0.5, 1.5
-"""Element sizes of truths over that of the shared mesh: in the plane, and through the depth."""
 
-
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Truth:
     """A simulated finger and its load, as they differ from the drawn finger and the load of the solvers.
 
     Attributes:
-        name: Its name on the command line and in tables.
+        name: Its name in tables.
         description: Law, walls and load in words; `{:.4g}` stands for the stroke, mm.
         law: Law of finite strain, in plane strain.
-        poisson: Poisson's ratio; None for that of the material.
+        poisson: Poisson's ratio; that of the material if None.
         scaled: Factors of wall thicknesses, by their names in `Design`.
         thicker: Additions to wall thicknesses, mm, by their names in `Design`.
-        radius: Radius of a rigid cylinder without friction, mm; None for a patch of the contact's width.
+        radius: Radius of a rigid cylinder without friction, mm; a patch of the contact's width if None.
         slope: Displacement of the indenter along the front over the stroke; None lets a patch slide.
         solid: Whether the finger has its depth, with side faces free of traction, of which one is seen; else
             it is in plane strain.
@@ -44,13 +41,13 @@ class Truth:
 
     @property
     def solver(self) -> str:
-        """The solver that simulates it."""
+        """Name of the solver that simulates it."""
         return "fem-3d" if self.solid else "fem-nonlinear"
 
     @property
     def finer(self) -> float:
-        """Element size over that of the shared mesh."""
-        return FINER_SOLID if self.solid else FINER
+        """Element size over that of the shared mesh; through the depth elements are costly."""
+        return 1.5 if self.solid else 0.5
 
     @property
     def simulation(self) -> str:
@@ -71,10 +68,9 @@ class Truth:
         if self.keeps_walls:
             return {}
         if not isinstance(drawn, Design):
-            possible = ", ".join(name for name, truth in TRUTHS.items() if truth.keeps_walls)
             raise UserError(
                 f"truth {self.name}: {drawn.name} is a drawing, whose walls have no parameters to change; "
-                f"it can have {possible}"
+                f"it can have {_keeping_walls()}"
             )
         return {
             name: (self.scaled.get(name, 1.0) - 1.0) * getattr(drawn, name) + self.thicker.get(name, 0.0)
@@ -113,112 +109,63 @@ class Truth:
         return Load(kind="cylinder", displacement=(along, -stroke), radius=self.radius)
 
 
-SLIDING = Truth(
-    name="sliding",
-    description=(
-        "neo-Hookean, finite strain, plane strain, contact patch that is pressed in by {:.4g} mm and slides "
-        "along x"
-    ),
-)
-"""The truth of every virtual experiment that names no other."""
-
 _PRINTED = {"front_thickness": 1.05, "back_thickness": 0.95, "rib_thickness": 1.05}
 _THICK_BASE = {"base_thickness": 1.0}
 
-TRUTHS: Mapping[str, Truth] = {
-    truth.name: truth
-    for truth in (
-        SLIDING,
-        Truth(
-            name="stvk",
-            law="st-venant-kirchhoff",
-            description=(
-                "St Venant-Kirchhoff, contact patch that is pressed in by {:.4g} mm and slides along x"
-            ),
-        ),
-        Truth(
-            name="gent",
-            law="gent",
-            description=(
-                "Gent, which stiffens, contact patch that is pressed in by {:.4g} mm and slides along x"
-            ),
-        ),
-        Truth(
-            name="print",
-            scaled=_PRINTED,
-            description=(
-                "neo-Hookean, front wall and ribs printed 5 % thicker and back wall 5 % thinner than drawn, "
-                "contact patch that is pressed in by {:.4g} mm and slides along x"
-            ),
-        ),
-        Truth(
-            name="base",
-            scaled=_PRINTED,
-            thicker=_THICK_BASE,
-            description=(
-                "neo-Hookean, front wall and ribs printed 5 % thicker, back wall 5 % thinner and base wall "
-                "1 mm thicker than drawn, contact patch that is pressed in by {:.4g} mm and slides along x"
-            ),
-        ),
-        Truth(
-            name="cylinder",
-            radius=10.0,
-            slope=0.0,
-            description=(
-                "neo-Hookean, rigid cylinder of radius 10 mm without friction that is pressed in by {:.4g} mm"
-            ),
-        ),
-        Truth(
-            name="oblique",
-            radius=20.0,
-            slope=0.3,
-            description=(
-                "neo-Hookean, rigid cylinder of radius 20 mm without friction that is pressed in by {:.4g} "
-                "mm and moves 0.3 times as far towards the tip"
-            ),
-        ),
-        Truth(
-            name="mixed",
-            law="st-venant-kirchhoff",
-            poisson=0.42,
-            scaled=_PRINTED,
-            thicker=_THICK_BASE,
-            radius=10.0,
-            slope=0.0,
-            description=(
-                "St Venant-Kirchhoff with Poisson's ratio 0.42, front wall and ribs printed 5 % thicker, "
-                "back wall 5 % thinner and base wall 1 mm thicker than drawn, rigid cylinder of radius 10 mm "
-                "without friction that is pressed in by {:.4g} mm"
-            ),
-        ),
-        Truth(
-            name="friction",
-            slope=-0.07,
-            description=(
-                "neo-Hookean, contact patch that is pressed in by {:.4g} mm and that friction "
-                "holds half way between sliding and sticking"
-            ),
-        ),
-        Truth(
-            name="3d",
-            solid=True,
-            description=(
-                "neo-Hookean finger in three dimensions, of which the side face is seen, contact patch that "
-                "is pressed in by {:.4g} mm and slides along x"
-            ),
-        ),
-        Truth(
-            name="sticking",
-            slope=0.0,
-            description="neo-Hookean, contact patch that is pressed in by {:.4g} mm, sticks and cannot turn",
-        ),
-    )
-}
+_PATCH = "contact patch that is pressed in by {:.4g} mm"
+_SLIDES = f"{_PATCH} and slides along x"
+_CYLINDER = "rigid cylinder of radius {} mm without friction that is pressed in by {{:.4g}} mm"
+_WALLS = "front wall and ribs printed 5 % thicker"
+_BASE = f"{_WALLS}, back wall 5 % thinner and base wall 1 mm thicker than drawn"
+
+SLIDING = Truth("sliding", f"neo-Hookean, finite strain, plane strain, {_SLIDES}")
+"""The truth of every virtual experiment that names no other."""
+
+_TRUTHS = (
+    SLIDING,
+    Truth("stvk", f"St Venant-Kirchhoff, {_SLIDES}", law="st-venant-kirchhoff"),
+    Truth("gent", f"Gent, which stiffens, {_SLIDES}", law="gent"),
+    Truth(
+        "print",
+        f"neo-Hookean, {_WALLS} and back wall 5 % thinner than drawn, {_SLIDES}",
+        scaled=_PRINTED,
+    ),
+    Truth("base", f"neo-Hookean, {_BASE}, {_SLIDES}", scaled=_PRINTED, thicker=_THICK_BASE),
+    Truth("cylinder", f"neo-Hookean, {_CYLINDER.format(10)}", radius=10.0, slope=0.0),
+    Truth(
+        "oblique",
+        f"neo-Hookean, {_CYLINDER.format(20)} and moves 0.3 times as far towards the tip",
+        radius=20.0,
+        slope=0.3,
+    ),
+    Truth(
+        "mixed",
+        f"St Venant-Kirchhoff with Poisson's ratio 0.42, {_BASE}, {_CYLINDER.format(10)}",
+        law="st-venant-kirchhoff",
+        poisson=0.42,
+        scaled=_PRINTED,
+        thicker=_THICK_BASE,
+        radius=10.0,
+        slope=0.0,
+    ),
+    Truth(
+        "friction",
+        f"neo-Hookean, {_PATCH} and that friction holds half way between sliding and sticking",
+        slope=-0.07,
+    ),
+    Truth(
+        "3d",
+        f"neo-Hookean finger in three dimensions, of which the side face is seen, {_SLIDES}",
+        solid=True,
+    ),
+    Truth("sticking", f"neo-Hookean, {_PATCH}, sticks and cannot turn", slope=0.0),
+)
+TRUTHS: Mapping[str, Truth] = {truth.name: truth for truth in _TRUTHS}
 """Every truth by name."""
 
 
 def check_truths(names: Sequence[str], drawn: Finger) -> None:
-    """Raise a `UserError` if a truth does not exist, is named twice, or is not for a finger."""
+    """Raise a `UserError` if a truth does not exist, is named twice, or cannot have the finger."""
     if unknown := next((name for name in names if name not in TRUTHS), None):
         raise UserError(f"there is no truth {unknown!r}; there are all, {', '.join(TRUTHS)}")
     if not names or len(set(names)) < len(names):
@@ -230,8 +177,11 @@ def check_truths(names: Sequence[str], drawn: Finger) -> None:
 def check_walls(truth: Truth) -> None:
     """Raise a `UserError` if a truth has other walls than the drawn finger."""
     if not truth.keeps_walls:
-        possible = ", ".join(name for name, each in TRUTHS.items() if each.keeps_walls)
         raise UserError(
             f"truth {truth.name}: its walls are not those of the drawing, so that fields cannot be "
-            f"compared point by point; take {possible}, or cross-validate with it"
+            f"compared point by point; take {_keeping_walls()}, or cross-validate with it"
         )
+
+
+def _keeping_walls() -> str:
+    return ", ".join(name for name, truth in TRUTHS.items() if truth.keeps_walls)
