@@ -43,18 +43,13 @@ ROUNDING = 1e-8
 class Region(NamedTuple):
     """The error in a part of the body.
 
-    Attributes:
-        area: Share of the body's area.
-        excess: Share of the excess energy; NaN where there is no excess to share.
-        rel_l2_displacement: L2 norm of the difference from `fem` in this part over that of `fem` in the whole
-            body, so that the squares of all parts add up to the square for the body.
-        rel_l2_von_mises: The same for the von Mises stress.
+    The squares of the L2 norms of all parts, relative to `fem` in the whole body, add up to the body's.
     """
 
-    area: float
-    excess: float
-    rel_l2_displacement: float
-    rel_l2_von_mises: float
+    area: float  #: Share of the body's area.
+    excess: float  #: Share of the excess energy; NaN where there is no excess to share.
+    rel_l2_displacement: float  #: L2 norm of the difference from `fem` here over the norm of `fem`.
+    rel_l2_von_mises: float  #: The like for the von Mises stress.
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,37 +59,23 @@ class Certificate:
     Its interpolant in the finite-element space is split into the minimiser of the energy with the same values
     at base and contact, and a rest. The rest and what the conditions were missed by are orthogonal in energy:
     the difference between the interpolant and the solution of `fem` has the energy `excess + violation`.
-
-    Attributes:
-        energy: Of the interpolant.
-        fem_energy: Of the solution of `fem`.
-        excess: By how much `energy` is above the least that the same values at base and contact allow.
-        violation: Energy of the least displacement that makes up for what the conditions were missed by.
-        missed: By how much the solver's own energy is below that least energy; negative if it is above.
-        weak_residual: Imbalance of the solver's own stress against all test functions, in the dual of the
-            energy norm, over the norm of the solution of `fem`.
-        imbalance: Largest force on a node that is not in balance, over the reaction of `fem`.
-        base: Largest displacement on the base, mm.
-        load: Largest deviation from the prescribed value of u and v, shape (2,), mm; NaN where free.
-        work: Of the solver's own reaction on the prescribed displacement; twice the energy in equilibrium.
-        stroke: Largest prescribed displacement, mm.
-        regions: The error by region, see `compare.evaluation.certification`.
-        density: Energy density of the rest, its mean over each triangle, shape (t,), MPa.
     """
 
-    energy: float
-    fem_energy: float
-    excess: float
-    violation: float
-    missed: float
+    energy: float  #: Of the interpolant.
+    fem_energy: float  #: Of the solution of `fem`.
+    excess: float  #: Amount of `energy` above the least that the same values at base and contact allow.
+    violation: float  #: Energy of the least displacement by which the missed conditions would be met.
+    missed: float  #: Amount of the solver's own energy below that least energy; negative if it is above.
+    #: Imbalance of the solver's own stress against all test functions, in the dual of the energy norm, over
+    #: the norm of the solution of `fem`.
     weak_residual: float
-    imbalance: float
-    base: float
-    load: FloatArray
-    work: float
-    stroke: float
-    regions: Mapping[str, Region]
-    density: FloatArray
+    imbalance: float  #: Largest force on a node that is not in balance, over the reaction of `fem`.
+    base: float  #: Largest displacement on the base, mm.
+    load: FloatArray  #: Largest deviation from the prescribed u and v, shape (2,), mm; NaN where free.
+    work: float  #: Of the own reaction on the prescribed displacement; twice the energy in equilibrium.
+    stroke: float  #: Largest prescribed displacement, mm.
+    regions: Mapping[str, Region]  #: The error by region, see `compare.evaluation.certification.REGIONS`.
+    density: FloatArray  #: Energy density of the rest, its mean over each triangle, shape (t,), MPa.
 
     @property
     def rel_excess(self) -> float:

@@ -31,41 +31,25 @@ TRUTH = "truth"
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """The results of several solvers for one finger under one load; `comparison["fem"]` is one of them.
-
-    Attributes:
-        design: The finger.
-        mesh: The mesh that the solvers shared.
-        observations: Marker displacements, measured or simulated.
-        evaluations: One for each solver, in the order of tables and pictures.
-        reference: The evaluation that the others are compared with.
-        material: The elastic constants; each evaluation knows its own law.
-        load: What moved the finger.
-        truth: The fields of the virtual experiment; None where the markers were measured.
-        adaptation: Rounds of mesh refinement, if it was asked for.
-        settings: Settings of each solver, by its name.
-        unsupported: Reasons why solvers do not support the problem, by their names.
-        failed: The exceptions of solvers that raised one, by their names.
-        warnings: Remarks of the marker tracking and on unlikely measurements.
-    """
+    """The results of several solvers for one finger under one load; `comparison["fem"]` is one of them."""
 
     design: Finger
-    mesh: TriangleMesh
-    observations: Observations
-    evaluations: Sequence[Evaluation]
-    reference: Evaluation
-    material: Material = field(default_factory=Material)
+    mesh: TriangleMesh  #: The mesh that the solvers shared.
+    observations: Observations  #: Marker displacements, measured or simulated.
+    evaluations: Sequence[Evaluation]  #: One for each solver, in the order of tables and pictures.
+    reference: Evaluation  #: The evaluation that the others are compared with.
+    material: Material = field(default_factory=Material)  #: Elastic constants; each evaluation has its law.
     load: Load = field(default_factory=Load)
-    truth: Evaluation | None = None
-    adaptation: Adaptation | None = None
-    settings: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
-    unsupported: Mapping[str, str] = field(default_factory=dict)
-    failed: Mapping[str, str] = field(default_factory=dict)
-    warnings: Sequence[str] = ()
+    truth: Evaluation | None = None  #: Fields of the virtual experiment; None where markers were measured.
+    adaptation: Adaptation | None = None  #: Rounds of mesh refinement, if a tolerance was given.
+    settings: Mapping[str, Mapping[str, object]] = field(default_factory=dict)  #: Of each solver, by name.
+    unsupported: Mapping[str, str] = field(default_factory=dict)  #: Reasons, by the solvers' names.
+    failed: Mapping[str, str] = field(default_factory=dict)  #: Exceptions, by the names of solvers.
+    warnings: Sequence[str] = ()  #: Remarks of the marker tracking and on unlikely measurements.
 
     @property
     def left_out(self) -> Mapping[str, str]:
-        """The same as `unsupported`: its former name."""
+        """Former name of `unsupported`."""
         return self.unsupported
 
     def __getitem__(self, solver: str) -> Evaluation:
@@ -76,7 +60,7 @@ class Comparison:
 
     @property
     def shown_fields(self) -> list[Evaluation]:
-        """The evaluations whose fields are drawn and written: all, and that of the truth, called `truth`."""
+        """The evaluations whose fields are drawn and written: all, and the truth's under the name `truth`."""
         true = [] if self.truth is None else [replace(self.truth, solver=TRUTH)]
         return [*self.evaluations, *true]
 

@@ -2,22 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 import shapely
 
 from compare.evaluation.certification import NOT_FINITE
 from compare.evaluation.evaluation import Evaluation
-from geometry.arrays import BoolArray, FloatArray, IntArray
+from geometry.arrays import BoolArray, FloatArray
 from geometry.mesh.boundary import boundary_edges
 from geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
 from solvers.lagrange import LagrangeSpace
 from solvers.solution import Solution, Status
-
-QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
-"""Nodes of the four triangles into which the middles of its edges cut a quadratic one."""
-
 
 INSIDE_OUT = "TURNED INSIDE OUT"
 THROUGH_ITSELF = "THE BODY GOES THROUGH ITSELF"
@@ -27,19 +22,18 @@ ADVICE = {
     THROUGH_ITSELF: "self-contact is not modelled, so that a result beyond the stroke at which parts meet "
     "says nothing of a real finger; take a smaller stroke",
 }
-"""What follows from a fault, and what to do."""
+"""Consequence of a fault, and advice."""
 
 
 class DeformedBody:
-    """A body at rest, and what is impossible about its deformations."""
+    """A body at rest, and the faults of its deformations."""
 
     def __init__(self, mesh: TriangleMesh) -> None:
         self._mesh, self._space = mesh, LagrangeSpace(mesh, 2)
         self._edges = boundary_edges(mesh.triangles)
-
-    @cached_property
-    def _quarters(self) -> IntArray:
-        return self._space.cell_nodes[:, QUARTERS].reshape(-1, 3)
+        # The middles of its edges cut a quadratic triangle into four.
+        quarters = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
+        self._quarters = self._space.cell_nodes[:, quarters].reshape(-1, 3)
 
     def inside_out(self, displacement: FloatArray) -> BoolArray:
         """The triangles that are turned inside out, wholly or in one of their quarters, shape (t,).
@@ -48,7 +42,7 @@ class DeformedBody:
             displacement: Of the mesh's nodes and the middles of its edges, shape (n + e, 2), mm.
         """
         moved = self._space.nodes + displacement
-        return np.asarray((signed_areas(moved, self._quarters) <= 0).reshape(-1, len(QUARTERS)).any(axis=1))
+        return np.asarray((signed_areas(moved, self._quarters) <= 0).reshape(-1, 4).any(axis=1))
 
     def crossings(self, displacement: FloatArray) -> FloatArray:
         """Places where the deformed boundary crosses or touches itself, shape (k, 2), mm, from base to tip.
@@ -69,7 +63,7 @@ class DeformedBody:
         return np.asarray(places[places[:, 0].argsort()])
 
     def faults(self, displacement: FloatArray) -> dict[str, str]:
-        """What is impossible about a displacement, with the place.
+        """The faults of a displacement, keys of `ADVICE`, each with its place.
 
         Args:
             displacement: Of the mesh's nodes and the middles of its edges, shape (n + e, 2), mm.
@@ -80,10 +74,9 @@ class DeformedBody:
         turned = self.inside_out(displacement)
         if turned.any():
             x, y = self._mesh.points[self._mesh.triangles[turned]].mean(axis=1)[0]
-            where = (
+            faults[INSIDE_OUT] = (
                 f" in {turned.sum()} of {len(turned)} triangles, one of them at rest at ({x:.3g}, {y:.3g}) mm"
             )
-            faults[INSIDE_OUT] = where
         crossed = self.crossings(displacement[: len(self._mesh.points)])
         if len(crossed):
             x, y = crossed[0]
@@ -91,34 +84,17 @@ class DeformedBody:
         return faults
 
     def status(self, solution: Solution) -> tuple[Status, list[str]]:
-        """The status of a solution with what is impossible about its body, as `with_body_checks` judges it.
-
-        Returns:
-            The status, and a remark on each fault.
-        """
+        """The status of a solution after the checks of `with_body_checks`, and a remark on each fault."""
         faults = self.faults(solution.displacement(self._space.at_nodes()))
         status, law = solution.status, solution.problem.material.law
         judged = Status(*_judged(bool(status.converged), status.message, law, faults))
         return judged, [f"{solution.solver}: {fault}; {ADVICE[fault]}" for fault in faults]
 
 
-def _faults(body: DeformedBody, evaluation: Evaluation) -> dict[str, str]:
-    if not evaluation.finite:
-        return {NOT_FINITE: ""}
-    return body.faults(np.concatenate([evaluation.node_displacement, evaluation.edge_displacement]))
-
-
-def _judged(converged: bool, message: str, law: str, faults: dict[str, str]) -> tuple[bool, str]:
-    """Whether a result counts as converged, and its message with the faults that it does not say yet."""
-    fatal = NOT_FINITE in faults or (INSIDE_OUT in faults and law != "linear")
-    said = [f"{fault}{place}" for fault, place in faults.items() if fault not in message]
-    return converged and not fatal, "; ".join([message.rstrip(". "), *said]) if said else message
-
-
 def with_body_checks(
     evaluations: Sequence[Evaluation], mesh: TriangleMesh, truth: Evaluation | None = None
 ) -> tuple[list[Evaluation], list[str]]:
-    """The evaluations, those with an impossible body with a sentence on it; and a remark on each fault.
+    """Add a sentence on each fault of its body to an evaluation; and return remarks on the faults.
 
     A result that is not finite, or of finite strain and turned inside out, does not count as converged. A
     linear law knows no such fault: its equations are those of the body at rest. No law here knows
@@ -127,19 +103,29 @@ def with_body_checks(
     Args:
         evaluations: Sampled on the mesh.
         mesh: The body at rest.
-        truth: The simulated finger, if there is one, of which there is a remark only.
+        truth: The simulated finger, if there is one; its faults are remarks only.
     """
     body, checked = DeformedBody(mesh), []
     having: dict[str, list[str]] = {}
-    for evaluation in evaluations:
-        faults = _faults(body, evaluation)
-        if faults:
-            own = _judged(evaluation.converged, evaluation.message, evaluation.law, faults)
-            evaluation = replace(evaluation, converged=own[0], message=own[1])
-        checked.append(evaluation)
+
+    def note_faults(evaluation: Evaluation, name: str) -> dict[str, str]:
+        nodal = np.concatenate([evaluation.node_displacement, evaluation.edge_displacement])
+        faults = body.faults(nodal) if evaluation.finite else {NOT_FINITE: ""}
         for fault in faults:
-            having.setdefault(fault, []).append(evaluation.solver)
+            having.setdefault(fault, []).append(name)
+        return faults
+
+    for evaluation in evaluations:
+        faults = note_faults(evaluation, evaluation.solver)
+        converged, message = _judged(evaluation.converged, evaluation.message, evaluation.law, faults)
+        checked.append(replace(evaluation, converged=converged, message=message) if faults else evaluation)
     if truth is not None:
-        for fault in _faults(body, truth):
-            having.setdefault(fault, []).append("the simulated finger")
+        note_faults(truth, "the simulated finger")
     return checked, [f"{', '.join(names)}: {fault}; {ADVICE[fault]}" for fault, names in having.items()]
+
+
+def _judged(converged: bool, message: str, law: str, faults: dict[str, str]) -> tuple[bool, str]:
+    """Whether a result counts as converged, and its message with the faults that it lacks yet."""
+    fatal = NOT_FINITE in faults or (INSIDE_OUT in faults and law != "linear")
+    said = [f"{fault}{place}" for fault, place in faults.items() if fault not in message]
+    return converged and not fatal, "; ".join([message.rstrip(". "), *said]) if said else message

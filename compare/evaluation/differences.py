@@ -9,37 +9,22 @@ from geometry.arrays import FloatArray
 
 
 class FieldDifference(NamedTuple):
-    """A field against the reference's, over the whole body.
+    """Difference of a field from the reference's, over the whole body."""
 
-    Attributes:
-        rel_l2: Area-weighted L2 norm of the difference over that of the reference.
-        mean: Area-weighted mean of the pointwise absolute difference, in the field's unit.
-        p95: Area-weighted 95th percentile of it.
-    """
-
-    rel_l2: float
-    mean: float
-    p95: float
+    rel_l2: float  #: Area-weighted L2 norm of the difference over the norm of the reference.
+    mean: float  #: Area-weighted mean of the pointwise absolute difference, in the field's unit.
+    p95: float  #: Area-weighted 95th percentile of the pointwise absolute difference.
 
 
 class ReferenceDifferences(NamedTuple):
-    """A solver against the reference solver, on the shared mesh; or the reference against the exact solution.
+    """Differences of a solver from the reference on the shared mesh, or of the exact solution from it."""
 
-    Attributes:
-        displacement: Of the displacement vector, mm.
-        von_mises: Of the von Mises stress, MPa.
-        stress: Of the in-plane Cauchy stress components, by name, MPa.
-        strain: Of the in-plane strain components, by name.
-        mae_markers: Mean over the markers of `|du| + |dv|`, mm.
-        energy: Relative difference of the energy (signed).
-    """
-
-    displacement: FieldDifference
-    von_mises: FieldDifference
-    stress: Mapping[str, FieldDifference]
-    strain: Mapping[str, FieldDifference]
-    mae_markers: float
-    energy: float
+    displacement: FieldDifference  #: Of the displacement vector, mm.
+    von_mises: FieldDifference  #: MPa.
+    stress: Mapping[str, FieldDifference]  #: Of the in-plane Cauchy stress components, by name, MPa.
+    strain: Mapping[str, FieldDifference]  #: Of the in-plane strain components, by name.
+    mae_markers: float  #: Mean over the markers of `|du| + |dv|`, mm.
+    energy: float  #: Relative difference of the energy, signed.
 
 
 def field_difference(values: FloatArray, reference: FloatArray, weights: FloatArray) -> FieldDifference:

@@ -1,7 +1,6 @@
-"""A solution sampled on the shared mesh and at the markers: all that metrics, pictures and reports look at.
+"""Samples of a solution on the shared mesh and at the markers, the base of metrics, pictures and reports.
 
-It is an archive of NumPy arrays, so that a run can be resumed, and a result compared again, without any
-solver.
+They are kept as an archive of NumPy arrays: a run is resumed, and a result compared again, without a solver.
 """
 
 import json
@@ -25,75 +24,44 @@ from solvers.lagrange import LagrangeSpace
 from solvers.solution import SolidField, Solution
 
 QUADRATURE_DEGREE = 2
-HISTORY_PREFIX = "history_"
 IN_SAMPLE = "† was given these markers: its errors there are training errors"
 """Meaning of the mark in `Evaluation.label_at_markers`."""
-UNCERTAINTY: TypeAdapter[ReferenceDifferences | None] = TypeAdapter(ReferenceDifferences | None)
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """One solver's result on the shared mesh: t triangles, n nodes, e edges, m markers, q = 3 t points.
+    """One solver's result on the shared mesh: t triangles, n nodes, e edges, m markers, q = 3 t points."""
 
-    Attributes:
-        solver: Name of the solver.
-        law: Material law that it had: "linear" (infinitesimal strain) or of finite strain (Green-Lagrange).
-        converged: Whether the solver's own criterion was met and, where there is a certificate, its limit.
-        message: The solver's sentence on how it ended, and what the certificate adds.
-        energy: Elastic energy per unit depth, N mm / mm.
-        reaction: Force of the indenter per unit depth, shape (2,), N/mm.
-        stats: What the solver says of its run: `seconds`, `unknowns`, ...
-        history: Columns of the training or load-stepping record, all of one length.
-        marker_displacement: Shape (m, 2), mm.
-        node_displacement: Shape (n, 2), mm.
-        edge_displacement: At the middles of the mesh's edges, shape (e, 2), mm.
-        weights: Quadrature weights, shape (q,), mm^2.
-        displacement: At the quadrature points, shape (q, 2), mm.
-        strain: At the quadrature points, shape (q, 2, 2).
-        stress: Cauchy, at the quadrature points, shape (q, 2, 2), MPa.
-        stress_zz: Shape (q,), MPa.
-        von_mises: Shape (q,), MPa.
-        energy_density: Shape (q,), MPa.
-        uncertainty: The solver's estimate of its own error, as differences of the exact solution from it.
-        marker_uncertainty: The same at the markers, absolute, shape (m, 2), mm.
-        in_sample: Whether the solver was given the observations: its errors at them are training errors.
-        family: Kind of method, of `Traits`.
-        twin: Name of the solver by finite elements that fits the markers in the same way, if there is one.
-        left_out: Displacement of each marker as the solver predicts it without that marker, shape (m, 2), mm;
-            None where it does not tell.
-        solid: Whether the field is a plane of a body in three dimensions.
-        path: Displacement of the nodes at every row of the history, shape (k, n, 2), mm, from a solver that
-            follows the load; None from any other.
-        certificate: What the result is worth by the energy of finite elements; not part of the archive.
-    """
-
-    solver: str
-    law: str
-    converged: bool
-    message: str
-    energy: float
-    reaction: FloatArray
-    stats: Mapping[str, float | int | str]
-    history: Mapping[str, FloatArray]
-    marker_displacement: FloatArray
-    node_displacement: FloatArray
-    edge_displacement: FloatArray
-    weights: FloatArray
-    displacement: FloatArray
-    strain: FloatArray
-    stress: FloatArray
-    stress_zz: FloatArray
-    von_mises: FloatArray
-    energy_density: FloatArray
+    solver: str  #: Name of the solver.
+    law: str  #: Its material law: "linear" (infinitesimal strain), or one of finite strain (Green-Lagrange).
+    converged: bool  #: By the solver's own criterion and, where there is a certificate, its limits.
+    message: str  #: The solver's sentence on how it ended, and what the certificate adds.
+    energy: float  #: Elastic energy per unit depth, N mm / mm.
+    reaction: FloatArray  #: Force of the indenter per unit depth, shape (2,), N/mm.
+    stats: Mapping[str, float | int | str]  #: Facts on the solver's run: `seconds`, `unknowns`, ...
+    history: Mapping[str, FloatArray]  #: Columns of the training or load-stepping record, all of one length.
+    marker_displacement: FloatArray  #: Shape (m, 2), mm.
+    node_displacement: FloatArray  #: Shape (n, 2), mm.
+    edge_displacement: FloatArray  #: At the middles of the mesh's edges, shape (e, 2), mm.
+    weights: FloatArray  #: Quadrature weights, shape (q,), mm^2.
+    displacement: FloatArray  #: At the quadrature points, shape (q, 2), mm.
+    strain: FloatArray  #: At the quadrature points, shape (q, 2, 2).
+    stress: FloatArray  #: Cauchy, at the quadrature points, shape (q, 2, 2), MPa.
+    stress_zz: FloatArray  #: Shape (q,), MPa.
+    von_mises: FloatArray  #: Shape (q,), MPa.
+    energy_density: FloatArray  #: Shape (q,), MPa.
+    #: The solver's estimate of its own error: differences of the exact solution from its own.
     uncertainty: ReferenceDifferences | None = None
-    marker_uncertainty: FloatArray | None = None
-    in_sample: bool = False
-    family: str | None = None
-    twin: str | None = None
+    marker_uncertainty: FloatArray | None = None  #: That estimate at the markers, absolute, shape (m, 2), mm.
+    in_sample: bool = False  #: Whether the solver was given the observations: errors there are of training.
+    family: str | None = None  #: Kind of method, from `Traits`.
+    twin: str | None = None  #: Name of the finite-element solver that fits the markers in the same way.
+    #: Displacement of each marker as the solver predicts it without that marker, shape (m, 2), mm.
     left_out: FloatArray | None = None
-    solid: bool = False
+    solid: bool = False  #: Whether the field is a plane of a body in three dimensions.
+    #: Displacement of the nodes at every row of the history, shape (k, n, 2), mm, if the load was followed.
     path: FloatArray | None = None
-    certificate: Certificate | None = None
+    certificate: Certificate | None = None  #: Judgement by the energy of finite elements; not archived.
 
     @classmethod
     def of(cls, solution: Solution, mesh: TriangleMesh, markers: ArrayLike | None = None) -> "Evaluation":
@@ -146,7 +114,7 @@ class Evaluation:
 
     @property
     def label_at_markers(self) -> str:
-        """The label for errors at the markers: it has a mark if the solver was given those markers."""
+        """The label for errors at the markers, marked if the solver was given those markers."""
         return f"{self.label}{' †' * self.in_sample}"
 
     @property
@@ -160,13 +128,12 @@ class Evaluation:
 
     def per_triangle(self, values: FloatArray) -> FloatArray:
         """Area-weighted mean over each triangle: values at the quadrature points (q, ...) to (t, ...)."""
-        points = 3
-        weights = self.weights.reshape(-1, points)
-        grouped = values.reshape(-1, points, *values.shape[1:])
+        weights = self.weights.reshape(-1, 3)
+        grouped = values.reshape(-1, 3, *values.shape[1:])
         return np.asarray(np.einsum("tq,tq...->t...", weights / weights.sum(axis=1, keepdims=True), grouped))
 
     def save(self, path: Path, key: str) -> None:
-        """Write the evaluation atomically under a key that says what it is the result of."""
+        """Write the evaluation atomically, with a key by which `load` tells whose result it is."""
         header: dict[str, Any] = {"key": key}
         arrays: dict[str, FloatArray] = {}
         for entry in fields(self):
@@ -175,7 +142,7 @@ class Evaluation:
                 arrays[entry.name] = value
             elif entry.name not in ("history", "certificate"):
                 header[entry.name] = dict(value) if isinstance(value, Mapping) else value
-        arrays |= {HISTORY_PREFIX + name: column for name, column in self.history.items()}
+        arrays |= {f"history_{name}": column for name, column in self.history.items()}
         write_arrays(path, {"header": np.array(json.dumps(header)), **arrays})
 
     @classmethod
@@ -184,24 +151,19 @@ class Evaluation:
         if not path.exists():
             return None
         try:
-            return cls._read(path, key)
+            with np.load(path) as archive:
+                header = json.loads(str(archive["header"]))
+                if header.pop("key") != key:
+                    return None
+                arrays = {name: archive[name] for name in archive.files if name != "header"}
+            prefix = "history_"
+            columns = [name for name in arrays if name.startswith(prefix)]
+            header["history"] = {name.removeprefix(prefix): arrays.pop(name) for name in columns}
+            adapter = TypeAdapter(ReferenceDifferences | None)
+            header["uncertainty"] = adapter.validate_python(header["uncertainty"])
+            return cls(**header, **arrays)
         except Exception as error:  # a damaged file can make the reader raise anything
             warnings.warn(
                 f"{path} is damaged ({type(error).__name__}) and is made again", RuntimeWarning, stacklevel=2
             )
             return None
-
-    @classmethod
-    def _read(cls, path: Path, key: str) -> "Evaluation | None":
-        with np.load(path) as archive:
-            header = json.loads(str(archive["header"]))
-            if header.pop("key") != key:
-                return None
-            arrays = {name: archive[name] for name in archive.files if name != "header"}
-        history = {
-            name.removeprefix(HISTORY_PREFIX): arrays.pop(name)
-            for name in list(arrays)
-            if name.startswith(HISTORY_PREFIX)
-        }
-        header["uncertainty"] = UNCERTAINTY.validate_python(header["uncertainty"])
-        return cls(history=history, **(header | arrays))

@@ -19,23 +19,14 @@ COMPONENTS: dict[str, tuple[int, int]] = {"xx": (0, 0), "yy": (1, 1), "xy": (0, 
 
 
 class MarkerErrors(NamedTuple):
-    """Errors at the visible markers; rows of markers that were not seen are NaN.
+    """Errors at the visible markers; rows of markers that were not seen are NaN."""
 
-    Attributes:
-        ae_u: Absolute error of u at each marker, shape (m,), mm.
-        ae_v: The same for v.
-        mae_u: Its mean over the visible markers, mm.
-        mae_v: The same for v.
-        mae_sum: Mean of `|du| + |dv|`: the absolute error as the paper's text defines it, mm.
-        mae_rss: sqrt(mae_u^2 + mae_v^2): what the `disp` row of the paper's Table I holds, mm.
-    """
-
-    ae_u: FloatArray
-    ae_v: FloatArray
-    mae_u: float
-    mae_v: float
-    mae_sum: float
-    mae_rss: float
+    ae_u: FloatArray  #: Absolute error of u at each marker, shape (m,), mm.
+    ae_v: FloatArray  #: Absolute error of v at each marker, shape (m,), mm.
+    mae_u: float  #: Mean of `ae_u` over the visible markers, mm.
+    mae_v: float  #: Mean of `ae_v` over the visible markers, mm.
+    mae_sum: float  #: Mean of `|du| + |dv|`: the absolute error that the paper's text defines, mm.
+    mae_rss: float  #: sqrt(mae_u^2 + mae_v^2), as in row `disp` of the paper's Table I, mm.
 
 
 MEANS = MarkerErrors._fields[2:]
@@ -48,10 +39,9 @@ def marker_errors(evaluation: Evaluation, observations: Observations) -> MarkerE
 
 
 def held_out_errors(evaluation: Evaluation, observations: Observations) -> MarkerErrors | None:
-    """The same at markers that the solver was not given: all, or each left out in its turn.
+    """Errors at markers that the solver was not given: at all of them, or at each left out in its turn.
 
-    None where no displacement is known, and for a solver that was given the markers and does not tell what
-    it would say without.
+    None where no displacement is known, and for a solver that was given all and predicts none without.
     """
     if not observations.known:
         return None
@@ -98,32 +88,25 @@ def _differences(evaluation: Evaluation, reference: Evaluation) -> ReferenceDiff
 
 
 class TruthDifferences(NamedTuple):
-    """A solver against the fields of the virtual experiment, on the shared mesh.
+    """Differences of a solver from the fields of the virtual experiment, on the shared mesh."""
 
-    Attributes:
-        displacement: Of the displacement vector, mm.
-        strain: Of the strain tensor, each with the strain of its own law.
-        von_mises: Of the von Mises stress, MPa.
-    """
-
-    displacement: FieldDifference
-    strain: FieldDifference
-    von_mises: FieldDifference
+    displacement: FieldDifference  #: Of the displacement vector, mm.
+    strain: FieldDifference  #: Of the strain tensor; each law has its own strain.
+    von_mises: FieldDifference  #: MPa.
 
 
 def truth_differences(evaluation: Evaluation, truth: Evaluation) -> TruthDifferences:
-    """Differences from what is true where the markers are simulated; shared work."""
-    return shared(("truth", evaluation, truth), lambda: _truth_differences(evaluation, truth))
+    """Differences from the simulated truth; shared work."""
 
-
-def _truth_differences(evaluation: Evaluation, truth: Evaluation) -> TruthDifferences:
     def differ(name: str) -> FieldDifference:
         values, true = (
             np.reshape(getattr(each, name), (len(truth.weights), -1)) for each in (evaluation, truth)
         )
         return field_difference(values, true, truth.weights)
 
-    return TruthDifferences(*map(differ, TruthDifferences._fields))
+    return shared(
+        ("truth", evaluation, truth), lambda: TruthDifferences(*map(differ, TruthDifferences._fields))
+    )
 
 
 def force_error(evaluation: Evaluation, truth: Evaluation) -> float:
@@ -139,10 +122,10 @@ def pick_reference(evaluations: Sequence[Evaluation], wanted: str | None = None)
 
 
 def evaluated(solution: Solution, mesh: TriangleMesh, markers: ArrayLike | None = None) -> Evaluation:
-    """The evaluation of a solution, with its uncertainty if its solver estimates its error.
+    """Evaluate a solution, with its uncertainty if its solver estimates its error.
 
-    The uncertainty is how the improved field of the estimate differs from the solution. For displacements
-    that are prescribed, the energy of the error is the error of the energy.
+    The uncertainty is the difference of the estimate's improved field from the solution. Under prescribed
+    displacements, the energy of the error is the error of the energy.
     """
     own, error = Evaluation.of(solution, mesh, markers), solution.error
     if error is None:
