@@ -20,8 +20,6 @@ UNITS = {"metres": 1000.0, "inches": 25.4, "centimetres": 10.0, "micrometres": 0
 """Millimetres in other units."""
 LOOKS_LIKE = "this looks like"
 """Words before the unit that a number is taken to have."""
-IMPOSSIBLE_UNITS = ("metres", "micrometres")
-"""Units that no other stroke explains: no camera sees a stroke a thousand times smaller."""
 POSITION_MIXUPS: Mapping[str, Callable[[FloatArray], FloatArray]] = {
     "x and y look swapped": lambda points: points[:, ::-1],
     "y looks reversed (the body lies below the front face, y = 0)": lambda points: points * [1.0, -1.0],
@@ -32,19 +30,11 @@ DISPLACEMENT_MIXUPS: Mapping[str, Callable[[FloatArray], FloatArray]] = {
     "u and v look swapped": lambda moved: moved[:, ::-1],
     "u and v look swapped and their signs reversed": lambda moved: -moved[:, ::-1],
 }
-ALIKE, UNLIKE = 0.85, 0.5
-"""Cosine between measured and linear displacements of all markers. At finite strain it is 0.92 or more on
-five designs with strokes up to 15 mm, and between -0.3 and 0.06 with u and v swapped."""
-OPPOSED = -0.7
-"""Cosine of u alone below which its sign looks reversed; at finite strain it falls to 0."""
+UNLIKE = 0.5
+"""Cosine between measured and linear displacements of all markers below which they are unlike. At finite
+strain it is 0.92 or more on five designs with strokes up to 15 mm, and at most 0.06 with u and v swapped."""
 SIZES = 3.0
 """Ratio of measured to linear displacements that is unlikely; at finite strain it is 0.86 to 1."""
-TINY = 1e-3
-"""Share of the finger's length below which a stroke or a radius looks like metres; strokes have per cents."""
-SOFT, STIFF = 0.02, 2e4
-"""Young's moduli that are printed, MPa: the softest silicones have 0.05, filled plastics up to 15,000."""
-NARROW = 0.02
-"""Share of the finger's length within which markers tell of one place only: a disc has about that size."""
 SMALL = 0.1
 """Share of the stroke below which `fem`'s displacements at the markers say little of a direction."""
 
@@ -82,19 +72,15 @@ def check_positions(observations: Observations, mesh: TriangleMesh) -> None:
 
 def unit_remarks(problem: Problem) -> list[str]:
     """Remarks on a load or a material that looks like another unit, a line each."""
-    length, load, young = (
-        float(np.ptp(problem.mesh.points, axis=0).max()),
-        problem.load,
-        problem.material.young,
-    )
+    load, young, length = problem.load, problem.material.young, _length(problem)
     remarks = [
         f"the {name} of {size:g} mm is {size / length:.1g} of the finger's length; {LOOKS_LIKE} metres, "
         "give mm"
         for name, size in (("stroke", float(np.abs(load.values).max())), ("radius", load.radius))
-        if size is not None and 0 < size < TINY * length
+        if size is not None and 0 < size < 1e-3 * length  # usual strokes have per cents
     ]
-    if not SOFT <= young <= STIFF:
-        unit = "gigapascals" if young < SOFT else "pascals"
+    if not 0.02 <= young <= 2e4:  # the softest silicones have 0.05, filled plastics up to 15,000
+        unit = "gigapascals" if young < 0.02 else "pascals"
         remarks.append(
             f"Young's modulus of {young:g} MPa is no rubber's or plastic's; {LOOKS_LIKE} {unit}, give MPa"
         )
@@ -113,7 +99,7 @@ def displacement_remarks(observations: Observations, problem: Problem) -> list[s
     """
     seen = observations.visible
     points, moved = observations.points[seen], observations.displacements[seen]
-    length = float(np.ptp(problem.mesh.points, axis=0).max())
+    length = _length(problem)
     farthest = int(np.linalg.norm(moved, axis=1).argmax())
     far, number = float(np.linalg.norm(moved[farthest])), int(np.flatnonzero(seen)[farthest]) + 1
     if far > 2 * length:
@@ -121,8 +107,13 @@ def displacement_remarks(observations: Observations, problem: Problem) -> list[s
             f"the measurements are impossible: marker {number} moved by {far:.4g} mm, and the finger is "
             f"{length:.4g} mm long; give displacements in mm, final minus initial position"
         )
-    spread = float(np.linalg.norm(np.ptp(points, axis=0)))
-    remarks = [] if spread > NARROW * length else [_of_one_place(len(points), spread)]
+    spread, count, remarks = float(np.linalg.norm(np.ptp(points, axis=0))), len(points), []
+    if not (apart := spread > 0.02 * length):  # within about the size of a disc
+        told = "one marker was seen" if count == 1 else f"all {count} markers seen lie within {spread:.2g} mm"
+        remarks.append(
+            f"{told}: the measurements say what happens at one place, and nothing of the rest of the finger; "
+            "errors at markers do not either"
+        )
     if not moved.any():
         return [*remarks, "the measurements say that no marker moved"]
     try:
@@ -132,16 +123,7 @@ def displacement_remarks(observations: Observations, problem: Problem) -> list[s
     stroke = float(np.abs(problem.load.values).max())
     if float(np.sqrt((expected**2).sum(axis=1).mean())) < SMALL * stroke:
         return remarks
-    return [*remarks, *_compared(moved, expected, stroke, number, apart=not remarks)]
-
-
-def _of_one_place(count: int, spread: float) -> str:
-    """The remark on markers that tell of one place only; all lie within `spread`, mm."""
-    seen = "one marker was seen" if count == 1 else f"all {count} markers seen lie within {spread:.2g} mm"
-    return (
-        f"{seen}: the measurements say what happens at one place, and nothing of the rest of the finger; "
-        "errors at markers do not either"
-    )
+    return [*remarks, *_compared(moved, expected, stroke, number, apart=apart)]
 
 
 def _compared(
@@ -149,20 +131,21 @@ def _compared(
 ) -> list[str]:
     """Remarks on displacements beside those of `fem`, shapes (m, 2), mm; marker `number` moved farthest.
 
-    At one place, where markers are not `apart`, their direction says nothing: at finite strain it is another.
+    At one place, where markers are not `apart`, their direction says nothing: finite strain changes it.
     """
     own = _cosine(moved, expected) if apart else 1.0
     ratio = float(np.linalg.norm(moved) / np.linalg.norm(expected))
     likeness = {said: _cosine(undone(moved), expected) for said, undone in DISPLACEMENT_MIXUPS.items()}
     mixup = max(likeness, key=lambda said: likeness[said])
-    if own < UNLIKE and likeness[mixup] > ALIKE:
+    if own < UNLIKE and likeness[mixup] > 0.85:
         raise UserError(
             f"the measurements do not fit the load: {mixup}; so changed they would be much like those of "
             f"fem (cosine {likeness[mixup]:.2f}), as they are they are not ({own:.2f})"
         )
     sized = f"the markers' displacements are {ratio:.3g} times those of fem for a stroke of {stroke:g} mm"
     unit = next((unit for unit, factor in UNITS.items() if 1 / 1.5 < ratio * factor < 1.5), None)
-    if unit in IMPOSSIBLE_UNITS and own > UNLIKE:
+    # No other stroke explains a factor of a thousand: no camera sees a stroke so much smaller.
+    if unit in ("metres", "micrometres") and own > UNLIKE:
         raise UserError(f"{sized}; these look like {unit}; give mm")
     remarks = []
     if not 1 / SIZES < ratio < SIZES:
@@ -170,16 +153,13 @@ def _compared(
         remarks.append(f"{sized}; {looks}")
     elif (far := np.linalg.norm(moved, axis=1).max()) > SIZES * np.linalg.norm(expected, axis=1).max():
         remarks.append(f"marker {number} moved by {far:.4g} mm, {SIZES:g} times farther than any in fem")
+    moves_along = apart and np.abs(moved[:, 0]).max() > SMALL * stroke
     if own < UNLIKE:
         remarks.append(
             f"the markers' displacements are unlike those of fem (cosine {own:.2f}); check markers, columns, "
             "signs and load"
         )
-    elif (
-        apart
-        and np.abs(moved[:, 0]).max() > SMALL * stroke
-        and _cosine(moved[:, 0], expected[:, 0]) < OPPOSED
-    ):
+    elif moves_along and _cosine(moved[:, 0], expected[:, 0]) < -0.7:  # at finite strain it falls to 0
         remarks.append("u goes against that of fem: its sign looks reversed (u is positive towards the tip)")
     return remarks
 
@@ -192,6 +172,11 @@ def _expected(problem: Problem, points: FloatArray) -> FloatArray:
     linear = problem.material.model_copy(update={"law": "linear"})
     fem = make_solver("fem", estimate=False)
     return fem.solve(Problem(problem.mesh, linear, load)).displacement(points)
+
+
+def _length(problem: Problem) -> float:
+    """Length of the finger, mm."""
+    return float(np.ptp(problem.mesh.points, axis=0).max())
 
 
 def _cosine(one: FloatArray, other: FloatArray) -> float:
