@@ -25,10 +25,6 @@ LoadKind = Literal["mean", "point", "patch", "cylinder"]
 RADIUS = 5.0
 """Default radius of the cylinder, mm."""
 
-SOFTEST, STIFFEST = 1e-6, 1e7
-"""Young's moduli of solids, MPa: a thousandth of the softest gels' to eight times diamond's."""
-
-
 LEAST_TRAVEL = 1e-9
 """Smallest displacement of an indenter that moves, mm: a hundredth of an atom's size."""
 
@@ -36,7 +32,7 @@ LEAST_TRAVEL = 1e-9
 class Material(CheckedModel):
     """An isotropic elastic material.
 
-    The defaults are those of the paper: Agilus30 and VeroUltra mixed to Shore 85A.
+    By default it is the paper's: Agilus30 and VeroUltra mixed to Shore 85A.
 
     Attributes:
         young: Young's modulus E, MPa.
@@ -56,9 +52,10 @@ class Material(CheckedModel):
     @field_validator("young")
     @classmethod
     def _of_a_solid(cls, young: float) -> float:
-        if not SOFTEST <= young <= STIFFEST:
+        softest, stiffest = 1e-6, 1e7  # a thousandth of the softest gels' to eight times diamond's
+        if not softest <= young <= stiffest:
             raise ValueError(
-                f"no solid has this Young's modulus; give {SOFTEST:g} to {STIFFEST:g} MPa (1 MPa = 10^6 Pa)"
+                f"no solid has this Young's modulus; give {softest:g} to {stiffest:g} MPa (1 MPa = 10^6 Pa)"
             )
         return young
 
@@ -176,24 +173,16 @@ class Load(CheckedModel):
 class Problem:
     """Find the displacement of the finger: clamped at `base`, moved at `contact`, free of traction elsewhere.
 
-    Attributes:
-        mesh: The mesh that every solver shares.
-        material: The elastic law.
-        load: The indenter's action.
-        observations: Marker displacements, for the solvers that assimilate them.
-        finger: The finger that the mesh is of, for solvers that need more than the mesh, such as the
-            thickness of a wall; None if only the mesh is known.
-
     Raises:
-        UserError: If part of the mesh is not connected to the base, so that it could move freely, if the
-            contact is not on the front face, or if the load moves the contact of a finger farther than the
-            finger is large.
+        UserError: If part of the mesh is not connected to the base, if the contact is not on the front face,
+            or if the load moves the contact of a finger farther than the finger is large.
     """
 
-    mesh: TriangleMesh
+    mesh: TriangleMesh  #: Shared by all solvers
     material: Material = Material()
     load: Load = Load()
-    observations: Observations | None = None
+    observations: Observations | None = None  #: Marker displacements, for the solvers that assimilate them
+    #: The meshed finger, for solvers that need more than the mesh, such as the thickness of a wall
     finger: Finger | None = None
 
     def __post_init__(self) -> None:
@@ -241,10 +230,6 @@ class Problem:
         return content_hash(content)
 
 
-POINTS_ON_EDGE = 12
-"""Quadrature points on an edge of the contact, enough if one edge holds the whole contact."""
-
-
 def contact_ends(problem: Problem) -> tuple[float, float]:
     """Abscissae of the contact's two ends, mm."""
     x = problem.mesh.points[problem.mesh.boundary("contact").ravel(), 0]
@@ -281,7 +266,8 @@ def contact_functional(problem: Problem) -> tuple[FloatArray, FloatArray]:
     middle, width = 0.5 * (left + right), right - left
     if load.kind == "point":
         return front_points(mesh, np.array([middle])), np.ones(1)
-    points, lengths = segment_quadrature(*_front_between(mesh, left, right), POINTS_ON_EDGE)
+    count = 12  # points on an edge, enough if one edge holds the whole contact
+    points, lengths = segment_quadrature(*_front_between(mesh, left, right), count)
     weights = lengths * (1 + np.cos(2 * np.pi * (points[:, 0] - middle) / width)) / width
     return points, weights / weights.sum()
 
@@ -294,7 +280,7 @@ def front_points(mesh: TriangleMesh, x: FloatArray) -> FloatArray:
 
 
 def _front_between(mesh: TriangleMesh, left: float, right: float) -> tuple[FloatArray, FloatArray]:
-    """The pieces of the front's edges between two abscissae: their ends, each (s, 2), mm, along x."""
+    """Ends, each (s, 2), mm, along x, of the pieces of the front's edges between two abscissae."""
     ends = mesh.points[mesh.boundary("front")]
     ends = np.take_along_axis(ends, ends[:, :, :1].argsort(axis=1), axis=1)
     ends = ends[ends[:, 0, 0].argsort()]

@@ -61,9 +61,7 @@ def solver_names() -> list[str]:
 
 
 def make_solver(name: str, **settings: Any) -> Solver:
-    """The solver called `name`, with the settings given and its defaults for the rest.
-
-    Where a solver has `PRESETS`, the setting `preset` chooses one.
+    """The solver called `name`, with its settings; `preset` chooses one of its `PRESETS`, if it has any.
 
     Raises:
         UserError: If there is no such solver or preset, or a package that offers it cannot be loaded.

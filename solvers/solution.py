@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class DisplacementField(Protocol):
-    """The displacement as a function of position, which a solver has to provide."""
+    """The displacement as a function of position, which a solver provides."""
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement at `location.points`, shape (n, 2), mm."""
@@ -41,7 +41,7 @@ class SolidField(DisplacementField, Protocol):
 
 @runtime_checkable
 class MovedWallsField(DisplacementField, Protocol):
-    """A displacement of the drawn material, of a solver that finds that the walls are not as drawn."""
+    """A displacement from a solver that finds that the walls are not as drawn."""
 
     def displacement_in_space(self, location: LocatedPoints) -> FloatArray:
         """Displacement of the material that is at `location.points` before the load, shape (n, 2), mm."""
@@ -49,29 +49,20 @@ class MovedWallsField(DisplacementField, Protocol):
 
 
 class Uncertainty(NamedTuple):
-    """Standard deviations of a solution that was estimated from markers, as functions of position.
+    """Standard deviations of a solution that was estimated from markers, as functions of position."""
 
-    Attributes:
-        displacement: Of `Solution.displacement_in_space`, shape (n, 2), mm.
-        von_mises: Of the von Mises stress, shape (n,), MPa, where the solver knows it.
-    """
-
+    #: Of `Solution.displacement_in_space`, shape (n, 2), mm
     displacement: Callable[[LocatedPoints], FloatArray]
+    #: Of the von Mises stress, shape (n,), MPa, where the solver knows it
     von_mises: Callable[[LocatedPoints], FloatArray] | None = None
 
 
 class Contact(NamedTuple):
-    """Contact between indenter and finger at the full load: abscissae on the drawn front, mm.
+    """Contact between indenter and finger at the full load: abscissae on the drawn front, mm."""
 
-    Attributes:
-        position: Where the resultant force acts.
-        start: End of the contact nearer to the base.
-        end: The other end.
-    """
-
-    position: float
-    start: float
-    end: float
+    position: float  #: Where the resultant force acts
+    start: float  #: End of the contact nearer to the base
+    end: float  #: The other end
 
 
 class Estimated(NamedTuple):
@@ -83,28 +74,18 @@ class Estimated(NamedTuple):
 
 
 class IdentifiedForce(NamedTuple):
-    """The indenter's force, identified from markers.
+    """The indenter's force, identified from markers."""
 
-    Attributes:
-        size: N/mm.
-        position: Abscissa of the contact on the drawn front, mm; None where it was not an unknown.
-    """
-
-    size: Estimated
-    position: Estimated | None
+    size: Estimated  #: N/mm
+    position: Estimated | None  #: Contact's abscissa on the drawn front, mm; None where it was no unknown
 
 
 @dataclasses.dataclass(frozen=True)
 class Status:
-    """Outcome of a solve.
+    """Outcome of a solve."""
 
-    Attributes:
-        converged: Whether the solver's own criterion was met.
-        message: A sentence on the outcome, with advice if it has not converged.
-    """
-
-    converged: bool
-    message: str
+    converged: bool  #: Whether the solver's own criterion was met
+    message: str  #: A sentence on the outcome, with advice if it has not converged
 
 
 def unstable_phrase(directions: int) -> str:
@@ -118,21 +99,13 @@ def unstable_phrase(directions: int) -> str:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ErrorEstimate:
-    """A solver's estimate of the error of its solution.
+    """A solver's estimate of the error of its solution."""
 
-    Attributes:
-        energy_norm: Error in the energy norm over the norm of the solution.
-        displacement: Relative L2 error of the displacement over the body.
-        von_mises: Relative L2 error of the von Mises stress over the body.
-        markers: Exact minus computed displacement at the mesh's markers, shape (m, 2), mm.
-        field: A more accurate field: its distance from the solution's is the estimated error.
-    """
-
-    energy_norm: float
-    displacement: float
-    von_mises: float
-    markers: FloatArray
-    field: DisplacementField
+    energy_norm: float  #: Error in the energy norm over the norm of the solution
+    displacement: float  #: Relative L2 error of the displacement over the body
+    von_mises: float  #: Relative L2 error of the von Mises stress over the body
+    markers: FloatArray  #: Exact minus computed displacement at the mesh's markers, shape (m, 2), mm
+    field: DisplacementField  #: A more accurate field, whose distance from the solution is the estimate
 
     @property
     def at_markers(self) -> float:
@@ -142,46 +115,33 @@ class ErrorEstimate:
     @property
     def phrase(self) -> str:
         """The estimated error in words."""
-        size = f"{self.at_markers:.2g} mm at the markers and {self.energy_norm:.2%} in the energy norm"
-        return f"an estimated {size}"
+        at_markers, energy_norm = f"{self.at_markers:.2g} mm at the markers", f"{self.energy_norm:.2%}"
+        return f"an estimated {at_markers} and {energy_norm} in the energy norm"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Solution:
-    """A displacement field with its problem and a record of the solve.
+    """A displacement field with its problem and a record of the solve."""
 
-    Attributes:
-        solver: Name of the solver.
-        problem: The problem solved, with the material that the solver used.
-        field: The displacement field.
-        energy: Elastic energy per unit depth, N mm / mm.
-        reaction: Force of the indenter on the finger per unit depth, shape (2,), N/mm.
-        status: Outcome of the solve.
-        stats: Numbers that describe the solve: `seconds`, `unknowns`, ...
-        history: Columns of the training or load-stepping record, all of one length; empty for a direct solve.
-        states: The displacement field at every row of the history, from a solver that follows the load.
-        error: The discretisation error, where the solver estimates it.
-        left_out: From a solver that assimilates: the displacement of each observed marker as predicted
-            without it, shape (m, 2), mm; NaN where it was not seen.
-        uncertainty: Standard deviations of the field, from a solver that estimates it.
-        contact: Where the indenter presses, from a solver of finite strain; None if it does not touch.
-        identified: The force, from a solver that identifies it.
-    """
-
-    solver: str
-    problem: Problem
+    solver: str  #: Name of the solver
+    problem: Problem  #: The problem solved, with the material that the solver used
     field: DisplacementField
-    energy: float
-    reaction: FloatArray
+    energy: float  #: Elastic energy per unit depth, N mm / mm
+    reaction: FloatArray  #: Force of the indenter on the finger per unit depth, shape (2,), N/mm
     status: Status
-    stats: Mapping[str, float | int | str]
+    stats: Mapping[str, float | int | str]  #: Numbers that describe the solve: `seconds`, `unknowns`, ...
+    #: Columns of the record of training or load steps, all of one length; empty for a direct solve
     history: Mapping[str, FloatArray] = dataclasses.field(default_factory=dict)
+    #: The displacement at every row of the history, from a solver that follows the load
     states: Sequence[DisplacementField] = ()
-    error: ErrorEstimate | None = None
+    error: ErrorEstimate | None = None  #: The discretisation error, where the solver estimates it
+    #: Displacement of each observed marker as predicted without it, from a solver that assimilates, shape
+    #: (m, 2), mm; NaN where it was not seen
     left_out: FloatArray | None = None
-    uncertainty: Uncertainty | None = None
+    uncertainty: Uncertainty | None = None  #: Standard deviations, from a solver that estimates them
+    #: Where the indenter presses, from a solver of finite strain; None if it does not touch
     contact: Contact | None = None
-    identified: IdentifiedForce | None = None
+    identified: IdentifiedForce | None = None  #: The force, from a solver that identifies it
 
     def displacement(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Displacement at points of shape (n, 2), mm: shape (n, 2), mm.
@@ -194,19 +154,14 @@ class Solution:
     def displacement_in_space(self, points: ArrayLike | LocatedPoints) -> FloatArray:
         """Displacement of the material that is at points (n, 2), mm, before the load: shape (n, 2), mm.
 
-        It is `displacement` unless the solver has found that the walls are not as drawn, so that other
-        material is there.
+        It differs from `displacement` where the solver has found that the walls are not as drawn.
         """
         if isinstance(self.field, MovedWallsField):
             return self.field.displacement_in_space(self._locate(points))
         return self.displacement(points)
 
     def gradient(self, points: ArrayLike | LocatedPoints) -> FloatArray:
-        """Displacement gradient du_i/dx_j at points of shape (n, 2), mm: shape (n, 2, 2).
-
-        Raises:
-            OutsideBodyError: If a point lies outside the finger.
-        """
+        """Displacement gradient du_i/dx_j at points of shape (n, 2), mm: shape (n, 2, 2)."""
         return self.field.gradient(self._locate(points))
 
     def state(self, points: ArrayLike | LocatedPoints) -> "State":
@@ -247,9 +202,9 @@ class Solution:
     def _repr_html_(self) -> str:
         """Status, energy, reaction, unknowns and time, in a notebook."""
         u, v = self.reaction
+        outcome = "converged" if self.status.converged else "not converged"
         facts = {
-            "status": ("converged" if self.status.converged else "not converged")
-            + f": {self.status.message}",
+            "status": f"{outcome}: {self.status.message}",
             "energy": f"{self.energy:.5g} N mm per mm of depth",
             "reaction": f"({u:.4g}, {v:.4g}) N per mm of depth",
             "unknowns": self.stats.get("unknowns", "–"),
@@ -263,22 +218,13 @@ class Solution:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class State:
-    """Strain and stress at n points.
+    """Strain and stress at n points."""
 
-    Attributes:
-        strain: In-plane strain tensor, shape (n, 2, 2): infinitesimal for the linear law, Green-Lagrange for
-            finite strain.
-        stress: In-plane Cauchy stress, shape (n, 2, 2), MPa.
-        stress_zz: Out-of-plane Cauchy stress, shape (n,), MPa; zero in plane stress.
-        von_mises: Shape (n,), MPa.
-        energy_density: Strain energy per reference volume, shape (n,), MPa.
-    """
-
-    strain: FloatArray
-    stress: FloatArray
-    stress_zz: FloatArray
-    von_mises: FloatArray
-    energy_density: FloatArray
+    strain: FloatArray  #: In-plane, shape (n, 2, 2): infinitesimal, or Green-Lagrange for finite strain
+    stress: FloatArray  #: In-plane Cauchy stress, shape (n, 2, 2), MPa
+    stress_zz: FloatArray  #: Out-of-plane Cauchy stress, shape (n,), MPa; zero in plane stress
+    von_mises: FloatArray  #: Shape (n,), MPa
+    energy_density: FloatArray  #: Strain energy per reference volume, shape (n,), MPa
 
     @classmethod
     def from_gradient(cls, gradient: FloatArray, problem: Problem) -> "State":

@@ -22,7 +22,6 @@ RESERVED = "truth"
 """Name of the field of a simulated finger, which no solver can have."""
 
 NONE_SEEN = "none of the markers is visible; at least one is needed, or leave the measurements out"
-"""Refusal of observations that say nothing."""
 
 Family = Literal["finite elements", "neural network", "statistics"]
 
@@ -42,17 +41,13 @@ class SolverFailedError(UserError):
     """A solver raised an exception, the cause of this one."""
 
     def __init__(self, solver: "Solver", cause: Exception) -> None:
-        kind, place = type(cause).__name__, _place(solver, cause)
-        super().__init__(" ".join(f"solver {solver.name} raised {kind}: {cause} ({place})".split()))
-
-
-def _place(solver: "Solver", cause: Exception) -> str:
-    """File and line of an exception: the innermost ones in the solver's folder, else of all."""
-    frames = traceback.extract_tb(cause.__traceback__)[1:]  # the first is the call
-    home = getattr(sys.modules.get(type(solver).__module__), "__file__", None)
-    own = [frame for frame in frames if home and Path(frame.filename).is_relative_to(Path(home).parent)]
-    last = (own or frames or traceback.extract_tb(cause.__traceback__))[-1]
-    return f"{last.filename}:{last.lineno}"
+        call, *frames = traceback.extract_tb(cause.__traceback__)
+        home = getattr(sys.modules.get(type(solver).__module__), "__file__", None)
+        own = [each for each in frames if home and Path(each.filename).is_relative_to(Path(home).parent)]
+        last = [call, *frames, *own][-1]  # the innermost line of the solver's folder, if one is there
+        place = f"{last.filename}:{last.lineno}"
+        message = f"solver {solver.name} raised {type(cause).__name__}: {cause} ({place})"
+        super().__init__(" ".join(message.split()))
 
 
 @runtime_checkable
@@ -79,11 +74,7 @@ class Solver(Protocol):
         ...
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
-        """Solve `problem`.
-
-        Raises:
-            UnsupportedProblemError: If the solver does not support the problem.
-        """
+        """Solve `problem`; an `UnsupportedProblemError` says that the solver does not support it."""
         ...
 
     def settings(self) -> dict[str, object]:
@@ -95,8 +86,7 @@ class FieldSettings:
     """Base of our solvers: frozen dataclasses whose fields are their settings."""
 
     name: ClassVar[str]
-    preset: ClassVar[str | None] = None
-    """Of a solver that is one preset of several."""
+    preset: ClassVar[str | None] = None  # Of a solver that is one preset of several
 
     def settings(self) -> dict[str, object]:
         """The preset and the fields; see `Solver`."""
@@ -124,17 +114,11 @@ class FieldSettings:
 
 @dataclass(frozen=True)
 class Traits:
-    """Optional attributes of a solver, with their values for a solver that lacks them.
+    """Optional attributes of a solver, with their values for a solver that lacks them."""
 
-    Attributes:
-        assimilates: Whether it uses the observations of a problem.
-        family: Kind of method; None if unknown.
-        twin: Name of the solver by finite elements that fits the markers in the same way, if there is one.
-    """
-
-    assimilates: bool = False
-    family: Family | None = None
-    twin: str | None = None
+    assimilates: bool = False  #: Whether it uses the observations of a problem
+    family: Family | None = None  #: Kind of method; None if unknown
+    twin: str | None = None  #: Solver by finite elements that fits the markers in the same way, if any
 
     @classmethod
     def of(cls, solver: Solver) -> "Traits":
@@ -154,11 +138,7 @@ def check_name(name: str) -> None:
 
 
 def check_problem(solver: Solver, problem: Problem) -> None:
-    """Raise an `UnsupportedProblemError` if the solver does not support the law or the kind of load.
-
-    Raises:
-        UserError: If there are markers, none of which was seen.
-    """
+    """Raise an error if the solver lacks the law or the kind of load, or if no marker was seen."""
     if problem.observations is not None and not problem.observations.known:
         raise UserError(f"{solver.name}: {NONE_SEEN}")
     if problem.material.law not in solver.laws:
@@ -180,8 +160,7 @@ def check_load(solver: Solver, load: Load) -> None:
 def with_law(material: Material, solver: Solver) -> Material:
     """The material with a law that the solver supports: its own if possible, else the solver's default.
 
-    Raises:
-        UnsupportedProblemError: If that law does not exist for the material's plane state.
+    An `UnsupportedProblemError` says that this law does not exist for the material's plane state.
     """
     law = material.law if material.law in solver.laws else solver.laws[0]
     try:
@@ -194,7 +173,7 @@ def solved(solver: Solver, problem: Problem, progress: Progress = silent) -> Sol
     """The solution of a solver, checked, so that a fault of a plug-in is not found far from it.
 
     Raises:
-        UserError: If it is no `Solution`, or an array in it has another shape or is not finite.
+        UserError: If it is no `Solution`, or an array in it has a wrong shape or is not finite.
         SolverFailedError: If it raises anything but an error of the input or of the system.
     """
     try:
@@ -209,7 +188,7 @@ def solved(solver: Solver, problem: Problem, progress: Progress = silent) -> Sol
 
 
 def _checked(solver: Solver, solution: Solution, problem: Problem) -> Solution:
-    """The solution under its solver's name; else an error, as of `solved`."""
+    """The solution under its solver's name, or the errors of `solved`."""
     for value, kind in ((solution, Solution), (getattr(solution, "status", None), Status)):
         if not isinstance(value, kind):
             said = f"{_named(value)} as its {kind.__name__}"
@@ -226,7 +205,7 @@ def _checked(solver: Solver, solution: Solution, problem: Problem) -> Solution:
 
 
 def _other_kind(values: Any, *, of_field: bool) -> str | None:
-    """The kind of values that are no array of real numbers; None if they are one."""
+    """A phrase for values that are no array of real numbers; None for an array of them."""
     if (of_field and not isinstance(values, np.ndarray)) or isinstance(values, np.ma.MaskedArray):
         return _named(values)
     try:
@@ -241,7 +220,7 @@ def _named(value: object) -> str:
 
 
 def _fault(solution: Solution, problem: Problem) -> str | None:
-    """A number or array of a solution that cannot be, with the reason; None if there is none."""
+    """A phrase for a number or array of a solution that cannot be right; None if all can."""
     if not isinstance(solution.problem, Problem):
         return f"Solution of {_named(solution.problem)}; it must have the problem that it was given"
     if solution.problem.mesh.digest != problem.mesh.digest:
@@ -285,16 +264,11 @@ class TrainingDiverged(UserError):
 
 @dataclass(frozen=True)
 class TrainingContext:
-    """Runtime context of a training, which does not change its result.
+    """Runtime context of a training, which does not change its result."""
 
-    Attributes:
-        folder: Folder for checkpoints and the history; None to write nothing.
-        resume: Whether to continue from the checkpoint in `folder` if there is one.
-        reference_energy: Energy of a reference solution per depth, N mm/mm, for the progress text.
-    """
-
-    folder: Path | None = None
-    resume: bool = False
+    folder: Path | None = None  #: Folder for checkpoints and the history; None to write nothing
+    resume: bool = False  #: Whether to continue from the checkpoint in `folder` if there is one
+    #: Energy of a reference solution per depth, N mm/mm, for the progress text
     reference_energy: float | None = None
 
 

@@ -16,7 +16,7 @@ from solvers.problem import Problem
 from solvers.registry import MissingLibraryError, make_solver
 
 if TYPE_CHECKING:
-    from solvers.fem.finite_strain.nearby import Equilibrium
+    from solvers.fem.finite_strain.solver import Equilibrium
 
 UNLIKE = 0.01
 """Relative L2 difference of displacements, beyond the stated errors, that needs an explanation: the networks'
@@ -96,7 +96,7 @@ def _branches(evaluations: Sequence[Evaluation], problem: Problem) -> tuple[list
     except MissingLibraryError as error:
         warnings.warn(f"results differ, and nobody looks for branches: {error}", stacklevel=2)
         return [], []
-    from solvers.fem.finite_strain.nearby import equilibria_near
+    from solvers.fem.finite_strain.solver import equilibria_near
 
     starts = [np.concatenate([entry.node_displacement, entry.edge_displacement]) for entry in evaluations]
     branches: list[_Branch] = []

@@ -34,9 +34,9 @@ MAX_ROUNDS, INFLATION_CHANGE = 8, 0.01
 MAX_STEPS, COST_CHANGE = 12, 1e-4
 """Steps of one fit at most, and the relative change of its cost below which it has converged.
 
-At the minimum the cost is about half the number of observations, so that for twenty of them the change is a
-thousandth: a few hundredths of a standard deviation. As much is added to the cost, so that observations
-without noise, which leave less, are fitted no further.
+At the minimum the cost is about half the number of observations: for twenty of them the change is a few
+hundredths of a standard deviation. As much is added to the cost, so that exact observations are fitted no
+further.
 """
 
 Prediction = tuple[FloatArray, FloatArray]
@@ -83,7 +83,7 @@ def values_of(parameters: Sequence[Parameter], z: FloatArray) -> tuple[FloatArra
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Estimates of p parameters from n observations, with covariance and resolution."""
+    """Estimates of p parameters from n observations."""
 
     parameters: Sequence[Parameter]
     z: FloatArray  # Standardised values, shape (p,)
@@ -156,10 +156,9 @@ class Estimate:
         return np.asarray(self.resolution >= MIN_RESOLUTION)
 
     def residuals_without(self, rows: IntArray) -> FloatArray:
-        """Residuals over φ σ of observations left out together, shape (k,), to first order: (I - H)^-1 r.
+        """Residuals over φ σ of observations left out together, shape (k,): (I - H)^-1 r to first order.
 
-        H = A (A^T A + 1)^-1 A^T; exact for a linear model and the same φ (D. M. Allen, Technometrics 16
-        (1974) 125-127).
+        H is A (A^T A + 1)^-1 A^T (D. M. Allen, Technometrics 16 (1974) 125-127).
         """
         own = self.sensitivities[rows]
         return np.linalg.solve(np.eye(len(rows)) - own @ self.covariance @ own.T, self.residuals[rows])

@@ -28,8 +28,7 @@ class MarkerFit(NamedTuple):
 
     forces: FloatArray  # p, shape (m, 2), N/mm
     residual: FloatArray  # d - B u, shape (m, 2), mm
-    # Residual of each marker in the fit without it, by unchanged weights, (m, 2), mm
-    residual_without: FloatArray
+    residual_without: FloatArray  # Of each marker in the fit without it, by unchanged weights, (m, 2), mm
     energy: float  # E(u) - E(u_0), N mm / mm
 
     @property
@@ -42,8 +41,7 @@ class MarkerFit(NamedTuple):
 class MarkerForces:
     """The minimisers for all factors of the weights."""
 
-    # C, shape (2 m, 2 m), mm per N/mm, the two components of a marker one after the other
-    compliance: FloatArray
+    compliance: FloatArray  # C, shape (2 m, 2 m), mm per N/mm, the components of a marker beside each other
     weights: FloatArray  # The diagonal of W, positive, shape (m, 2), MPa
     prior_residual: FloatArray  # d - B u_0, shape (m, 2), mm
 
@@ -74,10 +72,7 @@ class MarkerForces:
         )
 
     def log_evidence(self, scale: float, factor: float = 1.0) -> float:
-        """Log evidence of d up to a constant, for W = scale / σ² and the prior exp(-E / (factor scale)).
-
-        The scale is in N mm / mm.
-        """
+        """Log evidence of d up to a constant, for W = scale / σ² and the prior exp(-E / (factor scale))."""
         values, _ = self._modes
         spread = 1 + factor * values
         return -0.5 * float((self._in_modes**2 / spread).sum() / scale + np.log(spread).sum())

@@ -1,4 +1,4 @@
-"""Weighting of the markers' misfit: the settings for it, the L-curve, and the choice of a factor on it."""
+"""Weighting of the markers' misfit: checked settings, the L-curve, and the choice of a factor on it."""
 
 from dataclasses import dataclass, fields
 from typing import get_args
@@ -18,7 +18,7 @@ FACTORS: FloatArray = 10.0 ** np.arange(-9, 3.25, 0.25)
 
 @dataclass(frozen=True, kw_only=True)
 class MarkerWeighting(MarkerSettings):
-    """Weights of the misfit by a solver's settings; messages have the solver's name."""
+    """Weights of the misfit by the settings of a solver, which messages name."""
 
     solver_name: str
 
@@ -38,11 +38,7 @@ class MarkerWeighting(MarkerSettings):
 
     @classmethod
     def of(cls, solver: Solver) -> "MarkerWeighting":
-        """The weighting by a solver's settings.
-
-        Raises:
-            UserError: If a setting is out of its range.
-        """
+        """The weighting by a solver's settings, checked."""
         names = [entry.name for entry in fields(cls) if hasattr(solver, entry.name)]
         return cls(solver_name=solver.name, **{name: getattr(solver, name) for name in names})
 
@@ -54,8 +50,7 @@ class MarkerWeighting(MarkerSettings):
     def misfit(self, problem: Problem) -> Misfit | None:
         """The misfit to a problem's markers; None without markers, or with weights of zero.
 
-        Raises:
-            UserError: If a factor is to be chosen at finite strain, or a patch is to have a deviation.
+        A `UserError` refuses to choose a factor at finite strain, and a patch with a deviation.
         """
         if problem.observations is None or not self.asm_weight * self.scale:
             return None
@@ -86,6 +81,5 @@ class MarkerWeighting(MarkerSettings):
         if self.choose == "given":
             return 1.0
         curve = self.curve(forces)
-        if self.choose == "left-out":
-            return float(FACTORS[curve["curve_left_out_mm"].argmin()])
-        return float(FACTORS[curve["curve_log_evidence"].argmax()])
+        lost = curve["curve_left_out_mm"] if self.choose == "left-out" else -curve["curve_log_evidence"]
+        return float(FACTORS[lost.argmin()])

@@ -5,9 +5,8 @@ Solvers minimise, per depth, elastic energy plus misfit:
     J(u) = E(u) + 1/2 (B u - d)^T W (B u - d)
 
 with the displacements B u of the markers, d observed there, and a diagonal of weights W. B takes the mean
-over a marker's disc, which a camera measures. At a radius of zero it takes the centre's displacement, as the
-paper does; that has no limit under refinement, since a point force displaces its point of a plane body
-without bound.
+over a marker's disc, which a camera measures. With a radius of zero it takes the centre's displacement, as in
+the paper; that has no limit under refinement: a point force displaces its point of a body without bound.
 
 Sources: X. Wang et al., PINN-Ray, arXiv:2407.08222, section "Loss function", whose loss times the body's area
 this is; A. M. Stuart, Inverse problems: a Bayesian perspective, Acta Numerica 19 (2010) 451-559, section 2,
@@ -33,29 +32,25 @@ Choice = Literal["given", "left-out", "evidence"]
 MIN_STANDARD_DEVIATION = 0.005
 """Minimum standard deviation of an observation, mm: a well-calibrated camera's; simulated ones have none."""
 
-RINGS, ANGLES = 4, 12
-"""Quadrature of a disc: Gauss points in the squared radius, equidistant angles."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class MarkerSettings:
     """Settings of a solver that minimises the misfit to the markers together with the energy.
 
     Attributes:
-        weights: "paper": the loss λ_ASM 1/m Σ |u - d|² beside the mean energy density, times the body's area
-            A, is W = 2 A λ_ASM / m. "precision": W = scale / σ², with standard deviations σ of at least
-            `MIN_STANDARD_DEVIATION`. The minimiser of J is then the mode of the posterior for the prior
+        weights: "paper": W = 2 A λ_ASM / m, from the loss λ_ASM 1/m Σ |u - d|² beside the mean energy density
+            and the body's area A. "precision": W = scale / σ², with standard deviations σ of at least
+            `MIN_STANDARD_DEVIATION`, so that the minimiser of J is the mode of the posterior for the prior
             exp(-E / scale) and independent normal errors of the observations.
         asm_weight: λ_ASM, MPa/mm², for "paper".
         scale: Model error for "precision", as an energy per depth, N mm / mm: a typical deviation from the
             model's solution has half of it in every degree of freedom.
         marker_radius: Radius of the discs over which the displacement is averaged, mm; 0: the centres; None:
             the observations' own; less where a marker is nearer to the boundary of the body.
-        contact_deviation: Standard deviation of the contact's displacement about the prescribed one, mm,
-            where the prior is exp(-E / scale): a spring of stiffness scale / contact_deviation² between
-            contact and indenter. Zero: the contact moves as prescribed.
-        choose: Factor of the weights. "given": one; "left-out": of `FACTORS`, the one with the least error at
-            markers left out one at a time; "evidence": with the largest evidence, for "precision".
+        contact_deviation: Standard deviation of the contact's displacement about the prescribed one, mm: a
+            spring of stiffness scale / contact_deviation² between contact and indenter, or none if zero.
+        choose: Factor of the weights: "given" (one), or of `FACTORS` the one with the least error at markers
+            left out one at a time ("left-out") or with the largest evidence ("evidence", for "precision").
     """
 
     weights: Weighting = "paper"
@@ -67,9 +62,6 @@ class MarkerSettings:
     assimilates: ClassVar[bool] = True
 
 
-DEFAULTS = MarkerSettings()
-
-
 @dataclass(frozen=True, eq=False)
 class Misfit:
     """1/2 (B u - d)^T W (B u - d) at the m markers that were seen, per depth."""
@@ -77,8 +69,7 @@ class Misfit:
     points: FloatArray  # Positions of the markers at rest, shape (m, 2), mm
     observed: FloatArray  # Displacements d, shape (m, 2), mm
     weights: FloatArray  # The diagonal of W, shape (m, 2), MPa: N/mm of force per depth for 1 mm of misfit
-    # Radius of the discs over which the displacement is averaged, mm; zero: the centres alone
-    radius: float = 0.0
+    radius: float = 0.0  # Of the discs over which the displacement is averaged, mm; zero: the centres alone
 
     def sampling(self) -> tuple[FloatArray, FloatArray]:
         """Points (q, 2), mm, and the weights (m, q) by which a field's values there give B u."""
@@ -95,9 +86,9 @@ class Misfit:
         return Misfit(points, observed, weights, self.radius)
 
 
-def misfit_of(problem: Problem, settings: MarkerSettings = DEFAULTS) -> Misfit | None:
-    """The misfit to a problem's observations; None where it has none. Markers not seen are left out."""
-    observations = problem.observations
+def misfit_of(problem: Problem, settings: MarkerSettings | None = None) -> Misfit | None:
+    """The misfit to the markers that were seen; None where the problem has no observations."""
+    settings, observations = settings or MarkerSettings(), problem.observations
     if observations is None:
         return None
     seen = observations.visible
@@ -114,15 +105,16 @@ def misfit_of(problem: Problem, settings: MarkerSettings = DEFAULTS) -> Misfit |
 
 def disc_quadrature(centres: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
     """Points (q, 2), mm, and weights (m, q) that give a field's means over the discs at m centres."""
-    count = len(centres)
+    one_each = np.eye(len(centres))
     if not radius:
-        return centres, np.eye(count)
-    roots, shares = roots_legendre(RINGS)
-    angles = 2 * np.pi * (np.arange(ANGLES) + 0.5) / ANGLES
+        return centres, one_each
+    count = 12  # equidistant angles; four Gauss points in the squared radius
+    roots, shares = roots_legendre(4)
+    angles = 2 * np.pi * (np.arange(count) + 0.5) / count
     distance = radius * np.sqrt(0.5 * (1 + roots))
     disc = distance[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     points = centres[:, None] + disc.reshape(-1, 2)
-    return points.reshape(-1, 2), np.kron(np.eye(count), np.repeat(shares / (2 * ANGLES), ANGLES))
+    return points.reshape(-1, 2), np.kron(one_each, np.repeat(shares / (2 * count), count))
 
 
 def standard_deviations(observations: Observations) -> FloatArray:
@@ -133,7 +125,7 @@ def standard_deviations(observations: Observations) -> FloatArray:
 def leave_one_out_displacements(problem: Problem, residuals: FloatArray) -> FloatArray:
     """Displacement of each marker as predicted without it, (m, 2), mm; NaN where it was not seen.
 
-    Residuals are observed minus predicted, shape (number of markers seen, 2), mm.
+    `residuals` are observed minus predicted, shape (number of markers seen, 2), mm.
     """
     observations = problem.observations
     if observations is None:

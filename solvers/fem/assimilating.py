@@ -1,7 +1,4 @@
-"""`fem-asm`: the displacement of least energy plus misfit to the markers, exactly, on the shared mesh.
-
-This module has the linear law; `assimilated` has finite strain.
-"""
+"""`fem-asm`: the displacement of least energy plus misfit to the markers, exactly, on the shared mesh."""
 
 import time
 from collections.abc import Callable
@@ -39,22 +36,6 @@ class MarkerCompliance:
     # forces, while base and load hold at zero
     markers: ConstrainedElimination
 
-    @classmethod
-    def of(cls, problem: Problem, degree: int, misfit: Misfit, slack: float = 0.0) -> "MarkerCompliance":
-        """Factorise once; solve once for the problem and once for every component of a marker.
-
-        Args:
-            problem: With the conditions that hold.
-            degree: Degree of the elements.
-            misfit: With the markers.
-            slack: Compliance of springs between contact and indenter, mm per N/mm, for `mean` and `point`.
-        """
-        space = LagrangeSpace(problem.mesh, degree)
-        equilibrium = LinearEquilibrium.of(LinearElasticity.of(problem, space), slack)
-        rows = marker_functionals(misfit, space)
-        markers = ConstrainedElimination(rows, equilibrium.responses(rows))
-        return cls(equilibrium, equilibrium.solution(), markers)
-
     def of_markers(self, chosen: BoolArray) -> "MarkerCompliance":
         """Subset of the markers selected by a mask of shape (m,)."""
         both, markers = np.repeat(chosen, 2), self.markers
@@ -75,15 +56,11 @@ class MarkerCompliance:
 class FemAsmSolver(FieldSettings):
     """`fem` with the markers' misfit: one factorisation, and one solve for each component of a marker.
 
-    For a law of finite strain it is `fem-nonlinear` with the misfit, solved again without each marker.
-
-    Attributes:
-        degree: Degree of the elements, 1 or 2.
-
-    The other settings are those of `MarkerSettings`.
+    For a law of finite strain it is `fem-nonlinear` with the misfit, solved again without each marker. The
+    settings of the misfit are explained in `MarkerSettings`.
     """
 
-    degree: int = 2
+    degree: int = 2  # Of the elements, 1 or 2
     weights: Weighting = "paper"
     asm_weight: float = 1000.0
     scale: float = 1.0
@@ -101,11 +78,7 @@ class FemAsmSolver(FieldSettings):
         _ = self.weighting
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
-        """Solve for the minimiser; see `Solver`. Without markers it is that of `fem` or `fem-nonlinear`.
-
-        Raises:
-            UserError: If a factor is to be chosen at finite strain, or a patch is to have a deviation.
-        """
+        """Solve for the minimiser; see `Solver`. Without markers it is `fem` or `fem-nonlinear`."""
         check_problem(self, problem)
         if self.weighting.misfit(problem) is not None:
             return on_all_ranks(self._solve, problem, progress)
@@ -123,15 +96,19 @@ class FemAsmSolver(FieldSettings):
         return MarkerWeighting.of(self)
 
     def prepare(self, problem: Problem) -> tuple[MarkerCompliance, Misfit]:
-        """Factorise, and solve for the forces at the markers; further weights and markers cost no solve.
+        """Factorise, and solve for the problem and for every component of a marker.
 
-        Raises:
-            UserError: If the problem has no markers that weigh anything, or a patch is to have a deviation.
+        Further weights and markers cost no solve. A `UserError` refuses a problem without markers that weigh
+        anything.
         """
         misfit = self.weighting.misfit(problem)
         if misfit is None:
             raise UserError("fem-asm was given no markers to assimilate")
-        return MarkerCompliance.of(problem, self.degree, misfit, self.weighting.slack), misfit
+        space = LagrangeSpace(problem.mesh, self.degree)
+        equilibrium = LinearEquilibrium.of(LinearElasticity.of(problem, space), self.weighting.slack)
+        rows = marker_functionals(misfit, space)
+        markers = ConstrainedElimination(rows, equilibrium.responses(rows))
+        return MarkerCompliance(equilibrium, equilibrium.solution(), markers), misfit
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
         """See `Refittable`; one factorisation for all observations if the law is linear."""

@@ -25,31 +25,32 @@ from solvers.extrusion import NodalSpace
 from solvers.fem.ranks import communicator
 from solvers.lagrange import LagrangeSpace
 
+# DOLFINx and FFCx read their option files once: here, from a folder without any. A file of others in the
+# working folder could choose the compiler's flags and the text that it compiles.
+with chdir(Path(dolfinx.__file__).parent):
+    for package in (dolfinx.jit, ffcx):
+        (getattr(package, "get_options", None) or package.get_parameters)()  # until 0.5
 
-def _read_options() -> None:
-    """Let DOLFINx and FFCx read their files of options, which they do once: those of the user alone.
+EDGES = {
+    2: np.array([[1, 2], [0, 2], [0, 1]]),
+    3: np.array([[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]]),
+}
+"""The corners that each edge of a simplex joins, in the order of DOLFINx."""
 
-    One of others in the working folder could choose the flags of the compiler and the text that it compiles.
-    """
-    with chdir(Path(dolfinx.__file__).parent):
-        for package in (dolfinx.jit, ffcx):
-            (getattr(package, "get_options", None) or package.get_parameters)()  # until 0.5
-
-
-_read_options()
-
-
-def _vector_element(dimension: int) -> Any:
-    cell = SIMPLICES[dimension]
-    if hasattr(ufl, "VectorElement"):  # until 0.6
-        return ufl.VectorElement("Lagrange", cell, 1)
-    import basix.ufl
-
-    return basix.ufl.element("Lagrange", cell, 1, shape=(dimension,))
+ABANDONED_S = 120.0
+"""Age at which a form that is not compiled has been given up, s."""
 
 
 def _create_mesh(comm: MPI.Comm, cells: IntArray, points: FloatArray) -> Any:
-    domain = ufl.Mesh(_vector_element(points.shape[1]))
+    dimension = points.shape[1]
+    cell = {2: "triangle", 3: "tetrahedron"}[dimension]
+    if hasattr(ufl, "VectorElement"):  # until 0.6
+        element = ufl.VectorElement("Lagrange", cell, 1)
+    else:
+        import basix.ufl
+
+        element = basix.ufl.element("Lagrange", cell, 1, shape=(dimension,))
+    domain = ufl.Mesh(element)
     names = inspect.signature(dolfinx.mesh.create_mesh).parameters
     return dolfinx.mesh.create_mesh(
         comm, cells=cells, x=points, **{"domain" if "domain" in names else "e": domain}
@@ -90,10 +91,10 @@ T = TypeVar("T")
 
 
 def _compiled(build: Callable[[], T]) -> T:
-    """What a call of DOLFINx gives, without the build log that distutils prints through the root logger.
+    """The result of a call of DOLFINx, without the build log that distutils prints through the root logger.
 
-    Nothing half compiled stays behind an interruption: later runs would wait for it and fail. After a kill
-    it does stay; what is older than `ABANDONED_S` is compiled again.
+    An interruption leaves nothing half compiled, for which later runs would wait and fail. A kill does; what
+    is older than `ABANDONED_S` is compiled again.
     """
     before, began = logging.root.manager.disable, time()
     logging.disable(logging.INFO)
@@ -120,30 +121,14 @@ def _forget_half_compiled(chosen: Callable[[float], bool]) -> None:
                 source.unlink()
 
 
-ABANDONED_S = 120.0
-"""Age at which a form that is not compiled has been given up, s."""
-
-SIMPLICES = {2: "triangle", 3: "tetrahedron"}
-
-EDGES = {
-    2: np.array([[1, 2], [0, 2], [0, 1]]),
-    3: np.array([[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]]),
-}
-"""The corners that each edge of a simplex joins, in the order of DOLFINx."""
-
 SpaceT = TypeVar("SpaceT", bound=NodalSpace)
 
 
 class DistributedSpace(Generic[SpaceT]):
     """A DOLFINx vector space on the shared mesh, or its extrusion, distributed over ranks.
 
-    Nodal arrays of shape (N, d), in the numbering of the `NodalSpace`, are the same on every rank.
-
-    Attributes:
-        space: The elements in NumPy.
-        comm: The ranks.
-        dimension: d, 2 or 3.
-        function: The DOLFINx function that forms are written with.
+    Nodal arrays of shape (N, d), in the numbering of the elements in NumPy, `space`, are the same on every
+    rank of `comm`. Forms are written with `function`.
     """
 
     def __init__(self, space: SpaceT) -> None:
@@ -182,12 +167,9 @@ class DistributedSpace(Generic[SpaceT]):
     def assemble_matrix(
         self, form: Any, conditions: Sequence[Any], *, into: PETSc.Mat | None = None
     ) -> PETSc.Mat:
-        """Matrix with rows and columns of clamped components replaced by the identity.
+        """Matrix of a compiled form, with the identity in rows and columns of clamped components.
 
-        Args:
-            form: The compiled bilinear form.
-            conditions: Dirichlet conditions.
-            into: An earlier matrix of the same form, which is overwritten; a new one if None.
+        It overwrites `into`, an earlier matrix of the form, if there is one.
         """
         if into is not None:
             into.zeroEntries()
@@ -242,10 +224,10 @@ class DistributedSpace(Generic[SpaceT]):
 
 @dataclass(frozen=True, eq=False)
 class NodeFunction:
-    """A vector field given at the nodes of the mesh."""
+    """A vector field given at the nodes of the mesh, as a function of DOLFINx."""
 
-    function: Any  # The DOLFINx function
-    node_of_dof: IntArray  # Its degrees of freedom
+    function: Any
+    node_of_dof: IntArray
 
     def set(self, values: FloatArray) -> None:
         """Give it values of shape (number of the mesh's nodes, 2)."""

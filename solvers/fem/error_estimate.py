@@ -5,17 +5,13 @@ for nodal displacements u (Zienkiewicz and Zhu, Int. J. Numer. Meth. Engng 24 (1
 the error in the energy norm.
 
 The error of any functional j of the displacement is a(e, z - z_h) with the dual solution z, a(v, z) = j(v),
-and z_h in the finite-element space (R. Becker, R. Rannacher, An optimal control approach to a posteriori
-error estimation in finite element methods, Acta Numerica 10 (2001) 1-102, section 3). With both errors
-estimated by R this is c(R u, R z_h), which is linear in z_h = K^-1 j. Hence one solve serves every
-functional:
+and z_h in the finite-element space (R. Becker, R. Rannacher, Acta Numerica 10 (2001) 1-102, section 3). With
+both errors estimated by R this is c(R u, R z_h), linear in z_h = K^-1 j, so that one solve serves all:
 
     j(e) = j . d,    K d = R^T C R u
 
-so that d is the estimated error of the displacement itself, at markers and everywhere. At finite strain K and
-C are the tangents at the solution.
-
-Linear triangles of a nearly incompressible material lock in plane strain: `locking_advice` warns.
+where d is the estimated error of the displacement itself. At finite strain K and C are the tangents at the
+solution.
 """
 
 from collections.abc import Callable
@@ -34,31 +30,13 @@ from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Material, Problem
 from solvers.solution import ErrorEstimate, State
 
-QUADRATURE_DEGREE = 4
-"""Exact for the energy of the estimated error: smoothed gradients are polynomials of degree 2."""
-
-STEP = 1e-6
-"""Fraction of the gradient's error in the finite difference of the stress."""
-
-ONSET = 0.4
-"""Poisson's ratio up to which the energy error of linear elements is within a fifth of that at 0.3."""
-
-GROWTH = 0.09
-"""Growth of the energy error of linear elements with λ/μ, as a fraction of that at Poisson's ratio 0.3.
-
-Measured on the fingers `default` and `slender` with elements of 1, 0.5 and 0.25 mm: 0.06 to 0.11 up to 0.49.
-"""
-
-MOST = 5.0
-"""Largest factor stated: beyond Poisson's ratio 0.49 the elements hardly move, and the error grows less."""
-
 
 @dataclass(frozen=True, eq=False)
 class ImprovedField(LagrangeField):
     """A finite-element displacement with its estimated error added, and its smoothed gradient."""
 
     gradients: FloatArray  # Nodal values of the smoothed gradient, shape (N, 2, 2)
-    # The field whose gradient replaces it where it would turn the material inside out; None at small strain
+    # Field whose gradient replaces it where it would turn the material inside out; None at small strain
     own: LagrangeField | None = None
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
@@ -80,8 +58,8 @@ class ErrorEstimator:
 
     @cached_property
     def rule(self) -> Quadrature:
-        """The element rule of all integrals."""
-        return body_quadrature(self.space.mesh, QUADRATURE_DEGREE)
+        """The rule of all integrals, exact for the estimate: smoothed gradients are of degree 2."""
+        return body_quadrature(self.space.mesh, 4)
 
     @cached_property
     def recovery(self) -> GradientRecovery:
@@ -102,12 +80,10 @@ class ErrorEstimator:
         return np.asarray(self.recovery.transposed(smooth) - own)
 
     def estimate(self, nodal: FloatArray, solve: Callable[[FloatArray], FloatArray]) -> ErrorEstimate:
-        """The estimated error of a solution.
+        """The estimated error of a solution with nodal displacements of shape (N, 2), mm.
 
-        Args:
-            nodal: Its nodal displacements, shape (N, 2), mm.
-            solve: Change of the nodal displacements, mm, under nodal forces, N/mm, both (N, 2), at constant
-                prescribed values at base and contact.
+        `solve` gives the change of the nodal displacements, mm, under nodal forces, N/mm, both (N, 2), while
+        the prescribed values at base and contact are constant.
         """
         own = LagrangeField(self.space, nodal)
         gradient, difference = own.gradient(self.rule.location), self.gradient_error(nodal)
@@ -129,12 +105,12 @@ class ErrorEstimator:
         )
 
     def _changes(self, gradient: FloatArray, difference: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Changes of the first Piola-Kirchhoff stress and of the von Mises stress with the gradient.
+        """Changes of first Piola-Kirchhoff and von Mises stress at the quadrature points, MPa.
 
-        At the quadrature points, shapes (q, 2, 2) and (q,), MPa. To first order at finite strain: the whole
-        difference, large in corners, might turn material inside out.
+        To first order at finite strain: the whole difference, large in corners, might turn material inside
+        out.
         """
-        step = 1.0 if self.problem.material.law == "linear" else STEP
+        step = 1.0 if self.problem.material.law == "linear" else 1e-6
         before, after = (self._stresses(gradient + part * difference) for part in (0.0, step))
         return (after[0] - before[0]) / step, (after[1] - before[1]) / step
 
@@ -144,12 +120,7 @@ class ErrorEstimator:
         return piola_stress(self.problem.material.law, gradient, state.stress), state.von_mises
 
     def shares(self, nodal: FloatArray, dual: FloatArray) -> FloatArray:
-        """Contribution of every triangle to the error of a functional, shape (t,).
-
-        Args:
-            nodal: The solution, shape (N, 2), mm.
-            dual: The functional's dual solution K^-1 j, shape (N, 2).
-        """
+        """Shares of the triangles, (t,), in a functional's error, by its dual solution K^-1 j, (N, 2)."""
         stress = State.from_gradient(self.gradient_error(nodal), self.problem).stress
         products = np.einsum("qij,qij->q", stress, self.gradient_error(dual)) * self.rule.weights
         return np.asarray(products.reshape(len(self.space.mesh.triangles), -1).sum(axis=1))
@@ -172,15 +143,17 @@ class ErrorEstimator:
 
 
 def locking_advice(degree: int, material: Material) -> str:
-    """A clause for the status of a solution: empty where elements of that degree do not lock.
+    """A clause for a solution's status if its elements lock, else nothing.
 
-    Every linear triangle has to keep its volume, and there are more of them than nodes: they are too stiff
-    (T. J. R. Hughes, The Finite Element Method, Prentice-Hall, 1987, chapter 4).
+    Every linear triangle of a nearly incompressible material in plane strain has to keep its volume, and
+    there are more of them than nodes (T. J. R. Hughes, The Finite Element Method, Prentice-Hall, 1987,
+    chapter 4).
     """
-    if degree > 1 or material.plane == "stress" or material.poisson <= ONSET:
+    if degree > 1 or material.plane == "stress" or material.poisson <= 0.4:  # the error has grown by a fifth
         return ""
-    factor = locking_factor(material.poisson)
-    times = f"more than {MOST:g}" if factor > MOST else f"about {factor:.1f}"
+    # Beyond Poisson's ratio 0.49 the elements hardly move, and the error grows less.
+    factor, most = locking_factor(material.poisson), 5
+    times = f"more than {most}" if factor > most else f"about {factor:.1f}"
     return (
         f"linear elements lock in plane strain at Poisson's ratio {material.poisson:g}: "
         f"their energy is {times} times as far off as at 0.3; take degree=2"
@@ -188,6 +161,10 @@ def locking_advice(degree: int, material: Material) -> str:
 
 
 def locking_factor(poisson: float) -> float:
-    """Error of linear elements in energy in plane strain, over that at Poisson's ratio 0.3."""
+    """Error of linear elements in energy in plane strain, over the error at Poisson's ratio 0.3.
+
+    Its growth with λ/μ was measured on the fingers `default` and `slender` with elements of 1, 0.5 and
+    0.25 mm: 0.06 to 0.11 up to 0.49.
+    """
     ratio, usual = (lame.λ / lame.μ for lame in (lame_constants(1.0, ν, "strain") for ν in (poisson, 0.3)))
-    return float(1 + GROWTH * (ratio - usual))
+    return float(1 + 0.09 * (ratio - usual))

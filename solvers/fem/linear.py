@@ -8,7 +8,8 @@ from typing import ClassVar, get_args
 from geometry.errors import UserError
 from solvers.fem.boundary_conditions import reaction_by_residual_work
 from solvers.fem.error_estimate import ErrorEstimator, locking_advice
-from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium, LinearSolver
+from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium
+from solvers.fem.linear_solvers import LinearSolver
 from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Problem
@@ -18,21 +19,17 @@ from solvers.solver import Family, FieldSettings, Progress, check_problem, silen
 
 @dataclass(frozen=True)
 class FemSolver(FieldSettings):
-    """Lagrange elements of degree 1 or 2 on exactly the shared mesh.
+    """Lagrange elements on exactly the shared mesh.
 
     A `mean` or `point` load is one linear functional b_k per prescribed component: K x_k = b_k is solved once
     for each, and the forces f follow from (b_i . x_j) f_j = prescribed displacement. A `patch` is a Dirichlet
     condition.
-
-    Attributes:
-        degree: Degree of the elements, 1 or 2.
-        estimate: Whether to estimate the discretisation error, at about half the cost of the solution.
-        linear_solver: "direct" (MUMPS), "iterative" (conjugate gradients with algebraic multigrid) or "auto",
-            the latter beyond `ITERATIVE_BEYOND` unknowns.
     """
 
-    degree: int = 2
-    estimate: bool = True
+    degree: int = 2  # Of the elements, 1 or 2
+    estimate: bool = True  # Whether to estimate the discretisation error, at half the cost of the solution
+    # "direct" (MUMPS), "iterative" (conjugate gradients with algebraic multigrid) or "auto", which iterates
+    # beyond `ITERATIVE_BEYOND` unknowns
     linear_solver: LinearSolver = "auto"
     name: ClassVar[str] = "fem"
     family: ClassVar[Family] = "finite elements"
@@ -51,11 +48,7 @@ class FemSolver(FieldSettings):
         return on_all_ranks(self._solve, problem, progress)
 
     def prepare(self, problem: Problem) -> "FactorisedProblem":
-        """Assemble and factorise once, to solve for many loads.
-
-        Raises:
-            UserError: If the problem is of a kind that the solver does not have.
-        """
+        """Assemble and factorise once, to solve for many loads."""
         check_problem(self, problem)
         space = LagrangeSpace(problem.mesh, self.degree)
         elasticity = LinearElasticity.of(problem, space, self.linear_solver)
@@ -68,9 +61,8 @@ class FemSolver(FieldSettings):
         progress(0.6, "factorised")
         solution = prepared.solve(problem.load)
         prepared.destroy()
-        return replace(
-            solution, stats={**solution.stats, "seconds": seconds + float(solution.stats["seconds"])}
-        )
+        seconds += float(solution.stats["seconds"])
+        return replace(solution, stats={**solution.stats, "seconds": seconds})
 
 
 class FactorisedProblem:
@@ -78,22 +70,13 @@ class FactorisedProblem:
 
     `mean` and `point` loads share the factorisation, wherever they act; so do patches at one place that hold
     the same components. Loads that differ in their displacement only share the responses to unit forces too.
-
-    Args:
-        solver: The solver.
-        equilibrium: The factorisation, and the responses for one load.
     """
 
-    def __init__(self, solver: FemSolver, equilibrium: "LinearEquilibrium") -> None:
-        self._solver = solver
-        self._equilibrium = equilibrium
+    def __init__(self, solver: FemSolver, equilibrium: LinearEquilibrium) -> None:
+        self._solver, self._equilibrium = solver, equilibrium
 
     def solve(self, load: Load) -> Solution:
-        """Solve for a load; `seconds` of the solution's `stats` is the time of this call.
-
-        Raises:
-            UserError: If the load is of a kind that the solver does not have.
-        """
+        """Solve for a load; `seconds` of the solution's `stats` is the time of this call."""
         started = time.perf_counter()
         problem = replace(self._equilibrium.elasticity.problem, load=load)
         check_problem(self._solver, problem)
@@ -106,8 +89,9 @@ class FactorisedProblem:
         if self._solver.estimate and load.kind != "point" and load.values.any():
             error = self._estimator.estimate(nodal, self._equilibrium.response)
         space = elasticity.distributed.space
+        factors = self._equilibrium.factors
         sentence = [
-            self._equilibrium.factors.message,
+            factors.message,
             _uncertainty(problem, error),
             locking_advice(space.degree, problem.material),
         ]
@@ -125,16 +109,15 @@ class FactorisedProblem:
                 "triangles": len(problem.mesh.triangles),
                 "degree": space.degree,
                 "ranks": elasticity.distributed.comm.size,
-                **self._equilibrium.factors.stats,
+                **factors.stats,
             },
             error=error,
         )
 
     @cached_property
     def _estimator(self) -> ErrorEstimator:
-        return ErrorEstimator(
-            self._equilibrium.elasticity.problem, self._equilibrium.elasticity.distributed.space
-        )
+        elasticity = self._equilibrium.elasticity
+        return ErrorEstimator(elasticity.problem, elasticity.distributed.space)
 
     def destroy(self) -> None:
         """Free the factors."""

@@ -1,7 +1,7 @@
 """Linear elasticity: the stiffness, and equilibria for given values at base and contact."""
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import ufl
@@ -16,12 +16,9 @@ from solvers.fem.boundary_conditions import (
     load_targets,
 )
 from solvers.fem.dolfinx_compat import DistributedSpace
-from solvers.fem.linear_solvers import Factorisation, Multigrid
+from solvers.fem.linear_solvers import Factorisation, LinearSolver, Multigrid
 from solvers.lagrange import LagrangeSpace
-from solvers.petsc import PETSc
 from solvers.problem import Problem
-
-LinearSolver = Literal["auto", "direct", "iterative"]
 
 ITERATIVE_BEYOND = 10_000_000
 """Unknowns beyond which "auto" means "iterative".
@@ -33,12 +30,12 @@ the iterations (1.4 GB).
 
 @dataclass(frozen=True, eq=False)
 class LinearElasticity:
-    """The forms of the linear problem."""
+    """The compiled forms of the linear problem."""
 
-    problem: Problem  # The problem
+    problem: Problem
     distributed: DistributedSpace[LagrangeSpace]  # The elements in DOLFINx
-    force: Any  # The compiled internal force
-    stiffness: Any  # The compiled stiffness
+    force: Any
+    stiffness: Any
     iterative: bool  # Whether systems are solved by multigrid, not by factorisation
 
     @classmethod
@@ -54,13 +51,9 @@ class LinearElasticity:
             iterative = 2 * len(space.nodes) > ITERATIVE_BEYOND
         return cls(problem, distributed, *distributed.derivatives(energy), iterative)
 
-    def assemble(self, clamped: BoolArray) -> PETSc.Mat:
-        """The stiffness with the components of the mask `clamped`, shape (N, 2)."""
-        return self.distributed.assemble_matrix(self.stiffness, self.distributed.clamp(clamped))
-
     def factorise(self, clamped: BoolArray) -> Factorisation | Multigrid:
         """Assemble and factorise with the components of the mask `clamped`, shape (N, 2)."""
-        matrix = self.assemble(clamped)
+        matrix = self.distributed.assemble_matrix(self.stiffness, self.distributed.clamp(clamped))
         if self.iterative:
             return Multigrid(self.distributed, matrix, clamped)
         return Factorisation(self.distributed, matrix, clamped, positive_definite=True)
@@ -75,7 +68,7 @@ class LinearElasticity:
 class LinearEquilibrium:
     """Displacements of least energy for any values at base and contact, from one factorisation."""
 
-    elasticity: LinearElasticity  # The stiffness
+    elasticity: LinearElasticity
     clamped: BoolArray  # Components with a Dirichlet condition, mask of shape (N, 2)
     factors: Factorisation | Multigrid  # Solver of the stiffness with these components clamped
     load: ConstrainedElimination  # Solves with the load's k functionals, of which a `patch` has none
@@ -84,9 +77,7 @@ class LinearEquilibrium:
     def of(cls, elasticity: LinearElasticity, slack: float = 0.0) -> "LinearEquilibrium":
         """Factorise, and solve once for each functional.
 
-        Args:
-            elasticity: The stiffness.
-            slack: Compliance of springs through which the functionals' values are given, mm per N/mm.
+        Springs of the compliance `slack`, mm per N/mm, stand between the functionals and their given values.
         """
         problem, space = elasticity.problem, elasticity.distributed.space
         clamped = dirichlet_mask(problem, space)
@@ -114,12 +105,7 @@ class LinearEquilibrium:
         return self.minimiser(dirichlet_displacement(problem, space), load_targets(problem))
 
     def minimiser(self, given: FloatArray, values: FloatArray) -> FloatArray:
-        """The nodal displacements of least energy, shape (N, 2), mm.
-
-        Args:
-            given: Nodal displacements whose components of `clamped` are taken, shape (N, 2), mm.
-            values: Prescribed values of the functionals, shape (k,), mm.
-        """
+        """Nodal displacements (N, 2), mm, of least energy, for those given where clamped, and values (k,)."""
         nodal = np.where(self.clamped, given, 0.0)
         if nodal.any():
             nodal = nodal + self.factors.solve(-self.elasticity.internal_force(nodal))
@@ -130,15 +116,13 @@ class LinearEquilibrium:
         return self.load.solution(self.factors.solve(force))[0]
 
     def responses(self, forces: FloatArray) -> FloatArray:
-        """The same for several at once, shape (r, N, 2)."""
+        """Responses to several at once, shape (r, N, 2)."""
         return np.array([self.load.solution(free)[0] for free in self.factors.solve_all(forces)])
 
     def residual(self, internal: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Residual of internal forces, shape (N, 2), N/mm, under the best forces of the functionals.
+        """Residual r, (N, 2), N/mm, of internal forces with the functionals' best forces; `response(r)`.
 
-        Returns:
-            Residual force r, shape (N, 2), N/mm, zero where displacements are given, and `response(r)`: the
-            square root of their product is the dual norm of r.
+        It is zero where displacements are given. The square root of the product of both is its dual norm.
         """
         response, forces = self.load.solution(self.factors.solve(internal))
         return np.where(self.clamped, 0.0, internal + self.load.weighted(forces)), response

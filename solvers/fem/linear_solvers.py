@@ -1,6 +1,6 @@
 """Solutions of the stiffness: factors by MUMPS, or multigrid for large matrices in little memory."""
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 from weakref import finalize
 
 import numpy as np
@@ -10,20 +10,12 @@ from geometry.errors import UserError
 from solvers.fem.dolfinx_compat import DistributedSpace
 from solvers.petsc import PETSc
 
+LinearSolver = Literal["auto", "direct", "iterative"]
+
 TOLERANCE = 1e-10
 """Residual force over the right-hand side at which the iteration ends."""
 
 MAX_ITERATIONS = 1000
-
-PREFIX = "pinnray_multigrid_"
-STRONG = 0.01
-"""Weakest coupling within an aggregate in three dimensions, where layers are thicker than elements are wide:
-134 iterations in place of 176 on 235,000 unknowns."""
-
-PLANE_PREFIX = "pinnray_plane_"
-ORDERING, MINIMUM_FILL = "mat_mumps_icntl_7", 2
-"""MUMPS' option to eliminate in the order of approximate minimum fill: its analysis of plane meshes is
-quicker than the usual one, in all 2.5 s in place of 5.5 s at 717,000 unknowns, with 7 % more entries."""
 
 LARGEST_RESIDUAL = 1e-3
 """Residual force of a direct solution over its right-hand side above which rounding has spoilt it.
@@ -32,27 +24,13 @@ It is 1e-10 for the default finger, and 1e-3 at Poisson's ratio 0.49999999, wher
 right digits; at 0.1 it has four, at 2 none.
 """
 
-NEGATIVE_PIVOTS = 12
-"""Number of MUMPS' output that counts them."""
-EXACT_INERTIA = 13, 1
-"""MUMPS' option to eliminate on one process what comes last: on several, pivots would not be counted."""
-
-INDEFINITE = (
-    PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT,
-    PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC,
-)
-
 
 class StiffnessSolver:
     """A symmetric matrix and its solver in PETSc, for any number of right-hand sides.
 
-    On one rank both are freed with this object at the latest: petsc4py would keep them for ever. On several
-    ranks all have to call `destroy` at once.
-
-    Args:
-        space: The space of right-hand sides and solutions.
-        matrix: The assembled matrix.
-        clamped: Mask of shape (N, d): components whose right-hand side is set to zero.
+    A mask `clamped`, shape (N, d), says which components of the right-hand sides are set to zero. On one rank
+    PETSc's objects are freed with this one at the latest: petsc4py would keep them for ever. On several ranks
+    all have to call `destroy` at once.
     """
 
     def __init__(self, space: DistributedSpace[Any], matrix: PETSc.Mat, clamped: BoolArray) -> None:
@@ -89,13 +67,12 @@ class StiffnessSolver:
 class Factorisation(StiffnessSolver):
     """A symmetric matrix factorised by MUMPS.
 
-    Args:
-        positive_definite: False where a tangent may be indefinite, whose solutions only are steps of an
-            iteration; others are checked. The others are those of `StiffnessSolver`.
+    Solutions are checked if the matrix is `positive_definite`; those of a tangent that may be indefinite only
+    are steps of an iteration.
     """
 
-    message: ClassVar[str] = "solved directly"  # The method in words
-    stats: ClassVar[dict[str, float | int | str]] = {"linear_solver": "direct"}  # The same for a table
+    message: ClassVar[str] = "solved directly"
+    stats: ClassVar[dict[str, float | int | str]] = {"linear_solver": "direct"}
 
     def __init__(
         self, space: DistributedSpace[Any], matrix: PETSc.Mat, clamped: BoolArray, *, positive_definite: bool
@@ -106,26 +83,24 @@ class Factorisation(StiffnessSolver):
         matrix.setOption(PETSc.Mat.Option.SPD, positive_definite)
         self._ksp.setType(PETSc.KSP.Type.PREONLY)
         if space.dimension == 2:
-            self._ksp.setOptionsPrefix(PLANE_PREFIX)
-            PETSc.Options(PLANE_PREFIX)[ORDERING] = MINIMUM_FILL
+            # Eliminate in the order of approximate minimum fill, whose analysis of plane meshes is quicker:
+            # in all 2.5 s in place of 5.5 s at 717,000 unknowns, with 7 % more entries.
+            self._ksp.setOptionsPrefix("pinnray_plane_")
+            PETSc.Options("pinnray_plane_")["mat_mumps_icntl_7"] = 2
         preconditioner = self._ksp.getPC()
         preconditioner.setType(PETSc.PC.Type.CHOLESKY)
         preconditioner.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
         if not positive_definite:
             preconditioner.setFactorSetUpSolverType()
             factors = preconditioner.getFactorMatrix()
-            factors.setMumpsIcntl(*EXACT_INERTIA)
+            factors.setMumpsIcntl(13, 1)  # the end on one process: on several, pivots would not be counted
             factors.destroy()
         preconditioner.destroy()  # the name only: petsc4py would keep it, and the factors, for ever
         self._ksp.setErrorIfNotConverged(True)
         self.update()
 
     def update(self, nodal: FloatArray | None = None) -> None:
-        """Factorise again after the matrix has got new values in its old places: the analysis is kept.
-
-        Args:
-            nodal: Displacements at which the matrix is the tangent; factors do not need them.
-        """
+        """Factorise again after the matrix has got new values in its old places; needs no displacements."""
         self._ksp.setOperators(self._matrix)
         try:
             self._ksp.setUp()
@@ -137,20 +112,16 @@ class Factorisation(StiffnessSolver):
 
     @property
     def negative(self) -> int:
-        """Number of negative eigenvalues: that of negative pivots, by Sylvester's law of inertia."""
+        """Number of negative eigenvalues: of the negative pivots, by Sylvester's law of inertia."""
         preconditioner = self._ksp.getPC()
         factors = preconditioner.getFactorMatrix()
-        found = int(factors.getMumpsInfog(NEGATIVE_PIVOTS))
+        found = int(factors.getMumpsInfog(12))
         for item in (factors, preconditioner):
             item.destroy()  # petsc4py would keep the factors for ever
         return found
 
     def solve(self, nodal: FloatArray) -> FloatArray:
-        """Solve for a right-hand side of shape (N, d); the solution has the same shape.
-
-        Raises:
-            UserError: If rounding has spoilt a solution that is no step of an iteration.
-        """
+        """See `StiffnessSolver`; a `UserError` says that rounding has spoilt the solution."""
         values = super().solve(nodal)
         self._check(nodal, values)
         return values
@@ -163,10 +134,9 @@ class Factorisation(StiffnessSolver):
         self._space.distribute(values, given)
         self._matrix.mult(given, product)
         right: FloatArray = np.where(self._clamped, 0.0, nodal)
-        left = float(np.linalg.norm(self._space.gather(product) - right))
+        left, size = np.linalg.norm(self._space.gather(product) - right), np.linalg.norm(right)
         for item in (given, product):
             item.destroy()
-        size = float(np.linalg.norm(right))
         if not left <= LARGEST_RESIDUAL * size:  # nor if it is NaN
             raise UserError(
                 f"rounding has spoilt the solution of the stiffness: a residual of {left / size:.1g} of the "
@@ -205,15 +175,14 @@ class Factorisation(StiffnessSolver):
 class Multigrid(StiffnessSolver):
     """A symmetric stiffness, solved by conjugate gradients, or by MINRES where a tangent is indefinite.
 
-    The preconditioner is PETSc's smoothed aggregation (GAMG). Its aggregates carry the rigid motions,
-    translations and rotations, which have no energy in the unclamped body (Vanek, Mandel, Brezina 1996,
-    Computing 56, 179-196).
+    The preconditioner is PETSc's smoothed aggregation (GAMG). Its aggregates carry the rigid motions, which
+    have no energy in the unclamped body (Vanek, Mandel, Brezina 1996, Computing 56, 179-196).
 
     Args:
         tolerance: Residual force over the right-hand side at which the iteration ends; for MINRES both are
             preconditioned.
         tangent: Whether the matrix will change. Its first values, which must be definite, are kept and
-            precondition indefinite ones. The others are those of `StiffnessSolver`.
+            precondition indefinite ones.
     """
 
     def __init__(
@@ -236,19 +205,16 @@ class Multigrid(StiffnessSolver):
         preconditioner = self._ksp.getPC()
         preconditioner.setType(PETSc.PC.Type.GAMG)
         if space.dimension == 3:
-            self._ksp.setOptionsPrefix(PREFIX)
-            PETSc.Options(PREFIX)["pc_gamg_threshold"] = STRONG
+            # Weakest coupling within an aggregate, as layers are thicker than elements are wide: 134
+            # iterations in place of 176 on 235,000 unknowns.
+            self._ksp.setOptionsPrefix("pinnray_multigrid_")
+            PETSc.Options("pinnray_multigrid_")["pc_gamg_threshold"] = 0.01
             preconditioner.setFromOptions()
         preconditioner.destroy()  # the name only
         self.update()
 
     def update(self, nodal: FloatArray | None = None) -> None:
-        """Renew the preconditioner after the matrix has got new values.
-
-        Args:
-            nodal: Displacements at which the matrix is the tangent, shape (N, d), mm: rigid motions are those
-                of the displaced nodes. None is at rest.
-        """
+        """Renew the preconditioner after the matrix has become the tangent at displacements (N, d), mm."""
         self._precondition_by(self._matrix, nodal)
         self._ksp.setType(PETSc.KSP.Type.CG)
         self._ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
@@ -284,13 +250,11 @@ class Multigrid(StiffnessSolver):
         return {"linear_solver": "iterative", "iterations": sum(self._iterations)}
 
     def solve(self, nodal: FloatArray) -> FloatArray:
-        """Solve for a right-hand side of shape (N, d); the solution has the same shape.
-
-        Raises:
-            UserError: If the iteration does not converge.
-        """
+        """See `StiffnessSolver`; a `UserError` says that the iteration does not converge."""
+        reasons = PETSc.KSP.ConvergedReason
+        indefinite = reasons.DIVERGED_INDEFINITE_MAT, reasons.DIVERGED_INDEFINITE_PC
         values = super().solve(nodal)
-        if self._ksp.getConvergedReason() in INDEFINITE and self._first is not None:
+        if self._ksp.getConvergedReason() in indefinite and self._first is not None:
             self._precondition_by(self._first)
             self._ksp.setType(PETSc.KSP.Type.MINRES)
             self._ksp.setNormType(PETSc.KSP.NormType.PRECONDITIONED)

@@ -1,16 +1,23 @@
-"""Displacement fields as sums of Matérn kernels: posterior means of Gaussian processes.
+"""Displacement fields as sums of Matérn kernels, the posterior means of Gaussian processes; markers left out.
 
 Source: C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006, equations
 4.9, 4.16 and 4.17.
 """
 
-from dataclasses import dataclass
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
+from solvers.assimilation.misfit import leave_one_out_displacements
+from solvers.solution import Solution
+
+Prediction = tuple[FloatArray, FloatArray]
+"""Mean and standard deviation of an observation, each of shape (2,), mm."""
 
 Kernel = Literal["matern32", "matern52", "gaussian"]
 SMOOTHNESS: dict[Kernel, float] = {"matern32": 1.5, "matern52": 2.5, "gaussian": np.inf}
@@ -63,3 +70,24 @@ def _distance(points: FloatArray, others: FloatArray, length: float, kernel: Ker
     """√(2 ν) |x - x'| / length, and |x - x'| / length for the limit of large ν: shape (n, m)."""
     scale = 1.0 if kernel == "gaussian" else np.sqrt(2 * SMOOTHNESS[kernel])
     return np.asarray(np.linalg.norm(points[:, None] - others, axis=2) * scale / length)
+
+
+def with_markers_left_out(
+    solution: Solution, observed: FloatArray, without: Callable[[int], Prediction], started: float
+) -> Solution:
+    """A solution with every marker as predicted without it, and the share within two standard deviations.
+
+    Args:
+        solution: Conditioned on all markers that were seen.
+        observed: Their displacements, shape (m, 2), mm.
+        without: Predicts a marker by the others.
+        started: When the solver began, by `time.perf_counter`, s.
+    """
+    predictions = [without(marker) for marker in range(len(observed))]
+    means, spreads = (np.array(values) for values in zip(*predictions, strict=True))
+    residuals = observed - means
+    within = float((np.abs(residuals) < 2 * spreads).mean())
+    seconds = time.perf_counter() - started
+    stats = {**solution.stats, "seconds": seconds, "left_out_within_2sd": within}
+    left_out = leave_one_out_displacements(solution.problem, residuals)
+    return replace(solution, stats=stats, left_out=left_out)

@@ -11,10 +11,9 @@ factor ρ, a discrepancy δ and the error e of the observations. Random, and nor
 ρ, the amplitudes and the length maximise the marginal likelihood. The displacement returned is the posterior
 mean of ρ u + δ.
 
-Source: M. Girolami, E. Febrianto, G. Yin, F. Cirak, The statistical finite element method (statFEM) for
-coherent synthesis of observation data and model predictions, Comput. Methods Appl. Mech. Engrg. 375 (2021)
-113533: the model of the data, its conditioning and its marginal likelihood. There the source term is random;
-here it is the prescribed displacement.
+Source: M. Girolami, E. Febrianto, G. Yin, F. Cirak, The statistical finite element method (statFEM), Comput.
+Methods Appl. Mech. Engrg. 375 (2021) 113533: the model of the data, its conditioning and its marginal
+likelihood. There the source term is random; here it is the prescribed displacement.
 
 At finite strain u is linearised about the nominal load: the shape of its largest component is the
 secant from rest, the other is the tangent.
@@ -23,14 +22,13 @@ secant from rest, the other is the tangent.
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, cast
 
 import numpy as np
 
-from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.assimilation.misfit import leave_one_out_displacements, standard_deviations
+from solvers.assimilation.misfit import standard_deviations
 from solvers.energy_and_force import energy_and_force
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
@@ -38,7 +36,7 @@ from solvers.lagrange import LagrangeField
 from solvers.problem import Problem
 from solvers.solution import Solution, Status, Uncertainty
 from solvers.solver import Family, FieldSettings, Progress, check_problem, silent
-from solvers.statistics.kernel_field import Kernel
+from solvers.statistics.kernel_field import Kernel, Prediction, with_markers_left_out
 from solvers.statistics.statistical_posterior import Posterior, StatFemData, StatFemField
 
 TANGENT_STEP = 0.1
@@ -47,17 +45,11 @@ TANGENT_STEP = 0.1
 
 @dataclass(frozen=True)
 class StatFemSolver(FieldSettings):
-    """Finite elements with an uncertain load and a discrepancy, conditioned on the markers.
+    """Finite elements with an uncertain load and a discrepancy, conditioned on the markers."""
 
-    Attributes:
-        degree: Degree of the elements, 1 or 2.
-        stroke_deviation: Standard deviation of each component of the prescribed displacement, mm.
-        kernel: Covariance function of the discrepancy, as of `gp`.
-    """
-
-    degree: int = 2
-    stroke_deviation: float = 0.5
-    kernel: Kernel = "matern52"
+    degree: int = 2  # Of the elements, 1 or 2
+    stroke_deviation: float = 0.5  # Standard deviation of each prescribed displacement, mm
+    kernel: Kernel = "matern52"  # Covariance function of the discrepancy, as of `gp`
     name: ClassVar[str] = "statfem"
     family: ClassVar[Family] = "statistics"
     laws: ClassVar[tuple[str, ...]] = (*FemSolver.laws, *FemNonlinearSolver.laws)
@@ -66,10 +58,7 @@ class StatFemSolver(FieldSettings):
 
     def __post_init__(self) -> None:
         self.check_degree(self.degree)
-        if not (np.isfinite(self.stroke_deviation) and self.stroke_deviation >= 0):
-            raise UserError(
-                f"statfem: stroke_deviation must be zero or more, got {self.stroke_deviation} (mm)"
-            )
+        self.check_not_negative("stroke_deviation")
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Condition on the problem's observations; see `Solver`. Without any it is `fem`."""
@@ -83,11 +72,15 @@ class StatFemSolver(FieldSettings):
         shapes = self._shapes(problem, progress)
         data = self._data(problem, problem.observations, shapes)
         solution = self._conditioned(problem, data, shapes)
-        residuals, spread = _leave_one_out(data, progress)
-        within = float((np.abs(residuals) < 2 * spread).mean())
-        seconds = time.perf_counter() - started
-        stats = {**solution.stats, "seconds": seconds, "left_out_within_2sd": within}
-        return replace(solution, stats=stats, left_out=leave_one_out_displacements(problem, residuals))
+
+        def without(marker: int) -> Prediction:
+            progress(0.5 + marker / len(data.points) / 2, "leaving each marker out")
+            mean, variance = Posterior.of(data.without(marker)).at(
+                data.points[[marker]], data.shapes[:, [marker]]
+            )
+            return mean[0], np.sqrt(variance[0] + data.deviations[marker] ** 2)
+
+        return with_markers_left_out(solution, data.observed, without, started)
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
         """A function that solves for other observations with the same finite elements; see `Refittable`."""
@@ -99,45 +92,69 @@ class StatFemSolver(FieldSettings):
 
         return refit
 
-    def _data(self, problem: Problem, observations: Observations, shapes: Sequence[Solution]) -> StatFemData:
+    def _fem(self, problem: Problem) -> FemSolver | FemNonlinearSolver:
+        if problem.material.law == "linear":
+            return FemSolver(degree=self.degree, estimate=False)
+        return FemNonlinearSolver(degree=self.degree)
+
+    def _shapes(self, problem: Problem, progress: Progress) -> list[LagrangeField]:
+        """Finite elements for a unit displacement of each prescribed component of the contact.
+
+        At finite strain their sum, times the nominal displacements, is the solution; others add tangents. A
+        `UserError` says that the finger has no equilibrium under the nominal load or near it.
+        """
+        fem, load = self._fem(problem), problem.load
+
+        def moved(displacement: Sequence[float | None]) -> LagrangeField:
+            there = load.model_copy(update={"displacement": tuple(displacement)})
+            solution = fem.solve(replace(problem, load=there, observations=None), progress)
+            if not solution.status.converged:
+                raise UserError(f"statfem: {fem.name} {solution.status.message}")
+            return cast(LagrangeField, solution.field)
+
+        if problem.material.law == "linear":
+            rest = [None if value is None else 0.0 for value in load.displacement]
+            return [
+                moved([1.0 if axis == own else value for axis, value in enumerate(rest)])
+                for own in load.prescribed
+            ]
+        main = int(np.abs(load.values).argmax())
+        if not load.values[main]:
+            raise UserError("statfem at finite strain needs a load that moves the contact")
+        whole = moved(load.displacement)
+        nodal, secant = {}, whole.values
+        for number, axis in enumerate(load.prescribed):
+            if number != main:
+                beside = list(load.displacement)
+                beside[axis] = load.values[number] + TANGENT_STEP
+                nodal[number] = (moved(beside).values - whole.values) / TANGENT_STEP
+                secant = secant - load.values[number] * nodal[number]
+        nodal[main] = secant / load.values[main]
+        return [LagrangeField(whole.space, nodal[number]) for number in sorted(nodal)]
+
+    def _data(
+        self, problem: Problem, observations: Observations, shapes: Sequence[LagrangeField]
+    ) -> StatFemData:
         points = observations.points[observations.visible]
+        location = problem.mesh.locate(points)
         return StatFemData(
             points=points,
             observed=observations.displacements[observations.visible],
             deviations=standard_deviations(observations),
-            shapes=np.stack([shape.displacement(points) for shape in shapes]),
+            shapes=np.stack([shape.displacement(location) for shape in shapes]),
             load=problem.load.values,
             load_deviation=self.stroke_deviation,
             kernel=self.kernel,
         )
 
-    def _shapes(self, problem: Problem, progress: Progress) -> list[Solution]:
-        """Finite elements for a unit displacement of each prescribed component of the contact."""
-        fem = self._fem(problem)
-        if problem.material.law != "linear":
-            return _linearised_shapes(fem, replace(problem, observations=None), progress)
-        shapes = []
-        for axis in problem.load.prescribed:
-            unit = [None if value is None else 0.0 for value in problem.load.displacement]
-            unit[axis] = 1.0
-            load = problem.load.model_copy(update={"displacement": tuple(unit)})
-            shapes.append(fem.solve(replace(problem, load=load, observations=None), progress))
-        return shapes
-
-    def _fem(self, problem: Problem) -> FemSolver | FemNonlinearSolver:
-        """The model of the problem's law."""
-        if problem.material.law == "linear":
-            return FemSolver(degree=self.degree, estimate=False)
-        return FemNonlinearSolver(degree=self.degree)
-
-    def _conditioned(self, problem: Problem, data: StatFemData, shapes: Sequence[Solution]) -> Solution:
+    def _conditioned(self, problem: Problem, data: StatFemData, shapes: Sequence[LagrangeField]) -> Solution:
         started = time.perf_counter()
-        posterior = Posterior.of(data, np.arange(len(data.points)))
-        field = StatFemField(posterior, tuple(shape.field for shape in shapes))
+        posterior = Posterior.of(data)
+        field = StatFemField(posterior, shapes)
         energy, reaction = energy_and_force(problem, field, 4)
-        constants = posterior.constants
-        discrepancy = constants.amplitudes
+        factor, (u, v), length = posterior.constants
         _, variances = posterior.at(data.points, data.shapes)
+        loads = zip(problem.load.prescribed, posterior.load, strict=True)
         return Solution(
             solver=self.name,
             problem=problem,
@@ -146,84 +163,19 @@ class StatFemSolver(FieldSettings):
             reaction=reaction,
             status=Status(
                 True,
-                f"{self._fem(problem).name} times {constants.factor:.3g} plus a discrepancy of "
-                f"{discrepancy[0]:.2g} mm in u and {discrepancy[1]:.2g} mm in v over "
-                f"{constants.length:.3g} mm; its energy and force include the discrepancy's",
+                f"{self._fem(problem).name} times {factor:.3g} plus a discrepancy of {u:.2g} mm in u and "
+                f"{v:.2g} mm in v over {length:.3g} mm; its energy and force include the discrepancy's",
             ),
             stats={
                 "seconds": time.perf_counter() - started,
-                "unknowns": int(shapes[0].stats["unknowns"]),
-                "factor": constants.factor,
-                "discrepancy_u": float(discrepancy[0]),
-                "discrepancy_v": float(discrepancy[1]),
-                "length": constants.length,
+                "unknowns": shapes[0].values.size,
+                "factor": factor,
+                "discrepancy_u": float(u),
+                "discrepancy_v": float(v),
+                "length": length,
                 "log_evidence": posterior.log_evidence,
                 "deviation_at_markers": float(np.sqrt(variances.max())),
-            }
-            | {
-                f"load_{'uv'[axis]}": float(value)
-                for axis, value in zip(problem.load.prescribed, posterior.load, strict=True)
+                **{f"load_{'uv'[axis]}": float(value) for axis, value in loads},
             },
             uncertainty=Uncertainty(field.standard_deviation),
         )
-
-
-def _linearised_shapes(
-    fem: FemSolver | FemNonlinearSolver, problem: Problem, progress: Progress
-) -> list[Solution]:
-    """Fields whose sum, times the nominal displacements, is the solution; a change of load adds tangents.
-
-    Raises:
-        UserError: If the finger has no equilibrium under the nominal load or near it.
-    """
-    values = problem.load.values
-    main = int(np.abs(values).argmax())
-    if not values[main]:
-        raise UserError("statfem at finite strain needs a load that moves the contact")
-    whole = _reached(fem, problem, progress)
-    shapes: list[Solution] = []
-    for number, axis in enumerate(problem.load.prescribed):
-        if number == main:
-            shapes.append(whole)
-            continue
-        moved = list(problem.load.displacement)
-        moved[axis] = values[number] + TANGENT_STEP
-        load = problem.load.model_copy(update={"displacement": tuple(moved)})
-        there = _reached(fem, replace(problem, load=load), progress)
-        shapes.append(
-            replace(whole, field=_combined([(there, 1 / TANGENT_STEP), (whole, -1 / TANGENT_STEP)]))
-        )
-    rest = [(shape, -value) for shape, value in zip(shapes, values, strict=True) if shape is not whole]
-    scaled = [(each, factor / values[main]) for each, factor in [(whole, 1.0), *rest]]
-    shapes[main] = replace(whole, field=_combined(scaled))
-    return shapes
-
-
-def _reached(fem: FemNonlinearSolver | FemSolver, problem: Problem, progress: Progress) -> Solution:
-    solution = fem.solve(problem, progress)
-    if not solution.status.converged:
-        raise UserError(f"statfem: {fem.name} {solution.status.message}")
-    return solution
-
-
-def _combined(parts: Sequence[tuple[Solution, float]]) -> LagrangeField:
-    """A sum of finite-element fields, each times a factor."""
-    fields = [(solution.field, factor) for solution, factor in parts]
-    nodal = [factor * field.values for field, factor in fields if isinstance(field, LagrangeField)]
-    first = fields[0][0]
-    if not isinstance(first, LagrangeField) or len(nodal) < len(fields):
-        raise TypeError("statfem adds fields of finite elements")
-    return LagrangeField(first.space, np.sum(nodal, axis=0))
-
-
-def _leave_one_out(data: StatFemData, progress: Progress) -> tuple[FloatArray, FloatArray]:
-    """Leave-one-out residuals of the markers and their standard deviations, each (m, 2), mm."""
-    every = np.arange(len(data.points))
-    residuals, spread = np.zeros((2, len(every), 2))
-    for marker in every:
-        progress(0.5 + marker / len(every) / 2, "leaving each marker out")
-        others = Posterior.of(data, np.delete(every, marker))
-        mean, covariance = others.at(data.points[[marker]], data.shapes[:, [marker]])
-        residuals[marker] = data.observed[marker] - mean[0]
-        spread[marker] = np.sqrt(covariance[0] + data.deviations[marker] ** 2)
-    return residuals, spread

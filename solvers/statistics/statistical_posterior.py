@@ -4,14 +4,16 @@ See `solvers.statistics.statistical_fem` for the random variables and the source
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_solve
 from scipy.optimize import minimize
 from threadpoolctl import threadpool_limits
 
-from geometry.arrays import FloatArray, IntArray
+from geometry.arrays import FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from solvers.solution import DisplacementField
 from solvers.statistics.kernel_field import Kernel, KernelField, correlation
@@ -35,9 +37,19 @@ class StatFemData:
     load_deviation: float  # Their standard deviation, mm
     kernel: Kernel  # Covariance function of δ
 
+    def without(self, marker: int) -> "StatFemData":
+        """The other markers' data."""
+        kept = np.arange(len(self.points)) != marker
+        return replace(
+            self,
+            points=self.points[kept],
+            observed=self.observed[kept],
+            deviations=self.deviations[kept],
+            shapes=self.shapes[:, kept],
+        )
 
-@dataclass(frozen=True, eq=False)
-class Hyperparameters:
+
+class Hyperparameters(NamedTuple):
     """Factor ρ; amplitudes of δ, shape (2,), mm; its length, mm."""
 
     factor: float
@@ -53,21 +65,20 @@ class Hyperparameters:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """ρ u + δ given some of the markers."""
+    """ρ u + δ given the markers."""
 
-    data: StatFemData  # All markers
-    given: IntArray  # Numbers of the markers conditioned on, shape (g,)
-    constants: Hyperparameters  # Hyperparameters of the largest marginal likelihood
-    coefficients: FloatArray  # Inverse covariance of d times (d minus the prior mean), shape (g, 2), 1/mm
-    cholesky: FloatArray  # Cholesky factor of that covariance, shape (2 g, 2 g)
+    data: StatFemData
+    constants: Hyperparameters  # Of the largest marginal likelihood
+    coefficients: FloatArray  # Inverse covariance of d times (d minus the prior mean), shape (m, 2), 1/mm
+    cholesky: FloatArray  # Cholesky factor of that covariance, shape (2 m, 2 m)
     log_evidence: float  # Logarithm of the marginal likelihood of d
 
     @classmethod
-    def of(cls, data: StatFemData, given: IntArray) -> "Posterior":
-        """Find the hyperparameters from some of the markers alone."""
+    def of(cls, data: StatFemData) -> "Posterior":
+        """Find the hyperparameters, and condition on the markers."""
 
         def minus_log_likelihood(parameters: FloatArray) -> float:
-            cholesky, residual, coefficients = _condition(data, given, Hyperparameters.of(parameters))
+            cholesky, residual, coefficients = _condition(data, Hyperparameters.of(parameters))
             return float(0.5 * residual @ coefficients) + log_root_determinant(cholesky)
 
         bounds = np.log([FACTORS, SPREADS, SPREADS, LENGTHS])
@@ -78,33 +89,30 @@ class Posterior:
             ]
         best = min(found, key=lambda result: result.fun)
         constants = Hyperparameters.of(best.x)
-        cholesky, _, coefficients = _condition(data, given, constants)
-        log_evidence = -float(best.fun) - len(given) * np.log(2 * np.pi)
-        return cls(data, given, constants, coefficients.reshape(-1, 2), cholesky, log_evidence)
+        cholesky, _, coefficients = _condition(data, constants)
+        log_evidence = -float(best.fun) - len(data.points) * np.log(2 * np.pi)
+        return cls(data, constants, coefficients.reshape(-1, 2), cholesky, log_evidence)
 
     @property
     def load(self) -> FloatArray:
         """Posterior mean of the contact's displacement, shape (k,), mm."""
-        pulled = np.einsum("kgc,gc->k", self.data.shapes[:, self.given], self.coefficients)
+        pulled = np.einsum("kgc,gc->k", self.data.shapes, self.coefficients)
         return np.asarray(self.data.load + self.data.load_deviation**2 * self.constants.factor * pulled)
 
     @property
     def discrepancy(self) -> KernelField:
         """Posterior mean of δ."""
-        centres, lengths = self.data.points[self.given], np.full(2, self.constants.length)
         coefficients = self.constants.amplitudes**2 * self.coefficients
-        return KernelField(centres, coefficients, lengths, self.data.kernel)
+        lengths = np.full(2, self.constants.length)
+        return KernelField(self.data.points, coefficients, lengths, self.data.kernel)
 
     def at(self, points: FloatArray, shapes: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean, mm, and variance, mm², at points (n, 2) where `shapes` is of shape (k, n, 2): each (n, 2)."""
-        data, constants = self.data, self.constants
-        others = (data.points[self.given], data.shapes[:, self.given])
-        between = _covariance(data, constants, points, shapes, *others)
-        mean = constants.factor * np.einsum("k,knc->nc", data.load, shapes)
+        data, (factor, amplitudes, _) = self.data, self.constants
+        between = _covariance(data, self.constants, points, shapes)
+        mean = factor * np.einsum("k,knc->nc", data.load, shapes)
         mean = mean + (between @ self.coefficients.ravel()).reshape(-1, 2)
-        prior = (constants.factor * data.load_deviation) ** 2 * (shapes**2).sum(
-            axis=0
-        ) + constants.amplitudes**2
+        prior = (factor * data.load_deviation) ** 2 * (shapes**2).sum(axis=0) + amplitudes**2
         known = (between * cho_solve((self.cholesky, True), between.T).T).sum(axis=1).reshape(-1, 2)
         return mean, np.maximum(prior - known, 0.0)
 
@@ -113,9 +121,8 @@ class Posterior:
 class StatFemField:
     """The posterior as a displacement field."""
 
-    posterior: Posterior  # The posterior, conditioned on the markers
-    # The finite elements' displacements by unit displacements of the contact, k of them
-    shapes: tuple[DisplacementField, ...]
+    posterior: Posterior
+    shapes: Sequence[DisplacementField]  # Finite elements for k unit displacements of the contact
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Posterior mean, shape (n, 2), mm."""
@@ -145,29 +152,21 @@ def log_root_determinant(cholesky: FloatArray) -> float:
     return sum(map(math.log, cholesky.diagonal().tolist()))
 
 
-def _condition(
-    data: StatFemData, given: IntArray, constants: Hyperparameters
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Cholesky factor of the covariance C of d, (2 g, 2 g); d minus its prior mean r, mm; C^-1 r, 1/mm."""
-    points, shapes = data.points[given], data.shapes[:, given]
-    covariance = _covariance(data, constants, points, shapes, points, shapes)
-    covariance = covariance + np.diag(data.deviations[given].ravel() ** 2)
-    mean = constants.factor * np.einsum("k,kgc->gc", data.load, shapes)
-    residual = (data.observed[given] - mean).ravel()
+def _condition(data: StatFemData, constants: Hyperparameters) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Cholesky factor of the covariance C of d, (2 m, 2 m); d minus its prior mean r, mm; C^-1 r, 1/mm."""
+    covariance = _covariance(data, constants, data.points, data.shapes)
+    covariance = covariance + np.diag(data.deviations.ravel() ** 2)
+    mean = constants.factor * np.einsum("k,kgc->gc", data.load, data.shapes)
+    residual = (data.observed - mean).ravel()
     cholesky = np.linalg.cholesky(covariance)
     return cholesky, residual, cho_solve((cholesky, True), residual)
 
 
 def _covariance(
-    data: StatFemData,
-    constants: Hyperparameters,
-    points: FloatArray,
-    shapes: FloatArray,
-    others: FloatArray,
-    other_shapes: FloatArray,
+    data: StatFemData, constants: Hyperparameters, points: FloatArray, shapes: FloatArray
 ) -> FloatArray:
-    """Prior covariance of ρ u + δ between n points and g others, mm²: shape (2 n, 2 g), u and v by turns."""
-    by_load = np.einsum("knc,kgd->ncgd", shapes, other_shapes) * (constants.factor * data.load_deviation) ** 2
-    kernel = correlation(points, others, constants.length, data.kernel)
+    """Prior covariance of ρ u + δ between n points and the markers, mm²: (2 n, 2 m), u and v by turns."""
+    by_load = np.einsum("knc,kgd->ncgd", shapes, data.shapes) * (constants.factor * data.load_deviation) ** 2
+    kernel = correlation(points, data.points, constants.length, data.kernel)
     discrepancy = np.einsum("ng,cd->ncgd", kernel, np.diag(constants.amplitudes**2))
-    return np.asarray((by_load + discrepancy).reshape(2 * len(points), 2 * len(others)))
+    return np.asarray((by_load + discrepancy).reshape(2 * len(points), 2 * len(data.points)))

@@ -4,8 +4,8 @@ At a stationary point of E(u) + 1/2 (B u - d)^T W (B u - d) the force f_j acts o
 where b_j . u + f_j / W_jj = d_j: the misfit is a compliant spring, as is a contact with a standard deviation.
 On the path the observed displacements grow with the load.
 
-There is no closed form for a marker that is left out: Newton's method continues from the solution without
-its two springs and, where that does not converge, from rest.
+To leave a marker out, Newton's method continues from the solution without its two springs and, where that
+does not converge, from rest.
 """
 
 import time
@@ -17,7 +17,7 @@ from geometry.errors import UserError
 from solvers.assimilation.marker_forces import residual_phrase
 from solvers.assimilation.marker_weighting import MarkerWeighting
 from solvers.assimilation.misfit import leave_one_out_displacements
-from solvers.fem.finite_strain.constraints import DisplacementConstraints, LoadState
+from solvers.fem.finite_strain.equilibrium import DisplacementConstraints, LoadState
 from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.lagrange import LagrangeField, LagrangeSpace
@@ -25,23 +25,12 @@ from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from solvers.solver import Progress, silent
 
-MIN_STEP = 0.01
-"""Smallest load step, as a fraction of the load; large forces at the markers invert elements."""
-PATH_SHARE = 0.5
-"""Share of the load path in the progress; the rest is for the markers left out."""
-
 
 def assimilated(problem: Problem, weighting: MarkerWeighting, *, degree: int, progress: Progress) -> Solution:
-    """The stationary point that the load path leads to, and the same without each marker.
+    """The stationary point that the load path leads to, with every marker and without each.
 
-    Args:
-        problem: With a law of finite strain, and observations.
-        weighting: Of the markers; its contact springs are for the loads `mean` and `point`.
-        degree: Of the elements.
-        progress: Of the work.
-
-    Raises:
-        UserError: If the problem has no markers that weigh anything.
+    The law is one of finite strain; `degree` is the elements'. A `UserError` refuses a problem without
+    markers that weigh anything.
     """
     started = time.perf_counter()
     misfit = weighting.misfit(problem)
@@ -51,11 +40,11 @@ def assimilated(problem: Problem, weighting: MarkerWeighting, *, degree: int, pr
     springs = DisplacementConstraints.springs(misfit, space)
     constraints = DisplacementConstraints.of(problem, space, weighting.slack).joined(springs)
     path = _path(problem, space, constraints)
-    path.follow(lambda done, text: progress(PATH_SHARE * done, text))
-    steps, iterations, last = len(path.points) - 1, path.iterations, path.points[-1]
+    path.follow(lambda done, text: progress(0.5 * done, text))
+    stats, phrase, last = path.stats, path.phrase, path.points[-1]
     forces = last.forces[-len(springs.targets) :]
     residual = (springs.targets - springs.values(last.nodal)).reshape(-1, 2)
-    energies = np.array([path.equilibrium.energy(point.nodal) for point in path.points])
+    history = {name: path.history()[name] for name in ("load_fraction", "energy")}
     reaction = path.reaction(last) - forces.reshape(-1, 2).sum(axis=0)
     left_out = _left_out(path, problem, space, springs, progress) if last.fraction == 1 else None
     path.close()
@@ -63,31 +52,27 @@ def assimilated(problem: Problem, weighting: MarkerWeighting, *, degree: int, pr
         solver=weighting.solver_name,
         problem=problem,
         field=LagrangeField(space, last.nodal),
-        energy=float(energies[-1]),
+        energy=float(history["energy"][-1]),
         reaction=reaction,
-        status=_status(path, steps, iterations, residual, left_out),
+        status=_status(phrase, residual, left_out),
         stats={
             "seconds": time.perf_counter() - started,
             "unknowns": last.nodal.size,
             "triangles": len(problem.mesh.triangles),
             "degree": degree,
-            "load_steps": steps,
-            "halved_steps": path.halved,
-            "newton_iterations": iterations,
+            **stats,
             "weight_factor": 1.0,
             "misfit": misfit.value(misfit.observed - residual),
             "marker_force": float(np.linalg.norm(forces.reshape(-1, 2), axis=1).max()),
         },
-        history={
-            "load_fraction": np.array([point.fraction for point in path.points]),
-            "energy": energies,
-        },
+        history=history,
         left_out=None if left_out is None else leave_one_out_displacements(problem, left_out),
     )
 
 
 def _path(problem: Problem, space: LagrangeSpace, constraints: DisplacementConstraints) -> LoadPath:
-    return FemNonlinearSolver(degree=space.degree, min_step=MIN_STEP).path(problem, space, constraints)
+    # Shorter steps do not help: large forces at the markers invert elements.
+    return FemNonlinearSolver(degree=space.degree, min_step=0.01).path(problem, space, constraints)
 
 
 def _left_out(
@@ -102,7 +87,7 @@ def _left_out(
     first = len(path.points[-1].forces) - 2 * count
     missed = np.full((count, 2), np.nan)
     for marker in range(count):
-        progress(PATH_SHARE + (1 - PATH_SHARE) * marker / count, f"without marker {marker}")
+        progress(0.5 + 0.5 * marker / count, f"without marker {marker}")
         own = slice(2 * marker, 2 * marker + 2)
         kept = np.ones(first + 2 * count, dtype=bool)
         kept[first:][own] = False
@@ -120,20 +105,15 @@ def _from_rest(path: LoadPath, problem: Problem, space: LagrangeSpace, kept: Boo
     return again.points[-1] if again.points[-1].fraction == 1 else None
 
 
-def _status(
-    path: LoadPath, steps: int, iterations: int, residual: FloatArray, left_out: FloatArray | None
-) -> Status:
+def _status(phrase: str, residual: FloatArray, left_out: FloatArray | None) -> Status:
     if left_out is None:
         return Status(
             False,
-            f"stopped at {path.points[-1].fraction:.1%} of the load: Newton's method fails beyond "
-            f"({path.reason}): load and markers contradict each other; let the contact slide, give it a "
+            f"{phrase}: load and markers contradict each other; let the contact slide, give it a "
             "contact_deviation or take smaller weights",
         )
-    said = (
-        f"energy plus misfit is stationary: all of the load applied in {steps} steps, {iterations} Newton "
-        f"iterations; {residual_phrase(residual, left_out[np.isfinite(left_out)])}"
-    )
+    residuals = residual_phrase(residual, left_out[np.isfinite(left_out)])
+    said = f"energy plus misfit is stationary: {phrase}; {residuals}"
     if lost := int(np.isnan(left_out[:, 0]).sum()):
         said += f"; no equilibrium was found without {lost} of the markers"
     return Status(True, said)

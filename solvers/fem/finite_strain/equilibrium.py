@@ -7,45 +7,92 @@ potential Π of the elastic energy and, for a cylinder, of contact, equilibrium 
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import ufl
 
 from geometry.arrays import BoolArray, FloatArray
+from solvers.assimilation.misfit import Misfit
 from solvers.constrained_elimination import ConstrainedElimination
-from solvers.cylinder_contact import CylinderContact
+from solvers.cylinder_contact import ContactState, CylinderContact
 from solvers.elasticity import deformation_jacobian, energy_density_of
 from solvers.extrusion import NodalSpace
-from solvers.fem.boundary_conditions import dirichlet_displacement, dirichlet_mask
+from solvers.fem.boundary_conditions import (
+    dirichlet_displacement,
+    dirichlet_mask,
+    load_functionals,
+    load_targets,
+    marker_functionals,
+)
 from solvers.fem.dolfinx_compat import DistributedSpace
-from solvers.fem.finite_strain.constraints import DisplacementConstraints, LoadState
-from solvers.fem.linear_solvers import TOLERANCE, Factorisation, Multigrid
+from solvers.fem.linear_solvers import Factorisation, Multigrid
+from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem
 from solvers.stability import ShiftedStep
 
 QUADRATURE_DEGREE = 4
 """Exact for the quadratic part of the law on quadratic elements."""
-NEWTON_TOLERANCE = 1e-4
-"""Residual of the iterations for one step of Newton's method, whose next step takes the rest."""
-PROBE = 1e-4
-"""Fraction of the load in the finite difference of the internal forces at rest."""
 
 
-INVERSE_ITERATIONS = 3
-"""Enough to leave soft directions of an unstable equilibrium, not only the softest."""
+@dataclass(frozen=True, eq=False)
+class LoadState(ContactState):
+    """A state of the finger, in equilibrium or a guess; `contact` is empty without a cylinder."""
+
+    forces: FloatArray  # Multipliers of the constraints, shape (k,), N/mm
+
+
+@dataclass(frozen=True, eq=False)
+class DisplacementConstraints:
+    """Constraints b_k . c + s_k f_k = d_k on the displacements c, with forces f_k."""
+
+    functionals: FloatArray  # b_k, shape (k, N, d)
+    targets: FloatArray  # d_k under the full load, shape (k,), mm
+    # s_k, shape (k,), mm per N/mm: zero where the value is prescribed, else the compliance of a spring with
+    # the energy (d_k - b_k . c)^2 / (2 s_k)
+    slacks: FloatArray
+
+    @classmethod
+    def of(cls, problem: Problem, space: NodalSpace, slack: float = 0.0) -> "DisplacementConstraints":
+        """The constraints of a `mean` or `point` load, all of one slack; else none."""
+        targets = load_targets(problem)
+        return cls(load_functionals(problem, space), targets, np.full(len(targets), slack))
+
+    @classmethod
+    def springs(cls, misfit: Misfit, space: LagrangeSpace) -> "DisplacementConstraints":
+        """Springs between markers and observed positions, whose energy is the misfit; u v u v ..."""
+        return cls(marker_functionals(misfit, space), misfit.observed.ravel(), 1 / misfit.weights.ravel())
+
+    def joined(self, other: "DisplacementConstraints") -> "DisplacementConstraints":
+        """Both, in this order."""
+        return DisplacementConstraints(
+            np.concatenate([self.functionals, other.functionals]),
+            np.concatenate([self.targets, other.targets]),
+            np.concatenate([self.slacks, other.slacks]),
+        )
+
+    def only(self, kept: BoolArray) -> "DisplacementConstraints":
+        """Subset selected by a mask of shape (k,)."""
+        return DisplacementConstraints(self.functionals[kept], self.targets[kept], self.slacks[kept])
+
+    def values(self, nodal: FloatArray) -> FloatArray:
+        """b_k . c of displacements of shape (N, d), mm: shape (k,)."""
+        return np.asarray(np.einsum("knx,nx->k", self.functionals, nodal))
+
+    def at_nodes(self, forces: FloatArray) -> FloatArray:
+        """f_k b_k of forces of shape (k,), N/mm: shape (N, d)."""
+        return np.asarray(np.einsum("k,knx->nx", forces, self.functionals))
+
+    def residual(self, nodal: FloatArray, forces: FloatArray, fraction: float) -> FloatArray:
+        """Residual of the constraints at a fraction of the load, shape (k,), mm."""
+        return np.asarray(fraction * self.targets - self.values(nodal) - self.slacks * forces)
 
 
 class FiniteStrainEquilibrium:
     """The discrete problem; nodal arrays of shape (N, d) are the same on every rank.
 
-    Attributes:
-        distributed: The elements in DOLFINx.
-        clamped: Mask of components with a Dirichlet condition, of shape (N, d).
-        prescribed: Their displacement under the full load, shape (N, d), mm.
-        constraints: On functionals of the displacements.
-        elimination: Solves with the constraints and the last factorised tangent.
-        contact: The cylinder, if there is one.
+    `clamped` is the mask of components with a Dirichlet condition, and `prescribed` their displacement under
+    the full load, mm; `elimination` solves with the constraints and the tangent factorised last.
     """
 
     def __init__(
@@ -56,14 +103,7 @@ class FiniteStrainEquilibrium:
         *,
         iterative: bool = False,
     ) -> None:
-        """Compile the forms.
-
-        Args:
-            problem: The problem.
-            space: The elements.
-            constraints: The load's if None.
-            iterative: Whether multigrid solves with the tangent, not factors.
-        """
+        """Compile the forms; without constraints they are the load's."""
         self.distributed = DistributedSpace(space)
         self.clamped: BoolArray = dirichlet_mask(problem, space)
         self.prescribed = dirichlet_displacement(problem, space)
@@ -82,13 +122,13 @@ class FiniteStrainEquilibrium:
         self._conditions = self.distributed.clamp(self.clamped)
         self.matrix = self.distributed.assemble_matrix(self._tangent, self._conditions)
         system = self.distributed, self.matrix, self.clamped
-        self.factors: Factorisation | Multigrid = (
-            Multigrid(*system, tolerance=TOLERANCE)
-            if iterative and material.law == "linear"
-            else Multigrid(*system, tolerance=NEWTON_TOLERANCE, tangent=True)
-            if iterative
-            else Factorisation(*system, positive_definite=False)
-        )
+        self.factors: Factorisation | Multigrid
+        if not iterative:
+            self.factors = Factorisation(*system, positive_definite=False)
+        elif material.law == "linear":
+            self.factors = Multigrid(*system)
+        else:  # What a step of Newton's method leaves, the next one takes.
+            self.factors = Multigrid(*system, tolerance=1e-4, tangent=True)
         self.elimination = self._elimination()
 
     def energy(self, nodal: FloatArray) -> float:
@@ -140,12 +180,12 @@ class FiniteStrainEquilibrium:
         return self.elimination.unstable(self.factors.negative)
 
     def softest(self) -> FloatArray:
-        """The direction of least stiffness at the state factorised last, largest component one, (N, d).
+        """Direction of least stiffness at the state factorised last, largest component one, (N, d).
 
-        By inverse iteration; it keeps the constraints.
+        By inverse iteration, which keeps the constraints.
         """
         direction = np.random.default_rng(0).standard_normal(self.clamped.shape)
-        for _ in range(INVERSE_ITERATIONS):
+        for _ in range(3):  # enough to leave soft directions of an unstable equilibrium, not only the softest
             direction = self.response(np.where(self.clamped, 0.0, direction))
             direction /= np.abs(direction).max()
         return direction
@@ -191,14 +231,15 @@ class FiniteStrainEquilibrium:
     def linear_guess(self, fraction: float) -> LoadState:
         """The linear solution at a fraction of the load, by the undeformed tangent, which must be factorised.
 
-        A cylinder touches only the node nearest to it, or the nodes at its place along z.
+        A cylinder touches only the node nearest to it, and the nodes above it along z.
         """
         if self.contact is not None:
             return self._pressed_at_one_node(self.contact, fraction)
         nodal = fraction * self.prescribed
         if nodal.any():
-            step = PROBE * self.prescribed
-            stiffness = (self.internal_force(step) - self.internal_force(-step)) / (2 * PROBE)
+            probe = 1e-4  # fraction of the load in the finite difference of the internal forces at rest
+            step = probe * self.prescribed
+            stiffness = (self.internal_force(step) - self.internal_force(-step)) / (2 * probe)
             nodal = nodal + self.factors.solve(-fraction * stiffness)
         nodal, forces = self.elimination.solution(nodal, fraction * self.constraints.targets)
         return LoadState(fraction, nodal, np.zeros(0), forces)

@@ -12,31 +12,24 @@ from geometry.errors import UserError
 from solvers.cylinder_contact import ContactRegion
 from solvers.extrusion import NodalSpace
 from solvers.fem.boundary_conditions import reaction_by_residual_work
-from solvers.fem.finite_strain.constraints import DisplacementConstraints, LoadState
-from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
+from solvers.fem.finite_strain.equilibrium import DisplacementConstraints, FiniteStrainEquilibrium, LoadState
 from solvers.fem.finite_strain.newton import ConstrainedNewton
 from solvers.problem import Problem
 from solvers.solver import Progress
 from solvers.stability import aside, descended
 
-QUICK = 5
-"""Newton iterations of a step after which the next one may be twice as long."""
-UPDATES = 30
-"""Updates of the contact's multipliers in a step before it counts as failed."""
 PENETRATION = 1e-5
 """Largest gap of a node in contact and penetration of any node, mm."""
-LOOSEST = 1e-3
-"""Largest tolerance of Newton's method: with more, a state that is no equilibrium would count as one."""
 
 
 def check_tolerance(solver: str, tolerance: float) -> None:
     """Raise a `UserError` unless Newton's method ends near an equilibrium."""
-    if not 0 < tolerance <= LOOSEST:
-        raise UserError(f"{solver} needs 0 < tolerance <= {LOOSEST:g}, not {tolerance:g}")
+    if not 0 < tolerance <= 1e-3:
+        raise UserError(f"{solver} needs 0 < tolerance <= 0.001, not {tolerance:g}")
 
 
 class LoadPath:
-    """Equilibria of a problem as its load grows.
+    """Equilibria of a problem as its load grows: `points`, from rest.
 
     Every step starts from the last three states extrapolated (two with a cylinder), the first from the linear
     solution. A step whose Newton iteration fails is halved.
@@ -49,14 +42,6 @@ class LoadPath:
             the guide's change.
         iterative: Whether multigrid solves with the tangent, not factors. The rest are settings of
             `FemNonlinearSolver`.
-
-    Attributes:
-        equilibrium: The discrete problem.
-        points: The equilibria, from rest.
-        halved: Number of failed steps.
-        iterations: Newton iterations of all steps.
-        left: Number of unstable equilibria that were left for a stable one.
-        reason: Why the last failed step failed, for Newton's method in PETSc's word.
     """
 
     def __init__(
@@ -86,8 +71,9 @@ class LoadPath:
         contact = self.equilibrium.contact
         self._max_step = max_step if contact is None else min(max_step, contact.longest_step)
         self.points = [self.equilibrium.rest]
-        self.halved = self.iterations = self.left = 0
-        self.reason = ""
+        self.left = 0  # Number of unstable equilibria that were left for a stable one
+        self._halved = self._iterations = 0  # Failed steps; Newton iterations of all steps
+        self._reason = ""  # Why the last failed step failed, for Newton's method in PETSc's word
 
     def close(self) -> None:
         """Free what PETSc holds, on all ranks at once."""
@@ -99,18 +85,18 @@ class LoadPath:
         step = min(self._first_step, self._max_step)
         while (rest := 1 - self.points[-1].fraction) > 0:
             fraction = 1 - rest * (1 - 1 / math.ceil(rest / step - 1e-9))  # equal steps to the end
-            before = self.iterations
+            before = self._iterations
             point, hardest = self._step(fraction)
             if point is None:
-                self.halved += 1
+                self._halved += 1
                 step /= 2
                 if step < self._min_step:
                     return
                 continue
             point = self._stable(point)
             self.points.append(point)
-            progress(fraction, f"{fraction:.0%} of the load, {self.iterations - before} Newton iterations")
-            step = min(self._max_step, step * (2 if hardest <= QUICK else 1))
+            progress(fraction, f"{fraction:.0%} of the load, {self._iterations - before} Newton iterations")
+            step = min(self._max_step, step * (2 if hardest <= 5 else 1))
 
     def relaxed(self, kept: BoolArray) -> LoadState | None:
         """Equilibrium near the last one under the constraints of a mask alone; None if none is found."""
@@ -135,10 +121,10 @@ class LoadPath:
         return None if lower is None else self._settled(self._newton, replace(start, nodal=lower))
 
     def _stable(self, point: LoadState) -> LoadState:
-        """An equilibrium or, if it is unstable, a stable one beside it: of those to either side, the lower.
+        """The equilibrium or, if it is unstable, the lower of the stable ones to either side of it.
 
-        Stability is that of the tangent factorised last, at Newton's last guess. A cylinder's contact, whose
-        multipliers would have to settle again, is left where it is.
+        Stability is judged by the tangent factorised last, at Newton's last guess. A cylinder's contact,
+        whose multipliers would have to settle again, is left where it is.
         """
         equilibrium = self.equilibrium
         if not equilibrium.unstable or equilibrium.contact is not None:
@@ -156,18 +142,18 @@ class LoadPath:
 
     def _settled(self, newton: ConstrainedNewton, guess: LoadState) -> LoadState | None:
         result = newton.solve(guess)
-        self.iterations += result.iterations
+        self._iterations += result.iterations
         return result.state if result.converged else None
 
     def _step(self, fraction: float) -> tuple[LoadState | None, int]:
         """Equilibrium at a fraction of the load, None if there is none; iterations of the hardest solve."""
         guess, contact, hardest = self._guess(fraction), self.equilibrium.contact, 0
-        for _ in range(UPDATES):
+        for _ in range(30):
             result = self._newton.solve(guess)
-            self.iterations += result.iterations
+            self._iterations += result.iterations
             hardest = max(hardest, result.iterations)
             if not result.converged:
-                self.reason = f"SNES: {result.reason}"
+                self._reason = f"SNES: {result.reason}"
                 return None, hardest
             if contact is None:
                 return result.state, hardest
@@ -175,7 +161,7 @@ class LoadPath:
             gap, _ = contact.gaps(guess)
             if max(np.abs(gap[guess.contact > 0]).max(initial=0.0), -gap.min()) <= PENETRATION:
                 return guess, hardest
-        self.reason = "the contact does not settle"
+        self._reason = "the contact does not settle"
         return None, hardest
 
     def _guess(self, fraction: float) -> LoadState:
@@ -194,15 +180,41 @@ class LoadPath:
         forces = sum(share * point.forces for share, point in zip(shares, known, strict=True))
         return LoadState(fraction, nodal, last.contact, forces)
 
+    @property
+    def phrase(self) -> str:
+        """The steps taken, in words; where the path ends before the full load, with the reason."""
+        if (fraction := self.points[-1].fraction) < 1:
+            return f"stopped at {fraction:.1%} of the load: Newton's method fails beyond ({self._reason})"
+        steps = len(self.points) - 1
+        return f"all of the load applied in {steps} steps, {self._iterations} Newton iterations"
+
+    @property
+    def stats(self) -> dict[str, float | int | str]:
+        """The number of steps and iterations."""
+        return {
+            "load_steps": len(self.points) - 1,
+            "halved_steps": self._halved,
+            "newton_iterations": self._iterations,
+        }
+
+    def history(self) -> dict[str, FloatArray]:
+        """Fraction of the load, energy, N mm/mm, and reaction, N/mm, at every equilibrium."""
+        reactions = np.array([self.reaction(point) for point in self.points])
+        return {
+            "load_fraction": np.array([point.fraction for point in self.points]),
+            "energy": np.array([self.equilibrium.energy(point.nodal) for point in self.points]),
+            "reaction_x": reactions[:, 0],
+            "reaction_y": reactions[:, 1],
+        }
+
     def reaction(self, point: LoadState) -> FloatArray:
         """Force of the indenter on the finger, shape (2,), N/mm."""
         return reaction_by_residual_work(self._space, self.equilibrium.internal_force(point.nodal))
 
     def force_abscissa(self, point: LoadState) -> float | None:
-        """Abscissa before the load at which the indenter's force into the front face acts, mm.
+        """Abscissa before the load at which the indenter's force along y acts, mm; None without such a force.
 
-        The mean of the front's nodes, weighted by their forces along y; None without such a force. It differs
-        from the contact's middle where the contact cannot turn, and holds the finger by a couple, too.
+        It differs from the contact's middle where the contact cannot turn, and holds the finger by a couple.
         """
         front = np.setdiff1d(self._space.boundary_nodes("front"), self._space.boundary_nodes("base"))
         forces = self.equilibrium.internal_force(point.nodal)[front, 1]

@@ -6,24 +6,16 @@ from typing import Any
 import numpy as np
 
 from geometry.arrays import FloatArray
-from solvers.fem.finite_strain.constraints import LoadState
-from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
+from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium, LoadState
 from solvers.petsc import PETSc
-
-SMALL = 1e-4
-"""Least internal force over Young's modulus, mm, in the criterion: rounding of positions makes forces too."""
-NEAR = 1e-5
-"""Residual over the largest internal force below which the tangent of the step before serves for one more."""
-SHORTEST = 2.0**-10
-"""Fraction of a Newton step below which it is not shortened further."""
 
 
 @dataclass(frozen=True, eq=False)
 class NewtonResult:
     """The end of a Newton iteration."""
 
-    state: LoadState  # Displacements and forces
-    converged: bool  # Whether they are in equilibrium
+    state: LoadState
+    converged: bool  # Whether the state is in equilibrium
     reason: str  # PETSc's word for the end, in lower case
     iterations: int  # Newton steps taken
 
@@ -36,19 +28,13 @@ class ConstrainedNewton:
     The factor s, Young's modulus, makes forces of the constraints. `ConstrainedElimination` solves J y = R.
     A step that would turn an element inside out is halved before the line search. Near equilibrium every
     second step takes the tangent of the one before, which saves a factorisation at the end of most solves.
+
+    The iteration ends where R is below `tolerance` times the largest internal force.
     """
 
     def __init__(
         self, equilibrium: FiniteStrainEquilibrium, *, scale: float, tolerance: float, max_iterations: int
     ) -> None:
-        """Prepare the solver.
-
-        Args:
-            equilibrium: The problem.
-            scale: s, MPa.
-            tolerance: The iteration ends where R is below this fraction of the largest internal force.
-            max_iterations: Newton steps.
-        """
         self._equilibrium, self._scale, self._tolerance = equilibrium, scale, tolerance
         self._state = equilibrium.rest
         self._size = 0.0
@@ -129,10 +115,10 @@ class ConstrainedNewton:
         """Halve the step, which will be subtracted, until no element is turned inside out."""
         start, _ = self._split(unknown)
         down, _ = self._split(step)
-        length = 1.0
-        while not self._equilibrium.admissible(start - length * down) and length >= SHORTEST:
+        length, shortest = 1.0, 2.0**-10
+        while not self._equilibrium.admissible(start - length * down) and length >= shortest:
             length /= 2
-        self._torn = length < SHORTEST
+        self._torn = length < shortest
         step.scale(length)
         return length < 1
 
@@ -143,8 +129,8 @@ class ConstrainedNewton:
         residual = snes.getFunction()[0].norm(PETSc.NormType.INFINITY)
         if not np.isfinite(residual):
             return int(reasons.DIVERGED_FNORM_NAN)
-        size = max(self._size, SMALL * self._scale)
-        self._near = iteration > 0 and residual <= NEAR * size
+        size = max(self._size, 1e-4 * self._scale)  # rounding of positions makes forces, too
+        self._near = iteration > 0 and residual <= 1e-5 * size
         if residual <= self._tolerance * size:
             return int(reasons.CONVERGED_FNORM_RELATIVE)
         return int(reasons.CONVERGED_ITERATING)

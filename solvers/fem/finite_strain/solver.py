@@ -3,6 +3,7 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -11,7 +12,7 @@ from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
 from solvers.fem.error_estimate import ErrorEstimator, locking_advice
-from solvers.fem.finite_strain.constraints import DisplacementConstraints
+from solvers.fem.finite_strain.equilibrium import DisplacementConstraints
 from solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
 from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
@@ -19,30 +20,23 @@ from solvers.problem import Problem
 from solvers.solution import ErrorEstimate, Solution, Status, unstable_phrase
 from solvers.solver import Family, FieldSettings, Progress, check_problem, silent
 
+ITERATIONS = 40
+"""Newton iterations from given displacements."""
+
 
 @dataclass(frozen=True)
 class FemNonlinearSolver(FieldSettings):
-    """Neo-Hookean or St Venant-Kirchhoff plane strain by Newton's method, the load applied in adaptive steps.
+    """Plane strain by Newton's method, the load applied in adaptive steps; see `LoadPath`.
 
-    Every step starts from the last three states extrapolated; the first from the linear solution. A step
-    whose Newton iteration fails, or turns an element inside out, is halved. A `patch` whose tangential
-    component is free slides. A `cylinder` presses without friction.
-
-    Attributes:
-        degree: Degree of the elements, 1 or 2.
-        first_step: First fraction of the load.
-        max_step: Largest fraction of the load in one step.
-        min_step: Fraction of the load below which the solver gives up.
-        tolerance: Newton stops when the residual force is below this fraction of the internal forces.
-        max_iterations: Newton iterations in one step.
+    A `patch` whose tangential component is free slides. A `cylinder` presses without friction.
     """
 
-    degree: int = 2
-    first_step: float = 0.05
-    max_step: float = 0.2
-    min_step: float = 1e-3
-    tolerance: float = 1e-8
-    max_iterations: int = 12
+    degree: int = 2  # Of the elements, 1 or 2
+    first_step: float = 0.05  # First fraction of the load
+    max_step: float = 0.2  # Largest fraction of the load in one step
+    min_step: float = 1e-3  # Fraction of the load below which the solver gives up
+    tolerance: float = 1e-8  # Largest residual force over the largest internal force
+    max_iterations: int = 12  # Newton iterations in one step
     name: ClassVar[str] = "fem-nonlinear"
     family: ClassVar[Family] = "finite elements"
     laws: ClassVar[tuple[str, ...]] = ("neo-hookean", "st-venant-kirchhoff", "gent")
@@ -55,7 +49,7 @@ class FemNonlinearSolver(FieldSettings):
         check_tolerance(self.name, self.tolerance)
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
-        """Solve the finite-strain problem; see `Solver`. The material law must be one of finite strain."""
+        """Solve the finite-strain problem; see `Solver`."""
         check_problem(self, problem)
         return on_all_ranks(self._solve, problem, progress)
 
@@ -79,10 +73,8 @@ class FemNonlinearSolver(FieldSettings):
         space = LagrangeSpace(problem.mesh, self.degree)
         path = self.path(problem, space)
         path.follow(progress)
-        points, energies = path.points, [path.equilibrium.energy(point.nodal) for point in path.points]
-        reactions = np.array([path.reaction(point) for point in points])
-        last = points[-1]
-        regions = [path.region(point) for point in points]
+        last, history = path.points[-1], path.history()
+        regions = [path.region(point) for point in path.points]
         abscissa = path.force_abscissa(last)
         path.equilibrium.factorise(last)
         unstable = path.equilibrium.unstable or 0
@@ -97,34 +89,64 @@ class FemNonlinearSolver(FieldSettings):
             solver=self.name,
             problem=problem,
             field=LagrangeField(space, last.nodal),
-            energy=energies[-1],
-            reaction=reactions[-1],
+            energy=float(history["energy"][-1]),
+            reaction=np.array([history[name][-1] for name in ("reaction_x", "reaction_y")]),
             status=_status(path, regions, unstable, "; ".join(filter(None, remarks))),
             stats={
                 "seconds": solved - started,
                 "estimate_seconds": time.perf_counter() - solved,
                 "unknowns": last.nodal.size,
-                "load_steps": len(points) - 1,
-                "halved_steps": path.halved,
-                "newton_iterations": path.iterations,
+                **path.stats,
                 "unstable_directions": unstable,
                 "left_unstable": path.left,
                 "degree": self.degree,
                 **({} if abscissa is None else {"force_abscissa_mm": abscissa}),
                 **(regions[-1].stats() if regions[-1] else {}),
             },
-            history={
-                "load_fraction": np.array([point.fraction for point in points]),
-                "energy": np.array(energies),
-                "reaction_x": reactions[:, 0],
-                "reaction_y": reactions[:, 1],
-                **_place_history(path),
-                **_contact_history(path, regions),
-            },
-            states=[LagrangeField(space, point.nodal) for point in points],
+            history={**history, **_place_history(path), **_contact_history(path, regions)},
+            states=[LagrangeField(space, point.nodal) for point in path.points],
             error=error,
             contact=contact_of(problem, abscissa, regions[-1]),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """An equilibrium under the full load, in elements of degree 2."""
+
+    nodal: FloatArray  # Displacements, shape (N, 2), mm
+    energy: float  # Elastic energy per depth, N mm / mm
+    unstable: int  # Number of directions in which the energy falls
+
+
+def equilibria_near(problem: Problem, starts: Sequence[FloatArray]) -> list[Equilibrium | None]:
+    """The equilibrium to which Newton's method leads from each start; None where it leads nowhere.
+
+    All are on one set of elements, so that their energies can be compared.
+
+    Args:
+        problem: With a law of finite strain and a load without a cylinder.
+        starts: Displacements of the nodes of a `LagrangeSpace` of degree 2, shape (N, 2), mm.
+    """
+    return on_all_ranks(partial(_equilibria_near, tuple(starts)), problem, silent)
+
+
+def _equilibria_near(
+    starts: Sequence[FloatArray], problem: Problem, progress: Progress
+) -> list[Equilibrium | None]:
+    # Many iterations: from a displacement that is off by some percent the first steps are short.
+    path = FemNonlinearSolver(max_iterations=ITERATIONS).path(problem, LagrangeSpace(problem.mesh, 2))
+    found: list[Equilibrium | None] = []
+    for start in starts:
+        if (state := path.settled_from(start)) is None:
+            found.append(None)
+            continue
+        equilibrium = path.equilibrium
+        equilibrium.factorise(state)
+        energy, unstable = equilibrium.energy(state.nodal), equilibrium.unstable
+        found.append(Equilibrium(state.nodal, energy, unstable or 0))
+    path.close()
+    return found
 
 
 def _error(path: LoadPath, problem: Problem, space: LagrangeSpace) -> ErrorEstimate | None:
@@ -141,16 +163,10 @@ def _error(path: LoadPath, problem: Problem, space: LagrangeSpace) -> ErrorEstim
 
 def _status(path: LoadPath, regions: Sequence[ContactRegion | None], unstable: int, remarks: str) -> Status:
     """Success at the full load with remarks, or advice."""
-    contact = path.equilibrium.contact
-    fraction = path.points[-1].fraction
-    if fraction < 1:
+    contact, taken = path.equilibrium.contact, path.phrase
+    if path.points[-1].fraction < 1:
         wider = "a wider contact" if contact is None else "another radius"
-        return Status(
-            False,
-            f"stopped at {fraction:.1%} of the load: Newton's method fails beyond ({path.reason}); "
-            f"take a finer mesh, {wider} or a smaller stroke",
-        )
-    taken = f"all of the load applied in {len(path.points) - 1} steps, {path.iterations} Newton iterations"
+        return Status(False, f"{taken}; take a finer mesh, {wider} or a smaller stroke")
     if unstable:
         return Status(False, f"{taken}, but {unstable_phrase(unstable)}")
     if path.left:

@@ -6,29 +6,21 @@ step at 235,000. Other bodies may differ by a factor of two.
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 from geometry.errors import UserError
-
-LinearSolver = Literal["auto", "direct", "iterative"]
-
-METHODS = {"auto": (False, True), "direct": (False,), "iterative": (True,)}
-"""By the linear solver that is asked for, whether to iterate, in the order to try."""
-
-USABLE = 0.7
-"""Share of the free memory that a solution may take."""
+from solvers.fem.linear_solvers import LinearSolver
 
 
 @dataclass(frozen=True)
 class Cost:
     """The linear solver and its price."""
 
-    unknowns: int  # Number of unknowns
+    unknowns: int
     levels: int  # Number of nodes above each other
     iterative: bool  # Whether multigrid solves, not factors
 
     @property
-    def entries(self) -> float:
+    def _entries(self) -> float:
         """Estimated entries of the factors."""
         nodes = self.unknowns / (3 * self.levels)
         return float(self.unknowns * (100 + 33 * self.levels) * (nodes / 8500) ** 0.25)
@@ -36,33 +28,28 @@ class Cost:
     @property
     def memory_gb(self) -> float:
         """Estimated memory, GB: matrix and vectors, and factors or the coarser matrices."""
-        return 3.4e-6 * self.unknowns if self.iterative else 2.4e-6 * self.unknowns + 1e-8 * self.entries
-
-    @property
-    def step_seconds(self) -> float:
-        """Estimated time of a Newton step on one core, s."""
-        if self.iterative:
-            return float(110 * (1e-6 * self.unknowns) ** 1.17)
-        return 2e-5 * self.unknowns + 1.3e-10 * self.entries**2 / self.unknowns
+        return 3.4e-6 * self.unknowns if self.iterative else 2.4e-6 * self.unknowns + 1e-8 * self._entries
 
     @property
     def words(self) -> str:
-        """Unknowns, method, memory and time."""
-        how = "iterative" if self.iterative else "direct"
-        time = max(1.0, self.step_seconds)
-        size = f"{time:.0f} s" if time < 100 else f"{time / 60:.0f} min"
-        return f"{self.unknowns:,} unknowns, {how}: about {self.memory_gb:.1f} GB, {size} a Newton step"
+        """Unknowns, method, memory and time of a Newton step on one core."""
+        if self.iterative:
+            how, seconds = "iterative", float(110 * (1e-6 * self.unknowns) ** 1.17)
+        else:
+            how, seconds = "direct", 2e-5 * self.unknowns + 1.3e-10 * self._entries**2 / self.unknowns
+        time = f"{max(1.0, seconds):.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
+        return f"{self.unknowns:,} unknowns, {how}: about {self.memory_gb:.1f} GB, {time} a Newton step"
 
 
 def affordable(unknowns: int, levels: int, asked: LinearSolver, free_gb: float) -> Cost:
     """The linear solver that is asked for or, if "auto", direct where memory allows it.
 
-    Raises:
-        UserError: If the memory that is free does not suffice.
+    A `UserError` says that the memory that is free does not suffice; a solution may take 70 % of it.
     """
-    costs = [Cost(unknowns, levels, iterative) for iterative in METHODS[asked]]
+    methods = {"auto": (False, True), "direct": (False,), "iterative": (True,)}[asked]
+    costs = [Cost(unknowns, levels, iterative) for iterative in methods]
     for cost in costs:
-        if cost.memory_gb <= USABLE * free_gb:
+        if cost.memory_gb <= 0.7 * free_gb:
             return cost
     advice = "take fewer layers or a coarser mesh"
     if asked == "direct":

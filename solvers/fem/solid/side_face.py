@@ -28,10 +28,9 @@ class FaceField:
 
     @cached_property
     def slopes(self) -> FloatArray:
-        """Their derivatives along z, shape (P, 3).
+        """Their derivatives along z, shape (P, 3), by a parabola through the three nodes of a layer.
 
-        That of the parabola through the three nodes of a layer above each other. In the middle plane symmetry
-        leaves only that of u_z.
+        In the middle plane symmetry leaves only that of u_z.
         """
         levels = [-1, -2, -3] if self.face == "side" else [0, 1, 2]
         own, half, whole = (self.space.at_level(self.nodal, level) for level in levels)

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solvers.fem.finite_strain.constraints import LoadState
-from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
+from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium, LoadState
 from solvers.fem.finite_strain.newton import ConstrainedNewton, NewtonResult
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem

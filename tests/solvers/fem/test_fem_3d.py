@@ -191,7 +191,7 @@ def test_cross_validation_does_not_read_its_stress_as_that_of_the_plane(wedge):
         ({"grading": 0.0}, "0 < grading <= 1"),  # a layer without thickness
         ({"grading": 2.0}, "0 < grading <= 1"),  # thicker where the stress changes
         ({"face": "top"}, "side, middle"),
-        ({"sides": "loose"}, "free or held"),
+        ({"sides": "loose"}, "free, held"),
         ({"linear_solver": "fast"}, "auto, direct, iterative"),
         ({"max_step": 0.0}, "min_step <= max_step"),
         ({"tolerance": 1e30}, r"0 < tolerance <= 0.001, not 1e\+30"),  # the linear guess would do

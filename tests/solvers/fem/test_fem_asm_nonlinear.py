@@ -9,8 +9,7 @@ from geometry.errors import UserError
 from geometry.mesh.quadrature import body_quadrature
 from solvers.assimilation.misfit import MarkerSettings, misfit_of
 from solvers.fem.assimilating import FemAsmSolver
-from solvers.fem.finite_strain.constraints import DisplacementConstraints, LoadState
-from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
+from solvers.fem.finite_strain.equilibrium import DisplacementConstraints, FiniteStrainEquilibrium, LoadState
 from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.lagrange import LagrangeSpace
