@@ -94,7 +94,7 @@ class Evaluation:
             edge_displacement=displacement[len(mesh.points) :],
             weights=quadrature.weights,
             displacement=solution.displacement(inside),
-            strain=state.strain,
+            strain=np.ascontiguousarray(state.strain),  # as from the archive, to the last digit of a mean
             stress=state.stress,
             stress_zz=state.stress_zz,
             von_mises=state.von_mises,

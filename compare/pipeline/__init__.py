@@ -1,5 +1,4 @@
-"""The main job: a comparison of solvers and the folder of its files.
+"""One comparison of solvers, and the folder of its files: `pipeline.run` makes the comparison of a `job.Job`.
 
-`job.Job` says what is compared, `pipeline.run` makes it. Imports `compare.camera`, `compare.report`,
-`compare.figures`, `compare.evaluation`, `compare.runtime`.
+Imports `compare.camera`, `compare.report`, `compare.figures`, `compare.evaluation`, `compare.runtime`.
 """

@@ -1,4 +1,4 @@
-"""The job of a comparison: what is compared, and whether it can be."""
+"""The job of a comparison, and its checks before anything is computed."""
 
 import sys
 from collections.abc import Collection, Mapping, Sequence
@@ -21,41 +21,24 @@ from vision.measurements import read_measurements
 
 @dataclass(frozen=True)
 class Job:
-    """A comparison to make.
-
-    Attributes:
-        design: The finger.
-        solvers: The solvers, in the order of tables and pictures.
-        spare: Names of those that are left out, with a remark, if they do not support the problem.
-        mesh: Element sizes.
-        adapt: Tolerance to which `fem` shall know the markers, mm, for which the mesh is refined; None: not.
-        material: The elastic constants; each solver takes the law that it has.
-        load: What moves the finger.
-        measurements: Marker displacements, their CSV file, or a film to track; None for a virtual experiment.
-        truth: What the virtual experiment simulates; a key of `TRUTHS`.
-        reference: Name of the solver that the others are compared with; `fem`, else the first, if None.
-        out: Output folder.
-        resume: Whether to take over solutions that an earlier run of the same job finished.
-        picture_formats: Formats of the pictures besides PNG, of `FORMATS`.
-        processes: Processes that may solve at a time; a second one takes the solvers of finite strain.
-        options: Options of the command line that made the job, for `run.json`; empty from Python.
-    """
+    """A comparison to make."""
 
     design: Finger
-    solvers: Sequence[Solver]
-    spare: Collection[str] = ()
-    mesh: MeshSettings = field(default_factory=MeshSettings)
-    adapt: float | None = None
-    material: Material = field(default_factory=Material)
-    load: Load = field(default_factory=Load)
+    solvers: Sequence[Solver]  #: In the order of tables and pictures.
+    spare: Collection[str] = ()  #: Names of solvers to leave out if they do not support the problem.
+    mesh: MeshSettings = field(default_factory=MeshSettings)  #: Element sizes.
+    adapt: float | None = None  #: Tolerance of `fem` at the markers, mm, for which the mesh is refined.
+    material: Material = field(default_factory=Material)  #: Elastic constants; each solver has its own law.
+    load: Load = field(default_factory=Load)  #: Motion of the indenter.
+    #: Marker displacements, their CSV file, or a film to track; simulated if None.
     measurements: Observations | Path | Film | None = None
-    truth: str = SLIDING.name
-    reference: str | None = None
-    out: Path = Path("out/default")
-    resume: bool = False
-    picture_formats: Sequence[str] = ()
-    processes: int = 1
-    options: Mapping[str, object] = field(default_factory=dict)
+    truth: str = SLIDING.name  #: Key of `TRUTHS` to simulate.
+    reference: str | None = None  #: Solver to compare the others with; `fem`, else the first, if None.
+    out: Path = Path("out/default")  #: Output folder.
+    resume: bool = False  #: Whether to take over the finished solutions of an earlier run.
+    picture_formats: Sequence[str] = ()  #: Formats of the pictures besides PNG, of `FORMATS`.
+    processes: int = 1  #: Processes that solve at a time; a second one takes the solvers of finite strain.
+    options: Mapping[str, object] = field(default_factory=dict)  #: Of the command line, for `run.json`.
 
     @property
     def names(self) -> list[str]:
@@ -64,7 +47,11 @@ class Job:
 
 
 def checked(job: Job) -> Job:
-    """The job with its measurements read, refused if it cannot be done, before anything is computed."""
+    """Refuse a job that cannot be done, and read its file of measurements.
+
+    Raises:
+        UserError: If the job cannot be done.
+    """
     if not job.solvers:
         raise UserError("no solver was asked for; name at least one")
     for name in job.names:
@@ -79,11 +66,13 @@ def checked(job: Job) -> Job:
         check_adaptable(job.adapt, job.load)
     if job.reference is not None and job.reference not in job.names:
         raise UserError(f"the reference {job.reference!r} is not among the solvers {', '.join(job.names)}")
-    if job.resume and (typed := next((each for each in job.solvers if _source_file(each) is None), None)):
-        raise UserError(
-            f"solver {typed.name} has no source file, so that an edit of its class cannot be told; do not "
-            "resume, or move the class from the notebook or shell into a module"
-        )
+    for solver in job.solvers if job.resume else ():
+        package = sys.modules.get(type(solver).__module__.partition(".")[0])
+        if getattr(package, "__file__", None) is None:
+            raise UserError(
+                f"solver {solver.name} has no source file, so that an edit of its class cannot be told; do "
+                "not resume, or move the class from the notebook or shell into a module"
+            )
     check_formats(job.picture_formats)
     check_truths([job.truth], job.design)
     check_walls(TRUTHS[job.truth])
@@ -92,8 +81,3 @@ def checked(job: Job) -> Job:
         radius = job.design.marker_radius
         return replace(job, measurements=read_measurements(job.measurements, marker_radius=radius))
     return job
-
-
-def _source_file(solver: Solver) -> str | None:
-    """File of the package or module that holds a solver's class; None where it was typed in."""
-    return getattr(sys.modules.get(type(solver).__module__.partition(".")[0]), "__file__", None)

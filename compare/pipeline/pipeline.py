@@ -42,9 +42,6 @@ from solvers.solver import Solver, Traits
 from vision.frames.frame import Frame
 from vision.measurements import write_measurements
 
-TRACK = "track"
-"""Folder of the files of the marker tracking."""
-
 
 def run(job: Job, stages: Stages) -> Comparison:
     """Make the comparison and write its output folder.
@@ -55,31 +52,31 @@ def run(job: Job, stages: Stages) -> Comparison:
     job = checked(job)
     check_output(job.out)
     with replaced_folder(job.out, keep=job.names if job.resume else ()) as folder:
-        photographs: list[Picture] = []
-        tracked: Sequence[str] = ()
-        measurements = job.measurements
-        if isinstance(measurements, Film):
-            # They need OpenCV.
-            from compare.camera.predicted_frame import predicted_frame
-            from compare.camera.track_film import track_figures, track_film
+        if not isinstance(job.measurements, Film):
+            comparison = compute(job, stages, folder)
+            _write(folder, job, comparison, stages)
+            return comparison
+        # They need OpenCV.
+        from compare.camera.predicted_frame import predicted_frame
+        from compare.camera.track_film import track_figures, track_film
 
-            last: deque[Frame] = deque(maxlen=1)
-            with stages.stage("track") as progress:
-                (folder / TRACK).mkdir()
-                tracking, measurements = track_film(
-                    measurements,
-                    job.design,
-                    folder / TRACK,
-                    progress,
-                    video=False,
-                    watch=lambda frame, _: last.append(frame),
-                )
-            photographs, tracked = track_figures(folder / TRACK, tracking), tracking.warnings
+        last: deque[Frame] = deque(maxlen=1)
+        track = folder / "track"
+        with stages.stage("track") as progress:
+            track.mkdir()
+            tracking, measurements = track_film(
+                job.measurements,
+                job.design,
+                track,
+                progress,
+                video=False,
+                watch=lambda frame, _: last.append(frame),
+            )
+        photographs = track_figures(track, tracking)
         comparison = compute(replace(job, measurements=measurements), stages, folder)
-        comparison = replace(comparison, warnings=[*tracked, *comparison.warnings])
-        if photographs:
-            photographs.append(predicted_frame(folder / TRACK, comparison, tracking, last[0].image))
-        write(folder, job, comparison, stages, photographs=photographs)
+        comparison = replace(comparison, warnings=[*tracking.warnings, *comparison.warnings])
+        photographs.append(predicted_frame(track, comparison, tracking, last[0].image))
+        _write(folder, job, comparison, stages, photographs)
     return comparison
 
 
@@ -88,7 +85,7 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
 
     Args:
         job: Checked, with its film tracked.
-        stages: Told of the progress.
+        stages: Shows the progress.
         folder: For solutions and checkpoints as they are finished, from which a resumed run goes on.
 
     Raises:
@@ -145,7 +142,7 @@ def compute(job: Job, stages: Stages, folder: Path) -> Comparison:
 def _without_markers(
     solvers: Sequence[Solver], spare: Collection[str], error: UserError
 ) -> tuple[list[Solver], dict[str, str]]:
-    """The solvers that need no markers, and by name why others are left out.
+    """The solvers that need no markers, and reasons why others are left out, by name.
 
     Raises:
         UserError: The given one, if a solver that needs markers is not spare, or all need them.
@@ -157,23 +154,10 @@ def _without_markers(
     return chosen, dict.fromkeys(needing, "no markers to assimilate")
 
 
-def write(
-    folder: Path,
-    job: Job,
-    comparison: Comparison,
-    stages: Stages,
-    *,
-    photographs: Sequence[Picture] = (),
+def _write(
+    folder: Path, job: Job, comparison: Comparison, stages: Stages, photographs: Sequence[Picture] = ()
 ) -> None:
-    """Write every file of a comparison but its solutions, which `compute` has written.
-
-    Args:
-        folder: Where to write.
-        job: What was asked for.
-        comparison: What was found.
-        stages: Told of the progress.
-        photographs: Pictures of the marker tracking, for the report.
-    """
+    """Write every file of a comparison but its solutions; photographs of the tracking are for the report."""
     if comparison.adaptation is not None:
         write_rounds(folder / "adapt.csv", comparison.adaptation)
     write_measurements(folder / "observations.csv", comparison.observations)
@@ -197,7 +181,7 @@ def write(
 
 
 def _provenance(folder: Path, job: Job, comparison: Comparison, stages: Stages) -> dict[str, Any]:
-    """Times, and what the numbers depend on: hashes, settings, seeds, devices, versions, machine."""
+    """Times, and the causes of the numbers: hashes, settings, seeds, devices, versions, machine."""
     adaptation, settings = comparison.adaptation, comparison.settings
     return {
         **stages.record(),
