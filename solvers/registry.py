@@ -40,7 +40,7 @@ FORMER = {"pinn-local": "pinn-std", "pinn-local-asm": "pinn-asm"}
 BUILT_IN = {
     "fem": "solvers.fem.linear:FemSolver",
     "fem-nonlinear": "solvers.fem.finite_strain.solver:FemNonlinearSolver",
-    "fem-3d": "solvers.fem.solid.solver:Fem3dSolver",
+    "fem-3d": "solvers.fem.solid:Fem3dSolver",
     "fem-id": "solvers.fem.identification:FemIdSolver",
     "fem-asm": "solvers.fem.assimilating:FemAsmSolver",
     "gp": "solvers.statistics.gaussian_process:GaussianProcessSolver",

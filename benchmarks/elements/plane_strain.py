@@ -26,8 +26,7 @@ from geometry.mesh.quadrature import body_quadrature
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
-from solvers.fem.solid.side_face import FaceField
-from solvers.fem.solid.solver import Fem3dSolver
+from solvers.fem.solid import FaceField, Fem3dSolver
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution
 

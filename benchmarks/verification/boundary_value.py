@@ -15,7 +15,7 @@ from geometry.arrays import BoolArray, FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import Quadrature, edge_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.fem.linear_equilibrium import LinearElasticity
+from solvers.fem.linear import LinearElasticity
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Material, Problem
 from solvers.solution import State

@@ -85,7 +85,7 @@ class Certifier:
     """Finite elements of degree 2 on a problem's mesh, by which any displacement is measured."""
 
     def __init__(self, problem: Problem) -> None:
-        from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium  # it needs DOLFINx
+        from solvers.fem.linear import LinearElasticity, LinearEquilibrium  # it needs DOLFINx
 
         self._problem = problem
         self._space = LagrangeSpace(problem.mesh, 2)

@@ -140,10 +140,8 @@ class Estimate:
     def intervals(self) -> FloatArray:
         """Confidence intervals of the values at `LEVEL`, shape (p, 2)."""
         half = self.quantile * np.sqrt(np.diagonal(self.covariance))
-        ends = self.z[:, None] + half[:, None] * [-1, 1]
-        return np.array(
-            [np.clip(u.value(e), u.low, u.high) for u, e in zip(self.parameters, ends, strict=True)]
-        )
+        ends = zip(self.parameters, self.z[:, None] + half[:, None] * [-1, 1], strict=True)
+        return np.array([np.clip(each.value(end), each.low, each.high) for each, end in ends])
 
     @property
     def resolution(self) -> FloatArray:
@@ -191,6 +189,7 @@ def estimate(
 
     @cache  # least_squares asks for residuals and derivatives separately
     def evaluated(z: tuple[float, ...]) -> Prediction:
+        """Residuals over σ, shape (n,), and their derivatives by z, shape (n, p)."""
         values, scales = values_of(parameters, np.array(z))
         if (found := model(values)) is None:
             return np.full(len(observed), np.inf), np.zeros((len(observed), count))
@@ -198,7 +197,6 @@ def estimate(
         return (predicted - observed) / deviations, derivatives * scales / deviations[:, None]
 
     def whitened(z: FloatArray) -> Prediction:
-        """Residuals over σ, shape (n,), and their derivatives by z, shape (n, p)."""
         return evaluated(tuple(z.tolist()))
 
     count = len(parameters)

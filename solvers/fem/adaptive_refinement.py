@@ -27,8 +27,8 @@ from solvers.solver import Progress, silent
 class RefinementRound(NamedTuple):
     """One mesh of the sequence."""
 
-    triangles: int  # Number of triangles
-    nodes: int  # Number of nodes
+    triangles: int
+    nodes: int
     at_markers: float  # Largest estimated error of u or v at a marker, mm
     energy_norm: float  # Estimated relative error in the energy norm
 
@@ -37,7 +37,7 @@ class RefinementRound(NamedTuple):
 class Adaptation:
     """A refined mesh and the rounds that led to it."""
 
-    tolerance: float  # Tolerance of u and v at the markers, mm
+    tolerance: float  # Of u and v at the markers, mm
     rounds: tuple[RefinementRound, ...]  # From the first mesh to the refined one
     mesh: TriangleMesh  # The refined mesh
 
@@ -83,19 +83,10 @@ def adapted(
     most_rounds: int = 30,
     progress: Progress = silent,
 ) -> Adaptation:
-    """Refine the mesh of a linear problem until the estimated error at its markers is within a tolerance.
+    """Refine the mesh of a linear problem until u and v at its markers are within a tolerance, mm.
 
-    Args:
-        problem: With the mesh to start from.
-        tolerance: Largest estimated error of u or v at a marker, mm.
-        degree: Degree of the elements.
-        section: The body, for the arcs of refined fillets.
-        most_triangles: Largest number of triangles.
-        most_rounds: Largest number of solutions.
-        progress: Called after every round.
-
-    Raises:
-        UserError: As `check_adaptable`.
+    The section is for the arcs of refined fillets. The progress is called after every round, which has one
+    solution. A `UserError` refuses what `check_adaptable` does.
     """
     check_adaptable(tolerance, problem.load)
     rounds: list[RefinementRound] = []
@@ -103,10 +94,11 @@ def adapted(
         found, shares = _solve(problem, degree, tolerance)
         mesh = problem.mesh
         rounds.append(found)
-        progress(
-            _done(rounds, tolerance), f"{found.triangles} triangles, {found.at_markers:.2g} mm at the markers"
-        )
-        if found.at_markers <= tolerance or len(rounds) == most_rounds:
+        # On a logarithmic scale from the first estimate to the tolerance
+        first, now = rounds[0].at_markers, found.at_markers
+        done = 1.0 if now <= tolerance else max(0.0, log(first / now) / log(first / tolerance))
+        progress(done, f"{found.triangles} triangles, {now:.2g} mm at the markers")
+        if now <= tolerance or len(rounds) == most_rounds:
             break
         finer = refined(mesh, largest(shares, 0.6), section)
         if len(finer.triangles) > most_triangles:
@@ -126,7 +118,7 @@ def largest(shares: FloatArray, part: float) -> BoolArray:
 
 def _solve(problem: Problem, degree: int, tolerance: float) -> tuple[RefinementRound, FloatArray]:
     """One solution: its estimate, and every triangle's contribution to the functional's error, shape (t,)."""
-    from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium  # needs DOLFINx
+    from solvers.fem.linear import LinearElasticity, LinearEquilibrium  # needs DOLFINx
 
     mesh, space = problem.mesh, LagrangeSpace(problem.mesh, degree)
     equilibrium = LinearEquilibrium.of(LinearElasticity.of(problem, space))
@@ -138,9 +130,3 @@ def _solve(problem: Problem, degree: int, tolerance: float) -> tuple[RefinementR
     equilibrium.factors.destroy()
     found = RefinementRound(len(mesh.triangles), len(mesh.points), error.at_markers, error.energy_norm)
     return found, shares
-
-
-def _done(rounds: list[RefinementRound], tolerance: float) -> float:
-    """The fraction of the way from the first estimate to the tolerance, on a logarithmic scale."""
-    first, now = rounds[0].at_markers, rounds[-1].at_markers
-    return 1.0 if now <= tolerance else max(0.0, log(first / now) / log(first / tolerance))

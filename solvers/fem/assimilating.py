@@ -1,4 +1,11 @@
-"""`fem-asm`: the displacement of least energy plus misfit to the markers, exactly, on the shared mesh."""
+"""`fem-asm`: the displacement of least energy plus misfit to the markers, exactly, on the shared mesh.
+
+At a stationary point of E(u) + 1/2 (B u - d)^T W (B u - d) the force f_j acts on component j of the markers,
+where b_j . u + f_j / W_jj = d_j: the misfit is a compliant spring, as is a contact with a standard deviation.
+For the linear law the forces follow from the compliance at the markers. At finite strain the observed
+displacements grow with the load on its path; to leave a marker out, Newton's method continues from the
+solution without its two springs and, where that does not converge, from rest.
+"""
 
 import time
 from collections.abc import Callable
@@ -10,15 +17,15 @@ import numpy as np
 from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
 from geometry.observations import Observations
-from solvers.assimilation.marker_forces import MarkerForces
+from solvers.assimilation.marker_forces import MarkerForces, residual_phrase
 from solvers.assimilation.marker_weighting import MarkerWeighting
 from solvers.assimilation.misfit import Choice, Misfit, Weighting, leave_one_out_displacements
 from solvers.constrained_elimination import ConstrainedElimination
 from solvers.fem.boundary_conditions import marker_functionals, reaction_by_residual_work
-from solvers.fem.finite_strain.assimilation import assimilated
+from solvers.fem.finite_strain.equilibrium import DisplacementConstraints
+from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium
+from solvers.fem.linear import FemSolver, LinearElasticity, LinearEquilibrium
 from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
@@ -82,13 +89,18 @@ class FemAsmSolver(FieldSettings):
         check_problem(self, problem)
         if self.weighting.misfit(problem) is not None:
             return on_all_ranks(self._solve, problem, progress)
+        said = "without markers, or with weights of zero, this is"
         if problem.material.law in FemSolver.laws:
             plain = FemSolver(degree=self.degree, estimate=False).solve(problem, progress)
-            status = Status(True, "without markers, or with weights of zero, this is fem")
-            return replace(plain, solver=self.name, status=status)
-        stiff = FemNonlinearSolver(degree=self.degree).solve(problem, progress)
-        said = f"without markers, or with weights of zero, this is fem-nonlinear: {stiff.status.message}"
-        return replace(stiff, solver=self.name, status=replace(stiff.status, message=said))
+            return replace(plain, solver=self.name, status=Status(True, f"{said} fem"))
+        plain = FemNonlinearSolver(degree=self.degree).solve(problem, progress)
+        status = Status(plain.status.converged, f"{said} fem-nonlinear: {plain.status.message}")
+        return replace(plain, solver=self.name, status=status)
+
+    def _misfit(self, problem: Problem) -> Misfit:
+        if (misfit := self.weighting.misfit(problem)) is None:
+            raise UserError("fem-asm was given no markers to assimilate")
+        return misfit
 
     @property
     def weighting(self) -> MarkerWeighting:
@@ -98,13 +110,9 @@ class FemAsmSolver(FieldSettings):
     def prepare(self, problem: Problem) -> tuple[MarkerCompliance, Misfit]:
         """Factorise, and solve for the problem and for every component of a marker.
 
-        Further weights and markers cost no solve. A `UserError` refuses a problem without markers that weigh
-        anything.
+        Further weights and markers cost no solve. Without markers that weigh anything it is a `UserError`.
         """
-        misfit = self.weighting.misfit(problem)
-        if misfit is None:
-            raise UserError("fem-asm was given no markers to assimilate")
-        space = LagrangeSpace(problem.mesh, self.degree)
+        misfit, space = self._misfit(problem), LagrangeSpace(problem.mesh, self.degree)
         equilibrium = LinearEquilibrium.of(LinearElasticity.of(problem, space), self.weighting.slack)
         rows = marker_functionals(misfit, space)
         markers = ConstrainedElimination(rows, equilibrium.responses(rows))
@@ -133,7 +141,7 @@ class FemAsmSolver(FieldSettings):
 
     def _solve(self, problem: Problem, progress: Progress) -> Solution:
         if problem.material.law not in FemSolver.laws:
-            return assimilated(problem, self.weighting, degree=self.degree, progress=progress)
+            return self._stationary(problem, progress)
         started = time.perf_counter()
         finger, misfit = self.prepare(problem)
         progress(0.9, "solved for the forces at the markers")
@@ -169,3 +177,77 @@ class FemAsmSolver(FieldSettings):
             history=self.weighting.curve(forces),
             left_out=leave_one_out_displacements(problem, fit.residual_without),
         )
+
+    def _stationary(self, problem: Problem, progress: Progress) -> Solution:
+        """At finite strain: the stationary point that the load path leads to, also without each marker."""
+        started = time.perf_counter()
+        misfit, space = self._misfit(problem), LagrangeSpace(problem.mesh, self.degree)
+        # Shorter steps do not help: large forces at the markers invert elements.
+        solver = FemNonlinearSolver(degree=self.degree, min_step=0.01)
+        springs = DisplacementConstraints.springs(misfit, space)
+        constraints = DisplacementConstraints.of(problem, space, self.weighting.slack).joined(springs)
+        path = solver.path(problem, space, constraints)
+        path.follow(lambda done, text: progress(0.5 * done, text))
+        stats, phrase, history, last = path.stats, path.phrase, path.history(), path.points[-1]
+        forces = last.forces[-len(springs.targets) :].reshape(-1, 2)
+        reaction = path.reaction(last) - forces.sum(axis=0)
+        residual = (springs.targets - springs.values(last.nodal)).reshape(-1, 2)
+        if last.fraction < 1:
+            left_out = None
+            advice = "let the contact slide, give it a contact_deviation or take smaller weights"
+            status = Status(False, f"{phrase}: load and markers contradict each other; {advice}")
+        else:
+            missed = _left_out(path, solver, problem, springs, progress)
+            found, lost = missed[np.isfinite(missed)], int(np.isnan(missed[:, 0]).sum())
+            said = f"energy plus misfit is stationary: {phrase}; {residual_phrase(residual, found)}"
+            if lost:
+                said += f"; no equilibrium was found without {lost} of the markers"
+            left_out, status = leave_one_out_displacements(problem, missed), Status(True, said)
+        path.close()
+        return Solution(
+            solver=self.name,
+            problem=problem,
+            field=LagrangeField(space, last.nodal),
+            energy=float(history["energy"][-1]),
+            reaction=reaction,
+            status=status,
+            stats={
+                "seconds": time.perf_counter() - started,
+                "unknowns": last.nodal.size,
+                "triangles": len(problem.mesh.triangles),
+                "degree": self.degree,
+                **stats,
+                "weight_factor": 1.0,
+                "misfit": misfit.value(misfit.observed - residual),
+                "marker_force": float(np.linalg.norm(forces, axis=1).max()),
+            },
+            history={name: history[name] for name in ("load_fraction", "energy")},
+            left_out=left_out,
+        )
+
+
+def _left_out(
+    path: LoadPath,
+    solver: FemNonlinearSolver,
+    problem: Problem,
+    springs: DisplacementConstraints,
+    progress: Progress,
+) -> FloatArray:
+    """Residual of each marker without it, shape (m, 2), mm; NaN where no equilibrium is found."""
+    count, constraints = len(springs.targets) // 2, path.equilibrium.constraints
+    first = len(constraints.targets) - 2 * count
+    missed = np.full((count, 2), np.nan)
+    for marker in range(count):
+        progress(0.5 + 0.5 * marker / count, f"without marker {marker}")
+        own = slice(2 * marker, 2 * marker + 2)
+        kept = np.ones(first + 2 * count, dtype=bool)
+        kept[first:][own] = False
+        point = path.relaxed(kept)
+        if point is None:
+            again = solver.path(problem, LagrangeSpace(problem.mesh, solver.degree), constraints.only(kept))
+            again.follow(silent)
+            again.close()
+            point = again.points[-1]
+        if point.fraction == 1:
+            missed[marker] = (springs.targets - springs.values(point.nodal))[own]
+    return missed

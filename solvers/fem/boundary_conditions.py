@@ -53,8 +53,8 @@ def marker_functionals(misfit: Misfit, space: LagrangeSpace) -> FloatArray:
 def reaction_by_residual_work(space: NodalSpace, residual: FloatArray) -> FloatArray:
     """Force of the indenter on the finger, shape (2,), N/mm: the work of the residual on a unit translation.
 
-    The translation is one everywhere but at the base, where the clamp's own force works. Exact for the
-    discrete solution, unlike an integral of stresses along the boundary.
+    The translation is zero at the base, where the clamp's own force works. Unlike an integral of stresses
+    along the boundary it is exact for the discrete solution.
     """
     moved = np.ones(len(space.nodes), dtype=bool)
     moved[space.boundary_nodes("base")] = False

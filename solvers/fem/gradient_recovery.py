@@ -22,9 +22,6 @@ from geometry.mesh.quadrature import triangle_rule
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.lagrange import LagrangeSpace
 
-FEWEST = 4
-"""Least number of triangles in a patch."""
-
 
 @dataclass(frozen=True, eq=False)
 class GradientRecovery:
@@ -52,10 +49,8 @@ class GradientRecovery:
 
     def transposed(self, nodal: FloatArray) -> FloatArray:
         """The transposed map, from shape (N, 2, 2) to shape (N, 2)."""
-        parts = (
-            along.T @ (self.smoothing.T @ nodal[..., axis]) for axis, along in enumerate(self.derivatives)
-        )
-        return np.asarray(sum(parts))
+        x, y = (self.smoothing.T @ nodal[..., axis] for axis in (0, 1))
+        return np.asarray(self.derivatives[0].T @ x + self.derivatives[1].T @ y)
 
 
 class _Fits(NamedTuple):
@@ -72,7 +67,7 @@ def _fit(mesh: TriangleMesh, degree: int, samples: FloatArray) -> _Fits:
     vertices, (triangles, per_triangle, _) = len(mesh.points), samples.shape
     corners = (np.ones(3 * triangles), (mesh.triangles.ravel(), np.repeat(np.arange(triangles), 3)))
     touching = csr_matrix(corners, shape=(vertices, triangles))
-    narrow = diags((touching.getnnz(axis=1) < FEWEST).astype(np.float64))
+    narrow = diags((touching.getnnz(axis=1) < 4).astype(np.float64))
     patches = (touching + narrow @ touching @ touching.T @ touching).tocsr()
     start = patches.indptr.astype(np.int64) * per_triangle
     sample = (patches.indices[:, None].astype(np.int64) * per_triangle + np.arange(per_triangle)).ravel()

@@ -152,15 +152,10 @@ def _both_components(values: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, kw_only=True)
 class FemIdSolver(IdentifyingSolver):
-    """Finite elements whose contact, walls and law are found from the markers.
+    """Finite elements whose contact, walls and law are found from the markers."""
 
-    Attributes:
-        model: "fem-nonlinear", the only one: finite strain under an unknown force.
-        degree: Degree of the elements, 1 or 2.
-    """
-
-    model: str = "fem-nonlinear"
-    degree: int = 2
+    model: str = "fem-nonlinear"  # The only one: finite strain under an unknown force
+    degree: int = 2  # Of the elements, 1 or 2
     name: ClassVar[str] = "fem-id"
     family: ClassVar[Family] = "finite elements"
     laws: ClassVar[tuple[str, ...]] = FemNonlinearSolver.laws
@@ -211,13 +206,13 @@ class FemIdSolver(IdentifyingSolver):
 def fem_law_tracker(
     problem: Problem, points: FloatArray, radius: float, laws: Sequence[LawName] = LAWS, *, degree: int = 2
 ) -> LawTracker:
-    """The force tracker of a finger by the most probable of some laws.
+    """The force tracker of a finger by the most probable of some laws of finite strain.
 
     Args:
         problem: The finger; its load only gives the drawn contact.
         points: Markers at rest, shape (m, 2), mm, in the drawn body.
         radius: Of the markers' discs, mm; less is taken where one is nearer to the boundary.
-        laws: Laws of finite strain.
+        laws: The laws.
         degree: Of the elements, 1 or 2.
     """
     trackers = {}

@@ -25,16 +25,16 @@ from solvers.solver import Progress, silent
 TASK, DISMISSAL = 1, 2
 """Tags of messages from rank 0: a task with its problem, the exit code of the command."""
 
-FAULT = 1
-"""Exit code after an unexpected exception."""
-
 PATIENCE_S = 5.0
 """Time that a rank on which a task failed waits for the others before it ends them."""
 
 POLL_S = 0.005
 """Time between two looks of an idle rank at its messages; MPI itself would keep a core busy."""
 
-Answer = TypeVar("Answer")
+TaskResult = TypeVar("TaskResult")
+
+Task = Callable[[Problem, Progress], TaskResult]
+"""A collective task: a method of an object that can be pickled, or a function of a module."""
 
 
 def communicator() -> MPI.Comm:
@@ -43,14 +43,8 @@ def communicator() -> MPI.Comm:
     return MPI.COMM_WORLD if pool is None or pool.busy else MPI.COMM_SELF
 
 
-def on_all_ranks(task: Callable[[Problem, Progress], Answer], problem: Problem, progress: Progress) -> Answer:
-    """Do a collective task; rank 0 of a pool has the others do it too.
-
-    Args:
-        task: A method of an object that can be pickled, or a function of a module.
-        problem: Its argument, the same on all ranks.
-        progress: Called on this rank.
-    """
+def on_all_ranks(task: Task[TaskResult], problem: Problem, progress: Progress) -> TaskResult:
+    """Do a task; rank 0 of a pool has the others do it too. The progress is called on this rank."""
     pool = _pool.get()
     if pool is None or pool.busy:
         return task(problem, progress)
@@ -60,9 +54,7 @@ def on_all_ranks(task: Callable[[Problem, Progress], Answer], problem: Problem, 
 def lead(command: Callable[[], Any], guarded: Callable[[Callable[[], Any]], int]) -> int:
     """Run a command on rank 0 of several, served by the others; the exit code is the same on all of them.
 
-    Args:
-        command: Run by rank 0.
-        guarded: Runs it and reports errors; returns the exit code.
+    `guarded` runs the command, reports errors and returns the exit code.
     """
     pool = RankPool(MPI.COMM_WORLD.Dup())
     # What this process starts from now on must not take itself for a rank of this run.
@@ -78,7 +70,7 @@ def lead(command: Callable[[], Any], guarded: Callable[[Callable[[], Any]], int]
         code = guarded(command if leads else pool.serve)
     except Exception:
         traceback.print_exc()
-        code = FAULT
+        code = 1
     finally:
         _pool.reset(token)
     sys.stdout.flush()
@@ -98,20 +90,14 @@ class RankPool:
     busy: bool = False  # Whether this rank is in a collective task
     broken: bool = False  # Whether another rank may be waiting for this one in a task that this one has left
 
-    def call(
-        self, task: Callable[[Problem, Progress], Answer], problem: Problem, progress: Progress
-    ) -> Answer:
+    def call(self, task: Task[TaskResult], problem: Problem, progress: Progress) -> TaskResult:
         """Do a task on all ranks, of which this is rank 0."""
         for rank in range(1, self.comm.size):
             self.comm.send((task, problem), dest=rank, tag=TASK)
         return self._do(task, problem, progress)
 
     def serve(self) -> int:
-        """Do what rank 0 sends until it dismisses this rank; returns the exit code that it sends.
-
-        Raises:
-            Exception: That of a task that failed here and not on rank 0.
-        """
+        """Do the tasks that rank 0 sends, until it sends the exit code; raise if one fails here alone."""
         status = MPI.Status()
         while True:
             while not self.comm.Iprobe(source=0):
@@ -131,9 +117,7 @@ class RankPool:
         for rank in range(1, self.comm.size):
             self.comm.send(code, dest=rank, tag=DISMISSAL)
 
-    def _do(
-        self, task: Callable[[Problem, Progress], Answer], problem: Problem, progress: Progress
-    ) -> Answer:
+    def _do(self, task: Task[TaskResult], problem: Problem, progress: Progress) -> TaskResult:
         self.broken = self.busy = True
         try:
             answer = task(problem, progress)

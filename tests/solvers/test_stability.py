@@ -13,7 +13,7 @@ from solvers.constrained_elimination import ConstrainedElimination
 from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.identification import FemBody
-from solvers.fem.solid.solver import Fem3dSolver
+from solvers.fem.solid import Fem3dSolver
 from solvers.identification.model import ResponseModel
 from solvers.identification.unknowns import Unknowns
 from solvers.pinn.finite_basis import newton

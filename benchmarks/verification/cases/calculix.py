@@ -17,7 +17,7 @@ from solvers.extrusion import ExtrudedSpace
 from solvers.fem.boundary_conditions import dirichlet_displacement, dirichlet_mask
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
-from solvers.fem.solid.solver import Fem3dSolver
+from solvers.fem.solid import Fem3dSolver
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
 

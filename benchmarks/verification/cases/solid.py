@@ -15,7 +15,7 @@ from solvers.extrusion import ExtrudedSpace
 from solvers.fem.dolfinx_compat import DistributedSpace
 from solvers.fem.linear import FemSolver
 from solvers.fem.linear_solvers import Factorisation
-from solvers.fem.solid.solver import Fem3dSolver
+from solvers.fem.solid import Fem3dSolver
 from solvers.problem import Load, Material, Problem
 
 LENGTH, HEIGHT, DEPTH = 4.0, 2.0, 2.0

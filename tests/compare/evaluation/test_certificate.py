@@ -27,8 +27,7 @@ from geometry.mesh.mesher import build_mesh
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.fem.boundary_conditions import load_functionals
-from solvers.fem.linear import FemSolver
-from solvers.fem.linear_equilibrium import LinearEquilibrium
+from solvers.fem.linear import FemSolver, LinearEquilibrium
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, Status

@@ -9,8 +9,7 @@ from geometry.cache import finger_mesh
 from geometry.mesh.settings import MeshSettings
 from solvers.fem.error_estimate import ErrorEstimator
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.fem.linear_equilibrium import LinearElasticity, LinearEquilibrium
+from solvers.fem.linear import FemSolver, LinearElasticity, LinearEquilibrium
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, State

@@ -16,9 +16,7 @@ from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.fem.linear_solvers import Multigrid
-from solvers.fem.solid.cost import affordable
-from solvers.fem.solid.side_face import FaceField
-from solvers.fem.solid.solver import Fem3dSolver
+from solvers.fem.solid import FaceField, Fem3dSolver, affordable
 from solvers.problem import Load, Material, Problem
 from solvers.solution import State
 from tests.solvers.bodies import body_mesh

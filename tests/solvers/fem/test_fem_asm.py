@@ -10,8 +10,7 @@ from solvers.assimilation.marker_weighting import FACTORS
 from solvers.assimilation.misfit import MarkerSettings, misfit_of
 from solvers.fem.assimilating import FemAsmSolver
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver
-from solvers.fem.linear_equilibrium import LinearElasticity
+from solvers.fem.linear import FemSolver, LinearElasticity
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem, contact_functional
 from tests.solvers.conftest import observed_at

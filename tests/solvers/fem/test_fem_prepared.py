@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from solvers.fem import linear_equilibrium, linear_solvers
-from solvers.fem.linear import FemSolver
-from solvers.fem.linear_equilibrium import Factorisation, LinearElasticity
+from solvers.fem import linear, linear_solvers
+from solvers.fem.linear import Factorisation, FemSolver, LinearElasticity
 from solvers.problem import Load, Problem
 
 
@@ -90,7 +89,7 @@ def test_iterations_that_do_not_converge_are_an_error(coarse_mesh, monkeypatch):
 
 
 def test_many_unknowns_are_solved_by_iterations(coarse_mesh, monkeypatch):
-    monkeypatch.setattr(linear_equilibrium, "ITERATIVE_BEYOND", 2 * len(coarse_mesh.points))
+    monkeypatch.setattr(linear, "ITERATIVE_BEYOND", 2 * len(coarse_mesh.points))
     chosen = [
         FemSolver(degree, estimate=False).solve(Problem(coarse_mesh)).stats["linear_solver"]
         for degree in (1, 2)

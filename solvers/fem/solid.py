@@ -1,13 +1,17 @@
 """`fem-3d`: linear and finite-strain elasticity of the extruded finger with DOLFINx."""
 
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
+from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from geometry.machine_memory import free_memory_gb
+from geometry.mesh.point_location import LocatedPoints
 from solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
 from solvers.extrusion import ExtrudedSpace
 from solvers.fem.finite_strain.equilibrium import LoadState
@@ -15,28 +19,122 @@ from solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear_solvers import LinearSolver
 from solvers.fem.ranks import communicator, on_all_ranks
-from solvers.fem.solid.cost import Cost, affordable
-from solvers.fem.solid.side_face import Face, FaceField
 from solvers.problem import Problem
 from solvers.solution import Solution, Status, unstable_phrase
 from solvers.solver import Family, FieldSettings, Progress, check_problem, silent
 
+Face = Literal["side", "middle"]
 
-class PlaneGuide:
+
+@dataclass(frozen=True, eq=False)
+class FaceField:
+    """A plane z = constant of a displacement in three dimensions; it is a `SolidField`."""
+
+    space: ExtrudedSpace  # Quadratic elements on half of the body
+    nodal: FloatArray  # Nodal displacements, shape (N, 3), mm
+    face: Face  # The "side" face or the "middle" plane
+
+    @cached_property
+    def values(self) -> FloatArray:
+        """Displacements of the plane's nodes, shape (P, 3), mm."""
+        return self.space.at_level(self.nodal, -1 if self.face == "side" else 0)
+
+    @cached_property
+    def slopes(self) -> FloatArray:
+        """Their derivatives along z, shape (P, 3), by a parabola through the three nodes of a layer.
+
+        In the middle plane symmetry leaves only that of u_z.
+        """
+        levels = [-1, -2, -3] if self.face == "side" else [0, 1, 2]
+        own, half, whole = (self.space.at_level(self.nodal, level) for level in levels)
+        height = self.space.levels[levels[2]] - self.space.levels[levels[0]]
+        slopes = (-3 * own + 4 * half - whole) / height
+        if self.face == "middle":
+            slopes[:, :2] = 0.0
+        return np.asarray(slopes)
+
+    def on(self, face: Face) -> "FaceField":
+        """Another plane of the same displacement."""
+        return replace(self, face=face)
+
+    def displacement(self, location: LocatedPoints) -> FloatArray:
+        """Displacement in the plane, shape (n, 2), mm."""
+        return np.asarray(self.space.section.shape_functions(location) @ self.values[:, :2])
+
+    def gradient(self, location: LocatedPoints) -> FloatArray:
+        """Displacement gradient du_i/dx_j in the plane, shape (n, 2, 2)."""
+        return self.solid_gradient(location)[:, :2, :2]
+
+    def solid_gradient(self, location: LocatedPoints) -> FloatArray:
+        """Displacement gradient du_i/dx_j, shape (n, 3, 3)."""
+        dx, dy = self.space.section.shape_gradients(location)
+        dz = self.space.section.shape_functions(location) @ self.slopes
+        return np.stack([dx @ self.values, dy @ self.values, dz], axis=-1)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """The linear solver and its price, fitted to the default finger with 235,000 to 812,000 unknowns.
+
+    Other bodies may differ by a factor of two.
+    """
+
+    unknowns: int
+    levels: int  # Number of nodes above each other
+    iterative: bool  # Whether multigrid solves, not factors
+
+    @property
+    def _entries(self) -> float:
+        """Estimated entries of the factors."""
+        nodes = self.unknowns / (3 * self.levels)
+        return float(self.unknowns * (100 + 33 * self.levels) * (nodes / 8500) ** 0.25)
+
+    @property
+    def memory_gb(self) -> float:
+        """Estimated memory, GB: matrix and vectors, and factors or the coarser matrices."""
+        return 3.4e-6 * self.unknowns if self.iterative else 2.4e-6 * self.unknowns + 1e-8 * self._entries
+
+    @property
+    def words(self) -> str:
+        """Unknowns, method, memory and time of a Newton step on one core."""
+        if self.iterative:
+            how, seconds = "iterative", float(110 * (1e-6 * self.unknowns) ** 1.17)
+        else:
+            how, seconds = "direct", 2e-5 * self.unknowns + 1.3e-10 * self._entries**2 / self.unknowns
+        step = f"{max(1.0, seconds):.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
+        return f"{self.unknowns:,} unknowns, {how}: about {self.memory_gb:.1f} GB, {step} a Newton step"
+
+
+def affordable(unknowns: int, levels: int, asked: LinearSolver, free_gb: float) -> Cost:
+    """The linear solver that is asked for or, if "auto", direct where memory allows it.
+
+    A `UserError` says that the memory that is free does not suffice; a solution may take 70 % of it.
+    """
+    methods = {"auto": (False, True), "direct": (False,), "iterative": (True,)}[asked]
+    costs = [Cost(unknowns, levels, iterative) for iterative in methods]
+    for cost in costs:
+        if cost.memory_gb <= 0.7 * free_gb:
+            return cost
+    advice = "take fewer layers or a coarser mesh"
+    if asked == "direct":
+        advice = f"take linear_solver=iterative, {advice.removeprefix('take ')}"
+    raise UserError(
+        f"fem-3d would need about {costs[-1].memory_gb:.1f} GB for {unknowns:,} unknowns, "
+        f"and {free_gb:.1f} GB are free; {advice}"
+    )
+
+
+def _plane_guide(problem: Problem, space: ExtrudedSpace, progress: Progress) -> Callable[[float], LoadState]:
     """The load path in plane strain, as states of the extruded body at any fraction of the load."""
+    path = FemNonlinearSolver().path(problem, space.section)
+    path.follow(progress)
+    path.close()
+    places = [point.fraction for point in path.points]
 
-    def __init__(self, problem: Problem, space: ExtrudedSpace, progress: Progress) -> None:
-        self._space = space
-        path = FemNonlinearSolver().path(problem, space.section)
-        path.follow(progress)
-        self._points = path.points
-        path.close()
-
-    def __call__(self, fraction: float) -> LoadState:
-        """The state at a fraction of the load, between two of the path; beyond its end the last one."""
-        places = [point.fraction for point in self._points]
+    def guide(fraction: float) -> LoadState:
+        """The state between two of the path; beyond its end the last one."""
         after = min(int(np.searchsorted(places, fraction)), len(places) - 1)
-        last, first = self._points[after], self._points[max(after - 1, 0)]
+        last, first = path.points[after], path.points[max(after - 1, 0)]
         share = 1.0
         if last is not first:
             share = min(1.0, (fraction - first.fraction) / (last.fraction - first.fraction))
@@ -44,8 +142,10 @@ class PlaneGuide:
             share * getattr(last, name) + (1 - share) * getattr(first, name)
             for name in ("nodal", "forces", "contact")
         )
-        contact = np.outer(self._space.shares, contact).ravel()
-        return LoadState(fraction, self._space.extruded(nodal), contact, forces)
+        contact = np.outer(space.shares, contact).ravel()
+        return LoadState(fraction, space.extruded(nodal), contact, forces)
+
+    return guide
 
 
 @dataclass(frozen=True)
@@ -108,7 +208,7 @@ class Fem3dSolver(FieldSettings):
         progress(0.0, cost.words)
         guide, step = None, 1.0
         if not linear:
-            guide = PlaneGuide(problem, space, lambda done, text: progress(0.1 * done, f"plane: {text}"))
+            guide = _plane_guide(problem, space, lambda done, text: progress(0.1 * done, f"plane: {text}"))
             step = self.max_step
         path = LoadPath(
             problem,
