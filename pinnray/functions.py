@@ -251,8 +251,8 @@ def crossval(
         material: The elastic constants.
         load: What moves the finger.
         progress: Whether to show the stages on standard error.
-        study: Further attributes of `compare.crossval.study.Study`, such as `truths`, `schemes`, `seeds`,
-            `noise`.
+        study: Further attributes of `compare.crossval.study.CrossvalStudy`, such as `truths`, `schemes`,
+            `seeds`, `noise`.
 
     Returns:
         The scores; `table()` has them by truth, layout, solver and scheme.
@@ -261,12 +261,12 @@ def crossval(
         UserError: If the study cannot be made, or the folder holds another one.
     """
     from compare.crossval.cross_validation import cross_validate
-    from compare.crossval.study import ELEMENT_SIZE, Study, solver_variants
+    from compare.crossval.study import ELEMENT_SIZE, CrossvalStudy, solver_variants
     from compare.runtime.stages import Stages
 
     finger, elastic = _design(design), material or Material()
     chosen = [_solver(each) for each in ([solvers] if isinstance(solvers, str) else solvers)]
-    job = Study(
+    job = CrossvalStudy(
         design=finger,
         variants=solver_variants(chosen, elastic),
         out=Path(out),

@@ -88,10 +88,10 @@ def draw_weight_sweeps(sweeps: Mapping[str, Mapping[str, Sequence[float]]]) -> F
     """Draw the errors of `fem-asm` at the markers and over the body against the weight of the markers.
 
     Args:
-        sweeps: For each layout the columns of `compare.crossval.weight_sweep.sweep_weights`; a row each.
+        sweeps: For each layout the columns of `compare.crossval.solver_folds.sweep_weights`; a row each.
     """
     panels: dict[str, dict[str, str]] = {
-        "root mean square, mm": {"in_sample_mm": "markers given", "left_out_mm": "each left out"},
+        "root mean square, mm": {"in_sample_mm": "markers given", "left_out_mm": "each held out"},
         "distance from the truth, %": FIELD_NAMES,
     }
     between, top = LEFT, HEAD + len(FIELD_NAMES) * LEGEND_LINE

@@ -8,11 +8,10 @@ import numpy as np
 
 from compare.crossval.folds import LOAD, FoldResult, LoadCase, SeedResults, folds_of, load_cases_of
 from compare.crossval.output_files import write_results
-from compare.crossval.result import Case, CrossvalResult, LayoutResult
-from compare.crossval.solver_folds import SolverTask, run_folds
-from compare.crossval.study import Study, visible_markers
+from compare.crossval.result import Case, CaseResult, CrossvalResult
+from compare.crossval.solver_folds import SWEPT, SolverTask, run_folds, sweep_weights
+from compare.crossval.study import CrossvalStudy, visible_markers
 from compare.crossval.true_fields import TrueField, TruthTask, simulate_truth
-from compare.crossval.weight_sweep import SWEPT, sweep_weights
 from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
 from compare.evaluation.virtual_experiment import experiment_source
 from compare.runtime.output_folder import locked
@@ -29,7 +28,7 @@ from solvers.problem import Problem
 DEFINITION = "definition.json"
 
 
-def cross_validate(study: Study, stages: Stages | None = None) -> CrossvalResult:
+def cross_validate(study: CrossvalStudy, stages: Stages | None = None) -> CrossvalResult:
     """Score the solvers of a study in every fold and write the study's output folder.
 
     Solvers run in processes of their own. A Python script that calls this must do so below
@@ -61,11 +60,12 @@ def cross_validate(study: Study, stages: Stages | None = None) -> CrossvalResult
     with locked(study.out):
         write_json(study.out / DEFINITION, definition)
         mesh.save(study.mesh_file)
-        files = {} if given else _true_fields(study, load_cases, stages)
+        files: dict[Case, list[Path]] = {}
         if given:
             observations = {Case(given.label, given.label): [[given]] * study.seeds}
         else:
-            observations = _noisy(study, files, problem)
+            files = _true_fields(study, load_cases, stages)
+            observations = {case: _noisy(study, case, paths, problem) for case, paths in files.items()}
         folds = {
             case: folds_of(study.schemes, len(seeds[0][0].points), load_cases)
             for case, seeds in observations.items()
@@ -89,7 +89,7 @@ def cross_validate(study: Study, stages: Stages | None = None) -> CrossvalResult
         found = CrossvalResult(
             study,
             {
-                case: LayoutResult.of(seeds[0][0], folds[case], results[case], failed[case])
+                case: CaseResult.of(seeds[0][0], folds[case], results[case], failed[case])
                 for case, seeds in observations.items()
             },
             {case.truth: TrueField.load(paths[0]).contact for case, paths in files.items()},
@@ -102,7 +102,9 @@ def cross_validate(study: Study, stages: Stages | None = None) -> CrossvalResult
     return found
 
 
-def _true_fields(study: Study, load_cases: Sequence[LoadCase], stages: Stages) -> dict[Case, list[Path]]:
+def _true_fields(
+    study: CrossvalStudy, load_cases: Sequence[LoadCase], stages: Stages
+) -> dict[Case, list[Path]]:
     """Files of the true fields at every load, each of which is simulated in its own process."""
     truths = study.chosen_truths
     tasks = {
@@ -121,8 +123,8 @@ def _true_fields(study: Study, load_cases: Sequence[LoadCase], stages: Stages) -
     ):
         if isinstance(answer, ProcessFailed):
             raise UserError(
-                f"{name}: the virtual experiment did not come to its end; press less, leave the truth or "
-                f"{LOAD} out, or give measurements"
+                f"{name}: the virtual experiment did not come to its end; press less, drop the truth or "
+                f"{LOAD}, or give measurements"
             )
         found[name] = answer
     return {
@@ -133,13 +135,15 @@ def _true_fields(study: Study, load_cases: Sequence[LoadCase], stages: Stages) -
 
 
 def _noisy(
-    study: Study, files: Mapping[Case, Sequence[Path]], problem: Problem
-) -> dict[Case, list[list[Observations]]]:
-    """The true marker displacements with noise, for each seed at each load; the same noise in every truth."""
+    study: CrossvalStudy, case: Case, paths: Sequence[Path], problem: Problem
+) -> list[list[Observations]]:
+    """True marker displacements with noise, for each seed at each load; the noise is equal in every truth."""
+    source = experiment_source(problem, study.chosen_truths[case.truth])
+    displacements = [TrueField.load(path).sampled.markers for path in paths]
 
-    def observed(points: FloatArray, true: FloatArray, seed: int, at: int, source: str) -> Observations:
+    def observed(true: FloatArray, seed: int, at: int) -> Observations:
         return Observations(
-            points=points,
+            points=study.markers[case.layout],
             displacements=true + np.random.default_rng([seed, at]).normal(0, study.noise, true.shape),
             standard_deviations=np.full_like(true, study.noise),
             visible=np.ones(len(true), dtype=bool),
@@ -148,22 +152,13 @@ def _noisy(
             marker_radius=study.design.marker_radius,
         )
 
-    found = {}
-    for case, paths in files.items():
-        points, source = (
-            study.markers[case.layout],
-            experiment_source(problem, study.chosen_truths[case.truth]),
-        )
-        displacements = [TrueField.load(path).sampled.markers for path in paths]
-        found[case] = [
-            [observed(points, true, seed, at, source) for at, true in enumerate(displacements)]
-            for seed in range(study.seeds)
-        ]
-    return found
+    return [
+        [observed(true, seed, at) for at, true in enumerate(displacements)] for seed in range(study.seeds)
+    ]
 
 
 def _results(
-    study: Study, tasks: Mapping[tuple[Case, str], SolverTask], stages: Stages
+    study: CrossvalStudy, tasks: Mapping[tuple[Case, str], SolverTask], stages: Stages
 ) -> tuple[dict[Case, dict[str, SeedResults]], dict[Case, dict[str, str]]]:
     """By truth and layout the results of every solver, and the error messages of the solvers that failed."""
 
@@ -173,7 +168,7 @@ def _results(
         return answer if isinstance(answer, str) else "scored"
 
     cases = list(dict.fromkeys(case for case, _ in tasks))
-    named = {", ".join(filter(None, [label, case.said_among(cases)])): (case, label) for case, label in tasks}
+    named = {case.named(label, cases): (case, label) for case, label in tasks}
     order = {label: -place for place, (_, label) in enumerate(tasks)}
     answers = dict(
         in_stages(
@@ -219,4 +214,5 @@ def _sweeps(
             note=lambda *_: "weighed",
         )
     )
-    return {cases[name]: each for name, each in answers.items() if not isinstance(each, ProcessFailed)}
+    found = {case: answers[name] for name, case in cases.items()}  # in this order, whichever ended first
+    return {case: each for case, each in found.items() if not isinstance(each, ProcessFailed)}

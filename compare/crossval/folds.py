@@ -21,51 +21,35 @@ SCHEMES = {
 """Every scheme and what it holds out."""
 
 DRAWS = 10
-"""Draws of `RANDOM`; the same for every seed and solver, so that differences are paired."""
-
-STROKES = (0.5, 0.75)
-"""Smaller strokes of `LOAD`, as shares of the full one."""
-CONTACTS = (-5.0, 5.0)
-"""Shifts of the contact along the finger in `LOAD`, mm."""
+"""Draws of `RANDOM`, equal for every seed and solver, so that differences are paired."""
 
 
 @dataclass(frozen=True)
 class LoadCase:
-    """A load at which solvers predict the markers.
-
-    Attributes:
-        name: Its name in messages and files.
-        load: As the solvers take it.
-        share: Its stroke over the full one.
-        contact: Abscissa of the contact's middle, mm.
-    """
+    """A load at which solvers predict the markers."""
 
     name: str
     load: Load
-    share: float
-    contact: float
+    share: float  # its stroke over the full one
+    contact: float  # abscissa of the contact's middle, mm
 
 
 @dataclass(frozen=True)
 class Fold:
-    """Markers, or a load, held out together.
-
-    Attributes:
-        scheme: A key of `SCHEMES`.
-        name: Unique in its scheme.
-        held: Numbers of the markers that are not given, from zero.
-        load_case: Number of the predicted load; markers are given at load case zero.
-    """
+    """Markers, or a load, held out together."""
 
     scheme: str
-    name: str
-    held: tuple[int, ...]
-    load_case: int = 0
+    name: str  # unique in its scheme
+    held: tuple[int, ...]  # numbers of the markers that are not given, from zero
+    load_case: int = 0  # number of the predicted load; markers are given at load case zero
 
 
 @dataclass(frozen=True)
 class FoldResult:
     """A solver in one fold for one seed.
+
+    The numbers from `force` on exist in the scheme `ALL` with a truth only; else they are None, and where the
+    solver states nothing.
 
     Attributes:
         fold: The held-out markers and the load.
@@ -74,13 +58,11 @@ class FoldResult:
         fields: Relative L2 distances from the truth; empty without a truth.
         converged: Whether the solver converged, by its own criterion.
         given: Whether it was given any markers.
-        force: Magnitude of the reaction over that of the truth, less one; None without a truth, like the
-            following, and None in schemes other than `ALL`.
-        position: Stated minus true abscissa at which the contact's force acts, mm; None if none is stated.
-        von_mises_coverage: Share of the body whose true von Mises stress lies in the stated interval; None
-            if the solver states none.
-        force_within: Whether the magnitude of the true force lies in the stated interval; None likewise.
-        position_within: Whether the place of the true force lies in the stated interval; None likewise.
+        force: Magnitude of the reaction over the true one, less one.
+        position: Stated minus true abscissa at which the contact's force acts, mm.
+        von_mises_coverage: Share of the body whose true von Mises stress lies in the stated interval.
+        force_within: Whether the magnitude of the true force lies in the stated interval.
+        position_within: Whether the place of the true force lies in the stated interval.
         message: What speaks against the result; empty if nothing does.
     """
 
@@ -138,11 +120,11 @@ def load_cases_of(problem: Problem, *, others: bool) -> list[LoadCase]:
             f"schemes without {LOAD}"
         )
     stroke = float(np.linalg.norm(load.values))
-    for share in STROKES:
+    for share in (0.5, 0.75):  # smaller strokes
         displacement = tuple(None if value is None else share * value for value in load.displacement)
         smaller = load.model_copy(update={"displacement": displacement})
         cases.append(LoadCase(f"stroke {share * stroke:g}", smaller, share, middle))
-    for at in (middle + shift for shift in CONTACTS):
+    for at in (middle - 5.0, middle + 5.0):  # other contacts, mm
         moved = load.model_copy(update={"position": at})
         try:
             replace(problem, load=moved)
@@ -179,6 +161,8 @@ def hide_markers(observations: Observations, held: Sequence[int]) -> Observation
     """The observations without the held-out markers: invisible, and their numbers zero."""
     keep = np.ones(len(observations.points), dtype=bool)
     keep[list(held)] = False
-    displacements: FloatArray = np.where(keep[:, None], observations.displacements, 0.0)
-    deviations: FloatArray = np.where(keep[:, None], observations.standard_deviations, 0.0)
+    displacements, deviations = (
+        np.where(keep[:, None], values, 0.0)
+        for values in (observations.displacements, observations.standard_deviations)
+    )
     return replace(observations, displacements=displacements, standard_deviations=deviations, visible=keep)

@@ -1,12 +1,13 @@
-"""The scores of a finished cross-validation."""
+"""The scores of a finished cross-validation, and the rows of its CSV files."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from math import isnan, nan
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
-from compare.crossval.folds import SCHEMES, Fold, SeedResults
+from compare.crossval.folds import ALL, SCHEMES, Fold, SeedResults
 from compare.crossval.scores import (
+    BASELINES,
     COMPARED,
     LEVEL,
     MARKERS,
@@ -17,7 +18,7 @@ from compare.crossval.scores import (
     of_scheme,
     score,
 )
-from compare.crossval.study import SolverVariant, Study
+from compare.crossval.study import CrossvalStudy, SolverVariant
 from compare.crossval.true_fields import TrueContact
 from compare.runtime.tables import Cell
 from geometry.observations import Observations
@@ -26,17 +27,9 @@ from solvers.solver import Traits
 if TYPE_CHECKING:
     import pandas as pd
 
-BASELINES = ("fem", "gp", "statfem", "fem-asm")
-"""Solvers that the others are compared with."""
-
 
 class Case(NamedTuple):
-    """A truth and a layout of its markers.
-
-    Attributes:
-        truth: Name of the truth; `measured` or `simulated` with measurements.
-        layout: Name of the layout; likewise.
-    """
+    """A truth and a layout of its markers; with measurements both are called `measured` or `simulated`."""
 
     truth: str
     layout: str
@@ -47,15 +40,14 @@ class Case(NamedTuple):
             own for own, others in zip(self, zip(*cases, strict=True), strict=True) if len(set(others)) > 1
         )
 
-    @property
-    def cells(self) -> dict[str, Cell]:
-        """The first columns of every CSV file."""
-        return {"truth": self.truth, "layout": self.layout}
+    def named(self, text: str, cases: Collection["Case"]) -> str:
+        """A text with the names in which cases differ after it."""
+        return ", ".join(filter(None, [text, self.said_among(cases)]))
 
 
 @dataclass(frozen=True, eq=False)
-class LayoutResult:
-    """The scores of all solvers in one case: with a truth and the markers of one layout.
+class CaseResult:
+    """The scores of all solvers with one truth and the markers of one layout.
 
     Attributes:
         source: One sentence on the source of the markers' displacements, opened by simulated or measured.
@@ -76,8 +68,13 @@ class LayoutResult:
     remarks: Sequence[str] = ()
 
     def difference(self, label: str, baseline: str, scheme: str, what: str) -> Difference | None:
-        """One of the `differences`; None if there is no such one."""
+        """One of the `differences`, if it exists."""
         return self.differences[label].get(baseline, {}).get(scheme, {}).get(what)
+
+    def verdict(self, label: str, baseline: str, scheme: str, what: str) -> str:
+        """The verdict of one of the `differences`; an empty text if it does not exist."""
+        found = self.difference(label, baseline, scheme, what)
+        return found.verdict if found else ""
 
     @classmethod
     def of(
@@ -107,54 +104,12 @@ class LayoutResult:
             }
             for label, each in by_scheme.items()
         }
-        return cls(
-            source=observations.origin,
-            markers=len(observations.points),
-            folds=folds,
-            scores={
-                label: {scheme: score(found) for scheme, found in each.items()}
-                for label, each in by_scheme.items()
-            },
-            differences=differences,
-            failed=failed,
-            remarks=list(_remarks(results)),
-        )
-
-    def held_out_rows(self) -> list[dict[str, Cell]]:
-        """Errors at given and held-out markers by solver and scheme."""
-        rows: list[dict[str, Cell]] = []
-        for label, scores in self.scores.items():
-            for scheme, found in scores.items():
-                row: dict[str, Cell] = {"solver": label, "scheme": scheme}
-                for kind, errors in (("in_sample", found.in_sample), ("held_out", found.held_out)):
-                    for name in MARKERS:
-                        row |= interval_cells(f"{kind}_{name}", "_mm", errors.get(name))
-                row["within_stated"] = "" if found.coverage is None else found.coverage
-                row |= self._difference_cells(label, scheme, "mae_sum", "_mm")
-                row |= interval_cells("force_error", "", found.force)
-                row |= interval_cells("position_error", "_mm", found.position)
-                row |= {name: "" if share is None else share for name, share in found.stated.items()}
-                rows.append(row | {"converged": found.converged})
-        return rows
-
-    def field_rows(self) -> list[dict[str, Cell]]:
-        """Relative L2 distances from the truth by solver, scheme and field."""
-        return [
-            {"solver": label, "scheme": scheme, "field": name}
-            | interval_cells("rel_l2", "", interval)
-            | self._difference_cells(label, scheme, name, "")
-            for label, scores in self.scores.items()
-            for scheme, found in scores.items()
-            for name, interval in found.fields.items()
-        ]
-
-    def _difference_cells(self, label: str, scheme: str, what: str, unit: str) -> dict[str, Cell]:
-        row: dict[str, Cell] = {}
-        for baseline in BASELINES:
-            found = self.difference(label, baseline, scheme, what)
-            row |= interval_cells(f"from_{baseline}", unit, found, "_mean")
-            row[f"from_{baseline}"] = found.verdict if found else ""
-        return row
+        scores = {
+            label: {scheme: score(found) for scheme, found in each.items()}
+            for label, each in by_scheme.items()
+        }
+        remarks = list(_remarks(results))
+        return cls(observations.origin, len(observations.points), folds, scores, differences, failed, remarks)
 
     def content(self, variants: Sequence[SolverVariant]) -> dict[str, Any]:
         """The entry of `crossval.json` for this layout."""
@@ -171,7 +126,12 @@ class LayoutResult:
                     "assimilates": Traits.of(variant.make(0)).assimilates,
                     "schemes": {scheme: asdict(one) for scheme, one in self.scores[variant.label].items()},
                     "against": {
-                        baseline: {scheme: _with_verdicts(each) for scheme, each in by_scheme.items()}
+                        baseline: {
+                            scheme: {
+                                what: {**asdict(one), "verdict": one.verdict} for what, one in each.items()
+                            }
+                            for scheme, each in by_scheme.items()
+                        }
                         for baseline, by_scheme in self.differences[variant.label].items()
                     },
                 }
@@ -185,16 +145,16 @@ class LayoutResult:
 
 @dataclass(frozen=True, eq=False)
 class CrossvalResult:
-    """A finished study.
+    """A finished cross-validation.
 
     Attributes:
-        study: The study.
+        study: Its settings.
         cases: The scores by truth and layout of the markers; of a single one with measurements.
         true_contacts: Force and place of the contact of each truth at the full load.
     """
 
-    study: Study
-    cases: Mapping[Case, LayoutResult]
+    study: CrossvalStudy
+    cases: Mapping[Case, CaseResult]
     true_contacts: Mapping[str, TrueContact] = field(default_factory=dict)
 
     @property
@@ -202,11 +162,16 @@ class CrossvalResult:
         """Names of the truths; `measured` or `simulated` with measurements."""
         return list(dict.fromkeys(case.truth for case in self.cases))
 
-    def of_truth(self, truth: str) -> dict[str, LayoutResult]:
+    @property
+    def layouts(self) -> list[str]:
+        """Names of the layouts, likewise."""
+        return list(dict.fromkeys(case.layout for case in self.cases))
+
+    def of_truth(self, truth: str) -> dict[str, CaseResult]:
         """The scores with a truth by layout."""
         return {case.layout: each for case, each in self.cases.items() if case.truth == truth}
 
-    def of_layout(self, layout: str) -> dict[str, LayoutResult]:
+    def of_layout(self, layout: str) -> dict[str, CaseResult]:
         """The scores with a layout by truth."""
         return {case.truth: each for case, each in self.cases.items() if case.layout == layout}
 
@@ -217,30 +182,32 @@ class CrossvalResult:
         return [scheme for scheme in SCHEMES if scheme in present]
 
     @property
-    def source(self) -> str:
-        """The sources of the markers' displacements, which are the same for every layout."""
-        return "; ".join(dict.fromkeys(each.source for each in self.cases.values()))
+    def main_scheme(self) -> str:
+        """The scheme whose held-out error stands for a solver: one marker at a time if it was asked for."""
+        return next(scheme for scheme in self.schemes if scheme != ALL)
 
     @property
-    def scores(self) -> list[Score]:
-        """All scores, of every truth, layout, solver and scheme."""
-        return [
-            score
-            for each in self.cases.values()
-            for by_scheme in each.scores.values()
-            for score in by_scheme.values()
-        ]
+    def source(self) -> str:
+        """The sources of the markers' displacements."""
+        return "; ".join(dict.fromkeys(each.source for each in self.cases.values()))
+
+    def every_score(self) -> Iterator[tuple[dict[str, Cell], CaseResult, Score]]:
+        """Every score with its truth, layout, solver and scheme, the first columns of all CSV files."""
+        for case, each in self.cases.items():
+            for label, by_scheme in each.scores.items():
+                for scheme, found in by_scheme.items():
+                    yield {**case._asdict(), "solver": label, "scheme": scheme}, each, found
 
     @property
     def has_fields(self) -> bool:
         """True if fields were compared with a truth."""
-        return any(score.fields for score in self.scores)
+        return any(found.fields for _, _, found in self.every_score())
 
     @property
     def failed(self) -> dict[str, str]:
         """Error messages of the solvers without a score, by solver (and truth and layout, if several)."""
         return {
-            ", ".join(filter(None, [label, case.said_among(self.cases)])): message
+            case.named(label, self.cases): message
             for case, each in self.cases.items()
             for label, message in each.failed.items()
         }
@@ -258,28 +225,58 @@ class CrossvalResult:
         """The columns of `held_out.csv` by truth, layout, solver and scheme; NaN where there is no number."""
         import pandas as pd
 
-        rows = [
-            {name: nan if cell == "" else cell for name, cell in row.items()} for row in self.held_out_rows()
-        ]
-        return pd.DataFrame(rows).set_index(["truth", "layout", "solver", "scheme"])
+        rows = self.held_out_rows()
+        numbers = [{name: nan if cell == "" else cell for name, cell in row.items()} for row in rows]
+        return pd.DataFrame(numbers).set_index(["truth", "layout", "solver", "scheme"])
 
     def held_out_rows(self) -> list[dict[str, Cell]]:
-        """The rows of `held_out.csv`: errors at markers by truth, layout, solver and scheme."""
-        return [case.cells | row for case, each in self.cases.items() for row in each.held_out_rows()]
+        """The rows of `held_out.csv`: errors at given and held-out markers."""
+        rows = []
+        for row, each, found in self.every_score():
+            for kind, errors in (("in_sample", found.in_sample), ("held_out", found.held_out)):
+                for name in MARKERS:
+                    row |= _interval_cells(f"{kind}_{name}", "_mm", errors.get(name))
+            row["within_stated"] = "" if found.coverage is None else found.coverage
+            row |= _difference_cells(row, each, "mae_sum", "_mm") | _contact_cells(found)
+            rows.append(row | {"converged": found.converged})
+        return rows
 
     def field_rows(self) -> list[dict[str, Cell]]:
-        """The rows of `fields.csv`: distances from the truth by truth, layout, solver, scheme and field."""
-        return [case.cells | row for case, each in self.cases.items() for row in each.field_rows()]
+        """The rows of `fields.csv`: relative L2 distances from the truth by field."""
+        return [
+            {**row, "field": name}
+            | _interval_cells("rel_l2", "", interval)
+            | _difference_cells(row, each, name, "")
+            for row, each, found in self.every_score()
+            for name, interval in found.fields.items()
+        ]
+
+    def truth_rows(self) -> list[dict[str, Cell]]:
+        """The rows of `truths.csv`: held-out error; stress and force with every marker given; verdicts."""
+        rows = []
+        for row, each, found in self.every_score():
+            if row["scheme"] != self.main_scheme:
+                continue
+            label, truth = str(row["solver"]), str(row["truth"])
+            full = each.scores[label][ALL]
+            row |= self.true_contacts[truth].cells if truth in self.true_contacts else {}
+            row |= _interval_cells("held_out_mae_sum", "_mm", found.held_out.get("mae_sum"))
+            row |= _interval_cells("von_mises_rel_l2", "", full.fields.get("von_mises"))
+            row |= _contact_cells(full)
+            for what, at in (("mae_sum", self.main_scheme), ("von_mises", ALL), ("force", ALL)):
+                for baseline in ("gp", "statfem", "fem-asm"):
+                    row[f"{what}_against_{baseline}"] = each.verdict(label, baseline, at, what)
+            rows.append(row)
+        return rows
 
     def content(self) -> dict[str, Any]:
         """The part of `crossval.json` that holds the result."""
+        simulations = dict.fromkeys(each.simulation for each in self.study.chosen_truths.values())
         return {
             "schema": 3,
             "seeds": self.study.seeds,
             "level": LEVEL,
-            "truth_mesh": None
-            if self.study.measurements is not None
-            else ", ".join(dict.fromkeys(each.simulation for each in self.study.chosen_truths.values())),
+            "truth_mesh": ", ".join(simulations) or None,
             "schemes": {scheme: SCHEMES[scheme] for scheme in self.schemes},
             "truths": {
                 truth: {
@@ -303,12 +300,25 @@ def _remarks(results: Mapping[str, SeedResults]) -> Iterator[str]:
             yield f"{label}, {len(against)} of {len(every)} folds and seeds, the first of them: {against[0]}"
 
 
-def _with_verdicts(differences: Mapping[str, Difference]) -> dict[str, dict[str, Any]]:
-    return {what: {**asdict(one), "verdict": one.verdict} for what, one in differences.items()}
+def _difference_cells(row: Mapping[str, Cell], each: CaseResult, what: str, unit: str) -> dict[str, Cell]:
+    """Differences of a row's score from every baseline, with verdicts."""
+    cells: dict[str, Cell] = {}
+    for baseline in BASELINES:
+        found = each.difference(str(row["solver"]), baseline, str(row["scheme"]), what)
+        cells |= _interval_cells(f"from_{baseline}", unit, found, "_mean")
+        cells[f"from_{baseline}"] = found.verdict if found else ""
+    return cells
 
 
-def interval_cells(name: str, unit: str, interval: Interval | None, mean: str = "") -> dict[str, Cell]:
-    """Three columns of a CSV file: a mean and the ends of its interval, empty where there is none."""
+def _contact_cells(score: Score) -> dict[str, Cell]:
+    """Errors of force and place of the contact, and how often stated intervals hold the truth."""
+    row = _interval_cells("force_error", "", score.force)
+    row |= _interval_cells("position_error", "_mm", score.position)
+    return row | {name: "" if share is None else share for name, share in score.stated.items()}
+
+
+def _interval_cells(name: str, unit: str, interval: Interval | None, mean: str = "") -> dict[str, Cell]:
+    """A mean and the ends of its interval in three columns, empty where there is none."""
     values = (None, None, None) if interval is None else (interval.mean, interval.low, interval.high)
     return {
         f"{name}{end}{unit}": "" if value is None or isnan(value) else value

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import nan, sqrt
+from typing import Self
 
 import numpy as np
 from scipy.stats import norm, t
@@ -13,33 +14,25 @@ from geometry.arrays import FloatArray
 LEVEL = 0.95
 """Confidence level of every interval; coverage is the share of errors inside the interval of this level."""
 
-RESAMPLES = 2000
-"""Resamples of the bootstrap."""
-
 MARKERS = ("mae_u", "mae_v", "mae_sum", "mae_rss")
 FIELDS = ("displacement", "strain", "von_mises", "von_mises_finite")
 FIELD_NAMES = {"displacement": "displacement", "strain": "strain", "von_mises": "von Mises stress"}
-FORCE = "force"
-COMPARED = ("mae_sum", *FIELD_NAMES, FORCE)
+COMPARED = ("mae_sum", *FIELD_NAMES, "force")
 """Scores of which differences from the baselines are computed."""
+BASELINES = ("fem", "gp", "statfem", "fem-asm")
+"""Solvers that the others are compared with."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A mean with a confidence interval, whose ends are NaN for one seed.
-
-    Attributes:
-        mean: The mean.
-        low: Lower end.
-        high: Upper end.
-    """
+    """A mean with a confidence interval, whose ends are NaN for one seed."""
 
     mean: float
     low: float
     high: float
 
     @classmethod
-    def of(cls, values: Sequence[float]) -> "Interval":
+    def of(cls, values: Sequence[float]) -> Self:
         """Student's interval from a value for each seed."""
         mean = float(np.mean(values))
         if len(values) < 2:
@@ -53,7 +46,7 @@ class Difference(Interval):
     """A solver's score minus a baseline's, in the same folds and seeds; negative if it is better."""
 
     @classmethod
-    def bootstrap(cls, differences: FloatArray) -> "Difference":
+    def bootstrap(cls, differences: FloatArray) -> Self:
         """Bootstrap interval from one difference for each seed and fold, shape (s, f).
 
         Seeds and folds are resampled with replacement, independently of each other, since a fold is equally
@@ -61,8 +54,8 @@ class Difference(Interval):
         """
         seeds, folds = differences.shape
         draws = np.random.default_rng(0)
-        rows = draws.integers(seeds, size=(RESAMPLES, seeds, 1))
-        columns = draws.integers(folds, size=(RESAMPLES, 1, folds))
+        rows = draws.integers(seeds, size=(2000, seeds, 1))
+        columns = draws.integers(folds, size=(2000, 1, folds))
         means = differences[rows, columns].mean(axis=(1, 2))
         low, high = np.quantile(means, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
         return cls(float(differences.mean()), float(low), float(high))
@@ -77,7 +70,7 @@ class Difference(Interval):
 
 @dataclass(frozen=True)
 class Score:
-    """A solver in one scheme.
+    """A solver in one scheme; its last five numbers are means of those of `FoldResult`, None where one is.
 
     Attributes:
         in_sample: Errors at markers that it was given, mm, by the names of `MARKERS`; empty if none were.
@@ -87,13 +80,6 @@ class Score:
             deviations that the solver states; None if it states none.
         per_marker: Mean of |du| + |dv| at each marker over the folds that hold it out, shape (m,), mm.
         converged: Share of folds and seeds in which the solver converged.
-        force: Magnitude of the reaction over that of the truth, less one; in the scheme `ALL` only, like the
-            following, and None without a truth.
-        position: Stated minus true abscissa at which the contact's force acts, mm; None if none is stated.
-        von_mises_coverage: Share of the body, weighted by area, whose true von Mises stress lies in the
-            interval of `LEVEL` that the solver states; None if it states none.
-        force_within: Share of seeds in which the true force lies in the stated interval; None likewise.
-        position_within: Share of seeds in which the place of the true force does; None likewise.
     """
 
     in_sample: Mapping[str, Interval]
@@ -110,7 +96,7 @@ class Score:
 
     @property
     def stated(self) -> dict[str, float | None]:
-        """How often the stated intervals of stress, force and place hold the truth, by column."""
+        """Shares in which the truth lies in the stated intervals of stress, force and place, by column."""
         return {
             "von_mises_within_stated": self.von_mises_coverage,
             "force_within_stated": self.force_within,
@@ -153,13 +139,7 @@ def mean_errors(errors: FloatArray) -> dict[str, float]:
 
 
 def difference(results: SeedResults, baseline: SeedResults, what: str) -> Difference | None:
-    """Difference of a solver's score from a baseline's; None where one of them has no such score.
-
-    Args:
-        results: Results of the solver in a scheme.
-        baseline: Results of the baseline in the same scheme.
-        what: One of `COMPARED`.
-    """
+    """Difference of a solver's score, one of `COMPARED`, from a baseline's; None if one of them has none."""
     own, other = (_values(each, what) for each in (results, baseline))
     return None if own is None or other is None else Difference.bootstrap(own - other)
 
@@ -168,7 +148,7 @@ def _values(results: SeedResults, what: str) -> FloatArray | None:
     """A score for each seed and fold, shape (s, f); None if some fold has none."""
 
     def value(found: FoldResult) -> float:
-        if what == FORCE:
+        if what == "force":
             return nan if found.force is None else abs(found.force)
         if what in FIELDS:
             return found.fields.get(what, nan)
@@ -179,7 +159,7 @@ def _values(results: SeedResults, what: str) -> FloatArray | None:
 
 
 def _interval(results: SeedResults, name: str) -> Interval | None:
-    """Interval of an optional number of a fold from its mean for each seed; None if some fold has none."""
+    """Interval over seeds of a number of the folds; None if some fold has none."""
     values = [[getattr(found, name) for found in seed] for seed in results]
     if any(value is None for seed in values for value in seed):
         return None
@@ -187,7 +167,6 @@ def _interval(results: SeedResults, name: str) -> Interval | None:
 
 
 def _share(results: SeedResults, name: str) -> float | None:
-    """Mean of an optional number of a fold over folds and seeds; None if some fold has none."""
     found = _interval(results, name)
     return None if found is None else found.mean
 

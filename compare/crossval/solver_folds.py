@@ -1,4 +1,4 @@
-"""Runs one solver through all folds, in a process of its own, and keeps the finished ones."""
+"""One solver in all folds, in a process of its own; finished folds are kept."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,8 +11,8 @@ from pydantic_core import to_jsonable_python
 from scipy.stats import norm
 
 from compare.crossval.folds import ALL, Fold, FoldResult, LoadCase, hide_markers
-from compare.crossval.scores import LEVEL
-from compare.crossval.study import SolverVariant, Study
+from compare.crossval.scores import FIELDS, LEVEL
+from compare.crossval.study import CrossvalStudy, SolverVariant
 from compare.crossval.true_fields import FieldSampler, SampledField, TrueField
 from compare.evaluation.deformed_body import DeformedBody
 from compare.evaluation.truths import SLIDING, Truth
@@ -21,6 +21,10 @@ from geometry.content_hash import sources_digest
 from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
+from solvers.assimilation.marker_forces import root_mean_square
+from solvers.assimilation.marker_weighting import FACTORS
+from solvers.fem.assimilating import FemAsmSolver
+from solvers.lagrange import LagrangeField
 from solvers.problem import Problem
 from solvers.solution import Solution
 from solvers.solver import (
@@ -41,17 +45,17 @@ class SolverTask:
     """All that a process needs to run one solver.
 
     Attributes:
-        study: The study.
+        study: Finger, mesh and material.
         layout: Name of the markers' layout.
         variant: The solver.
         load_cases: The loads, the full one first.
         truths: File of the true fields at each load; empty with measurements.
-        observations: For each seed, those at every load.
-        folds: The folds.
-        truth: The truth of the true fields; None with measurements.
+        observations: For each seed, the markers at every load.
+        folds: The markers and loads to hold out.
+        truth: The truth that the files hold; None with measurements.
     """
 
-    study: Study
+    study: CrossvalStudy
     layout: str
     variant: SolverVariant
     load_cases: Sequence[LoadCase]
@@ -77,6 +81,9 @@ class _KeptFolds:
 
 
 _FILE = TypeAdapter(_KeptFolds)
+
+SWEPT = "fem-asm"
+"""The solver whose minimisers for all weights come from one factorisation."""
 
 
 def run_folds(task: SolverTask, progress: Progress = silent) -> list[list[FoldResult]] | str:
@@ -167,12 +174,9 @@ class FoldRunner:
         )
 
     def distances(self, sampled: SampledField, case: int, own: Problem | None = None) -> dict[str, float]:
-        """Relative L2 distances from the truth at a load case; none without a truth.
+        """Relative L2 distances of a field from the truth at a load case; none without a truth.
 
-        Args:
-            sampled: The field.
-            case: Number of the load case.
-            own: Problem with the solver's material; that of the study with the solver's law if None.
+        `own` is the problem with the material that the solver found, if it found one.
         """
         if not self._truths:
             return {}
@@ -241,3 +245,31 @@ def _kept(path: Path, settings: Mapping[str, Any]) -> dict[Fold, FoldResult]:
         return {}
     content = _FILE.validate_json(path.read_bytes())
     return {result.fold: result for result in content.results} if content.settings == settings else {}
+
+
+def sweep_weights(task: SolverTask, progress: Progress = silent) -> dict[str, list[float]]:
+    """The L-curve of `fem-asm`: its errors for all `FACTORS` of the weights, all markers given, first seed.
+
+    Returns:
+        Columns: `factor`; `in_sample_mm` and `left_out_mm`, root mean squares over the markers' components
+        with each marker given and held out; relative L2 distances from the truth by the names of `FIELDS`.
+    """
+    solver = task.variant.make(0)
+    if not isinstance(solver, FemAsmSolver):
+        raise TypeError(f"{solver.name} has no minimisers for all weights")
+    runner = FoldRunner(task, solver)
+    problem = replace(runner.problem, observations=task.observations[0][0])
+    solution = solver.solve(problem)
+    finger, misfit = solver.prepare(problem)
+    forces, space = finger.forces(misfit), finger.equilibrium.elasticity.distributed.space
+    rows = []
+    for number, factor in enumerate(FACTORS.tolist()):
+        progress(number / len(FACTORS), f"{factor:.3g} times the weight")
+        fit = forces.fit(factor)
+        weighted = replace(solution, field=LagrangeField(space, finger.under(fit.forces)))
+        distances = runner.distances(runner.sampler.of_solution(weighted, problem.mesh), 0)
+        errors = [root_mean_square(fit.residual), root_mean_square(fit.residual_without)]
+        rows.append([factor, *errors, *(distances[name] for name in FIELDS)])
+    finger.equilibrium.factors.destroy()
+    names = ("factor", "in_sample_mm", "left_out_mm", *FIELDS)
+    return {name: list(column) for name, column in zip(names, zip(*rows, strict=True), strict=True)}

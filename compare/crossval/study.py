@@ -1,4 +1,4 @@
-"""A cross-validation study: the finger, the solvers, what is held out, and the output folder."""
+"""A cross-validation to run: the finger, the solvers, what is held out, and the output folder."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -21,22 +21,12 @@ from solvers.problem import Load, Material
 from solvers.registry import make_solver
 from solvers.solver import Solver, check_load, with_law
 
-LARGEST_NOISE = 100.0
-"""Largest standard deviation of a marker's displacement, mm: more than a finger moves."""
 ELEMENT_SIZE = 0.5
-"""Usual element size, mm.
-
-The discretisation error of `fem` at the markers is then 0.01 mm, a hundredth of its model error.
-"""
-
-FEWEST = 3
-"""Fewest markers: some to hold out and some to give."""
-
+"""Usual element size, mm: `fem` is off by 0.01 mm at the markers, a hundredth of its model error."""
+FEWEST_MARKERS = 3
+"""Some to hold out and some to give."""
 EVERY_TRUTH = "all"
 """Name that stands for every truth."""
-
-WEIGHT_CHOICES = ("left-out", "evidence")
-"""Rules by which a solver can choose the weight of the markers, beside the paper's fixed weight."""
 
 
 @dataclass(frozen=True)
@@ -64,9 +54,9 @@ class SolverVariant:
 def solver_variants(
     solvers: Sequence[Solver], material: Material, *, fixed: Sequence[str] = ()
 ) -> list[SolverVariant]:
-    """A variant for each solver, and one for each of `WEIGHT_CHOICES` if the solver can choose the weight.
+    """A variant for each solver, and two more for one that can choose the weight of the markers in a fold.
 
-    The weight is chosen inside a fold, from the markers that are given.
+    Those choose it from the markers that are given: by leave-one-out errors, or by the evidence.
 
     Args:
         solvers: The solvers.
@@ -78,27 +68,22 @@ def solver_variants(
         settings = solver.settings()
         variants.append(SolverVariant(solver.name, solver.name, settings))
         if "choose" in settings and solver.name not in fixed and with_law(material, solver).law == "linear":
-            variants += [
-                SolverVariant(
-                    f"{solver.name} {choice}",
-                    solver.name,
-                    {**settings, "weights": "precision", "choose": choice},
-                )
-                for choice in WEIGHT_CHOICES
-            ]
+            for choice in ("left-out", "evidence"):
+                chosen = {**settings, "weights": "precision", "choose": choice}
+                variants.append(SolverVariant(f"{solver.name} {choice}", solver.name, chosen))
     return variants
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Study:
+class CrossvalStudy:
     """A cross-validation to run, and its output folder.
 
     Attributes:
         design: The finger.
         variants: The solvers, as `solver_variants` gives them.
-        out: Output folder; folds that an earlier study with the same settings finished there are reused.
+        out: Output folder; folds that an earlier study with equal settings finished there are reused.
         mesh: Element sizes of the mesh that solvers share.
-        material: The elastic constants; each solver takes the law that it has.
+        material: The elastic constants; each solver takes its own law.
         load: The prescribed displacement of the contact.
         truths: Keys of `TRUTHS`, or `EVERY_TRUTH` alone.
         layouts: Marker layouts at which every truth is sampled; empty for the design's own.
@@ -131,25 +116,34 @@ class Study:
         return self.out / "mesh.npz"
 
     @property
-    def chosen_truths(self) -> dict[str, Truth]:
-        """The truths by name; none with measurements."""
-        if self.measurements is not None:
-            return {}
-        return {name: TRUTHS[name] for name in self._truth_names}
-
-    @property
-    def _truth_names(self) -> tuple[str, ...]:
+    def truth_names(self) -> tuple[str, ...]:
+        """The chosen truths, whether there are measurements or not."""
         return tuple(TRUTHS) if tuple(self.truths) == (EVERY_TRUTH,) else tuple(self.truths)
 
     @property
+    def chosen_truths(self) -> dict[str, Truth]:
+        """The truths by name; none with measurements."""
+        return {name: TRUTHS[name] for name in self.truth_names if self.measurements is None}
+
+    @property
     def markers(self) -> dict[str, FloatArray]:
-        """Centres of the markers by layout, each of shape (m, 2), mm, the first layout's first.
+        """Centres of the markers by layout, each of shape (m, 2), mm.
 
         Raises:
             UserError: If the finger does not have such a layout.
         """
-        layouts = self.layouts or (self.design.marker_layout,)
-        return {layout: self._laid_out(layout).markers for layout in layouts}
+        design, found = self.design, {}
+        for layout in self.layouts or (design.marker_layout,):
+            if layout == design.marker_layout:
+                found[layout] = design.markers
+            elif isinstance(design, Design):
+                found[layout] = design.replaced(marker_layout=layout).markers
+            else:
+                raise UserError(
+                    f"layouts: {design.name} has no layout {layout!r}; its markers are those of its "
+                    f"drawing, {design.marker_layout!r}"
+                )
+        return found
 
     @property
     def label(self) -> str:
@@ -159,33 +153,31 @@ class Study:
     def check(self) -> None:
         """Raise a `UserError` for what cannot be done, before anything is computed."""
         if self.layouts and self.measurements:
-            raise UserError("layouts: markers that were measured are where they are; leave out layouts")
+            raise UserError("layouts: markers that were measured are where they are; name no layouts")
         if tuple(self.truths) != (SLIDING.name,) and self.measurements:
-            raise UserError("a truth is for a simulated experiment; with measurements leave it out")
-        check_truths(self._truth_names, self.design)
-        if len(set(self.layouts)) < len(self.layouts):
-            raise UserError(f"layouts: a layout is named twice: {', '.join(self.layouts)}")
-        if too_few := next((name for name, points in self.markers.items() if len(points) < FEWEST), None):
-            raise UserError(
-                f"cross-validation needs {FEWEST} markers, not the {len(self.markers[too_few])} of the "
-                f"layout {too_few!r}"
-            )
-        labels = [variant.label for variant in self.variants]
-        if not labels:
+            raise UserError("a truth is for a simulated experiment; with measurements name none")
+        check_truths(self.truth_names, self.design)
+        _check_distinct("layouts: a layout", self.layouts)
+        for layout, points in self.markers.items():
+            if len(points) < FEWEST_MARKERS:
+                raise UserError(
+                    f"cross-validation needs {FEWEST_MARKERS} markers, not the {len(points)} of the layout "
+                    f"{layout!r}"
+                )
+        if not self.variants:
             raise UserError("no solver was asked for; name at least one")
-        if len(set(labels)) < len(labels):
-            raise UserError(f"a solver is named twice: {', '.join(labels)}")
+        _check_distinct("a solver", [variant.label for variant in self.variants])
         known = [scheme for scheme in SCHEMES if scheme != ALL]
-        if unknown := next((scheme for scheme in self.schemes if scheme not in known), None):
-            raise UserError(f"schemes: there is no scheme {unknown!r}; there are {', '.join(known)}")
-        if not self.schemes or len(set(self.schemes)) < len(self.schemes):
-            raise UserError(f"schemes: name at least one of {', '.join(known)}, none twice")
+        if unknown := [scheme for scheme in self.schemes if scheme not in known]:
+            raise UserError(f"schemes: there is no scheme {unknown[0]!r}; there are {', '.join(known)}")
+        if not self.schemes:
+            raise UserError(f"schemes: name at least one of {', '.join(known)}")
+        _check_distinct("schemes: a scheme", self.schemes)
         if self.seeds < 1:
             raise UserError(f"seeds {self.seeds}: give a whole number from 1")
-        if not 0 <= self.noise <= LARGEST_NOISE:
+        if not 0 <= self.noise <= 100:  # mm, more than a finger moves
             raise UserError(
-                f"noise {self.noise:g}: give a standard deviation of zero or more, "
-                f"at most {LARGEST_NOISE:g} mm"
+                f"noise {self.noise:g}: give a standard deviation of zero or more, at most 100 mm"
             )
         for variant in self.variants:
             solver = variant.make(0)
@@ -198,42 +190,29 @@ class Study:
             if truth.radius is not None and (normal or 0.0) >= 0:
                 raise UserError(f"truth {name}: a cylinder presses on the finger: prescribe a v below zero")
 
-    def _laid_out(self, layout: str) -> Finger:
-        """The finger with the markers of a layout."""
-        if layout == self.design.marker_layout:
-            return self.design
-        if not isinstance(self.design, Design):
-            raise UserError(
-                f"layouts: {self.design.name} has no layout {layout!r}; its markers are those of its "
-                f"drawing, {self.design.marker_layout!r}"
-            )
-        return self.design.replaced(marker_layout=layout)
-
     def definition(self, given: Observations | None) -> dict[str, Any]:
         """Everything that finished folds depend on but the solvers' settings, which are kept with them."""
+        arrays = given and (given.points, given.displacements, given.standard_deviations)
         return job_definition(self.design, self.mesh, self.material, self.load, __name__) | {
             "noise_mm": None if given else self.noise,
-            "measurements": given
-            and [
-                values.tolist() for values in (given.points, given.displacements, given.standard_deviations)
-            ],
+            "measurements": arrays and [values.tolist() for values in arrays],
         }
+
+
+def _check_distinct(what: str, names: Sequence[str]) -> None:
+    if len(set(names)) < len(names):
+        raise UserError(f"{what} is named twice: {', '.join(names)}")
 
 
 def visible_markers(observations: Observations) -> Observations:
     """The visible markers from base to tip.
 
     Raises:
-        UserError: If there are fewer than `FEWEST`.
+        UserError: If there are fewer than `FEWEST_MARKERS`.
     """
     visible = observations.visible
-    if (count := int(visible.sum())) < FEWEST:
-        raise UserError(f"cross-validation needs {FEWEST} markers that were seen, not {count}")
+    if (count := int(visible.sum())) < FEWEST_MARKERS:
+        raise UserError(f"cross-validation needs {FEWEST_MARKERS} markers that were seen, not {count}")
     order = np.flatnonzero(visible)[observations.points[visible, 0].argsort(kind="stable")]
-    return replace(
-        observations,
-        points=observations.points[order],
-        displacements=observations.displacements[order],
-        standard_deviations=observations.standard_deviations[order],
-        visible=visible[order],
-    )
+    names = ("points", "displacements", "standard_deviations", "visible")
+    return replace(observations, **{name: getattr(observations, name)[order] for name in names})

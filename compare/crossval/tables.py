@@ -1,20 +1,17 @@
-"""A cross-validation as tables for the terminal, the report and CSV files."""
+"""A cross-validation as tables for the terminal and the report."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from math import isnan
-from pathlib import Path
 
 from rich.table import Table
 from rich.text import Text
 
-from compare.crossval.folds import ALL, SCHEMES, SeedResults
-from compare.crossval.result import Case, CrossvalResult, LayoutResult
-from compare.crossval.scores import FIELDS, LEVEL, Difference, Interval
-from compare.crossval.truth_summary import truth_grids, truth_rows
-from compare.runtime.tables import NONE, Cell, TextTable, percent, significant, terminal_table, write_csv
-
-SHORT = {"not told apart": "≈"}
-"""Short forms of verdicts."""
+from compare.crossval.folds import ALL, SCHEMES
+from compare.crossval.result import CaseResult, CrossvalResult
+from compare.crossval.scores import FIELDS, LEVEL, Interval
+from compare.crossval.verdicts import scored_solvers, shared_sentence, verdict_sentences
+from compare.runtime.tables import NONE, TextTable, distance, percent, significant, terminal_table
 
 CAPTION = (
     "Given: in-sample, at markers that were given. Held out: at markers that were not. sum: mean of "
@@ -25,62 +22,32 @@ CAPTION = (
 )
 
 
-def grids(result: CrossvalResult) -> list[TextTable]:
+def all_tables(result: CrossvalResult) -> list[TextTable]:
     """Solvers by truths, one table of the markers for each scheme, and one of the fields."""
     held = [scheme for scheme in result.schemes if scheme != ALL]
-    headings = [
-        "solver",
-        "given\nsum",
-        "held\nout u",
-        "v",
-        "sum",
-        "±",
-        "rss",
-        "vs\nfem",
-        "vs\ngp",
-        "with-\nin",
-    ]
-    markers = [
-        TextTable(
-            f"{scheme}: {SCHEMES[scheme]}; {result.study.label} markers, mm",
-            headings,
-            _by_case(result, _marker_row, [scheme]),
-            CAPTION if scheme == held[-1] else "",
-        )
-        for scheme in held
-    ]
-    return [*truth_grids(result), *markers, *([_field_grid(result)] if result.has_fields else [])]
+    vs = [f"vs\n{baseline}" for baseline in ("fem", "gp")]
+    headings = ["solver", "given\nsum", "held\nout u", "v", "sum", "±", "rss", *vs, "with-\nin"]
+    tables = list(truth_tables(result)) if result.study.chosen_truths else []
+    for scheme in held:
+        title = f"{scheme}: {SCHEMES[scheme]}; {result.study.label} markers, mm"
+        rows = _by_case(result, _marker_row, [scheme])
+        tables.append(TextTable(title, headings, rows, CAPTION if scheme == held[-1] else ""))
+    return [*tables, _field_table(result)] if result.has_fields else tables
 
 
-def tables(result: CrossvalResult) -> list[Table | Text]:
-    """The tables of `grids` and their captions; with several truths those of solvers by truths alone."""
+def terminal_tables(result: CrossvalResult) -> list[Table | Text]:
+    """The tables and their captions; with several truths those of solvers by truths alone."""
     left = ("solver", "held out", "truth", "layout")
     shown: list[Table | Text] = []
-    for grid in truth_grids(result) if len(result.truths) > 1 else grids(result):
-        shown.append(terminal_table(grid.title, grid.headings, grid.rows, left=left, narrow=True))
-        if grid.caption:  # apart from the table, which may be much narrower than the terminal
-            shown.append(Text(f"{grid.caption}\n", style="table.caption"))
+    for table in truth_tables(result) if len(result.truths) > 1 else all_tables(result):
+        shown.append(terminal_table(table.title, table.headings, table.rows, left=left, narrow=True))
+        if table.caption:  # apart from the table, which may be much narrower than the terminal
+            shown.append(Text(f"{table.caption}\n", style="table.caption"))
     return shown
 
 
-def write_tables(
-    out: Path, result: CrossvalResult, results: Mapping[Case, Mapping[str, SeedResults]]
-) -> None:
-    """Write the CSV files: markers and fields by scheme, every error of every fold, solvers by truths."""
-    write_csv(out / "held_out.csv", result.held_out_rows())
-    if result.has_fields:
-        write_csv(out / "fields.csv", result.field_rows())
-    if result.study.chosen_truths:
-        write_csv(out / "truths.csv", truth_rows(result))
-    write_csv(
-        out / "folds.csv", [case.cells | row for case, each in results.items() for row in _fold_rows(each)]
-    )
-
-
 def _by_case(
-    result: CrossvalResult,
-    row: Callable[[LayoutResult, str, str], list[str]],
-    schemes: Sequence[str],
+    result: CrossvalResult, row: Callable[[CaseResult, str, str], list[str]], schemes: Sequence[str]
 ) -> list[list[str]]:
     """The rows of all solvers in all schemes, those of each truth and layout below its name if several."""
     rows: list[list[str]] = []
@@ -92,24 +59,7 @@ def _by_case(
     return rows
 
 
-def _fold_rows(results: Mapping[str, SeedResults]) -> Iterable[dict[str, Cell]]:
-    for label, seeds in results.items():
-        for seed, folds in enumerate(seeds):
-            for found in folds:
-                for marker, (u, v) in enumerate(found.errors):
-                    yield {
-                        "solver": label,
-                        "seed": seed,
-                        "scheme": found.fold.scheme,
-                        "fold": found.fold.name,
-                        "marker": marker + 1,
-                        "held_out": int(marker in found.held),
-                        "error_u_mm": u,
-                        "error_v_mm": v,
-                    }
-
-
-def _marker_row(result: LayoutResult, label: str, scheme: str) -> list[str]:
+def _marker_row(result: CaseResult, label: str, scheme: str) -> list[str]:
     score = result.scores[label][scheme]
     held, total = score.held_out, score.held_out.get("mae_sum")
     return [
@@ -118,17 +68,26 @@ def _marker_row(result: LayoutResult, label: str, scheme: str) -> list[str]:
         *(_mm(held.get(name)) for name in ("mae_u", "mae_v", "mae_sum")),
         NONE if total is None or isnan(total.high) else significant(total.high - total.mean, 1),
         _mm(held.get("mae_rss")),
-        *(_verdict(result.difference(label, baseline, scheme, "mae_sum")) for baseline in ("fem", "gp")),
+        *(_verdict(result, label, baseline, scheme, "mae_sum") for baseline in ("fem", "gp")),
         NONE if score.coverage is None else f"{100 * score.coverage:.0f} %",
     ]
 
 
-def _field_grid(result: CrossvalResult) -> TextTable:
+def _mm(interval: Interval | None) -> str:
+    return NONE if interval is None else f"{interval.mean:.3f}"
+
+
+def _verdict(result: CaseResult, label: str, baseline: str, scheme: str, what: str) -> str:
+    verdict = result.verdict(label, baseline, scheme, what)
+    return {"": NONE, "not told apart": "≈"}.get(verdict, verdict)
+
+
+def _field_table(result: CrossvalResult) -> TextTable:
     """Relative L2 distances from the truth, a row for each scheme and solver."""
-    headings = ["solver", "held out", "displ.", "vs\nfem", "strain", "vs\nfem", "v.\nMises", "vs\nfem"]
+    vs = "vs\nfem"
     return TextTable(
         "Relative L2 distance from the truth over the body, %",
-        [*headings, "truth's\nlaw"],
+        ["solver", "held out", "displ.", vs, "strain", vs, "v.\nMises", vs, "truth's\nlaw"],
         _by_case(result, _field_row, result.schemes),
         f"{ALL}: {SCHEMES[ALL]}. Strain: of the solver's own law, Green-Lagrange for finite strain. Truth's "
         "law: the von Mises stress that the law of the truth gives for the solver's displacement gradient. "
@@ -136,17 +95,77 @@ def _field_grid(result: CrossvalResult) -> TextTable:
     )
 
 
-def _field_row(result: LayoutResult, label: str, scheme: str) -> list[str]:
+def _field_row(result: CaseResult, label: str, scheme: str) -> list[str]:
     fields = result.scores[label][scheme].fields
     *values, last = [percent(fields[name].mean, 2, sign=False) for name in FIELDS]
-    verdicts = [_verdict(result.difference(label, "fem", scheme, name)) for name in FIELDS[:-1]]
+    verdicts = [_verdict(result, label, "fem", scheme, name) for name in FIELDS[:-1]]
     pairs = [text for pair in zip(values, verdicts, strict=True) for text in pair]
     return [label, scheme, *pairs, last]
 
 
-def _verdict(difference: Difference | None) -> str:
-    return NONE if difference is None else SHORT.get(difference.verdict, difference.verdict)
+def truth_tables(result: CrossvalResult) -> Iterator[TextTable]:
+    """Tables of solvers by truths for each layout, as many as fit the truths into the width of a terminal."""
+    scheme, study = result.main_scheme, result.study
+    shared = "; ".join(shared_sentence(study, truth) for truth in study.chosen_truths.values())
+    simulations = ", ".join(dict.fromkeys(truth.simulation for truth in study.chosen_truths.values()))
+    caption = (
+        "Held-out error: mean |Δu| + |Δv|. Every marker given: relative L2 distance of the von Mises stress "
+        "over the body, at points that move with the walls, and the reaction's size against the truth's. "
+        f"Truths are solutions of {simulations}. {shared}."
+    )
+    for layout in result.layouts:
+        title = f"Held-out error in {scheme}, mm / von Mises stress, % / force, %, by truth"
+        title += f"; markers: {layout}" if len(result.layouts) > 1 else ""
+        by_truth = result.of_layout(layout)
+        labels = scored_solvers(by_truth)
+        columns = {
+            truth: [_truth_cell(each, label, scheme) for label in labels] for truth, each in by_truth.items()
+        }
+        found: list[TextTable] = []
+        for part in _parts(labels, columns):
+            rows = list(zip(labels, *(columns[truth] for truth in part), strict=True))
+            found.append(TextTable("" if found else title, ["solver", *part], rows))
+        sentences = verdict_sentences(by_truth, scheme) if len(by_truth) > 1 else []
+        yield from found[:-1]
+        yield replace(found[-1], caption="\n".join([caption, *sentences]))
+    stated = [
+        [label, *case, *map(_percent, scores[ALL].stated.values())]
+        for case, each in result.cases.items()
+        for label, scores in each.scores.items()
+        if any(value is not None for value in scores[ALL].stated.values())
+    ]
+    if stated:
+        yield TextTable(
+            f"Truth within the intervals of {LEVEL:.0%} that a solver states, every marker given, %",
+            ["solver", "truth", "layout", "von Mises", "force", "position"],
+            stated,
+            "von Mises: share of the body, by area. Force, and the position where it acts: share of seeds.",
+        )
 
 
-def _mm(interval: Interval | None) -> str:
-    return NONE if interval is None else f"{interval.mean:.3f}"
+def _truth_cell(result: CaseResult, label: str, scheme: str) -> str:
+    if label not in result.scores:
+        return NONE
+    scores = result.scores[label]
+    total, stress, force = scores[scheme].held_out, scores[ALL].fields.get("von_mises"), scores[ALL].force
+    shares = [NONE if found is None else _percent(found.mean) for found in (stress, force)]
+    return " / ".join([distance(total["mae_sum"].mean) if total else NONE, *shares])
+
+
+def _percent(share: float | None) -> str:
+    return NONE if share is None else percent(share, 2, sign=False)
+
+
+def _parts(labels: Sequence[str], columns: Mapping[str, Sequence[str]]) -> Iterator[list[str]]:
+    """The truths in groups whose columns fit 80 characters."""
+    room = 80 - max(map(len, ["solver", *labels]))
+    part: list[str] = []
+    left = room
+    for truth, cells in columns.items():
+        width = 1 + max(map(len, [truth, *cells]))
+        if part and width > left:
+            yield part
+            part, left = [], room
+        part.append(truth)
+        left -= width
+    yield part

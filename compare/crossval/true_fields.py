@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from compare.crossval.folds import LoadCase
-from compare.crossval.study import Study
+from compare.crossval.study import CrossvalStudy
 from compare.evaluation.differences import field_difference
 from compare.evaluation.truths import Truth
 from compare.evaluation.virtual_experiment import simulate
@@ -63,7 +63,7 @@ class SampledField:
 
         Args:
             truth: The true displacement.
-            own: Problem with the law that gives strain and stress of this displacement.
+            own: Problem with the solver's law.
             finite: Problem with the truth's law; it also gives this displacement's `von_mises_finite`.
             weights: Quadrature weights, shape (q,), mm².
         """
@@ -82,21 +82,13 @@ class SampledField:
 
 @dataclass(frozen=True, eq=False)
 class FieldSampler:
-    """The points of the shared mesh at which fields are sampled.
+    """The points of the shared mesh at which fields are sampled."""
 
-    Attributes:
-        inside: Quadrature points of the body.
-        weights: Their weights, shape (q,), mm².
-        centres: Centres of the markers.
-        discs: Points of the markers' discs.
-        means: Weights that average the discs' points to the markers, shape (m, d).
-    """
-
-    inside: LocatedPoints
-    weights: FloatArray
-    centres: LocatedPoints
-    discs: LocatedPoints
-    means: FloatArray
+    inside: LocatedPoints  # quadrature points of the body
+    weights: FloatArray  # their weights, shape (q,), mm²
+    centres: LocatedPoints  # of the markers
+    discs: LocatedPoints  # points of the markers' discs
+    means: FloatArray  # weights that average the discs' points to the markers, shape (m, d)
 
     @classmethod
     def of(cls, mesh: TriangleMesh, markers: FloatArray, radius: float) -> "FieldSampler":
@@ -151,17 +143,10 @@ def _shifts(mesh: TriangleMesh, location: LocatedPoints, changes: Mapping[str, f
 
 @dataclass(frozen=True)
 class TrueContact:
-    """Force and place of a truth's contact.
+    """Force and place of a truth's contact; abscissas are those before the load, mm."""
 
-    Attributes:
-        reaction: Force of the indenter on the finger, N/mm.
-        position: Abscissa before the load at which it acts, mm.
-        middle: Abscissa of the contact's middle before the load, mm.
-        width: Extent of the contact along x before the load, mm.
-    """
-
-    reaction: tuple[float, float]
-    position: float
+    reaction: tuple[float, float]  # of the indenter on the finger, N/mm
+    position: float  # where the force acts
     middle: float
     width: float
 
@@ -183,12 +168,7 @@ class TrueContact:
 
 @dataclass(frozen=True, eq=False)
 class TrueField:
-    """A true field with its contact.
-
-    Attributes:
-        sampled: The field at the points of the shared mesh, moved with the walls.
-        contact: Force and place.
-    """
+    """A true field at the points of the shared mesh, moved with the walls, and its contact."""
 
     sampled: SampledField
     contact: TrueContact
@@ -211,7 +191,7 @@ class TrueField:
 class TruthTask:
     """A truth and a load case of a study, which a process simulates."""
 
-    study: Study
+    study: CrossvalStudy
     truth: Truth
     case: LoadCase
 

@@ -61,8 +61,8 @@ def crossval(
     """
     from compare.crossval.cross_validation import cross_validate
     from compare.crossval.folds import LOAD
-    from compare.crossval.study import ELEMENT_SIZE, Study
-    from compare.crossval.tables import tables
+    from compare.crossval.study import ELEMENT_SIZE, CrossvalStudy
+    from compare.crossval.tables import terminal_tables
     from compare.runtime.stages import Stages
     from pinnray.options.cost import EXPERIMENT
     from vision.measurements import read_measurements
@@ -72,7 +72,7 @@ def crossval(
         mesh = mesh.model_copy(update={"size": ELEMENT_SIZE})
     material, load = physics.read(options.preset)
     file = existing_table(measurements)
-    study = Study(
+    study = CrossvalStudy(
         design=design,
         mesh=mesh,
         material=material,
@@ -92,21 +92,21 @@ def crossval(
     physics.check_law(made)
     finger.check_cost(design, mesh, [EXPERIMENT, *(solver.name for solver in made)])
     if study.measurements and LOAD in study.schemes:
-        say(f"warning: {LOAD} needs a truth at other loads, and is left out with --measurements")
+        say(f"warning: {LOAD} needs a truth at other loads, and is skipped with --measurements")
     try:
         with Stages() as stages:
             result = cross_validate(study, stages)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"the same command goes on from what {study.out} keeps") from None
     console = Console()
-    for table in tables(result):
+    for table in terminal_tables(result):
         console.print(table)
     for name in ("crossval.json", "report.html", "truths.csv", "held_out.csv", "fields.csv"):
         if (study.out / name).exists():
             print(study.out / name)
     for name, message in result.failed.items():
         say(f"error: {name} failed, and is tried again by the same command: {message}")
-    converged = all(score.converged == 1 for score in result.scores)
+    converged = all(score.converged == 1 for _, _, score in result.every_score())
     return 0 if converged and not result.failed else NOT_CONVERGED
 
 

@@ -29,13 +29,13 @@ from compare.crossval.folds import (
     hide_markers,
     load_cases_of,
 )
-from compare.crossval.result import Case, CrossvalResult, LayoutResult
+from compare.crossval.result import Case, CaseResult, CrossvalResult
 from compare.crossval.scores import Difference, Interval, difference, of_scheme, score
-from compare.crossval.solver_folds import SolverTask, run_folds
-from compare.crossval.study import EVERY_TRUTH, SolverVariant, Study, solver_variants
+from compare.crossval.solver_folds import SolverTask, run_folds, sweep_weights
+from compare.crossval.study import EVERY_TRUTH, CrossvalStudy, SolverVariant, solver_variants
+from compare.crossval.tables import truth_tables
 from compare.crossval.true_fields import FieldSampler, TrueContact, TrueField
-from compare.crossval.truth_summary import truth_grids, verdict_sentences
-from compare.crossval.weight_sweep import sweep_weights
+from compare.crossval.verdicts import verdict_sentences
 from compare.evaluation.truths import TRUTHS
 from compare.runtime.tables import terminal_table
 from geometry.arrays import FloatArray
@@ -94,7 +94,7 @@ def task(
         TrueField(sampled * share, TrueContact((u, v), 35.0, 34.0, 2.0)).save(path)
     half = replace(observations, displacements=0.5 * observations.displacements)
     return SolverTask(
-        study=Study(design=Design(), variants=[], out=tmp_path),
+        study=CrossvalStudy(design=Design(), variants=[], out=tmp_path),
         layout="joints",
         variant=variant("gp"),
         load_cases=[
@@ -531,13 +531,13 @@ def test_force_and_place_that_a_solver_identifies_are_near_those_of_the_truth(tm
 
 
 def test_verdicts_are_said_once_for_all_truths_that_share_them():
-    def result(stress: float, force: float | None) -> LayoutResult:
+    def result(stress: float, force: float | None) -> CaseResult:
         found = {
             "von_mises": Difference(stress, stress - 0.1, stress + 0.1),
             **({} if force is None else {"force": Difference(force, force - 0.1, force + 0.1)}),
         }
         own = {"fem": {"gp": {ALL: found}}}
-        return LayoutResult("a test", 9, [], {"fem": {}, "gp": {}}, own, {})
+        return CaseResult("a test", 9, [], {"fem": {}, "gp": {}}, own, {})
 
     by_truth = {"stvk": result(-1, -1), "print": result(-1, 0), "base": result(-1, -1)}
     assert verdict_sentences(by_truth, ONE) == [
@@ -553,14 +553,14 @@ def test_verdicts_are_said_once_for_all_truths_that_share_them():
 def test_tables_of_many_truths_fit_a_terminal():
     full = score([[outcome_of(ALL, (), [[1.0, 1.0]], fields={"von_mises": 9.99}, force=-0.123)]])
     one = score([[outcome_of(ONE, (0,), [[0.1, 0.1]])]])
-    study = Study(
+    study = CrossvalStudy(
         design=Design(),
         variants=[variant("fem"), variant("fem-nonlinear")],
         out=Path(),
         truths=[EVERY_TRUTH],
     )
     cases = {
-        Case(truth, layout): LayoutResult(
+        Case(truth, layout): CaseResult(
             "a test",
             1,
             [Fold(ALL, "all", ()), Fold(ONE, "marker 1", (0,))],
@@ -571,7 +571,7 @@ def test_tables_of_many_truths_fit_a_terminal():
         for truth in TRUTHS
         for layout in ("front", "joints")
     }
-    grids = truth_grids(CrossvalResult(study, cases))
+    grids = list(truth_tables(CrossvalResult(study, cases)))
     assert [name for grid in grids for name in grid.headings[1:]] == [*TRUTHS, *TRUTHS]
     assert grids[0].rows[0][1] == "0.2 / 999 / −12"
     for grid in grids:
@@ -590,7 +590,7 @@ def test_measured_markers_have_no_truth(tmp_path, capsys, in_line, observations)
     line = f"--measurements {tmp_path / 'markers.csv'} --solvers fem,gp --schemes one-out,load-out --seeds 1"
     assert run(line, tmp_path / "out") == 0
     printed = capsys.readouterr()
-    assert "load-out needs a truth at other loads, and is left out" in printed.err
+    assert "load-out needs a truth at other loads, and is skipped" in printed.err
     assert str(tmp_path / "out" / "held_out.csv") in printed.out
     assert "fields.csv" not in printed.out
     content = json.loads((tmp_path / "out" / "crossval.json").read_text())
@@ -697,7 +697,7 @@ def test_a_cache_that_cannot_be_written_is_a_warning_and_the_study_keeps_its_tru
 
 
 def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, observations):
-    study = Study(
+    study = CrossvalStudy(
         design=Design(),
         variants=solver_variants([make_solver("gp")], Material()),
         out=tmp_path / "out",

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from compare.crossval.folds import LoadCase
-from compare.crossval.study import Study
+from compare.crossval.study import CrossvalStudy
 from compare.crossval.true_fields import FieldSampler, TrueField, TruthTask, simulate_truth
 from compare.evaluation.truths import SLIDING, TRUTHS, Truth
 from compare.evaluation.virtual_experiment import experiment_source, simulate
@@ -25,14 +25,14 @@ FULL = LoadCase("full", Load(), 1.0, 35.0)
 
 
 @pytest.fixture
-def study(tmp_path: Path, coarse_mesh: TriangleMesh, monkeypatch: pytest.MonkeyPatch) -> Study:
+def study(tmp_path: Path, coarse_mesh: TriangleMesh, monkeypatch: pytest.MonkeyPatch) -> CrossvalStudy:
     monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path / "cache"))
-    study = Study(design=Design(), variants=[], out=tmp_path, mesh=MeshSettings(size=1.0))
+    study = CrossvalStudy(design=Design(), variants=[], out=tmp_path, mesh=MeshSettings(size=1.0))
     coarse_mesh.save(study.mesh_file)
     return study
 
 
-def true_field(study: Study, truth: Truth, case: LoadCase = FULL) -> TrueField:
+def true_field(study: CrossvalStudy, truth: Truth, case: LoadCase = FULL) -> TrueField:
     return TrueField.load(simulate_truth(TruthTask(study, truth, case))["joints"])
 
 
