@@ -44,13 +44,13 @@ def check_output(out: Path) -> None:
     check_links(out)
     files = [path.relative_to(out) for path in out.rglob("[!.]*") if path.is_file()]
     ours = _written(out)
-    if files and ours is None:
+    if files and not ours:
         state = "its run.json is damaged" if (out / RUN_FILE).exists() else "it has no run.json"
         raise UserError(
             f"{out} holds {min(files)}, and {state}, which lists the files that a run has written, so that "
             "files of yours could be lost; move the folder, or name another output folder"
         )
-    if foreign := next((path for path in files if path.as_posix() not in (ours or ())), None):
+    if foreign := next((path for path in files if path.as_posix() not in ours), None):
         raise UserError(
             f"{out} holds {foreign}, which no run has written and which would be lost; "
             "move it, or name another output folder"
@@ -58,10 +58,7 @@ def check_output(out: Path) -> None:
 
 
 def check_links(folder: Path) -> None:
-    """Raise a `UserError` if a folder holds a symbolic link: through it a run writes or removes elsewhere.
-
-    It may have come with the folder from somebody else; a run makes none.
-    """
+    """Raise a `UserError` if a folder of others holds a symbolic link, through which a run would write."""
     if found := next((path for path in folder.rglob("*") if path.is_symlink()), None):
         raise UserError(
             f"{found} is a link, which no run has made and which leads to files elsewhere; remove it, or "
@@ -186,27 +183,23 @@ def _previous(out: Path) -> Path:
 def _restore(out: Path) -> None:
     """Give the last result its name back, if a run ended between the two renames."""
     previous = _previous(out)
-    if out.exists() or not (previous / MARK).exists():
-        return
-    if _is_whole(previous):
+    if not out.exists() and (previous / MARK).exists() and _is_whole(previous):
         previous.replace(out)
         (out / MARK).unlink()
 
 
 def _discard(folder: Path) -> None:
     """Remove a folder that carries the mark; the mark goes last."""
-    for path in folder.iterdir():
-        if path.name != MARK:
-            _remove(path)
+    _clear(folder, keep=())
     shutil.rmtree(folder)
 
 
-def _written(out: Path) -> set[str] | None:
-    """The files that `run.json` lists, and itself; None if it is missing or damaged."""
+def _written(out: Path) -> set[str]:
+    """The files that `run.json` lists, and itself; none if it is missing or damaged."""
     try:
         return {RUN_FILE, *json.loads((out / RUN_FILE).read_text(encoding="utf-8"))["files_sha256"]}
     except (OSError, ValueError, LookupError, TypeError):
-        return None
+        return set()
 
 
 def _is_whole(folder: Path) -> bool:
@@ -214,24 +207,18 @@ def _is_whole(folder: Path) -> bool:
     return all((folder / name).is_file() for name in _written(folder) or {RUN_FILE})
 
 
-def _clear(partial: Path, keep: Collection[str]) -> None:
-    """Remove the files of an earlier run, except solutions and checkpoints that can be reused."""
-    for path in partial.iterdir():
-        if path.name not in (SOLUTIONS, TRAINING, MARK):
-            _remove(path)
-    for path in partial.glob(f"{SOLUTIONS}/*"):
-        if path.suffix != ".npz" or path.stem not in keep:
+def _clear(folder: Path, keep: Collection[str]) -> None:
+    """Remove everything but the mark, and the solutions and checkpoints of solvers to keep."""
+    kept = {folder / MARK, *(folder / TRAINING / name for name in keep)}
+    kept |= {folder / SOLUTIONS / f"{name}.npz" for name in keep}
+    kept |= {path.parent for path in kept}
+    for path in [*folder.glob(f"{SOLUTIONS}/*"), *folder.glob(f"{TRAINING}/*"), *folder.iterdir()]:
+        if path in kept:
+            continue
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        else:
             path.unlink()
-    for path in partial.glob(f"{TRAINING}/*"):
-        if path.name not in keep:
-            _remove(path)
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path)
-    else:
-        path.unlink()
 
 
 @contextmanager

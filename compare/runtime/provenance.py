@@ -1,4 +1,4 @@
-"""Provenance of a result: versions, machine, hashes."""
+"""Provenance of a result: versions and machine."""
 
 import os
 import platform
@@ -7,20 +7,8 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 PACKAGES = (
-    "pinn-ray",
-    "numpy",
-    "scipy",
-    "scikit-learn",
-    "torch",
-    "fenics-dolfinx",
-    "fenics-ufl",
-    "petsc4py",
-    "mpi4py",
-    "gmsh",
-    "cadquery",
-    "pyvista",
-    "vtk",
-    "opencv-python-headless",
+    *("pinn-ray", "numpy", "scipy", "scikit-learn", "torch", "fenics-dolfinx", "fenics-ufl", "petsc4py"),
+    *("mpi4py", "gmsh", "cadquery", "pyvista", "vtk", "opencv-python-headless"),
 )
 
 
@@ -46,11 +34,7 @@ def program_version() -> str:
 
 def machine() -> dict[str, str | int]:
     """The operating system, the processor and its cores."""
-    return {
-        "system": platform.platform(),
-        "processor": platform.machine(),
-        "cores": cores(),
-    }
+    return {"system": platform.platform(), "processor": platform.machine(), "cores": cores()}
 
 
 def cores() -> int:

@@ -62,10 +62,10 @@ def check_resumable_folder(
     except (OSError, ValueError):
         raise UserError(f"{out} holds files that are not of a {job}; name another output folder") from None
     now = _flat(to_jsonable_python(definition))
-    names = [name for name in {**before, **now} if name not in free]
-    if differing := [name for name in names if before.get(name) != now.get(name)]:
+    names = [name for name in before | now if name not in free and before.get(name) != now.get(name)]
+    if names:
         raise UserError(
-            f"{out} holds a {job} with other settings ({', '.join(differing)}); "
+            f"{out} holds a {job} with other settings ({', '.join(names)}); "
             "name another output folder, or remove that one"
         )
 
@@ -74,6 +74,6 @@ def _flat(content: Mapping[str, Any]) -> dict[str, Any]:
     """The entries, those of inner dictionaries as `key.name`."""
     entries: dict[str, Any] = {}
     for key, value in content.items():
-        inner = {f"{key}.{name}": each for name, each in value.items()} if isinstance(value, dict) else {}
-        entries |= inner or {key: value}
+        inner = value if isinstance(value, dict) else {}
+        entries |= {f"{key}.{name}": each for name, each in inner.items()} or {key: value}
     return entries

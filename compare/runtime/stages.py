@@ -37,19 +37,12 @@ def quiet_stages() -> Iterator[None]:
 
 
 class Stages:
-    """Shows a line with progress and time left for every stage.
-
-    Without a terminal, each finished stage is a plain line.
-
-    Attributes:
-        started: Time when the run began.
-        seconds: Duration of every finished stage, s.
-    """
+    """Shows a line with progress and time left for every stage; without a terminal, a line at its end."""
 
     def __init__(self, console: Console | None = None, *, quiet: bool = False) -> None:
         console, quiet = console or Console(stderr=True), quiet or _quiet.get()
-        self.started = datetime.now(UTC)
-        self.seconds: dict[str, float] = {}
+        self.seconds: dict[str, float] = {}  #: Duration of every finished stage, s.
+        self._started = datetime.now(UTC)
         self._console = console
         self._log = not (quiet or console.is_terminal)
         self._progress = Progress(
@@ -82,7 +75,7 @@ class Stages:
     def record(self) -> dict[str, Any]:
         """Start, durations so far and machine, for the provenance of a result."""
         return {
-            "started": self.started.isoformat(timespec="seconds"),
+            "started": self._started.isoformat(timespec="seconds"),
             "seconds": {name: round(seconds, 2) for name, seconds in self.seconds.items()},
             "machine": machine(),
         }
