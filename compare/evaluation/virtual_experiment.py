@@ -5,9 +5,7 @@ judged by it, and whose distance from them is known to be of the size and patter
 simulation and experiment.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
-from types import MappingProxyType
 
 import numpy as np
 
@@ -18,7 +16,6 @@ from geometry.cache import cache_folder, finger_mesh, kept_if_possible
 from geometry.content_hash import content_hash, sources_digest
 from geometry.errors import UserError
 from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Problem
 from solvers.registry import MissingLibraryError, make_solver
@@ -39,12 +36,12 @@ class UnfinishedExperimentError(UserError):
 def virtual_experiment(
     problem: Problem, marker_radius: float, progress: Progress = silent, truth: Truth = SLIDING
 ) -> tuple[Observations, Evaluation]:
-    """Simulate what a camera would have measured at the mesh's markers; kept in the cache folder.
+    """Simulate the displacements of the mesh's markers; kept in the cache folder.
 
     Args:
         problem: The finger and its load; the simulation has its own law and kind of load.
         marker_radius: Radius of the design's markers, mm.
-        progress: Told how far the simulation is.
+        progress: Called with the fraction of the simulation.
         truth: What is simulated; its walls must be as drawn. In three dimensions the section has elements of
             `SOLID_SIZE`, for which the problem must know its finger.
 
@@ -55,33 +52,42 @@ def virtual_experiment(
         UserError: If the simulation cannot be run.
         UnfinishedExperimentError: If it does not reach the full load.
     """
-    found = _truth(problem, progress, truth)
-    markers = problem.mesh.markers
-    observations = Observations(
-        points=markers,
-        displacements=found.marker_displacement,
-        standard_deviations=np.zeros_like(markers),
-        visible=np.ones(len(markers), dtype=bool),
-        source=experiment_source(problem, truth),
-        simulated=True,
-        marker_radius=marker_radius,
-    )
-    return observations, found
-
-
-def _truth(problem: Problem, progress: Progress, truth: Truth) -> Evaluation:
-    """The true fields, from the cache where they are there."""
     try:
-        solver, richer = _richer(_on_own_mesh(problem, truth), truth)
-        key = _key(solver, richer, problem.mesh)
-        entry = cache_folder() / f"experiment-{key}.npz"
-        if (kept := Evaluation.load(entry, key)) is not None:
-            progress(1.0, "from the cache")
-            return kept
-        solution = _solved(solver, richer, progress)
+        true = _true_fields(problem, progress, truth)
     except UserError as error:
         raise type(error)(f"{error}; or give measurements") from None
-    evaluation = Evaluation.of(solution, problem.mesh)
+    known = replace(
+        no_displacements(problem, marker_radius, experiment_source(problem, truth)), simulated=True
+    )
+    seen = np.ones_like(known.visible)
+    return replace(known, displacements=true.marker_displacement, visible=seen), true
+
+
+def _true_fields(problem: Problem, progress: Progress, truth: Truth) -> Evaluation:
+    """The fields of a truth on the problem's mesh, from the cache if they are there."""
+    check_walls(truth)
+    own = problem
+    if truth.solid:
+        if problem.finger is None:
+            raise UserError(f"truth {truth.name}: the problem has to know its finger, which is meshed anew")
+        own = replace(problem, mesh=finger_mesh(problem.finger, settings=MeshSettings(size=SOLID_SIZE)))
+    solver, richer = _richer(own, truth)
+    key = content_hash(
+        [
+            problem.mesh.digest,
+            solver.name,
+            richer.digest,
+            solver.settings(),
+            package_versions(),
+            sources_digest(__name__, type(solver).__module__),
+            SOURCE,
+        ]
+    )
+    entry = cache_folder() / f"experiment-{key}.npz"
+    if (kept := Evaluation.load(entry, key)) is not None:
+        progress(1.0, "from the cache")
+        return kept
+    evaluation = Evaluation.of(_solved(solver, richer, progress), problem.mesh)
     with kept_if_possible(entry.parent, "the virtual experiment"):
         evaluation.save(entry, key)
     return evaluation
@@ -97,11 +103,11 @@ def no_displacements(problem: Problem, marker_radius: float, reason: str) -> Obs
 def simulate(
     problem: Problem, progress: Progress = silent, truth: Truth = SLIDING, **settings: object
 ) -> Solution:
-    """The solution behind `virtual_experiment`, solved anew.
+    """Solve the problem of `virtual_experiment` anew.
 
     Args:
         problem: The finger, with the walls of the truth, and its load.
-        progress: Told how far the simulation is.
+        progress: Called with the fraction of the simulation.
         truth: Gives law and kind of load.
         settings: Of the solver that simulates it.
 
@@ -109,7 +115,7 @@ def simulate(
         UserError: If it cannot be run.
         UnfinishedExperimentError: If it does not reach the full load.
     """
-    return _solved(*_richer(problem, truth, settings), progress)
+    return _solved(*_richer(problem, truth, **settings), progress)
 
 
 def experiment_source(problem: Problem, truth: Truth = SLIDING) -> str:
@@ -124,9 +130,7 @@ def _solved(solver: Solver, richer: Problem, progress: Progress) -> Solution:
     return solution
 
 
-def _richer(
-    problem: Problem, truth: Truth = SLIDING, settings: Mapping[str, object] = MappingProxyType({})
-) -> tuple[Solver, Problem]:
+def _richer(problem: Problem, truth: Truth, **settings: object) -> tuple[Solver, Problem]:
     """The finite-strain solver and its problem."""
     normal = problem.load.displacement[1]
     if normal is None:
@@ -139,34 +143,5 @@ def _richer(
     try:
         solver = make_solver(truth.solver, **settings)
     except MissingLibraryError as error:
-        raise UserError(f"the virtual experiment: {error}; or give measurements") from None
-    richer = Problem(
-        mesh=problem.mesh,
-        material=truth.material(problem.material),
-        load=truth.load(-normal),
-    )
-    return solver, richer
-
-
-def _on_own_mesh(problem: Problem, truth: Truth) -> Problem:
-    """The problem on the mesh that a truth is simulated on."""
-    check_walls(truth)
-    if not truth.solid:
-        return problem
-    if problem.finger is None:
-        raise UserError(f"truth {truth.name}: the problem has to know its finger, which is meshed anew")
-    return replace(problem, mesh=finger_mesh(problem.finger, settings=MeshSettings(size=SOLID_SIZE)))
-
-
-def _key(solver: Solver, problem: Problem, shared: TriangleMesh) -> str:
-    """SHA-256 over the mesh of the fields, solver, problem, sources and versions."""
-    parts = [
-        shared.digest,
-        solver.name,
-        problem.digest,
-        solver.settings(),
-        package_versions(),
-        sources_digest(__name__, type(solver).__module__),
-        SOURCE,
-    ]
-    return content_hash(parts)
+        raise UserError(f"the virtual experiment: {error}") from None
+    return solver, Problem(problem.mesh, truth.material(problem.material), truth.load(-normal))
