@@ -31,7 +31,7 @@ class Comparison(comparison.Comparison):
 
     @classmethod
     def of(cls, finished: comparison.Comparison) -> Self:
-        """The same comparison, with its pictures and report."""
+        """Give a finished comparison its pictures and report."""
         return cls(**{each.name: getattr(finished, each.name) for each in fields(finished)})
 
     def plot(self, picture: str = "overlay") -> "Figure":
@@ -67,15 +67,13 @@ class Comparison(comparison.Comparison):
 
     def _repr_html_(self) -> str:
         """Design, load, markers, remarks and the main columns of `table`, in a notebook."""
-        seen = int(self.observations.visible.sum())
+        given = self.observations
         facts = {
             "load": f"{self.load.kind}, (u, v) = {self.load.displacement} mm",
-            "markers": f"{seen} of {len(self.observations.visible)}, {self.observations.label}: "
-            f"{self.observations.source}",
+            "markers": f"{given.visible.sum()} of {len(given.visible)}, {given.label}: {given.source}",
             "reference": self.reference.solver,
         }
-        for evaluation in self.unconverged:
-            facts[f"{evaluation.solver} is not converged"] = evaluation.message
+        facts |= {f"{each.solver} is not converged": each.message for each in self.unconverged}
         facts |= {f"remark {number}": remark for number, remark in enumerate(self.remarks, start=1)}
         shown = self.table()[list(SHOWN)].rename(columns=SHOWN).dropna(axis="columns", how="all")
         table: str = shown.to_html(float_format="{:.4g}".format, na_rep="–")

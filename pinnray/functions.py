@@ -30,10 +30,6 @@ if TYPE_CHECKING:
     from compare.crossval.result import CrossvalResult
 
 
-DRAWINGS = (".step", ".stp", ".dxf", ".svg", ".msh")
-"""Suffixes of files that are drawings."""
-
-
 def mesh(design: str | Path | Finger = "default", **settings: Any) -> TriangleMesh:
     """The mesh of a finger, from the cache if it was made before.
 
@@ -58,10 +54,8 @@ def load_drawing(file: str | Path, **description: Any) -> DrawnFinger:
     Raises:
         UserError: If the drawing cannot be read, is no sound section, or the description does not fit it.
     """
-    file = Path(file)
-    known = load_description(description_beside(file))
-    given = Description(**{**known.model_dump(exclude_none=True), **description})
-    return drawn_finger(file, given)
+    known = load_description(description_beside(Path(file))).model_dump(exclude_none=True)
+    return drawn_finger(Path(file), Description(**{**known, **description}))
 
 
 def solver(name: str, **settings: Any) -> Solver:
@@ -85,14 +79,14 @@ def solve(
     """Solve a problem, or a design with the usual material and load, with one solver.
 
     Warns of numbers that look like another unit, of unlikely measurements, and of a body that is turned
-    inside out or goes through itself, which the solution's status says, too.
+    inside out or goes through itself; the solution's status has these faults, too.
 
     Args:
         problem: A problem, or a design in one of the ways of `mesh`.
         solver: A solver or its name; it takes the material law that it has.
-        size: Largest element in walls and ribs, mm; for a design only, like the following.
+        size: Largest element in walls and ribs, mm; as the other arguments, for a design only.
         material: The elastic constants.
-        load: What moves the finger.
+        load: Motion of the indenter.
         measurements: Marker displacements, for a solver that assimilates them.
 
     Raises:
@@ -104,8 +98,8 @@ def solve(
     chosen = _solver(solver)
     if not isinstance(problem, Problem):
         finger = _design(problem)
-        given = None if measurements is None else _observations(measurements, finger)
-        triangles = mesh(finger, **({} if size is None else {"size": size}))
+        triangles = finger_mesh(finger, settings=_mesh_settings(size))
+        given = _observations(measurements, finger)
         problem = Problem(triangles, material or Material(), load or Load(), given, finger)
     elif any(each is not None for each in (size, material, load, measurements)):
         raise UserError(
@@ -150,7 +144,7 @@ def compare(
         size: Largest element in walls and ribs, mm.
         adapt: Tolerance of `fem` at the markers, mm, for which the mesh is refined.
         material: The elastic constants; each solver takes the law that it has.
-        load: What moves the finger.
+        load: Motion of the indenter.
         reference: Name of the solver that the others are compared with; `fem`, else the first, if None.
         out: Folder for the files of `compare` on the command line; nothing is written if None.
         resume: Whether to take over solutions that an earlier run with the same `out` finished.
@@ -171,11 +165,11 @@ def compare(
         design=finger,
         solvers=chosen,
         spare=[each.name for each in chosen if each.name != reference] if solvers is None else (),
-        mesh=MeshSettings() if size is None else MeshSettings(size=size),
+        mesh=_mesh_settings(size),
         adapt=adapt,
         material=material or Material(),
         load=load or Load(),
-        measurements=None if measurements is None else _observations(measurements, finger),
+        measurements=_observations(measurements, finger),
         truth=truth,
         reference=reference,
         resume=resume,
@@ -249,7 +243,7 @@ def crossval(
         measurements: As for `compare`, but no film.
         size: Largest element in walls and ribs, mm; 0.5 if None.
         material: The elastic constants.
-        load: What moves the finger.
+        load: Motion of the indenter.
         progress: Whether to show the stages on standard error.
         study: Further attributes of `compare.crossval.study.CrossvalStudy`, such as `truths`, `schemes`,
             `seeds`, `noise`.
@@ -273,7 +267,7 @@ def crossval(
         mesh=MeshSettings(size=ELEMENT_SIZE if size is None else size),
         material=elastic,
         load=load or Load(),
-        measurements=None if measurements is None else _observations(measurements, finger),
+        measurements=_observations(measurements, finger),
         **study,
     )
     with Stages(quiet=not progress) as stages:
@@ -281,11 +275,12 @@ def crossval(
 
 
 def _design(design: str | Path | Finger) -> Finger:
-    if not isinstance(design, str | Path):
-        if not isinstance(design, Design | DrawnFinger):
-            raise UserError(f"{design!r} is no design; give a finger, the name of a preset or a file")
-        return design
-    return load_drawing(design) if Path(design).suffix.lower() in DRAWINGS else load_design(design)
+    if isinstance(design, str | Path):
+        drawn = Path(design).suffix.lower() in (".step", ".stp", ".dxf", ".svg", ".msh")
+        return load_drawing(design) if drawn else load_design(design)
+    if not isinstance(design, Design | DrawnFinger):
+        raise UserError(f"{design!r} is no design; give a finger, the name of a preset or a file")
+    return design
 
 
 def _solver(given: str | Solver) -> Solver:
@@ -296,11 +291,17 @@ def _solver(given: str | Solver) -> Solver:
     return solver(given) if isinstance(given, str) else given
 
 
-def _observations(given: "str | Path | Observations | pd.DataFrame", design: Finger) -> Observations:
-    """Observations from whatever holds them: a data frame, a CSV file, or a film."""
+def _mesh_settings(size: float | None) -> MeshSettings:
+    return MeshSettings() if size is None else MeshSettings(size=size)
+
+
+def _observations(
+    given: "str | Path | Observations | pd.DataFrame | None", design: Finger
+) -> Observations | None:
+    """Observations from a data frame, a CSV file, or a film."""
     from vision.measurements import read_measurements
 
-    if isinstance(given, Observations):
+    if given is None or isinstance(given, Observations):
         return given
     if isinstance(given, str | Path):
         if Path(given).suffix.lower() != ".csv":
