@@ -7,6 +7,7 @@ import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 from typing import TypeVar
 
@@ -66,7 +67,8 @@ def finger_mesh(
     if isinstance(finger, DrawnFinger) and finger.mesh is not None and settings == MeshSettings():
         return replace(finger.mesh, depth=finger.depth)
     task["finger"] = finger.definition()
-    return _cached(finger.digest, task, ".npz", TriangleMesh.load, cache_dir, timeout_s, keep)
+    entry = _entry(task, finger.digest, ".npz", cache_dir)
+    return _cached(entry, task, timeout_s, TriangleMesh.load, TriangleMesh.save if keep else None)
 
 
 def drawn_finger(
@@ -96,7 +98,8 @@ def drawn_finger(
         "name": file.name,
         "description": description.model_dump(mode="json"),
     }
-    return _cached(file_digest(file), task, ".json", DrawnFinger.load, cache_dir, timeout_s)
+    entry = _entry(task, file_digest(file), ".json", cache_dir)
+    return _cached(entry, task, timeout_s, DrawnFinger.load, DrawnFinger.save)
 
 
 def cad_files(
@@ -131,7 +134,8 @@ def cad_files(
         "formats": sorted(set(formats)),
     }
     task["finger"] = finger.definition()
-    contents = _cached(finger.digest, task, ".zip", _unpack, cache_dir, timeout_s)
+    entry = _entry(task, finger.digest, ".zip", cache_dir)
+    contents = _cached(entry, task, timeout_s, _unpack, _pack)
     for name, content in contents.items():
         write_bytes(folder / name, content)
     return [folder / name for name in contents]
@@ -175,18 +179,19 @@ def cache_key(digest: str, task: dict[str, object]) -> str:
     return content_hash(parts)
 
 
+def _entry(task: dict[str, object], digest: str, suffix: str, cache_dir: Path | None) -> Path:
+    """The file of a task's result in the cache."""
+    return (cache_dir or cache_folder()) / f"{task['kind']}-{cache_key(digest, task)}{suffix}"
+
+
 def _cached(
-    digest: str,
+    entry: Path,
     task: dict[str, object],
-    suffix: str,
-    load: Callable[[Path], _Result],
-    cache_dir: Path | None,
     timeout_s: float,
-    keep: bool = True,
+    load: Callable[[Path], _Result],
+    save: Callable[[_Result, Path], None] | None,
 ) -> _Result:
-    """Load the task's result; make it first if it is missing or cannot be read."""
-    folder = cache_dir or cache_folder()
-    entry = folder / f"{task['kind']}-{cache_key(digest, task)}{suffix}"
+    """Load a task's result; make it first if it is missing or cannot be read."""
     if entry.exists():
         try:
             return load(entry)
@@ -196,16 +201,20 @@ def _cached(
                 RuntimeWarning,
                 stacklevel=3,
             )
-    made = run_task({**task, "output": entry.name}, timeout_s)
-    try:
-        result, content = load(made), made.read_bytes()
-    finally:
-        made.unlink(missing_ok=True)
-    if keep:
-        with kept_if_possible(folder, str(task["what"])):
-            remove_partials(folder, older_than_s=ABANDONED_S)
-            write_bytes(entry, content)
-    return result
+    made: _Result = run_task(task, timeout_s)
+    if save:
+        with kept_if_possible(entry.parent, str(task["what"])):
+            remove_partials(entry.parent, older_than_s=ABANDONED_S)
+            save(made, entry)
+    return made
+
+
+def _pack(contents: dict[str, bytes], path: Path) -> None:
+    buffer = BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in contents.items():
+            archive.writestr(name, content)
+    write_bytes(path, buffer.getvalue())
 
 
 def _unpack(path: Path) -> dict[str, bytes]:

@@ -4,7 +4,6 @@ The only module that imports CadQuery; import it where it is used.
 """
 
 import tempfile
-import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from errno import EIO
 from pathlib import Path
@@ -123,17 +122,15 @@ STL_HEAD, STL_TRIANGLE = 84, 50
 """Bytes of a binary STL file before its triangles, whose number comes last, and of each triangle."""
 
 
-def write_archive(finger: Finger, formats: Sequence[str], path: Path) -> None:
-    """Write the files of some formats into one ZIP archive."""
-    with tempfile.TemporaryDirectory() as folder, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name in formats:
-            for file in WRITERS[name](finger, Path(folder)):
-                _check_end(file)
-                archive.write(file, file.name)
+def cad_contents(finger: Finger, formats: Sequence[str]) -> dict[str, bytes]:
+    """The contents of a finger's CAD files in some formats, by name."""
+    with tempfile.TemporaryDirectory() as folder:
+        files = [file for name in formats for file in WRITERS[name](finger, Path(folder))]
+        return {file.name: _whole(file) for file in files}
 
 
-def _check_end(path: Path) -> None:
-    """Raise an `OSError` if a file has no end: OpenCASCADE does not say that a disk is full."""
+def _whole(path: Path) -> bytes:
+    """The content of a file; an `OSError` if it has no end: OpenCASCADE does not say that a disk is full."""
     content = path.read_bytes()
     if path.suffix == ".stl":
         whole = len(content) == STL_HEAD + STL_TRIANGLE * int.from_bytes(content[80:84], "little")
@@ -141,6 +138,7 @@ def _check_end(path: Path) -> None:
         whole = content.rstrip().endswith(ENDS[path.suffix])
     if not whole:
         raise OSError(EIO, "a part was not written; is the disk full?", str(path))
+    return content
 
 
 def _wires(finger: Finger) -> tuple[cq.Wire, list[cq.Wire]]:

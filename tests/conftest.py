@@ -15,7 +15,7 @@ from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.worker import child_environment
+from geometry.processes import child_environment
 
 PLUGIN = Path(__file__).parent / "solvers" / "plugin"
 

@@ -4,14 +4,11 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
-from contextlib import closing
 from pathlib import Path
 
 import pytest
 
-from compare.runtime.processes import in_processes
-from geometry.worker import Worker, child_environment
-from studies.sweep.workers import Workers
+from geometry.processes import Pool, child_environment
 
 
 def sum_of(number: int, progress: Callable[..., None]) -> int:
@@ -27,27 +24,12 @@ def hostile_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_the_worker_runs_no_module_of_the_working_folder(hostile_folder: Path) -> None:
-    worker = Worker()
-    task = {"kind": "cad", "what": "this", "formats": ["svg"], "finger": {}, "timeout_s": 60}
-    said = worker.answer({**task, "output": str(worker.folder / "made")}, timeout_s=60)
-    worker.stop()
-    assert (said, (hostile_folder / "ran").exists()) == ("", False)
-
-
 def test_processes_run_no_module_of_the_working_folder(hostile_folder: Path) -> None:
-    with closing(in_processes(sum_of, {"a": 1}, processes=1, report=lambda *_: None)) as answers:
-        assert list(answers) == [("a", 2)]
-    assert not (hostile_folder / "ran").exists()
-
-
-def test_workers_of_a_sweep_run_no_module_of_the_working_folder(hostile_folder: Path) -> None:
     before = dict(os.environ)
-    with Workers(1) as workers:
-        assert workers._connected().submit(os.getcwd).result() == str(hostile_folder)
+    with Pool(1) as pool:
+        assert dict(pool.answers(sum_of, {"a": 1})) == {"a": 2}
     assert not (hostile_folder / "ran").exists()
-    changed = {name for name, _ in os.environ.items() ^ before.items()}  # Dask sets the workers' here, too
-    assert changed <= {"__DASK_PARENT_PID"}
+    assert dict(os.environ) == before
 
 
 def test_gmsh_takes_no_options_from_the_working_folder(tmp_path: Path) -> None:

@@ -15,14 +15,14 @@ from compare.crossval.true_fields import TrueField, TruthTask, simulate_truth
 from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
 from compare.evaluation.virtual_experiment import experiment_source
 from compare.runtime.output_folder import locked
-from compare.runtime.processes import ProcessFailed, in_stages
 from compare.runtime.resumable_folder import check_resumable_folder
-from compare.runtime.stages import Stages
+from compare.runtime.stages import Stages, in_stages
 from geometry.arrays import FloatArray
 from geometry.atomic import write_json
 from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.observations import Observations
+from geometry.processes import ProcessFailed
 from solvers.problem import Problem
 
 DEFINITION = "definition.json"

@@ -14,13 +14,13 @@ from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import evaluated
 from compare.pipeline.job import Job
 from compare.runtime.output_folder import SOLUTIONS, TRAINING, take_training
-from compare.runtime.processes import ProcessFailed, end_with_parent, in_processes
-from compare.runtime.provenance import package_versions
+from compare.runtime.provenance import cores, package_versions
 from compare.runtime.stages import Stages
 from geometry.atomic import write_text
 from geometry.content_hash import content_hash, sources_digest
 from geometry.errors import UserError
 from geometry.observations import Observations
+from geometry.processes import Pool, ProcessFailed, end_with_parent
 from solvers.problem import Problem
 from solvers.shared_work import SharedWork
 from solvers.solver import (
@@ -77,7 +77,9 @@ def solve_all(
     """
     linear = [each for each in solvers if with_law(job.material, each).law == "linear"]
     others = [each for each in solvers if each not in linear]
-    if job.processes > 1 and linear and others and len(problem.mesh.points) >= LARGE:
+    # A class of the calling script is unknown to other processes.
+    elsewhere = all(type(each).__module__ != "__main__" for each in solvers)
+    if job.processes > 1 and elsewhere and linear and others and len(problem.mesh.points) >= LARGE:
         outcome = _in_two_processes(
             {
                 name: _Part(job, own, problem, observations, folder)
@@ -105,7 +107,10 @@ def _in_two_processes(parts: "Mapping[str, _Part]", stages: Stages) -> Outcome:
             shown[part, stage] = ends[part].enter_context(stages.stage(stage))
         shown[part, stage](fraction, note)
 
-    with closing(in_processes(_answered, parts, processes=len(parts), report=report)) as answers:
+    with (
+        Pool(len(parts), threads=max(1, cores() // len(parts))) as pool,
+        closing(pool.answers(_answered, parts, report=report)) as answers,
+    ):
         for name, answer in answers:
             if isinstance(answer, ProcessFailed):
                 raise UserError(f"{name}: {answer.message}; a resumed run goes on from what was finished")

@@ -13,6 +13,7 @@ from types import FrameType
 from typing import NoReturn
 
 from compare.runtime.exits import INTERRUPTED, say
+from geometry.processes import leave_signals_alone
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -35,16 +36,9 @@ def ending_at_once() -> Iterator[None]:
 @contextmanager
 def interruptible() -> Iterator[None]:
     """Raise KeyboardInterrupt in the block for every signal that asks the program to end."""
-    leave_signals_alone()
+    leave_signals_alone(os.environ)
     with _handled(signal.default_int_handler):
         yield
-
-
-def leave_signals_alone() -> None:
-    """Keep PETSc, once it is loaded, from ending the program at a signal with a page of text."""
-    options = os.environ.get("PETSC_OPTIONS", "")
-    if "-no_signal_handler" not in options:
-        os.environ["PETSC_OPTIONS"] = f"{options} -no_signal_handler".strip()
 
 
 @contextmanager

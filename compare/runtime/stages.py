@@ -1,12 +1,12 @@
 """The stages of a run: their progress and how long each took."""
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import ExitStack, closing, contextmanager
 from contextvars import ContextVar
 from datetime import UTC, datetime
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from rich.console import Console
 from rich.progress import (
@@ -19,9 +19,13 @@ from rich.progress import (
 )
 from rich.table import Column
 
-from compare.runtime.provenance import machine
+from compare.runtime.provenance import cores, machine
+from geometry.processes import Pool, ProcessFailed
 from solvers.solver import Progress as Report
 from solvers.solver import UnsupportedProblemError
+
+Input = TypeVar("Input")
+Output = TypeVar("Output")
 
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)
 
@@ -102,3 +106,42 @@ class Stages:
         if self._log:
             line = f"{name}: {self.seconds[name]:.1f} s{last and ', '}{last}"
             self._console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+def in_stages(
+    work: Callable[[Input, Report], Output],
+    tasks: Mapping[str, Input],
+    *,
+    processes: int,
+    stages: Stages,
+    kind: str,
+    note: Callable[[str, Output | ProcessFailed], str],
+) -> Generator[tuple[str, Output | ProcessFailed], None, None]:
+    """Run tasks in processes that share the cores, with a stage for each and one for all of them.
+
+    Args:
+        work: A function of a module, called with a task and a function that reports progress.
+        tasks: Tasks by name; they must be picklable.
+        processes: Largest number of processes at a time.
+        stages: Where the progress is shown.
+        kind: Name of the stage for all, such as "runs".
+        note: Turns a task's name and its answer into a short text.
+    """
+    lines: dict[str, tuple[ExitStack, Report]] = {}
+
+    def report(name: str, fraction: float, text: str) -> None:
+        if name not in lines:
+            stack = ExitStack()
+            lines[name] = stack, stack.enter_context(stages.stage(name))
+        lines[name][1](fraction, text)
+
+    with (
+        stages.stage(kind) as overall,
+        Pool(processes, threads=max(1, cores() // max(1, min(processes, len(tasks))))) as pool,
+        closing(pool.answers(work, tasks, report=report)) as answers,
+    ):
+        for done, (name, answer) in enumerate(answers, start=1):
+            yield name, answer
+            report(name, 1.0, note(name, answer))
+            lines[name][0].close()
+            overall(done / len(tasks), f"{done} of {len(tasks)} {kind}")

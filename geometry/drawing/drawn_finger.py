@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from geometry.arrays import FloatArray, frozen_array
+from geometry.atomic import write_text
 from geometry.content_hash import content_hash
 from geometry.drawing.checks import thinnest_wall
 from geometry.drawing.placement import Placement
@@ -150,7 +151,7 @@ class DrawnFinger:
 
     def save(self, path: Path) -> None:
         """Write the definition and the file's own mesh as JSON."""
-        path.write_text(json.dumps(self.whole()), encoding="utf-8")
+        write_text(path, json.dumps(self.whole()))
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle the whole definition, for other processes."""

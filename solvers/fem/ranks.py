@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 from mpi4py import MPI
 
 import solvers.petsc  # noqa: F401 (on all ranks together: one alone would wait for the others when it solves)
-from geometry.worker import child_environment
+from geometry.processes import child_environment
 from solvers.problem import Problem
 from solvers.solver import Progress, silent
 

@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from compare.runtime.output_folder import locked
-from compare.runtime.processes import ProcessFailed, in_stages
 from compare.runtime.provenance import cores
 from compare.runtime.resumable_folder import check_resumable_folder, job_definition
-from compare.runtime.stages import Stages
+from compare.runtime.stages import Stages, in_stages
 from geometry.atomic import write_json
 from geometry.cache import finger_mesh
 from geometry.finger.finger import Finger
 from geometry.mesh.settings import MeshSettings
+from geometry.processes import ProcessFailed
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
 from solvers.solver import Solver, check_load

@@ -28,9 +28,6 @@ STUDY_FILE, JOURNAL = "sweep.json", "journal.sqlite"
 FEW = 5
 """Samples that a remark names."""
 
-POOLS = 50
-"""Most times that the worker processes are started anew, because some of them died while they started."""
-
 
 @dataclass(frozen=True)
 class SweepJob:
@@ -119,25 +116,12 @@ def finish(
         journal: Where the results are kept.
         workers: The processes that do the work.
         progress: Called with the share that is done and a note.
-
-    Raises:
-        UserError: If the workers die whenever they start.
     """
-    for _ in range(POOLS):
-        known = journal.numbers() & tasks.keys()
-        missing = {number: task for number, task in tasks.items() if number not in known}
-        if not missing:
-            return
-        for answer in workers.answers(missing):
-            journal.add(answer)
-            known.add(answer.number)
-            progress(len(known) / len(tasks), f"{len(known)} of {len(tasks)} samples")
-        if len(known) < len(tasks):
-            workers.stop()  # some of them died while they started
-    raise UserError(
-        f"worker processes died while they started, {POOLS} times; the same command goes on with the "
-        f"{len(missing)} samples that are left"
-    )
+    known = journal.numbers() & tasks.keys()
+    for answer in workers.answers({number: task for number, task in tasks.items() if number not in known}):
+        journal.add(answer)
+        known.add(answer.number)
+        progress(len(known) / len(tasks), f"{len(known)} of {len(tasks)} samples")
 
 
 def _definition(job: SweepJob, first: dict[str, Any]) -> dict[str, Any]:

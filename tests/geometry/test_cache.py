@@ -1,19 +1,22 @@
 """Cache and worker: quick hits, damaged entries, time limits, one-line failures."""
 
-import json
 import os
 import shutil
 import subprocess
 import sys
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from geometry import Design, MeshSettings, UserError, cad_files, finger_mesh
+from geometry import Design, MeshSettings, UserError, cad_files, finger_mesh, worker
 from geometry.cache import cache_folder, cache_key, drawn_finger
 from geometry.drawing.description import Description
-from geometry.worker import Worker, child_environment, run_task
+from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.processes import Pool, child_environment
+from geometry.worker import perform, run_task
 
 COARSE = MeshSettings(size=1.5, coarsening=2)
 
@@ -61,13 +64,12 @@ def test_worker_gives_the_same_mesh_as_meshing_here(folder: Path) -> None:
 )
 def test_damaged_entry_is_rebuilt_with_a_warning(folder: Path, damage, monkeypatch) -> None:  # type: ignore[no-untyped-def]
     entry = entry_of(folder)
-    good = entry.read_bytes()
+    good, mesh = entry.read_bytes(), TriangleMesh.load(entry)
     rebuilt = []
 
     def run(task, timeout_s):  # type: ignore[no-untyped-def]
         rebuilt.append(task["kind"])
-        (made := folder / "made").write_bytes(good)
-        return made
+        return mesh
 
     monkeypatch.setattr("geometry.cache.run_task", run)
     entry.write_bytes(damage(good))
@@ -97,7 +99,7 @@ def test_time_limit_ends_the_worker_with_advice(tmp_path: Path) -> None:
 
 
 def test_refusal_in_the_worker_comes_back_as_its_own_line() -> None:
-    task = {"kind": "mesh", "what": "meshing", "settings": {}, "output": "m.npz"}
+    task = {"kind": "mesh", "what": "meshing", "settings": {}}
     with pytest.raises(UserError, match="ribs") as refused:
         run_task({**task, "finger": {"rib_count": 50}}, 60)
     assert "\n" not in str(refused.value)
@@ -120,34 +122,23 @@ def test_the_worker_stays_and_follows_a_change_of_folder(
 def test_crash_in_the_worker_gives_one_line() -> None:
     task = {"kind": "mesh", "what": "meshing", "settings": {}, "finger": None}  # a fault of our own
     with pytest.raises(UserError, match=r"meshing failed \(exit code 1\)") as refused:
-        run_task({**task, "output": "m.npz"}, 60)
+        run_task(task, 60)
     assert "\n" not in str(refused.value)
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is limited on Linux only")
-def test_a_task_that_needs_more_memory_than_is_free_is_one_line(tmp_path: Path) -> None:
-    """A worker whose task takes a gigabyte, then one whose task takes a megabyte, with 0.5 GB free."""
-    code = (
-        "import geometry.worker as worker\n"
-        "worker._work = lambda kind: lambda task, output: bytearray(task['bytes']) and None\n"
-        "worker.main()"
-    )
-    task = {"kind": "mesh", "what": "meshing", "output": "m.npz", "timeout_s": 60, "memory_gb": 0.5}
-    tasks = "".join(json.dumps({**task, "bytes": size}) + "\n" for size in (10**9, 10**6))
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, str(tmp_path / "folder")],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        env=child_environment(os.environ),
-    )
-    assert process.stdin is not None
-    assert process.stdout is not None
-    process.stdin.write(tasks)
-    process.stdin.flush()
-    answers = [json.loads(process.stdout.readline())["error"] for _ in range(2)]
-    process.communicate()
-    assert answers == ["meshing needs more than 0.5 GB, which is what is free; use larger elements", ""]
+def test_a_task_that_needs_more_memory_than_is_free_is_one_line() -> None:
+    """A task that takes a gigabyte, then one that takes a megabyte, with 0.5 GB free."""
+    tasks = {name: {"what": name, "bytes": size} for name, size in {"large": 10**9, "small": 10**6}.items()}
+    with Pool(1) as pool:
+        answers = dict(pool.answers(fill_memory, tasks))
+    assert str(answers["large"]) == "large needs more than 0.5 GB, which is what is free; use larger elements"
+    assert answers["small"] == 10**6
+
+
+def fill_memory(task: dict[str, Any], report: Callable[..., None]) -> object:
+    worker._work = lambda kind: lambda task: len(bytearray(task["bytes"]))
+    return perform({**task, "kind": "mesh", "memory_gb": 0.5}, report)
 
 
 def test_a_cache_that_cannot_be_written_is_a_warning_and_the_mesh_is_there(tmp_path: Path) -> None:
@@ -163,23 +154,18 @@ def test_a_cache_that_cannot_be_written_is_a_warning_and_the_mesh_is_there(tmp_p
     [
         ({"kind": "mesh", "settings": COARSE.model_dump()}, ": File too large"),
         # OpenCASCADE writes a part and says nothing
-        (
-            {"kind": "cad", "formats": ["step"]},
-            "/finger.step: a part was not written; is the disk full?",
-        ),
+        ({"kind": "cad", "formats": ["step"]}, "/finger.step: a part was not written; is the disk full?"),
     ],
     ids=["mesh", "cad"],
 )
 def test_a_full_disk_in_the_worker_names_the_place(
     full_disk: None, task: dict[str, object], end: str
 ) -> None:
-    worker = Worker()  # a new one, which inherits the full disk
-    more = {"what": "this", "finger": {}, "output": str(worker.folder / "made"), "timeout_s": 60}
-    said = worker.answer({**task, **more}, timeout_s=60)
-    worker.stop()
-    assert said.startswith(f"this failed: {worker.folder}")
-    assert said.endswith(end)
-    assert not worker.folder.exists()
+    more = {"what": "this", "finger": {}, "memory_gb": 8.0}
+    with Pool(1) as pool:  # a new process, which inherits the full disk
+        ((_, answer),) = pool.answers(perform, {"this": {**task, **more}})
+    assert str(answer).startswith("this failed: /")
+    assert str(answer).endswith(end)
 
 
 @pytest.mark.parametrize(
@@ -196,14 +182,6 @@ def test_cache_folder(variables: dict[str, str], expected: str, monkeypatch: pyt
     for name, value in variables.items():
         monkeypatch.setenv(name, value)
     assert cache_folder() == Path(expected)
-
-
-def test_worker_does_not_inherit_an_mpi_run() -> None:
-    kept = child_environment(
-        {"OMPI_COMM_WORLD_RANK": "1", "PMIX_RANK": "1", "PMI_RANK": "0", "PATH": "/bin", "PYTHONPATH": "/x"}
-    )
-    assert set(kept) == {"PATH", "PYTHONPATH"}
-    assert kept["PYTHONPATH"].endswith(os.pathsep + "/x")
 
 
 @pytest.mark.mpi

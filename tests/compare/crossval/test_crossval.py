@@ -385,11 +385,11 @@ def test_differences_are_of_the_same_folds():
 def in_line(monkeypatch: pytest.MonkeyPatch) -> None:
     """Tasks one after the other in this process."""
 
-    def inline(work: object, tasks: Mapping[str, object], **_: object) -> Generator:
+    def inline(pool: object, work: object, tasks: Mapping[str, object], **_: object) -> Generator:
         for name, each in tasks.items():
             yield name, work(each, silent)
 
-    monkeypatch.setattr("compare.runtime.processes.in_processes", inline)
+    monkeypatch.setattr("geometry.processes.Pool.answers", inline)
 
 
 def run(line: str, out: Path) -> int:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from compare.runtime.exits import INTERRUPTED
-from geometry.worker import child_environment
+from geometry.processes import child_environment
 
 ENDING = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 
@@ -66,7 +66,7 @@ def started(
 def workers(parent: int) -> list[int]:
     """The children that run the worker; libraries start others while they are imported."""
     found = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
-    return [int(word) for word in found if "geometry.worker" in Path(f"/proc/{word}/cmdline").read_text()]
+    return [int(word) for word in found if "geometry.processes" in Path(f"/proc/{word}/cmdline").read_text()]
 
 
 def runs(process: int) -> bool:

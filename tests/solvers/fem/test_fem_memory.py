@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from geometry.worker import child_environment
+from geometry.processes import child_environment
 
 PROGRAM = """
 import sys

@@ -14,7 +14,6 @@ import pytest
 from rich.console import Console
 
 from compare.runtime.exits import INTERRUPTED, NOT_CONVERGED
-from compare.runtime.processes import ProcessFailed
 from compare.runtime.stages import Stages
 from geometry.arrays import FloatArray
 from geometry.cache import finger_mesh
@@ -22,6 +21,7 @@ from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.settings import MeshSettings
+from geometry.processes import ProcessFailed
 from pinnray.cli import main
 from pinnray.commands.studies.gridsearch import read_settings
 from pinnray.options.shared import SolverOptions
@@ -120,12 +120,12 @@ def scripted(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[GridPoint]]:
             return answer
 
         def inline(
-            _: object, tasks: Mapping[str, TrainingTask], **__: object
+            _: object, __: object, tasks: Mapping[str, TrainingTask], **___: object
         ) -> Generator[tuple[str, TrainingRun | ProcessFailed]]:
             for name, task in tasks.items():
                 yield name, work(task)
 
-        monkeypatch.setattr("compare.runtime.processes.in_processes", inline)
+        monkeypatch.setattr("geometry.processes.Pool.answers", inline)
         return trained
 
     def train_with(task: TrainingTask, worth: TrainingMetrics) -> TrainingRun:

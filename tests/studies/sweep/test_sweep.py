@@ -11,6 +11,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pandas as pd
@@ -28,6 +29,7 @@ from studies.sweep.store import opened
 from studies.sweep.study import Study, TaskMaker, load_study
 from studies.sweep.sweep import JOURNAL, Sweep, SweepJob, load_sweep, run_sweep
 from studies.sweep.tables import failure_grid, table
+from studies.sweep.workers import Workers
 from tests.pinnray.commands.programs import COMMAND
 
 STUDY = """
@@ -114,7 +116,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
         text=True,
     )
     killed: set[int] = set()
-    while process.poll() is None:  # at its start, which Dask does not mend
+    while process.poll() is None:  # at its start
         if not killed and (workers := children(process.pid)):
             with suppress(ProcessLookupError):
                 os.kill(min(workers), signal.SIGKILL)
@@ -128,7 +130,9 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def children(parent: int) -> set[int]:
     """Worker processes of a sweep."""
-    listed = subprocess.run(["pgrep", "-P", str(parent), "-f", "spawn_main"], capture_output=True, text=True)
+    listed = subprocess.run(
+        ["pgrep", "-P", str(parent), "-f", "geometry.processes"], capture_output=True, text=True
+    )
     return {int(word) for word in listed.stdout.split()}
 
 
@@ -177,40 +181,59 @@ def test_another_study_in_the_folder_is_refused(
 def test_a_sample_that_always_kills_its_worker_is_listed_as_failed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("studies.sweep.workers.measured", die_at_one)
+    monkeypatch.setattr("studies.sweep.workers._measured", die_at_one)
     monkeypatch.setattr("studies.sweep.workers.DEATHS", 2)
-    monkeypatch.setattr("studies.sweep.workers.AWAY_S", 6)
-    monkeypatch.setattr("studies.sweep.workers.LOOK_S", 1)
     study = load_study(study_file(tmp_path, 4))
     sweep = run_sweep(SweepJob(study, tmp_path, tmp_path / "out", 1))
     assert [each.state for each in sweep.measurements] == ["done", "failed", "done", "done"]
     assert sweep.measurements[1].message == "its worker process died 2 times"
     assert failure_grid(sweep).rows == [("failed", "1", "its worker process died", "1")]
     assert list(table(sweep)["state"]) == ["done", "failed", "done", "done"]
-    monkeypatch.setattr("studies.sweep.workers.measured", answered)
+    monkeypatch.setattr("studies.sweep.workers._measured", answered)
     again = run_sweep(SweepJob(study, tmp_path, tmp_path / "out", 1))
     assert {each.state for each in again.measurements} == {"done"}
 
 
-def test_a_script_without_its_guard_is_told_what_it_lacks(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_the_workers_of_a_scheduler_do_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from distributed import LocalCluster
+
+    monkeypatch.setattr("studies.sweep.workers.measured", answered)
+    tasks = {number: SimpleNamespace(number=number) for number in range(5)}
+    with (
+        LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
+        Workers(1, cluster.scheduler_address) as workers,
+    ):
+        found = [each.number for part in ({0: tasks[0]}, tasks) for each in workers.answers(part)]
+    assert (found[0], sorted(found[1:])) == (0, [0, 1, 2, 3, 4])
+
+
+def test_a_sample_that_kills_the_workers_of_a_scheduler_is_listed_as_failed(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def no_cluster(**settings: object) -> None:  # what LocalCluster does where the script has no guard
-        raise RuntimeError("Nanny failed to start.")
+    from distributed import KilledWorker, LocalCluster
 
-    monkeypatch.setattr("distributed.LocalCluster", no_cluster)
-    study = load_study(study_file(tmp_path, 2))
-    with pytest.raises(UserError, match=r'what it does must stand under `if __name__ == "__main__":`'):
-        run_sweep(SweepJob(study, tmp_path, tmp_path / "out", 1))
+    def dying(task: SimpleNamespace) -> Measurement:
+        if task.number == 1:
+            raise KilledWorker("sample", SimpleNamespace(address="tcp://a"), 0)  # as the scheduler does
+        return answered(task)
+
+    monkeypatch.setattr("studies.sweep.workers.measured", dying)
+    tasks = {number: SimpleNamespace(number=number) for number in range(3)}
+    with (
+        LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
+        Workers(1, cluster.scheduler_address) as workers,
+    ):
+        found = {each.number: each.state for each in workers.answers(tasks)}
+    assert found == {0: "done", 1: "failed", 2: "done"}
 
 
-def die_at_one(task: object) -> Measurement:
+def die_at_one(task: object, report: object) -> Measurement:
     if getattr(task, "number", None) == 1:
         os.kill(os.getpid(), signal.SIGKILL)
-    return answered(task)
+    return answered(task, report)
 
 
-def answered(task: object) -> Measurement:
+def answered(task: object, report: object = None) -> Measurement:
     return Measurement(getattr(task, "number", -1), "done", "", 0.0, {"force": 1.0})
 
 
@@ -218,11 +241,11 @@ REFUSED: dict[str, tuple[Callable[[Path], list[str]], str]] = {
     "no file": (lambda folder: [str(folder / "none.toml")], "cannot read the study"),
     "no scheduler": (
         lambda folder: [str(study_file(folder, 2)), "--scheduler", "tcp://127.0.0.1:9"],
-        "--scheduler tcp://127.0.0.1:9: no Dask scheduler answers there",
+        "scheduler tcp://127.0.0.1:9: no Dask scheduler answers there",
     ),
     "no address": (
         lambda folder: [str(study_file(folder, 2)), "--scheduler", "nowhere"],
-        "--scheduler nowhere: no Dask scheduler answers there",
+        "scheduler nowhere: no Dask scheduler answers there",
     ),
     "no workers": (lambda folder: [str(study_file(folder, 2)), "--processes", "0"], "--processes 0"),
 }

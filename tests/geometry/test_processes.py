@@ -1,4 +1,4 @@
-"""Tasks in processes of their own: their answers, their end, and what is left of them."""
+"""A pool of processes: answers of tasks, their end, and what is left of them."""
 
 import logging
 import os
@@ -7,18 +7,17 @@ import subprocess
 import sys
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from pathlib import Path
 
 import pytest
 
-from compare.runtime.processes import ProcessFailed, in_processes
-from compare.runtime.provenance import cores
+from geometry.processes import Pool, ProcessFailed, child_environment
 from pinnray.commands.launch import guarded
 from solvers.solver import Progress
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 
 
 def half(number: int, progress: Progress) -> float:
@@ -39,6 +38,24 @@ def unwritten(folder: Path, progress: Progress) -> None:
 
 def threads(_: int, progress: Progress) -> str:
     return os.environ["OMP_NUM_THREADS"]
+
+
+def die_once(folder: Path, progress: Progress) -> str:
+    try:
+        (folder / "died").touch(exist_ok=False)
+    except FileExistsError:
+        return "alive"
+    os.kill(os.getpid(), signal.SIGKILL)
+    raise AssertionError
+
+
+def process_number(_: object, progress: Progress) -> int:
+    return os.getpid()
+
+
+def time_out(seconds: int, progress: Progress) -> int:
+    time.sleep(seconds)
+    return seconds
 
 
 def warning(number: int, progress: Progress) -> None:
@@ -71,35 +88,52 @@ def until(condition: Callable[[], bool]) -> None:
         time.sleep(0.05)
 
 
-def silent(name: str, fraction: float, note: str) -> None:
-    pass
+def answers_of(work: Callable[..., object], tasks: Mapping[str, object], **options: object) -> dict:
+    """All answers of two processes."""
+    with Pool(2) as pool:
+        return dict(pool.answers(work, tasks, **options))
 
 
 def test_every_task_is_answered_and_reports_under_its_name():
     said = []
     tasks = {f"task {number}": number for number in range(3)}
-    answers = dict(in_processes(half, tasks, processes=2, report=lambda *what: said.append(what)))
+    answers = answers_of(half, tasks, report=lambda *what: said.append(what))
     assert answers == {"task 0": 0.0, "task 1": 0.5, "task 2": 1.0}
     assert sorted(said) == [(f"task {number}", 0.5, f"halving {number}") for number in range(3)]
 
 
 def test_a_process_that_ends_without_an_answer_does_not_stop_the_others(capfd):
-    answers = dict(in_processes(ended, {"a": 1, "b": 2, "c": 3}, processes=3, report=silent))
+    answers = answers_of(ended, {"a": 1, "b": 2, "c": 3})
     assert answers == {"a": ProcessFailed(-signal.SIGKILL), "b": ProcessFailed(1), "c": 1.0}
     assert "ZeroDivisionError" in capfd.readouterr().err  # whose fault it is can be read
 
 
+def test_a_task_is_tried_again_where_a_process_may_die(tmp_path):
+    """The first process that reads it is killed, as by somebody else."""
+    assert answers_of(die_once, {"a": tmp_path}, deaths=2) == {"a": "alive"}
+    assert answers_of(ended, {"a": 1}, deaths=2) == {"a": ProcessFailed(-signal.SIGKILL)}
+
+
+def test_a_process_stays_for_the_next_task():
+    with Pool(1) as pool:
+        numbers = [dict(pool.answers(process_number, {each: None}))[each] for each in "ab"]
+    assert numbers[0] == numbers[1] != os.getpid()
+
+
 def test_a_process_that_ends_before_it_has_read_a_large_task_is_noticed(monkeypatch):
     """Its parent must not wait for a reader: the task is larger than a pipe holds."""
-    program, main = Path(__file__).with_name("ends_at_once.py"), sys.modules["__main__"]
-    monkeypatch.setattr(main, "__file__", str(program), raising=False)  # a worker of xdist has none
-    monkeypatch.setattr(main, "__spec__", None)
-    answers = dict(in_processes(half, {"a": bytes(2**22)}, processes=1, report=silent))
-    assert answers == {"a": ProcessFailed(5)}
+    monkeypatch.setattr("geometry.processes._CHILD", "import os; os._exit(5)")
+    assert answers_of(half, {"a": bytes(2**22)}) == {"a": ProcessFailed(5)}
+
+
+def test_a_task_that_takes_too_long_is_ended():
+    before = time.monotonic()
+    assert answers_of(time_out, {"a": 60, "b": 0}, timeout_s=2) == {"a": ProcessFailed(None), "b": 0}
+    assert time.monotonic() - before < 20
 
 
 def test_a_file_that_cannot_be_written_is_told_in_one_line(tmp_path, capfd):
-    answers = dict(in_processes(unwritten, {"a": tmp_path}, processes=1, report=silent))
+    answers = answers_of(unwritten, {"a": tmp_path})
     assert answers["a"].message == f"{tmp_path}/absent/file: No such file or directory"
     assert "Traceback" not in capfd.readouterr().err
 
@@ -115,8 +149,9 @@ def test_an_interruption_lets_every_process_save_its_state(tmp_path, work):
 
     tasks = {"a": tmp_path, "b": tmp_path, "c": tmp_path}
     with (
+        Pool(2) as pool,
         pytest.raises(KeyboardInterrupt),
-        closing(in_processes(work, tasks, processes=2, report=report)) as answers,
+        closing(pool.answers(work, tasks, report=report)) as answers,
     ):
         next(answers)
     assert {path.name for path in tmp_path.iterdir()} == heard  # and the third never started
@@ -126,11 +161,10 @@ def test_processes_end_with_the_program_that_started_them(tmp_path):
     code = (
         "import sys; sys.path[:0] = sys.argv[1:3]\n"
         "from pathlib import Path\n"
-        "from test_processes import endless, silent\n"
-        "from compare.runtime.processes import in_processes\n"
+        "from test_processes import endless\n"
+        "from geometry.processes import Pool\n"
         "def report(name, fraction, note): print(note, flush=True)\n"
-        "if __name__ == '__main__':\n"
-        "    list(in_processes(endless, {'a': Path(sys.argv[3])}, processes=1, report=report))\n"
+        "list(Pool(1).answers(endless, {'a': Path(sys.argv[3])}, report=report))\n"  # without a guard
     )
     script = tmp_path / "script.py"
     script.write_text(code)
@@ -147,24 +181,26 @@ def test_processes_end_with_the_program_that_started_them(tmp_path):
     assert (tmp_path / child).read_text() == "saved"
 
 
-@pytest.mark.parametrize(("chosen", "expected"), [(None, "1"), ("3", "3")], ids=["share", "chosen"])
-def test_processes_share_the_cores(monkeypatch, chosen, expected):
-    """As many processes as cores have one thread each, and this process keeps its own."""
-    if chosen is None:
-        monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
-    else:
+@pytest.mark.parametrize(("chosen", "expected"), [(None, "2"), ("3", "3")], ids=["share", "chosen"])
+def test_processes_have_their_share_of_the_cores(monkeypatch, chosen, expected):
+    """This process keeps its own threads."""
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    if chosen:
         monkeypatch.setenv("OMP_NUM_THREADS", chosen)
-    tasks = {str(number): number for number in range(cores())}
-    answers = dict(in_processes(threads, tasks, processes=cores(), report=silent))
-    assert set(answers.values()) == {expected}
+    with Pool(1, threads=2) as pool:
+        assert dict(pool.answers(threads, {"a": 1})) == {"a": expected}
     assert os.environ.get("OMP_NUM_THREADS") == chosen
 
 
-def test_a_warning_of_several_processes_is_one_line_once(capfd):
-    def command() -> None:
-        list(in_processes(warning, {"a": 1, "b": 2, "c": 3}, processes=2, report=lambda *_: None))
+def test_a_process_does_not_inherit_an_mpi_run():
+    ranks = {"OMPI_COMM_WORLD_RANK": "1", "PMIX_RANK": "1", "PMI_RANK": "0"}
+    kept = child_environment({**ranks, "PATH": "/bin", "PYTHONPATH": "/x"})
+    assert set(kept) == {"PATH", "PYTHONPATH"}
+    assert kept["PYTHONPATH"].endswith(os.pathsep + "/x")
 
+
+def test_a_warning_of_several_processes_is_one_line_once(capfd):
     with warnings.catch_warnings():
         warnings.simplefilter("default")  # Python's own, which pytest replaces
-        assert guarded(command) == 0
+        assert guarded(lambda: len(answers_of(warning, {"a": 1, "b": 2, "c": 3}))) == 3
     assert capfd.readouterr().err == "warning: the disk is full\n"
