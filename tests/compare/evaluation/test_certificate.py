@@ -73,7 +73,7 @@ def disturbed(problem: Problem, size: float, *, at_base: bool = False) -> FloatA
 
 
 @pytest.mark.parametrize("load", LOADS.values(), ids=LOADS)
-def test_fem_itself_has_no_excess_and_nothing_out_of_balance(finger: TriangleMesh, load: Load) -> None:
+def test_fem_itself_has_no_excess_and_nothing_out_of_balance(finger, load):
     problem = Problem(finger, load=load)
     (own,) = with_certificates([Evaluation.of(FemSolver().solve(problem), finger)], problem)
     certificate = own.certificate
@@ -88,7 +88,7 @@ def test_fem_itself_has_no_excess_and_nothing_out_of_balance(finger: TriangleMes
 
 
 @pytest.mark.parametrize("load", LOADS.values(), ids=LOADS)
-def test_energies_of_any_displacement_against_another_program(finger: TriangleMesh, load: Load) -> None:
+def test_energies_of_any_displacement_against_another_program(finger, load):
     """Pythagoras: excess and violation are the energy of the difference from `fem`, which scikit-fem has too.
 
     The excess is the energy above the least with the same values; the dual norm of the imbalance, where the
@@ -132,7 +132,7 @@ def stiffness_of_scikit_fem(problem: Problem, *, centroids_only: bool = False) -
 
 
 @pytest.mark.parametrize("load", LOADS.values(), ids=LOADS)
-def test_missed_conditions_are_told_in_mm(finger: TriangleMesh, load: Load) -> None:
+def test_missed_conditions_are_told_in_mm(finger, load):
     """Everything moved by (0.02, -0.03) mm, base and contact included, which takes no energy."""
     problem = Problem(finger, load=load)
     solution = FemSolver().solve(problem)
@@ -146,7 +146,7 @@ def test_missed_conditions_are_told_in_mm(finger: TriangleMesh, load: Load) -> N
     assert certificate.faults == []  # 0.04 mm of 10 mm
 
 
-def test_half_the_stroke_is_no_excess_and_a_quarter_of_the_energy_in_violation(finger: TriangleMesh) -> None:
+def test_half_the_stroke_is_no_excess_and_a_quarter_of_the_energy_in_violation(finger):
     problem = Problem(finger)
     half = 0.5 * FemSolver().solve(problem).field.values
     certificate = Certifier(problem).certificate(sampled(problem, half))
@@ -156,7 +156,7 @@ def test_half_the_stroke_is_no_excess_and_a_quarter_of_the_energy_in_violation(f
 
 
 @pytest.mark.parametrize("poisson", [0.3, 0.44])
-def test_a_wrong_law_shows(finger: TriangleMesh, poisson: float) -> None:
+def test_a_wrong_law_shows(finger, poisson):
     """The field of another Poisson's ratio is not in balance under the right law."""
     wrong = FemSolver().solve(Problem(finger, Material(poisson=poisson)))
     certificate = Certifier(Problem(finger)).certificate(Evaluation.of(wrong, finger))
@@ -164,14 +164,14 @@ def test_a_wrong_law_shows(finger: TriangleMesh, poisson: float) -> None:
     assert bool(certificate.faults) is (poisson == 0.3)
 
 
-def test_linear_elements_do_not_pass_on_a_coarse_mesh(finger: TriangleMesh) -> None:
+def test_linear_elements_do_not_pass_on_a_coarse_mesh(finger):
     problem = Problem(finger)
     (linear,) = with_certificates([Evaluation.of(FemSolver(degree=1).solve(problem), finger)], problem)
     assert not linear.converged
     assert "its energy is" in linear.message
 
 
-def test_a_solver_that_reports_too_little_energy_is_found_out(finger: TriangleMesh) -> None:
+def test_a_solver_that_reports_too_little_energy_is_found_out(finger):
     problem = Problem(finger)
     solution = FemSolver().solve(problem)
     honest = Certifier(problem).certificate(sampled(problem, solution.field.values, solution.energy))
@@ -189,9 +189,7 @@ def test_a_solver_that_reports_too_little_energy_is_found_out(finger: TriangleMe
     ],
 )
 @pytest.mark.parametrize("load", LOADS.values(), ids=LOADS)
-def test_a_wrong_energy_or_force_is_found_out(
-    finger: TriangleMesh, load: Load, changes: dict[str, float], fault: str
-) -> None:
+def test_a_wrong_energy_or_force_is_found_out(finger, load, changes, fault):
     """A factor of a thousand is that of a wrong unit."""
     problem = Problem(finger, load=load)
     solution = FemSolver().solve(problem)
@@ -203,7 +201,7 @@ def test_a_wrong_energy_or_force_is_found_out(
     assert fault in found.message
 
 
-def test_a_minimiser_whose_quadrature_is_too_coarse_is_found_out(finger: TriangleMesh) -> None:
+def test_a_minimiser_whose_quadrature_is_too_coarse_is_found_out(finger):
     """Quadratic elements whose energy is seen at one point a triangle: blind to some of their modes."""
     problem = Problem(finger)
     space = LagrangeSpace(finger, 2)
@@ -224,14 +222,12 @@ def test_a_minimiser_whose_quadrature_is_too_coarse_is_found_out(finger: Triangl
     assert len(certificate.faults) == 3  # the third: it reports no force
 
 
-def test_least_energy_does_not_judge_a_solver_that_was_given_the_markers(
-    fem: Evaluation, finger: TriangleMesh
-) -> None:
+def test_least_energy_does_not_judge_a_solver_that_was_given_the_markers(fem, finger):
     given = replace(fem, in_sample=True)
     assert with_certificates([given], Problem(finger)) == [given]
 
 
-def test_only_the_linear_law_is_certified(finger: TriangleMesh) -> None:
+def test_only_the_linear_law_is_certified(finger):
     problem = Problem(finger)
     evaluation = Evaluation.of(FemSolver().solve(problem), finger)
     other = replace(evaluation, law="neo-hookean")
@@ -240,7 +236,7 @@ def test_only_the_linear_law_is_certified(finger: TriangleMesh) -> None:
     assert second is other
 
 
-def test_a_contact_that_is_found_is_not_certified(finger: TriangleMesh) -> None:
+def test_a_contact_that_is_found_is_not_certified(finger):
     problem = Problem(finger)
     evaluation = Evaluation.of(FemSolver().solve(problem), finger)
     pressed = replace(problem, load=Load(kind="cylinder", radius=5.0))
@@ -249,7 +245,7 @@ def test_a_contact_that_is_found_is_not_certified(finger: TriangleMesh) -> None:
     assert "a contact that is given, not found" in certificate_sentences(found, "cylinder")
 
 
-def test_a_verdict_can_only_take_convergence_away(fem: Evaluation, failed: Evaluation) -> None:
+def test_a_verdict_can_only_take_convergence_away(fem, failed):
     good = perfect()
     assert with_certificate(fem, good).converged
     assert not with_certificate(failed, good).converged
@@ -287,7 +283,7 @@ def perfect() -> Certificate:
     )
 
 
-def test_the_regions_are_the_whole_body_once(finger: TriangleMesh, mesh: TriangleMesh) -> None:
+def test_the_regions_are_the_whole_body_once(finger, mesh):
     # A bar has no cavity: no walls, and nothing beyond the last one. A ring has nothing solid beyond its own.
     hollow = build_mesh(ring(), MeshSettings(size=1.0))
     for body, names in ((finger, ("tip", "walls")), (mesh, ("rest",)), (hollow, ("walls",))):
@@ -296,7 +292,7 @@ def test_the_regions_are_the_whole_body_once(finger: TriangleMesh, mesh: Triangl
         np.testing.assert_array_equal(sum(here.astype(int) for here in regions.values()), 1)
 
 
-def test_the_regions_are_where_they_are_called(finger: TriangleMesh) -> None:
+def test_the_regions_are_where_they_are_called(finger):
     regions = body_regions(Problem(finger))
     x, y = finger.at_centroids().points.T
     assert x[regions["tip"]].min() >= 90 - 20
@@ -308,7 +304,7 @@ def test_the_regions_are_where_they_are_called(finger: TriangleMesh) -> None:
         assert np.linalg.norm(corners - place, axis=1).min() < 1e-9
 
 
-def test_the_errors_of_the_regions_add_up_to_that_of_the_body(finger: TriangleMesh) -> None:
+def test_the_errors_of_the_regions_add_up_to_that_of_the_body(finger):
     problem = Problem(finger)
     evaluation = sampled(problem, disturbed(problem, 1e-3))
     differences = reference_differences(evaluation, Evaluation.of(FemSolver().solve(problem), finger))
@@ -319,9 +315,7 @@ def test_the_errors_of_the_regions_add_up_to_that_of_the_body(finger: TriangleMe
     assert sum(region.area for region in regions) == pytest.approx(1)
 
 
-def test_energy_below_the_least_is_a_fault_of_the_program(
-    finger: TriangleMesh, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_energy_below_the_least_is_a_fault_of_the_program(finger, monkeypatch):
     problem = Problem(finger)
     evaluation = Evaluation.of(FemSolver().solve(problem), finger)
     certifier = Certifier(problem)
@@ -331,7 +325,7 @@ def test_energy_below_the_least_is_a_fault_of_the_program(
         certifier.certificate(evaluation)
 
 
-def test_a_result_that_is_not_finite_is_not_converged(finger: TriangleMesh) -> None:
+def test_a_result_that_is_not_finite_is_not_converged(finger):
     problem = Problem(finger)
     nodal = np.full((len(LagrangeSpace(finger, 2).nodes), 2), np.nan)
     (lost,) = with_certificates([sampled(problem, nodal)], problem)

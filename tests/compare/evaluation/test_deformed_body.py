@@ -3,12 +3,10 @@
 import json
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from compare.evaluation.comparison import Comparison
 from compare.evaluation.deformed_body import DeformedBody, with_body_checks
 from compare.evaluation.evaluation import Evaluation
 from compare.report.html_report import render
@@ -46,13 +44,11 @@ def moved(
         (1.2, True),  # its end lies in its start
     ],
 )
-def test_a_strip_rolled_by_more_than_a_turn_goes_through_itself(
-    turns: float, through: bool, mesh: TriangleMesh
-) -> None:
+def test_a_strip_rolled_by_more_than_a_turn_goes_through_itself(turns, through, mesh):
     assert bool(len(DeformedBody(mesh).crossings(rolled(mesh.points, turns)))) is through
 
 
-def test_places_of_crossings_are_where_the_outline_meets(mesh: TriangleMesh) -> None:
+def test_places_of_crossings_are_where_the_outline_meets(mesh):
     """A node of the upper face is pushed through the lower one, y = -4: its edges of 0.5 mm cross it."""
     pushed = np.zeros_like(mesh.points)
     pushed[np.isclose(mesh.points, [6.0, 0.0]).all(axis=1), 1] = -6.0
@@ -60,7 +56,7 @@ def test_places_of_crossings_are_where_the_outline_meets(mesh: TriangleMesh) -> 
     np.testing.assert_allclose(places, [[6 - 0.5 / 3, -4.0], [6 + 0.5 / 3, -4.0]], rtol=1e-12)
 
 
-def test_a_slit_that_is_closed_at_rest_is_no_crossing() -> None:
+def test_a_slit_that_is_closed_at_rest_is_no_crossing():
     """Two squares whose facing sides lie on each other but share no node but one."""
     points = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [2, 0], [2, 1], [1, 1]], dtype=float)
     triangles = np.array([[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 6]])
@@ -81,9 +77,7 @@ def test_a_slit_that_is_closed_at_rest_is_no_crossing() -> None:
         ("neo-hookean", False),  # its energy is infinite there
     ],
 )
-def test_a_body_inside_out_is_said_and_is_no_result_of_finite_strain(
-    law: str, converged: bool, fem: Evaluation, mesh: TriangleMesh
-) -> None:
+def test_a_body_inside_out_is_said_and_is_no_result_of_finite_strain(law, converged, fem, mesh):
     mirrored = moved(replace(fem, law=law), mesh, lambda points: -2 * points * [0, 1])
     (checked,), remarks = with_body_checks([mirrored], mesh)
     assert "TURNED INSIDE OUT in 384 of 384 triangles" in checked.message
@@ -91,7 +85,7 @@ def test_a_body_inside_out_is_said_and_is_no_result_of_finite_strain(
     assert [remark.partition(";")[0] for remark in remarks] == ["fem: TURNED INSIDE OUT"]
 
 
-def test_one_quarter_of_a_quadratic_triangle_can_be_inside_out(fem: Evaluation, mesh: TriangleMesh) -> None:
+def test_one_quarter_of_a_quadratic_triangle_can_be_inside_out(fem, mesh):
     bent = fem.edge_displacement.copy()
     inner = np.flatnonzero(
         np.bincount(mesh.edges.ravel(), minlength=len(mesh.points))[mesh.edges].min(axis=1) >= 6
@@ -104,9 +98,7 @@ def test_one_quarter_of_a_quadratic_triangle_can_be_inside_out(fem: Evaluation, 
 @pytest.mark.parametrize("field", ["node_displacement", "edge_displacement", "marker_displacement", "stress"])
 @pytest.mark.parametrize("law", ["linear", "neo-hookean"])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_field_that_is_not_finite_is_no_result(
-    field: str, law: str, value: float, fem: Evaluation, mesh: TriangleMesh
-) -> None:
+def test_a_field_that_is_not_finite_is_no_result(field, law, value, fem, mesh):
     broken = getattr(fem, field).copy()
     broken[-1] = value
     (checked,), remarks = with_body_checks([replace(fem, law=law, **{field: broken})], mesh)
@@ -115,14 +107,12 @@ def test_a_field_that_is_not_finite_is_no_result(
     assert len(remarks) == 1
 
 
-def test_a_sound_body_is_left_as_it_is(fem: Evaluation, pinn: Evaluation, mesh: TriangleMesh) -> None:
+def test_a_sound_body_is_left_as_it_is(fem, pinn, mesh):
     small = moved(fem, mesh, lambda points: 0.01 * points)
     assert with_body_checks([small], mesh, truth=small) == ([small], [])
 
 
-def test_the_warning_names_all_and_the_simulated_finger(
-    fem: Evaluation, pinn: Evaluation, mesh: TriangleMesh, compared: Callable[..., Comparison]
-) -> None:
+def test_the_warning_names_all_and_the_simulated_finger(fem, pinn, mesh, compared):
     through = [moved(each, mesh, lambda points: rolled(points, 1.2)) for each in (fem, pinn)]
     checked, remarks = with_body_checks(through, mesh, truth=through[0])
     assert [each.converged for each in checked] == [True, True]  # each solved what it was asked
@@ -147,9 +137,7 @@ def test_the_warning_names_all_and_the_simulated_finger(
     )
 
 
-def test_a_stroke_through_the_back_is_said_everywhere(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], without_pictures: None
-) -> None:
+def test_a_stroke_through_the_back_is_said_everywhere(tmp_path, capsys, without_pictures):
     design, out = load_design(), tmp_path / "run"
     markers = finger_mesh(design, settings=MeshSettings(size=2.0)).markers
     rows = "".join(f"{x},{y},0,0\n" for x, y in markers)

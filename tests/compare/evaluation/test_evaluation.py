@@ -1,20 +1,16 @@
 from dataclasses import fields, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from compare.evaluation.evaluation import Evaluation
-from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
 from tests.meshes import permuted
 
 
-def test_it_samples_the_nodes_the_markers_and_three_points_a_triangle(
-    fem: Evaluation, mesh: TriangleMesh
-) -> None:
+def test_it_samples_the_nodes_the_markers_and_three_points_a_triangle(fem, mesh):
     x, y = mesh.points.T
     np.testing.assert_allclose(fem.node_displacement, np.stack([0.01 * y**2, -0.02 * x**2], axis=1))
     np.testing.assert_array_equal(fem.marker_displacement, fem.node_displacement[mesh.marker_nodes])
@@ -22,19 +18,19 @@ def test_it_samples_the_nodes_the_markers_and_three_points_a_triangle(
     assert fem.weights.sum() == pytest.approx(12 * 4)
 
 
-def test_energy_density_is_that_of_pure_shear(fem: Evaluation) -> None:
+def test_energy_density_is_that_of_pure_shear(fem):
     shear_modulus = 11.4 / (2 * 1.45)
     np.testing.assert_allclose(fem.energy_density, 2 * shear_modulus * fem.strain[:, 0, 1] ** 2, rtol=1e-12)
 
 
-def test_the_mean_over_a_triangle_is_weighted_by_area(fem: Evaluation) -> None:
+def test_the_mean_over_a_triangle_is_weighted_by_area(fem):
     two = replace(fem, weights=np.array([1.0, 1.0, 2.0, 5.0, 0.0, 0.0]))
     np.testing.assert_allclose(two.per_triangle(np.array([4.0, 8.0, 2.0, 7.0, 99.0, 99.0])), [4.0, 7.0])
     tensors = np.arange(6.0)[:, None, None] * np.eye(2)
     np.testing.assert_allclose(two.per_triangle(tensors), np.array([1.25, 3.0])[:, None, None] * np.eye(2))
 
 
-def test_everything_comes_back_from_disk(pinn: Evaluation, tmp_path: Path) -> None:
+def test_everything_comes_back_from_disk(pinn, tmp_path):
     path = tmp_path / "pinn.npz"
     pinn.save(path, "digest")
     back = Evaluation.load(path, "digest")
@@ -50,16 +46,16 @@ def test_everything_comes_back_from_disk(pinn: Evaluation, tmp_path: Path) -> No
             assert after == before, entry.name
 
 
-def test_another_key_is_another_result(pinn: Evaluation, tmp_path: Path) -> None:
+def test_another_key_is_another_result(pinn, tmp_path):
     pinn.save(tmp_path / "pinn.npz", "digest")
     assert Evaluation.load(tmp_path / "pinn.npz", "another digest") is None
 
 
-def test_a_missing_file_is_no_result(tmp_path: Path) -> None:
+def test_a_missing_file_is_no_result(tmp_path):
     assert Evaluation.load(tmp_path / "none.npz", "digest") is None
 
 
-def test_a_solution_found_on_another_mesh_is_sampled_at_the_same_places(mesh: TriangleMesh) -> None:
+def test_a_solution_found_on_another_mesh_is_sampled_at_the_same_places(mesh):
     """Where an element has another number there, the values must still be those of the place."""
     own, other = (
         Solution(

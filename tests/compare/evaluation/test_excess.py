@@ -1,6 +1,5 @@
 """The picture of the excess energy and the certificate in words."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 
 from compare.evaluation.certificate import Certificate, Region
 from compare.evaluation.certification import with_certificate
-from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.figures.fields import DECADES, draw_excess, excess_scale
 from compare.report.sentences import certificate_sentences
@@ -39,7 +37,7 @@ def words(evaluation: Evaluation, certificate: Certificate) -> str:
     return certificate_sentences(with_certificate(evaluation, certificate)).replace("\N{NO-BREAK SPACE}", " ")
 
 
-def test_a_good_result_in_words(pinn: Evaluation, certificate: Certificate) -> None:
+def test_a_good_result_in_words(pinn, certificate):
     assert words(pinn, certificate) == (
         "pinn-std is converged to 1.00 % of the energy: its displacement, taken over to the elements of fem, "
         "has 1.00 % more energy than the least with the same values at base and contact, and its own stress "
@@ -61,18 +59,16 @@ def test_a_good_result_in_words(pinn: Evaluation, certificate: Certificate) -> N
     ],
     ids=["too much energy", "fem", "much less energy", "a little less energy"],
 )
-def test_words_for_other_results(
-    pinn: Evaluation, certificate: Certificate, changes: dict[str, float], expected: str
-) -> None:
+def test_words_for_other_results(pinn, certificate, changes, expected):
     assert expected in words(pinn, replace(certificate, **changes))
 
 
-def test_a_finite_strain_result_has_no_certificate(pinn: Evaluation) -> None:
+def test_a_finite_strain_result_has_no_certificate(pinn):
     said = certificate_sentences(replace(pinn, law="neo-hookean"))
     assert said == "pinn-std has no certificate: there is one for the linear law only."
 
 
-def test_one_scale_for_all_that_ends_at_the_larger_excess(mesh: TriangleMesh) -> None:
+def test_one_scale_for_all_that_ends_at_the_larger_excess(mesh):
     flat = np.ones(len(mesh.triangles))
     scale = excess_scale(mesh, [flat, 5 * flat])
     assert (scale.low, scale.high) == (pytest.approx(5 / 10**DECADES), 5.0)
@@ -81,9 +77,7 @@ def test_one_scale_for_all_that_ends_at_the_larger_excess(mesh: TriangleMesh) ->
     assert (low.tolist(), high.tolist()) == ([68, 1, 84], [253, 231, 36])  # the ends of viridis
 
 
-def test_without_an_excess_there_is_no_picture(
-    fem: Evaluation, certificate: Certificate, compared: Callable[..., Comparison]
-) -> None:
+def test_without_an_excess_there_is_no_picture(fem, certificate, compared):
     exact = with_certificate(fem, replace(certificate, excess=0.0))
     assert draw_excess(compared(fem, exact)) is None
     assert draw_excess(compared(fem, with_certificate(fem, certificate))) is not None

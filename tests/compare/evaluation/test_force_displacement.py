@@ -3,7 +3,6 @@
 import csv
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,21 +23,19 @@ def followed(evaluate: Callable[..., Evaluation]) -> Evaluation:
     return replace(evaluate("fem-nonlinear", history=record), law="neo-hookean")
 
 
-def test_force_is_the_component_along_the_travel(followed: Evaluation) -> None:
+def test_force_is_the_component_along_the_travel(followed):
     oblique = ForceCurve.of(followed, Load(displacement=(6.0, -8.0)))
     np.testing.assert_allclose(oblique.travel, 10.0 * STEPS)
     np.testing.assert_allclose(oblique.force, 0.6 * 0.2 * STEPS + 0.8 * 3.0 * STEPS**2)
 
 
-def test_a_free_component_does_not_travel(followed: Evaluation) -> None:
+def test_a_free_component_does_not_travel(followed):
     sliding = ForceCurve.of(followed, Load(kind="patch", displacement=(None, -4.0)))
     np.testing.assert_allclose(sliding.travel, 4.0 * STEPS)
     np.testing.assert_allclose(sliding.force, 3.0 * STEPS**2)
 
 
-def test_linear_solvers_are_straight_lines_beside_one_that_follows_the_load(
-    followed: Evaluation, fem: Evaluation, evaluate: Callable[..., Evaluation]
-) -> None:
+def test_linear_solvers_are_straight_lines_beside_one_that_follows_the_load(followed, fem, evaluate):
     end_only = replace(evaluate("pinn-std"), law="neo-hookean")
     curves = force_curves([fem, followed, end_only], Load())
     assert [curve.evaluation.solver for curve in curves] == ["fem", "fem-nonlinear", "pinn-std"]
@@ -46,16 +43,16 @@ def test_linear_solvers_are_straight_lines_beside_one_that_follows_the_load(
     np.testing.assert_allclose([curves[2].travel, curves[2].force], [[10], [0.5]])
 
 
-def test_without_a_solver_that_follows_the_load_there_is_no_curve(fem: Evaluation, pinn: Evaluation) -> None:
+def test_without_a_solver_that_follows_the_load_there_is_no_curve(fem, pinn):
     assert force_curves([fem, pinn], Load()) == []
 
 
-def test_a_solver_that_was_given_markers_has_no_curve(followed: Evaluation, fem: Evaluation) -> None:
+def test_a_solver_that_was_given_markers_has_no_curve(followed, fem):
     curves = force_curves([replace(fem, in_sample=True), followed], Load())
     assert [curve.evaluation.solver for curve in curves] == ["fem-nonlinear"]
 
 
-def test_file_has_the_force_per_depth_and_for_the_depth(followed: Evaluation, tmp_path: Path) -> None:
+def test_file_has_the_force_per_depth_and_for_the_depth(followed, tmp_path):
     load = Load(kind="patch", displacement=(None, -4.0))
     path = tmp_path / "force_displacement.csv"
     write_force_displacement(path, force_curves([followed], load), load, depth=20.0)
@@ -67,7 +64,7 @@ def test_file_has_the_force_per_depth_and_for_the_depth(followed: Evaluation, tm
     assert all(name.split("_")[-1] in ("solver", "law", "converged", "1", "mm", "N") for name in rows[0])
 
 
-def test_picture_has_both_scales_and_the_end_of_every_curve(followed: Evaluation, fem: Evaluation) -> None:
+def test_picture_has_both_scales_and_the_end_of_every_curve(followed, fem):
     stopped = replace(followed, converged=False)
     page = page_of(draw_force_displacement(force_curves([fem, stopped], Load()), depth=20.0))
     assert "fem, 0.5 N/mm at 10 mm" in page.text
@@ -78,7 +75,7 @@ def test_picture_has_both_scales_and_the_end_of_every_curve(followed: Evaluation
     assert right.get_ylim() == pytest.approx([20 * end for end in left.get_ylim()])
 
 
-def test_the_force_on_the_simulated_finger_is_a_cross(followed: Evaluation, fem: Evaluation) -> None:
+def test_the_force_on_the_simulated_finger_is_a_cross(followed, fem):
     (curve,) = force_curves([followed], Load())
     page = page_of(draw_force_displacement([curve], depth=20.0, truth=ForceCurve.of(fem, Load())))
     assert "truth, simulated, 0.5 N/mm at 10 mm" in page.text

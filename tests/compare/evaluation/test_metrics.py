@@ -1,11 +1,9 @@
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from compare.evaluation.differences import field_difference, weighted_percentile
-from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import (
     MEANS,
     force_error,
@@ -15,7 +13,6 @@ from compare.evaluation.metrics import (
     reference_differences,
     truth_differences,
 )
-from geometry.observations import Observations
 
 
 @pytest.mark.parametrize(
@@ -28,12 +25,12 @@ from geometry.observations import Observations
         (100, 3.0),  # all of it
     ],
 )
-def test_weighted_percentile_of_three_values(percent: float, expected: float) -> None:
+def test_weighted_percentile_of_three_values(percent, expected):
     values, weights = np.array([3.0, 1.0, 2.0]), np.array([1.0, 1.0, 8.0])
     assert weighted_percentile(values, weights, percent) == expected
 
 
-def test_errors_at_the_markers_by_hand(fem: Evaluation, observe: Callable[..., Observations]) -> None:
+def test_errors_at_the_markers_by_hand(fem, observe):
     moved = replace(fem, marker_displacement=np.array([[1.0, -2.0], [50.0, 50.0], [-5.0, 6.0]]))
     errors = marker_errors(moved, observe(np.zeros((3, 2)), hidden=(1,)))
     np.testing.assert_array_equal(errors.ae_u, [1, np.nan, 5])
@@ -41,17 +38,13 @@ def test_errors_at_the_markers_by_hand(fem: Evaluation, observe: Callable[..., O
     assert errors[2:] == (3.0, 4.0, 7.0, 5.0)
 
 
-def test_without_a_visible_marker_there_is_no_mean_error(
-    fem: Evaluation, observe: Callable[..., Observations]
-) -> None:
+def test_without_a_visible_marker_there_is_no_mean_error(fem, observe):
     errors = marker_errors(fem, observe(np.zeros((3, 2)), hidden=(0, 1, 2)))
     assert np.isnan([*errors.ae_u, *errors.ae_v, *errors[2:]]).all()
     assert errors._fields[2:] == MEANS == ("mae_u", "mae_v", "mae_sum", "mae_rss")
 
 
-def test_held_out_errors_are_of_what_the_solver_was_not_given(
-    fem: Evaluation, observe: Callable[..., Observations]
-) -> None:
+def test_held_out_errors_are_of_what_the_solver_was_not_given(fem, observe):
     seen = observe(fem.marker_displacement + 1.0)
     assert held_out_errors(fem, observe(np.zeros((3, 2)), hidden=(0, 1, 2))) is None
     free = held_out_errors(fem, seen)
@@ -64,7 +57,7 @@ def test_held_out_errors_are_of_what_the_solver_was_not_given(
     assert (told.mae_u, told.mae_v) == pytest.approx((2, 2))
 
 
-def test_both_displacement_errors_of_the_paper(fem: Evaluation, observe: Callable[..., Observations]) -> None:
+def test_both_displacement_errors_of_the_paper(fem, observe):
     errors = marker_errors(fem, observe(fem.marker_displacement + np.array([1.41, -0.39])))
     assert errors.mae_rss == pytest.approx(1.463, abs=5e-4)  # Table I, row disp
     assert errors.mae_sum == pytest.approx(1.80)  # what the text defines
@@ -79,18 +72,16 @@ def test_both_displacement_errors_of_the_paper(fem: Evaluation, observe: Callabl
         ([[3.0, 4.0], [0.0, 0.0]], [[0.0, 0.0], [5.0, 0.0]], (2 / 3**0.5, 5.0, 5.0)),  # vectors, by length
     ],
 )
-def test_difference_of_fields_by_hand(
-    values: list[float], reference: list[float], expected: tuple[float, float, float]
-) -> None:
+def test_difference_of_fields_by_hand(values, reference, expected):
     difference = field_difference(np.array(values), np.array(reference), np.array([1.0, 3.0]))
     assert difference == pytest.approx(expected)
 
 
-def test_a_reference_of_zeros_has_no_relative_difference() -> None:
+def test_a_reference_of_zeros_has_no_relative_difference():
     assert np.isnan(field_difference(np.ones(2), np.zeros(2), np.ones(2)).rel_l2)
 
 
-def test_a_tenth_more_everywhere(pinn: Evaluation, fem: Evaluation) -> None:
+def test_a_tenth_more_everywhere(pinn, fem):
     differences = reference_differences(pinn, fem)
     for difference in (differences.displacement, differences.von_mises, differences.stress["xy"]):
         assert difference.rel_l2 == pytest.approx(0.1)
@@ -98,7 +89,7 @@ def test_a_tenth_more_everywhere(pinn: Evaluation, fem: Evaluation) -> None:
     assert differences.mae_markers == pytest.approx(0.1 * np.abs(fem.marker_displacement).sum(axis=1).mean())
 
 
-def test_strain_differences_tell_components_apart(fem: Evaluation) -> None:
+def test_strain_differences_tell_components_apart(fem):
     strain = fem.strain.copy()
     strain[:, 0, 0] += 0.5
     differences = reference_differences(replace(fem, strain=strain), fem)
@@ -107,15 +98,13 @@ def test_strain_differences_tell_components_apart(fem: Evaluation) -> None:
     )
 
 
-def test_the_reference_is_the_wanted_solver_then_fem_then_the_first(
-    fem: Evaluation, pinn: Evaluation, failed: Evaluation
-) -> None:
+def test_the_reference_is_the_wanted_solver_then_fem_then_the_first(fem, pinn, failed):
     assert pick_reference([failed, pinn, fem], "pinn-std") is pinn
     assert pick_reference([failed, pinn, fem]) is fem
     assert pick_reference([failed, pinn]) is failed
 
 
-def test_differences_from_the_truth_are_those_of_whole_tensors(fem: Evaluation) -> None:
+def test_differences_from_the_truth_are_those_of_whole_tensors(fem):
     strain = fem.strain.copy()
     strain[:, 0, 0] += 0.3
     strain[:, 1, 1] += 0.4
@@ -126,10 +115,10 @@ def test_differences_from_the_truth_are_those_of_whole_tensors(fem: Evaluation) 
 
 
 @pytest.mark.parametrize(("factor", "expected"), [(1.5, 0.5), (-0.75, -0.25)], ids=["too large", "too small"])
-def test_the_error_of_the_force_is_that_of_its_size(fem: Evaluation, factor: float, expected: float) -> None:
+def test_the_error_of_the_force_is_that_of_its_size(fem, factor, expected):
     assert force_error(replace(fem, reaction=factor * fem.reaction), fem) == pytest.approx(expected)
 
 
-def test_the_95th_percentile_of_a_difference_is_below_a_twentieth_of_the_area() -> None:
+def test_the_95th_percentile_of_a_difference_is_below_a_twentieth_of_the_area():
     values = np.random.default_rng(0).permutation(np.arange(1.0, 1001.0))
     assert field_difference(values, np.zeros(1000), np.ones(1000)).p95 == 950

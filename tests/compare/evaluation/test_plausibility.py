@@ -1,16 +1,13 @@
 """Measurements that cannot be, or hardly, of the finger under its load; units mm."""
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from compare.evaluation.plausibility import check_positions, displacement_remarks, unit_remarks
 from compare.evaluation.virtual_experiment import virtual_experiment
-from geometry.arrays import FloatArray, IntArray
 from geometry.errors import UserError
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
@@ -45,9 +42,7 @@ def measured(problem: Problem) -> Observations:
         ({}, 0.0114, "modulus of 0.0114 MPa .*; this looks like gigapascals, give MPa"),
     ],
 )
-def test_a_load_or_a_material_in_other_units_is_warned_of(
-    load: dict[str, Any], young: float, said: str, coarse_mesh: TriangleMesh
-) -> None:
+def test_a_load_or_a_material_in_other_units_is_warned_of(load, young, said, coarse_mesh):
     (remark,) = unit_remarks(Problem(coarse_mesh, Material(young=young), Load(**load)))
     assert re.search(said, remark)
 
@@ -60,21 +55,17 @@ def test_a_load_or_a_material_in_other_units_is_warned_of(
         ({"kind": "cylinder", "displacement": (0.0, -30.0), "radius": 2.0}, 3500.0),  # a hard plastic
     ],
 )
-def test_a_usual_load_and_material_are_not_warned_of(
-    load: dict[str, Any], young: float, coarse_mesh: TriangleMesh
-) -> None:
+def test_a_usual_load_and_material_are_not_warned_of(load, young, coarse_mesh):
     assert unit_remarks(Problem(coarse_mesh, Material(young=young), Load(**load))) == []
 
 
-def test_a_finger_at_finite_strain_is_plausible(measured: Observations, problem: Problem) -> None:
+def test_a_finger_at_finite_strain_is_plausible(measured, problem):
     check_positions(measured, problem.mesh)
     assert displacement_remarks(measured, problem) == []
 
 
 @pytest.mark.parametrize("scale", [0.5, 2.0])  # another stiffness of walls, another place of the contact
-def test_what_may_be_a_real_finger_is_not_warned_of(
-    measured: Observations, problem: Problem, scale: float
-) -> None:
+def test_what_may_be_a_real_finger_is_not_warned_of(measured, problem, scale):
     other = replace(measured, displacements=scale * measured.displacements)
     assert displacement_remarks(other, problem) == []
 
@@ -90,9 +81,7 @@ def test_what_may_be_a_real_finger_is_not_warned_of(
         (lambda points: points * [1, -1], "y looks reversed"),
     ],
 )
-def test_positions_are_refused_with_what_they_look_like(
-    measured: Observations, problem: Problem, change: Callable[[FloatArray], FloatArray], said: str
-) -> None:
+def test_positions_are_refused_with_what_they_look_like(measured, problem, change, said):
     with pytest.raises(UserError, match=f"not of this finger: .*{said}"):
         check_positions(replace(measured, points=change(measured.points)), problem.mesh)
 
@@ -112,9 +101,7 @@ def test_positions_are_refused_with_what_they_look_like(
         (lambda moved: -moved[:, ::-1], "u and v look swapped and their signs reversed"),
     ],
 )
-def test_impossible_displacements_are_refused(
-    measured: Observations, problem: Problem, change: Callable[[FloatArray], FloatArray], said: str
-) -> None:
+def test_impossible_displacements_are_refused(measured, problem, change, said):
     with pytest.raises(UserError, match=said):
         displacement_remarks(replace(measured, displacements=change(measured.displacements)), problem)
 
@@ -129,16 +116,14 @@ def test_impossible_displacements_are_refused(
         (lambda moved: moved * (-1) ** np.arange(9)[:, None], "unlike those of fem (cosine"),  # no pattern
     ],
 )
-def test_unlikely_displacements_are_warned_of(
-    measured: Observations, problem: Problem, change: Callable[[FloatArray], FloatArray], said: str
-) -> None:
+def test_unlikely_displacements_are_warned_of(measured, problem, change, said):
     (remark, *_) = displacement_remarks(
         replace(measured, displacements=change(measured.displacements)), problem
     )
     assert said in remark
 
 
-def test_markers_that_cannot_be_are_refused(measured: Observations, problem: Problem) -> None:
+def test_markers_that_cannot_be_are_refused(measured, problem):
     with pytest.raises(UserError, match="none of the markers is visible"):
         check_positions(replace(measured, visible=np.zeros(9, dtype=bool)), problem.mesh)
     twice = measured.points[[0, 1, 2, 3, 4, 5, 6, 7, 4]]
@@ -154,9 +139,7 @@ def test_markers_that_cannot_be_are_refused(measured: Observations, problem: Pro
         (np.arange(9), 2, None),  # two places
     ],
 )
-def test_markers_at_one_place_are_warned_of(
-    places: IntArray, seen: int, said: str | None, measured: Observations, problem: Problem
-) -> None:
+def test_markers_at_one_place_are_warned_of(places, seen, said, measured, problem):
     points = measured.points[places] + np.outer(0.01 * np.arange(9), [float(places[0] == 4), 0.0])
     moved, last = measured.displacements[places], np.arange(9) >= 9 - seen
     changed = replace(measured, points=points, displacements=moved, visible=last)
@@ -164,7 +147,7 @@ def test_markers_at_one_place_are_warned_of(
     assert [said in remark for remark in remarks] == [True] if said else remarks == []
 
 
-def test_a_reversed_u_is_warned_of_at_a_small_stroke(measured: Observations, problem: Problem) -> None:
+def test_a_reversed_u_is_warned_of_at_a_small_stroke(measured, problem):
     """At a large one u of linear `fem` says nothing of its sign."""
     small = replace(problem, load=Load(displacement=(0, -2)))
     moved = virtual_experiment(small, 0.8)[0].displacements
@@ -172,9 +155,7 @@ def test_a_reversed_u_is_warned_of_at_a_small_stroke(measured: Observations, pro
     assert "u goes against that of fem" in remark
 
 
-def test_markers_that_hardly_move_in_fem_say_nothing_of_directions(
-    measured: Observations, problem: Problem
-) -> None:
+def test_markers_that_hardly_move_in_fem_say_nothing_of_directions(measured, problem):
     only = np.arange(len(measured.points)) == 0
     reversed_ = replace(measured, displacements=-measured.displacements, visible=only)
     beside_base = replace(reversed_, points=np.vstack([[2.0, -1.0], measured.points[1:]]))

@@ -74,7 +74,7 @@ def test_laws_and_loads_are_those_of_the_names():
     }
 
 
-def test_the_source_names_law_and_load(mesh: TriangleMesh):
+def test_the_source_names_law_and_load(mesh):
     problem = Problem(mesh, load=Load(displacement=(0.0, -0.5)))
     said = experiment_source(problem, TRUTHS["cylinder"])
     assert said == (

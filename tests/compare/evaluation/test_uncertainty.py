@@ -1,8 +1,6 @@
 """A solver's own error beside every difference from it."""
 
 import json
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +10,7 @@ from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import indistinct, reference_differences
 
 
-def test_it_is_the_difference_of_the_improved_solution(estimated: Evaluation) -> None:
+def test_it_is_the_difference_of_the_improved_solution(estimated):
     """One per cent more of everything; the energy falls by the square."""
     own = estimated.uncertainty
     assert own is not None
@@ -25,12 +23,12 @@ def test_it_is_the_difference_of_the_improved_solution(estimated: Evaluation) ->
     assert own.mae_markers == pytest.approx(estimated.marker_uncertainty.sum(axis=1).mean())
 
 
-def test_a_solver_without_an_estimate_has_none(fem: Evaluation) -> None:
+def test_a_solver_without_an_estimate_has_none(fem):
     assert (fem.uncertainty, fem.marker_uncertainty) == (None, None)
 
 
 @pytest.mark.parametrize("name", ["estimated", "fem"])
-def test_it_comes_back_from_disk(name: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+def test_it_comes_back_from_disk(name, request, tmp_path):
     before: Evaluation = request.getfixturevalue(name)
     before.save(tmp_path / "fem.npz", "key")
     after = Evaluation.load(tmp_path / "fem.npz", "key")
@@ -49,9 +47,7 @@ def test_it_comes_back_from_disk(name: str, request: pytest.FixtureRequest, tmp_
         (1.02, []),
     ],
 )
-def test_what_is_smaller_than_the_own_error_is_named(
-    evaluate: Callable[..., Evaluation], estimated: Evaluation, scale: float, expected: list[str]
-) -> None:
+def test_what_is_smaller_than_the_own_error_is_named(evaluate, estimated, scale, expected):
     differences = reference_differences(evaluate("pinn-std", scale), estimated)
     assert indistinct(differences, estimated.uncertainty) == expected
     assert indistinct(differences, None) == []

@@ -244,7 +244,7 @@ def _compared(out: Path, *names: str, spare: tuple[str, ...] = ()) -> Comparison
         return run(job, stages)
 
 
-def test_a_comparison_goes_on_without_a_truth(tmp_path: Path, unfinished: None) -> None:
+def test_a_comparison_goes_on_without_a_truth(tmp_path, unfinished):
     comparison = _compared(tmp_path / "run", "fem", "fem-asm", spare=("fem-asm",))
     assert [each.solver for each in comparison.evaluations] == ["fem"]
     assert comparison.truth is None
@@ -266,9 +266,7 @@ def test_a_comparison_goes_on_without_a_truth(tmp_path: Path, unfinished: None) 
     assert float(row["energy_N_mm_per_mm"]) > 0
 
 
-def test_without_a_truth_a_chosen_solver_that_needs_markers_is_refused(
-    tmp_path: Path, unfinished: None
-) -> None:
+def test_without_a_truth_a_chosen_solver_that_needs_markers_is_refused(tmp_path, unfinished):
     with pytest.raises(UserError, match=r"stopped at 67\.5% of the load"):
         _compared(tmp_path / "run", "fem", "fem-asm")
     assert not (tmp_path / "run").exists()

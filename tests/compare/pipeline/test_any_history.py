@@ -11,7 +11,6 @@ import shutil
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -19,11 +18,8 @@ import pytest
 from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
-from rich.console import Console
 
 from compare.pipeline.job import Job
-from compare.pipeline.pipeline import run
-from compare.runtime.stages import Stages
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
@@ -31,6 +27,7 @@ from solvers.fem.linear import FemSolver
 from solvers.problem import Problem
 from solvers.solution import Solution
 from solvers.solver import Progress, silent
+from tests.compare.pipeline.runs import compare as run_quietly
 
 NAMES = ("first", "second", "third")
 ENDINGS: dict[str, Callable[[], BaseException]] = {
@@ -157,8 +154,7 @@ def finish(out: Path, names: Sequence[str], degree: int, resume: bool, called: C
     """Run a job and give its numbers, without times."""
     solvers = [Watched(name, degree, called) for name in names]
     job = Job(Design(), solvers, mesh=MeshSettings(size=2.0), measurements=MEASURED, out=out, resume=resume)
-    with Stages(Console(file=StringIO()), quiet=True) as stages:
-        run(job, stages)
+    run_quietly(job)
     numbers = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
     for solver in numbers["solvers"].values():
         del solver["seconds"], solver["stats"]
@@ -188,9 +184,7 @@ MEASURED = Path()
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.* is damaged .* and is made again")
-def test_any_history_ends_with_the_numbers_of_a_fresh_folder(without_pictures, monkeypatch, tmp_path):
-    measured = tmp_path / "measured.csv"
-    measured.write_text("x_mm,y_mm,u_mm,v_mm\n20,-1,-0.5,-5\n85,-1,-2,-0.5\n")
+def test_any_history_ends_with_the_numbers_of_a_fresh_folder(without_pictures, monkeypatch, measured):
     monkeypatch.setitem(globals(), "MEASURED", measured)
     run_state_machine_as_test(
         Histories,

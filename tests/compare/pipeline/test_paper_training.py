@@ -1,7 +1,6 @@
 """The paper's networks in the main job and the search: killed or interrupted, they go on to the same bits."""
 
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -21,7 +20,6 @@ from compare.pipeline.pipeline import run
 from compare.runtime.exits import NOT_CONVERGED
 from compare.runtime.stages import Stages
 from geometry.errors import UserError
-from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from solvers.fem.linear import FemSolver
@@ -29,6 +27,7 @@ from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
 from solvers.solver import Progress, silent
 from studies.gridsearch.training_run import GridPoint, ReferenceSolution, TrainingRun, TrainingTask, train
+from tests.compare.pipeline.runs import compare
 from tests.pinnray.commands.programs import WITHOUT_PICTURES
 
 ROOT = Path(__file__).parents[3]
@@ -55,16 +54,9 @@ class Interrupting(Stages):
             yield interrupted
 
 
-def quiet() -> Stages:
-    return Stages(Console(file=StringIO()), quiet=True)
-
-
 @pytest.fixture
-def job(tmp_path: Path, without_pictures: None) -> Job:
-    measured = tmp_path / "measured.csv"
-    measured.write_text("x_mm,y_mm,u_mm,v_mm\n20,-1,-0.5,-5\n")
-    solvers = [make_solver("pinn-std", **TINY, epochs=13)]
-    return Job(Design(), solvers, mesh=COARSE, measurements=measured, out=tmp_path / "run")
+def paper_job(job: Callable[..., Job], tmp_path: Path) -> Job:
+    return job(make_solver("pinn-std", **TINY, epochs=13), out=tmp_path / "run")
 
 
 def bits(out: Path) -> dict[str, bytes]:
@@ -79,43 +71,42 @@ def record(folder: Path) -> list[str]:
     return (folder / "history.csv").read_text().splitlines()
 
 
-def test_an_interrupted_run_ends_as_if_it_had_not_been(job, tmp_path):
-    with quiet() as stages:
-        run(replace(job, out=tmp_path / "whole"), stages)
+def test_an_interrupted_run_ends_as_if_it_had_not_been(paper_job, tmp_path):
+    compare(replace(paper_job, out=tmp_path / "whole"))
     with Interrupting("pinn-std") as stages, pytest.raises(KeyboardInterrupt):
-        run(job, stages)
+        run(paper_job, stages)
     left = tmp_path / "run.partial" / "training" / "pinn-std"
     assert (left / "checkpoint.safetensors").is_file()
     before = record(left)
     assert 1 < len(before) < 13
-    with quiet() as stages:
-        run(replace(job, resume=True), stages)
-    assert bits(job.out) == bits(tmp_path / "whole")
-    assert record(job.out / "training" / "pinn-std")[: len(before)] == before
-    assert sorted(path.name for path in (job.out / "training" / "pinn-std").iterdir()) == [
+    compare(replace(paper_job, resume=True))
+    assert bits(paper_job.out) == bits(tmp_path / "whole")
+    assert record(paper_job.out / "training" / "pinn-std")[: len(before)] == before
+    assert sorted(path.name for path in (paper_job.out / "training" / "pinn-std").iterdir()) == [
         "checkpoint.safetensors",
         "history.csv",
     ]
 
 
-def test_a_checkpoint_of_another_job_is_refused_in_one_line(job):
+def test_a_checkpoint_of_another_job_is_refused_in_one_line(paper_job):
     with Interrupting("pinn-std") as stages, pytest.raises(KeyboardInterrupt):
-        run(job, stages)
-    other = replace(job, load=Load(displacement=(0.0, -9.0)), resume=True)
-    with quiet() as stages, pytest.raises(UserError) as refused:
-        run(other, stages)
-    assert re.fullmatch(r".*checkpoint\.safetensors belongs to another problem .*", str(refused.value))
+        run(paper_job, stages)
+    other = replace(paper_job, load=Load(displacement=(0.0, -9.0)), resume=True)
+    with pytest.raises(UserError, match=r"checkpoint\.safetensors belongs to another problem [^\n]*$"):
+        compare(other)
 
 
 @pytest.mark.slow
-def test_a_killed_run_ends_as_if_it_had_not_been(job, tmp_path):
+def test_a_killed_run_ends_as_if_it_had_not_been(measured, tmp_path):
     """Killed without notice, it goes on from the last checkpoint that it wrote.
 
     All in processes of their own: the order in which a process loads torch and PETSc, each with its BLAS, was
     seen to change the last bits.
     """
-    line = f"compare --solvers pinn-std --mesh-size 1.0 --quiet --measurements {job.measurements}"
+    line = f"compare --solvers pinn-std --mesh-size 1.0 --quiet --measurements {measured}"
     line += "".join(f" --solver-set pinn-std.{key}={value}" for key, value in {**TINY, "epochs": 200}.items())
+
+    out = tmp_path / "run"
 
     def started(*options: str) -> subprocess.Popen[bytes]:
         return subprocess.Popen(
@@ -124,19 +115,19 @@ def test_a_killed_run_ends_as_if_it_had_not_been(job, tmp_path):
             stderr=subprocess.DEVNULL,
         )
 
-    whole, killed = started("--out", str(tmp_path / "whole")), started("--out", str(job.out))
+    whole, killed = started("--out", str(tmp_path / "whole")), started("--out", str(out))
     left = tmp_path / "run.partial" / "training" / "pinn-std"
     limit = time.monotonic() + 240
     while not (left / "history.csv").exists() and time.monotonic() < limit:
         time.sleep(0.005)
     killed.kill()
     assert killed.wait() == -signal.SIGKILL
-    assert not job.out.exists()
+    assert not out.exists()
     before = record(left)
-    resumed = started("--out", str(job.out), "--resume")
+    resumed = started("--out", str(out), "--resume")
     assert resumed.wait() == whole.wait() == NOT_CONVERGED
-    assert bits(job.out) == bits(tmp_path / "whole")
-    assert record(job.out / "training" / "pinn-std")[: len(before)] == before
+    assert bits(out) == bits(tmp_path / "whole")
+    assert record(out / "training" / "pinn-std")[: len(before)] == before
 
 
 @pytest.fixture

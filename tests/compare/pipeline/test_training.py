@@ -1,24 +1,15 @@
 """Solvers that train for long: what the main job tells them, keeps of them, and goes on from."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from io import StringIO
-from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import pytest
-from rich.console import Console
 
-from compare.evaluation.evaluation import Evaluation
-from compare.pipeline.job import Job
-from compare.pipeline.pipeline import run
-from compare.runtime.stages import Stages
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
 from solvers.fem.linear import FemSolver
 from solvers.problem import Material, Problem
 from solvers.solution import Solution
 from solvers.solver import Progress, TrainingContext, silent
+from tests.compare.pipeline.runs import compare
 
 
 @dataclass(frozen=True)
@@ -56,36 +47,17 @@ class Counting:
         return [epoch for epoch, _ in self.diary]
 
 
-@pytest.fixture
-def job(tmp_path: Path, without_pictures: None) -> Callable[..., Job]:
-    measured = tmp_path / "measured.csv"
-    measured.write_text("x_mm,y_mm,u_mm,v_mm\n20,-1,-0.5,-5\n")
-
-    def make(*solvers: Any, **changes: Any) -> Job:
-        mesh = MeshSettings(size=1.0)
-        return replace(
-            Job(Design(), solvers, mesh=mesh, measurements=measured, out=tmp_path / "run"), **changes
-        )
-
-    return make
-
-
-def compare(job: Job) -> list[Evaluation]:
-    with Stages(Console(file=StringIO()), quiet=True) as stages:
-        return list(run(job, stages).evaluations)
-
-
 def test_an_interrupted_training_goes_on_and_its_files_end_in_the_output(job, tmp_path):
     first, second = Counting([], stop_after=3), Counting([])
     with pytest.raises(KeyboardInterrupt):
         compare(job(first))
     assert first.epochs == [1, 2, 3]
-    assert (tmp_path / "run.partial" / "training" / "counting" / "checkpoint").read_text() == "3"
+    assert (tmp_path / "out" / "run.partial" / "training" / "counting" / "checkpoint").read_text() == "3"
     compare(job(second, resume=True))
     assert second.epochs == [4]
-    assert (tmp_path / "run" / "training" / "counting" / "checkpoint").read_text() == "4"
-    assert "training/counting/checkpoint" in (tmp_path / "run" / "run.json").read_text()
-    assert not (tmp_path / "run.partial").exists()
+    assert (tmp_path / "out" / "run" / "training" / "counting" / "checkpoint").read_text() == "4"
+    assert "training/counting/checkpoint" in (tmp_path / "out" / "run" / "run.json").read_text()
+    assert not (tmp_path / "out" / "run.partial").exists()
 
 
 def test_without_resume_a_training_starts_afresh(job):
@@ -101,7 +73,7 @@ def test_a_solution_that_is_taken_over_brings_its_training_along(job, tmp_path):
     again = Counting([])
     compare(job(again, FemSolver(), resume=True))
     assert again.epochs == []
-    assert (tmp_path / "run" / "training" / "counting" / "checkpoint").read_text() == "4"
+    assert (tmp_path / "out" / "run" / "training" / "counting" / "checkpoint").read_text() == "4"
 
 
 def test_a_finished_training_goes_on_where_more_is_asked_of_it(job, tmp_path):
@@ -109,7 +81,7 @@ def test_a_finished_training_goes_on_where_more_is_asked_of_it(job, tmp_path):
     longer = Counting([], total=6)
     compare(job(longer, resume=True))
     assert longer.epochs == [5, 6]
-    assert (tmp_path / "run" / "training" / "counting" / "checkpoint").read_text() == "6"
+    assert (tmp_path / "out" / "run" / "training" / "counting" / "checkpoint").read_text() == "6"
 
 
 class Other(FemSolver):
@@ -135,7 +107,7 @@ class FiniteStrain(Counting):
 )
 def test_the_energy_of_fem_is_told_if_it_was_solved_before_with_the_same_law(job, before, kind, known):
     counting = kind([])
-    reference, _ = compare(job(before, counting))
+    reference, _ = compare(job(before, counting)).evaluations
     _, context = counting.diary[0]
     assert context.reference_energy == (reference.energy if known else None)
     assert not context.resume

@@ -179,7 +179,7 @@ def test_our_own_result_an_empty_folder_and_none_may_be_replaced(out, tmp_path):
         (lambda out: (out / "run.json").unlink(), r"holds solutions/fem.npz, and it has no run.json"),
     ],
 )
-def test_what_no_comparison_wrote_is_not_lost(out, spoil: Callable[[Path], object], message):
+def test_what_no_comparison_wrote_is_not_lost(out, spoil, message):
     spoil(out)
     with pytest.raises(UserError, match=message):
         check_output(out)
@@ -275,7 +275,7 @@ def killed_before(
     ("change", "number"),
     [("unlink", 1), ("unlink", 2), ("unlink", 3), ("rmdir", 2)],  # the last leaves an empty folder
 )
-def test_a_run_that_is_killed_while_it_replaces_the_last_result_does_not_bar_the_next(
+def test_a_run_that_is_killed_while_it_replaces_a_result_does_not_bar_the_next(
     out, monkeypatch, change, number
 ):
     """The last result is removed file by file, and its mark must not be among the first."""

@@ -1,7 +1,6 @@
 """Folders that keep the finished parts of a job: whose they are, also after a kill at the very beginning."""
 
 import json
-from pathlib import Path
 
 import pytest
 
@@ -17,7 +16,7 @@ class Killed(BaseException):
     """The end of the process."""
 
 
-def test_a_job_killed_while_it_wrote_its_definition_can_go_on(tmp_path: Path) -> None:
+def test_a_job_killed_while_it_wrote_its_definition_can_go_on(tmp_path):
     with atomic_path(tmp_path / "sweep.json") as partial:
         partial.write_text("whole")
     (tmp_path / "sweep.json").unlink()
@@ -27,13 +26,13 @@ def test_a_job_killed_while_it_wrote_its_definition_can_go_on(tmp_path: Path) ->
     check_resumable_folder(tmp_path / "sweep.json", {"schema": 1}, job="sweep")
 
 
-def test_a_folder_with_files_of_others_is_refused(tmp_path: Path) -> None:
+def test_a_folder_with_files_of_others_is_refused(tmp_path):
     (tmp_path / "notes.txt").touch()
     with pytest.raises(UserError, match="holds files that are not of a sweep"):
         check_resumable_folder(tmp_path / "sweep.json", {"schema": 1}, job="sweep")
 
 
-def test_a_folder_with_a_link_to_another_is_refused(tmp_path: Path) -> None:
+def test_a_folder_with_a_link_to_another_is_refused(tmp_path):
     """Somebody else may have made it: checkpoints, journal and designs would be written there."""
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "sweep.json").write_text(json.dumps({"schema": 1}))
@@ -42,7 +41,7 @@ def test_a_folder_with_a_link_to_another_is_refused(tmp_path: Path) -> None:
         check_resumable_folder(tmp_path / "out" / "sweep.json", {"schema": 1}, job="sweep")
 
 
-def test_a_sweep_killed_before_its_definition_is_there_leaves_no_file(tmp_path: Path, monkeypatch) -> None:
+def test_a_sweep_killed_before_its_definition_is_there_leaves_no_file(tmp_path, monkeypatch):
     """A journal without a definition would bar the folder for good."""
 
     def killed(*_: object) -> None:
