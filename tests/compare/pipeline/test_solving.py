@@ -6,9 +6,10 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,50 +19,12 @@ from compare.pipeline import solving
 from compare.pipeline.job import Job
 from compare.pipeline.solving import Outcome, solve_all
 from compare.runtime.stages import Stages
-from geometry.cache import finger_mesh
 from geometry.errors import UserError
-from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
-from geometry.observations import Observations
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
-from solvers.problem import Problem
-from solvers.solution import Solution
-from solvers.solver import Progress, UnsupportedProblemError, silent
+from tests.compare.pipeline.endings import DESIGN, MARKERS, PROBLEM, Ending
 
 ROOT = Path(__file__).parents[3]
-DESIGN = Design()
-MESH = finger_mesh(DESIGN, settings=MeshSettings(size=1.5))
-PROBLEM = Problem(MESH, finger=DESIGN)
-STILL = np.zeros_like(MESH.markers)
-MARKERS = Observations(MESH.markers, STILL, STILL, np.full(len(STILL), True), "no test looks", True, 1.0)
-
-
-@dataclass(frozen=True)
-class Ending:
-    """A solver of finite strain that ends in the way of its name."""
-
-    name: str
-    laws: ClassVar[tuple[str, ...]] = ("neo-hookean",)
-    loads: ClassVar[tuple[str, ...]] = ("mean", "point")
-
-    def settings(self) -> dict[str, object]:
-        return {}
-
-    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
-        if self.name == "killed":
-            os.kill(os.getpid(), signal.SIGKILL)
-        if self.name == "faulty":
-            raise ZeroDivisionError("by nothing")
-        if self.name == "unsupporting":
-            raise UnsupportedProblemError("unsupporting: no markers here")
-        if self.name == "refusing":
-            raise UserError("refusing: the weight is negative")
-        progress(0.5, str(os.getpid()))
-        while True:
-            time.sleep(0.02)
-            if self.name == "reporting":
-                progress(0.5, "")
 
 
 @pytest.fixture
@@ -79,33 +42,41 @@ def solve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tupl
     return run
 
 
+@pytest.fixture
+def in_one_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both parts in this process: quicker, where no test looks at processes."""
+
+    def here(work, tasks, *, processes, report):
+        for name, task in tasks.items():
+            yield name, work(task, partial(report, name))
+
+    monkeypatch.setattr(solving, "in_processes", here)
+    monkeypatch.setattr(solving, "end_with_parent", lambda: None)
+
+
 def numbers(evaluation: Evaluation) -> dict[str, Any]:
     """All of an evaluation that is not a time."""
     kept = {key: value for key, value in evaluation.stats.items() if "seconds" not in key}
     return {**vars(evaluation), "stats": kept}
 
 
-def test_two_processes_give_the_numbers_of_one_in_the_order_of_the_job(solve, tmp_path):
+def test_two_processes_give_the_numbers_of_one_and_a_second_run_takes_them_over(solve, tmp_path, monkeypatch):
     solvers = FemNonlinearSolver(), FemSolver()
     (one, _), (two, seconds) = solve(1, *solvers), solve(2, *solvers)
-    assert list(one.evaluations) == list(two.evaluations) == ["fem-nonlinear", "fem"]
+    assert list(one.evaluations) == list(two.evaluations) == ["fem-nonlinear", "fem"]  # as in the job
     assert set(seconds) == {"fem-nonlinear", "fem"}
     for name, evaluation in one.evaluations.items():
         np.testing.assert_equal(numbers(two.evaluations[name]), numbers(evaluation))
-    assert {path.name for path in (tmp_path / "2" / "solutions").iterdir()} == {
-        "fem.npz",
-        "fem-nonlinear.npz",
-    }
+    kept = {path.name for path in (tmp_path / "2" / "solutions").iterdir()}
+    assert kept == {"fem.npz", "fem-nonlinear.npz"}
+    for solver in (FemSolver, FemNonlinearSolver):
+        monkeypatch.setattr(solver, "solve", None)
+    monkeypatch.setattr(solving, "LARGE", 10**9)  # in this process
+    again, _ = solve(3, *solvers, out=tmp_path / "2", resume=True)
+    assert again.evaluations["fem"].stats == two.evaluations["fem"].stats  # its seconds, too
 
 
-def test_a_second_run_takes_over_what_both_processes_finished(solve, monkeypatch):
-    solvers = FemNonlinearSolver(), FemSolver()
-    first, _ = solve(2, *solvers)
-    monkeypatch.setattr(FemSolver, "solve", None)
-    second, _ = solve(2, *solvers, resume=True)
-    assert second.evaluations["fem"].stats == first.evaluations["fem"].stats  # its seconds, too
-
-
+@pytest.mark.usefixtures("in_one_process")
 def test_the_fault_of_a_solver_in_the_second_process_is_kept_for_the_reader(solve, tmp_path):
     outcome, _ = solve(2, FemSolver(), Ending("faulty"), Ending("unsupporting"), spare=["unsupporting"])
     assert list(outcome.evaluations) == ["fem"]
@@ -120,41 +91,25 @@ def test_the_fault_of_a_solver_in_the_second_process_is_kept_for_the_reader(solv
         ("refusing", {}, r"^refusing: the weight is negative$"),
         ("unsupporting", {}, r"^unsupporting: no markers here$"),
         ("faulty", {"reference": "faulty"}, r"^solver faulty raised ZeroDivisionError"),
-        (
-            "killed",
-            {},
-            r"^solvers of finite strain: its process ended with exit code -9; a resumed run goes on",
-        ),
     ],
 )
+@pytest.mark.usefixtures("in_one_process")
 def test_a_refusal_in_the_second_process_is_one_line_of_the_first(solve, name, changes, message):
-    with pytest.raises(UserError, match=message):
+    with pytest.raises(UserError, match=message) as refused:
         solve(2, FemSolver(), Ending(name), **changes)
+    assert type(refused.value) is UserError  # which another process can raise
 
 
-PROGRAM = """
-import sys
-from pathlib import Path
-from compare.pipeline import solving
-from compare.pipeline.job import Job
-from compare.runtime.interruption import interruptible
-from solvers.fem.linear import FemSolver
-from tests.compare.pipeline.test_solving import DESIGN, MARKERS, PROBLEM, Ending
-
-class Said:
-    def stage(self, name):
-        return self
-    def __enter__(self):
-        return lambda fraction, note: print(note, flush=True) if note.isdigit() else None
-    def __exit__(self, *_):
-        pass
-
-if __name__ == "__main__":
-    solving.LARGE = 0
-    job = Job(DESIGN, (FemSolver(), Ending(sys.argv[2])), processes=2)
-    with interruptible():
-        solving.solve_all(job, job.solvers, PROBLEM, MARKERS, Path(sys.argv[1]), Said())
-"""
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("refusing", "^refusing: the weight is negative$"),
+        ("killed", "^solvers of finite strain: its process ended with exit code -9; a resumed run goes on"),
+    ],
+)
+def test_the_end_of_a_second_process_is_one_line_of_the_first(solve, name, message):
+    with pytest.raises(UserError, match=message):
+        solve(2, Ending("waiting", laws=("linear",)), Ending(name))
 
 
 @pytest.mark.parametrize(
@@ -163,29 +118,25 @@ if __name__ == "__main__":
 )
 def test_no_process_outlives_the_run(tmp_path, name, ending):
     program = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, str(tmp_path), name],
+        [sys.executable, "-m", "tests.compare.pipeline.endings", str(tmp_path), name],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         cwd=ROOT,
     )
     assert program.stdout is not None
-    child = int(program.stdout.readline())
+    children = [int(program.stdout.readline()) for _ in range(2)]
     program.send_signal(ending)
     program.communicate(timeout=60)
-    assert not alive(child, within=2.0)
-
-
-def alive(process: int, *, within: float) -> bool:
-    """Whether a process still runs after some seconds; it may end before."""
-    limit = time.monotonic() + within
-    while time.monotonic() < limit:
-        try:
-            os.kill(process, 0)
-            state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
-        except (ProcessLookupError, FileNotFoundError):
-            return False
-        if state == "Z":
-            return False
+    limit = time.monotonic() + 2
+    while any(map(alive, children)) and time.monotonic() < limit:
         time.sleep(0.02)
-    return True
+    assert not any(map(alive, children))
+
+
+def alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (ProcessLookupError, FileNotFoundError):
+        return False

@@ -1,0 +1,77 @@
+"""Solvers that end in the way of their name, and a program that runs them, without DOLFINx."""
+
+import os
+import signal
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from compare.pipeline import solving
+from compare.pipeline.job import Job
+from compare.runtime.interruption import interruptible
+from geometry.cache import finger_mesh
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from geometry.observations import Observations
+from solvers.problem import Problem
+from solvers.solution import Solution
+from solvers.solver import Progress, UnsupportedProblemError, silent
+
+DESIGN = Design()
+MESH = finger_mesh(DESIGN, settings=MeshSettings(size=1.5))
+PROBLEM = Problem(MESH, finger=DESIGN)
+STILL = np.zeros_like(MESH.markers)
+MARKERS = Observations(MESH.markers, STILL, STILL, np.full(len(STILL), True), "no test looks", True, 1.0)
+
+
+@dataclass(frozen=True)
+class Ending:
+    """A solver of finite strain, unless it has another law, that ends in the way of its name."""
+
+    name: str
+    laws: tuple[str, ...] = ("neo-hookean",)
+    loads: ClassVar[tuple[str, ...]] = ("mean", "point")
+
+    def settings(self) -> dict[str, object]:
+        return {}
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        if self.name == "killed":
+            os.kill(os.getpid(), signal.SIGKILL)
+        if self.name == "faulty":
+            raise ZeroDivisionError("by nothing")
+        if self.name == "unsupporting":
+            raise UnsupportedProblemError("unsupporting: no markers here")
+        if self.name == "refusing":
+            raise UserError("refusing: the weight is negative")
+        progress(0.5, str(os.getpid()))
+        while True:
+            time.sleep(0.02)
+            if self.name == "reporting":
+                progress(0.5, "")
+
+
+class Said:
+    """Stages that print the numbers of processes."""
+
+    def stage(self, name: str) -> "Said":
+        return self
+
+    def __enter__(self) -> Progress:
+        return lambda fraction, note: print(note, flush=True) if note.isdigit() else None
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+
+if __name__ == "__main__":
+    solving.LARGE = 0
+    solvers = Ending("waiting", laws=("linear",)), Ending(sys.argv[2])
+    with interruptible():
+        made = Job(DESIGN, solvers, processes=2)
+        solving.solve_all(made, solvers, PROBLEM, MARKERS, Path(sys.argv[1]), Said())  # type: ignore[arg-type]
