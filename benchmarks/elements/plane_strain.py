@@ -15,7 +15,7 @@ from rich.table import Table
 
 from benchmarks.tables import DOCS, fill, keep_rows, kept_rows, markdown
 from compare.evaluation.differences import field_difference
-from compare.figures.style import axes_at, heading
+from compare.figures.style import axes_at, write_heading
 from compare.runtime.tables import terminal_table
 from geometry.cache import finger_mesh
 from geometry.errors import UserError
@@ -258,7 +258,9 @@ def picture(rows: Sequence[Row]) -> Figure:
             axes.set_xticks(ratio, [f"{value:g}" for value in ratio])
             axes.minorticks_off()
             axes.set(xlabel="depth over wall thickness", ylim=(0, 1.13 * axes.get_ylim()[1]))
-        heading(drawn, "Plane strain against three dimensions", "default finger, linear law, sticking patch")
+        write_heading(
+            drawn, "Plane strain against three dimensions", "default finger, linear law, sticking patch"
+        )
     return drawn
 
 

@@ -216,11 +216,11 @@ def filled(folder: Path) -> Iterator[Path]:
     from geometry.figure import Figure
     from pinnray.cli import main
 
-    blank = gallery.Drawing(Figure(1.0), "Blank", "Blank.", "Blank.")
-    drawings = {name: (what, lambda _: blank) for name, (what, _) in gallery.DRAWINGS.items()}
+    blank = gallery.Illustration(Figure(1.0), "Blank", "Blank.", "Blank.")
+    drawings = {name: (what, lambda _: blank) for name, (what, _) in gallery.GALLERY.items()}
     with (
         # The same files with blank pictures, in a tenth of the time.
-        patch.object(gallery, "DRAWINGS", drawings),
+        patch.object(gallery, "GALLERY", drawings),
         patch("geometry.figure.DPI", 20),
         # Two processes work on any mesh, not only where that is worth its while.
         patch("compare.pipeline.solving.LARGE", 0),

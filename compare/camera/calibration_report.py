@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from compare.figures.style import axes_at, heading
+from compare.figures.style import axes_at, write_heading
 from geometry.arrays import FloatArray
 from geometry.figure import INK, MEASURED, MUTED, SMALL, WIDTH, Figure, figure
 from vision.calibration.camera import Camera
@@ -66,7 +66,7 @@ def draw_calibration(calibration: Calibration, name: str, photograph: NDArray[np
     longest = np.nanquantile(np.linalg.norm(_all(calibration.residuals.values()), axis=1), 0.95)
     factor = _round(LONGEST * camera.width / max(longest, 1e-9))
     with figure(below + half * shape + MARGIN) as drawn:
-        heading(
+        write_heading(
             drawn,
             f"Calibration from {len(calibration.views)} photographs",
             f"Lines: reprojection errors of the corners, {factor:g} times as long; rms "

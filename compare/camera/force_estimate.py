@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from rich.table import Table
 
-from compare.figures.force_track_chart import draw_force_track
+from compare.figures.force_charts import draw_force_track
 from compare.runtime.newest import NewestOnly
 from compare.runtime.tables import Cell, terminal_table, write_csv
 from geometry.arrays import BoolArray, FloatArray

@@ -14,8 +14,8 @@ from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import marker_errors
 from compare.figures import Picture
 from compare.figures.gallery import each_of
-from compare.figures.overlay import mean_errors
-from compare.figures.style import axes_at, heading, legend_below_heading
+from compare.figures.overlay import errors_note
+from compare.figures.style import axes_at, legend_below_heading, write_heading
 from geometry.arrays import FloatArray
 from geometry.figure import INK, MEASURED, SMALL, WIDTH, Figure, figure
 from geometry.mesh.boundary import boundary_edges
@@ -68,7 +68,7 @@ def draw_predictions(comparison: Comparison, tracking: Tracking, image: Image) -
     width = (WIDTH - GAP * (columns + 1)) / columns
     height = width * (bottom - top) / (right - left)
     with figure(HEAD + rows * (TITLE + height + GAP)) as drawn:
-        heading(drawn, "Predicted finger in the last frame")
+        write_heading(drawn, "Predicted finger in the last frame")
         for number, (body, evaluation) in enumerate(zip(bodies, comparison.evaluations, strict=True)):
             row, column = divmod(number, columns)
             place = (GAP + column * (width + GAP), HEAD + TITLE + row * (TITLE + height + GAP))
@@ -113,5 +113,5 @@ def _markers(axes: Axes, tracking: Tracking, computed: FloatArray) -> None:
 
 
 def _name(axes: Axes, comparison: Comparison, evaluation: Evaluation) -> None:
-    note = mean_errors(evaluation, comparison.observations)
+    note = errors_note(evaluation, comparison.observations)
     axes.set_title(f"{evaluation.label_at_markers}: {note}", size=SMALL)

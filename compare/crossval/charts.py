@@ -9,10 +9,10 @@ from compare.figures.style import (
     LEGEND_LINE,
     SOLVER_COLOURS,
     axes_at,
-    heading,
     legend_above,
     legend_height,
     solver_colour,
+    write_heading,
 )
 from geometry.figure import WIDTH, Figure, figure
 
@@ -41,7 +41,7 @@ def draw_held_out(errors: Mapping[str, Mapping[str, Sequence[float]]], label: st
     labels = _labels(errors)
     top = HEAD + legend_height(labels)
     with figure(top + len(errors) * ROW) as drawn:
-        heading(
+        write_heading(
             drawn,
             "Error of each marker when it is held out",
             f"Mean over seeds, against {label} displacements.",
@@ -63,7 +63,7 @@ def draw_fields(scores: Mapping[str, Mapping[str, Mapping[str, Score]]], schemes
     top, pitch = HEAD + legend_height(labels), ROW + 0.25
     width = (WIDTH - LEFT - 0.1 - (len(FIELD_NAMES) - 1) * GAP) / len(FIELD_NAMES)
     with figure(top + len(scores) * pitch) as drawn:
-        heading(
+        write_heading(
             drawn,
             "Distance from the truth over the body",
             "Relative L², %, by what is held out; the line at 100 % is a field of zero.",
@@ -97,7 +97,7 @@ def draw_weight_sweeps(sweeps: Mapping[str, Mapping[str, Sequence[float]]]) -> F
     between, top = LEFT, HEAD + len(FIELD_NAMES) * LEGEND_LINE
     width = (WIDTH - LEFT - 0.1 - between) / 2
     with figure(top + len(sweeps) * ROW) as drawn:
-        heading(
+        write_heading(
             drawn,
             "fem-asm for other weights of the markers",
             "All markers given, first seed. Factors of the weight that it has.",
@@ -148,7 +148,7 @@ def _line(axes: Axes, x: Sequence[float], values: Sequence[float], number: int, 
 def _finish(axes: Axes, *, legend: bool = True) -> None:
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")
-    axes.grid(color="#dddddd", linewidth=0.5)
+    axes.grid()
     axes.set_axisbelow(True)
     if legend:
         legend_above(axes)

@@ -5,8 +5,7 @@ run without pictures starts fast.
 """
 
 import gc
-from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,19 +25,12 @@ def check_formats(formats: Collection[str]) -> None:
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture that has been written.
-
-    Attributes:
-        path: The PNG file.
-        title: Its subject, in a few words.
-        caption: What a reader must know to read it, in sentences.
-        alt: What it shows, in numbers, for those who cannot see it.
-    """
+    """A picture that has been written as a PNG file."""
 
     path: Path
-    title: str
-    caption: str
-    alt: str
+    title: str  # its subject, in a few words
+    caption: str  # what a reader must know to read it, in sentences
+    alt: str  # what it shows, in numbers, for those who cannot see it
 
 
 def draw_all(
@@ -47,36 +39,23 @@ def draw_all(
     progress: Callable[[float, str], None] = lambda done, what: None,
     formats: Collection[str] = (),
 ) -> list[Picture]:
-    """Write every picture of a comparison as PNG, in the order of a report.
+    """Write every picture of a comparison as PNG, and in other `FORMATS`, in the order of a report.
 
-    Args:
-        folder: Where to write.
-        comparison: The comparison.
-        progress: Called before every picture with the share done, from 0 to 1, and what comes next.
-        formats: Others in which they are written too, of `FORMATS`.
+    `progress` is called before every picture with the share done, from 0 to 1, and what comes next.
     """
-    from compare.figures.gallery import DRAWINGS
+    from compare.figures.gallery import GALLERY
 
     pictures: list[Picture] = []
-    with SharedWork().used(), _older_objects_kept():
-        for number, (name, (what, draw)) in enumerate(DRAWINGS.items()):
-            progress(number / len(DRAWINGS), what)
-            if (drawing := draw(comparison)) is None:
-                continue
-            path = drawing.figure.save(folder / f"{name}.png", formats)
-            pictures.append(Picture(path, drawing.title, drawing.caption, drawing.alt))
-    progress(1.0, "pictures drawn")
-    return pictures
-
-
-@contextmanager
-def _older_objects_kept() -> Iterator[None]:
-    """Let the garbage collector pass over all that is older than the block.
-
-    Figures are made of so many objects that a tenth of their time went into looking through everything else.
-    """
+    # Figures have so many objects that a tenth of the time went into collecting garbage among older ones.
     gc.freeze()
     try:
-        yield
+        with SharedWork().used():
+            for number, (name, (what, draw)) in enumerate(GALLERY.items()):
+                progress(number / len(GALLERY), what)
+                if drawing := draw(comparison):
+                    path = drawing.figure.save(folder / f"{name}.png", formats)
+                    pictures.append(Picture(path, drawing.title, drawing.caption, drawing.alt))
     finally:
         gc.unfreeze()
+    progress(1.0, "pictures drawn")
+    return pictures

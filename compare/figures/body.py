@@ -21,24 +21,12 @@ PIXELS = 1800
 """Pixels across a picture of the body; a printed panel has fewer, which smooths its edges."""
 
 
-STRIP = 0.2
-"""Height of the strip below the body, inches."""
-
-TALLEST, SHORTEST = 3.0, 0.7
-"""Limits of the height of a panel above its strip, inches: a tall body is drawn narrower than the panel."""
-
-
 def panel_extent(
-    points: FloatArray, width: float, *, margin: float, tallest: float = TALLEST, shortest: float = 0.0
+    points: FloatArray, width: float, *, margin: float, tallest: float = 3.0, shortest: float = 0.0
 ) -> Extent:
-    """The extent of a panel that shows points of shape (n, 2), mm, and has its strip below them.
+    """The extent of a panel that shows points, shape (n, 2), with a margin, mm, and its strip below them.
 
-    Args:
-        points: What must be visible.
-        width: Of the panel, inches.
-        margin: Around the points, mm.
-        tallest: Largest height above the strip, inches.
-        shortest: Smallest height above the strip, inches.
+    Panel width and limits of its height above the strip in inches: a tall body is drawn narrower.
     """
     tight = Extent.around(points, margin=margin)
     across = max(tight.width, tight.height * width / tallest)
@@ -46,14 +34,14 @@ def panel_extent(
     beside = (across - tight.width) / 2
     above = max(shortest * inch - tight.height, 0.0) / 2
     return Extent(
-        tight.left - beside, tight.right + beside, tight.bottom - above - STRIP * inch, tight.top + above
+        tight.left - beside, tight.right + beside, tight.bottom - above - 0.2 * inch, tight.top + above
     )
 
 
 def field_extent(mesh: TriangleMesh, width: float) -> Extent:
     """The extent of a panel of a field, `width` inches wide: the undeformed body with a margin, mm."""
     margin = 0.012 * float(np.ptp(mesh.points, axis=0).max())
-    return panel_extent(mesh.points, width, margin=margin, shortest=SHORTEST)
+    return panel_extent(mesh.points, width, margin=margin, shortest=0.7)
 
 
 def prepare(axes: Axes, extent: Extent) -> None:
@@ -71,19 +59,12 @@ def show(axes: Axes, canvas: Canvas, colours: Pixels, points: FloatArray | None 
 
 
 def panel(
-    axes: Axes,
-    canvas: Canvas,
-    mesh: TriangleMesh,
-    colours: Pixels,
-    title: str,
-    note: str,
-    *,
-    bold: bool = True,
+    axes: Axes, canvas: Canvas, mesh: TriangleMesh, colours: Pixels, title: str, note: str, bold: bool = True
 ) -> None:
     """The undeformed body in the colours of its triangles, shape (t, 3), with its outline, title and note."""
     prepare(axes, canvas.extent)
     show(axes, canvas, colours)
-    outline(axes, canvas.outline, mesh.points, width=0.35)
+    draw_outline(axes, canvas.outline, mesh.points, width=0.35)
     axes.set_title(title, size=8.5, pad=2, y=1.0, weight="bold" if bold else "normal")
     write_note(axes, canvas.extent, note)
 
@@ -94,7 +75,7 @@ def write_note(axes: Axes, extent: Extent, note: str) -> None:
     axes.annotate(note, place, xytext=(0, 3), textcoords="offset points", size=SMALL, color=MUTED)
 
 
-def outline(
+def draw_outline(
     axes: Axes,
     paths: Iterable[IntArray],
     points: FloatArray,
@@ -123,12 +104,9 @@ def base_lines(mesh: TriangleMesh) -> list[FloatArray]:
 
 
 def clamp(axes: Axes, lines: Iterable[FloatArray], *, size: float) -> None:
-    """Hatch the clamped base on its outer side, behind the body.
+    """Hatch the clamped base on its outer side, behind the body, with strokes `size` mm apart.
 
-    Args:
-        axes: Where to draw.
-        lines: Its parts, each the points of a line, shape (k, 2), mm, with the body on its left.
-        size: Distance of the strokes, mm.
+    Each of its parts is given by the points of a line, shape (k, 2), mm, with the body on its left.
     """
     for line in lines:
         steps = np.diff(line, axis=0)
@@ -168,13 +146,9 @@ def round_length(wanted: float) -> float:
 
 
 def colour_bar(axes: Axes, scale: Scale, title: str, *, extend: str = "neither") -> None:
-    """A horizontal colour bar that fills `axes`.
+    """A horizontal colour bar that fills `axes`, with quantity and unit under its ticks.
 
-    Args:
-        axes: Axes for the bar alone.
-        scale: The shared scale.
-        title: Quantity and unit, set under the ticks.
-        extend: Which ends hold values beyond the scale: `neither`, `min`, `max` or `both`.
+    `extend` are the ends with values beyond the scale: `neither`, `min`, `max` or `both`.
     """
     figure = axes.figure
     bar = figure.colorbar(scale.mappable, cax=axes, orientation="horizontal", extend=extend, extendfrac=0.03)

@@ -44,26 +44,13 @@ class Extent(NamedTuple):
 
     @property
     def width(self) -> float:
-        """Width, mm."""
+        """In mm, as the height."""
         return self.right - self.left
 
     @property
     def height(self) -> float:
-        """Height, mm."""
+        """In mm."""
         return self.top - self.bottom
-
-
-class Cover(NamedTuple):
-    """The pixels that a mesh covers.
-
-    Attributes:
-        pixels: Numbers of the pixels with any triangle, row by row, shape (k,).
-        quarters: Number of the triangle in each of their quarters, or that of triangles where it has none,
-            shape (4, k).
-    """
-
-    pixels: IntArray
-    quarters: IntArray
 
 
 class Canvas(AbstractContextManager["Canvas"]):
@@ -113,35 +100,34 @@ class Canvas(AbstractContextManager["Canvas"]):
             self._plotter.close()
 
     def picture(self, colours: Pixels, points: FloatArray | None = None) -> Pixels:
-        """The mesh in those colours, transparent where it is not.
+        """Red, green, blue and opacity, shape (height, width, 4), of the mesh in colours.
 
         Args:
             colours: Red, green and blue of every triangle, shape (t, 3).
             points: Where the nodes are, shape (n, 2), mm, if not where the mesh has them.
-
-        Returns:
-            Red, green, blue and opacity, shape (height, width, 4).
         """
         if points is None:
             at_rest = ("cover", self._mesh.digest, self.extent, self._size)
-            cover = shared(at_rest, lambda: self._cover(self._mesh.points))
+            pixels, quarters = shared(at_rest, lambda: self._cover(self._mesh.points))
         else:
-            cover = self._cover(points)
+            pixels, quarters = self._cover(points)
         opaque = np.zeros((len(colours) + 1, 4), dtype=np.uint16)
         opaque[:-1, :3], opaque[:-1, 3] = colours, 255
         packed = opaque.view(np.uint64).ravel()  # four numbers at a time: the sum of four bytes fits each
-        first, second, third, fourth = cover.quarters
-        sums = (
-            (packed[first] + packed[second] + packed[third] + packed[fourth]).view(np.uint16).reshape(-1, 4)
-        )
+        sums = packed[quarters].sum(axis=0).view(np.uint16).reshape(-1, 4)
         image = np.zeros((*self._size, 4), dtype=np.uint8)
         seen = image.reshape(-1, 4)
-        seen[cover.pixels, :3] = sums[:, :3].astype(np.uint32) * 255 // sums[:, 3:]
-        seen[cover.pixels, 3] = sums[:, 3] // 4
+        seen[pixels, :3] = sums[:, :3].astype(np.uint32) * 255 // sums[:, 3:]
+        seen[pixels, 3] = sums[:, 3] // 4
         return image
 
-    def _cover(self, points: FloatArray) -> Cover:
-        """The pixels covered with the nodes at points of shape (n, 2), mm."""
+    def _cover(self, points: FloatArray) -> tuple[IntArray, IntArray]:
+        """The pixels that the mesh covers with its nodes at points of shape (n, 2), mm.
+
+        Returns:
+            Numbers of the pixels with any triangle, row by row, shape (k,), and the number of the triangle in
+            each of their quarters, shape (4, k): the count of triangles where there is none.
+        """
         self._surface.points = np.pad(points, ((0, 0), (0, 1)))
         self._plotter.render()
         with _without_warnings():
@@ -151,7 +137,7 @@ class Canvas(AbstractContextManager["Canvas"]):
         number = np.where(words >> 24, words & 0xFFFFFF, count)
         quarters = number.reshape(height, 2, width, 2).transpose(1, 3, 0, 2).reshape(4, -1)
         pixels = np.flatnonzero((quarters < count).any(axis=0))
-        return Cover(pixels, quarters[:, pixels].astype(np.int64))
+        return pixels, quarters[:, pixels].astype(np.int64)
 
 
 @contextmanager

@@ -16,23 +16,14 @@ from geometry.arrays import FloatArray
 PERCENT = 99.5
 """Share of the area within a colour scale; peaks at re-entrant corners would leave the rest in one colour."""
 
-_BLUE, _GREY, _RED = (0.42, -0.035, -0.145), (0.955, 0.0, 0.0), (0.45, 0.165, 0.075)
-
 
 class Scale(NamedTuple):
-    """A colour scale that several pictures share.
+    """A colour scale that several pictures share."""
 
-    Attributes:
-        low: Value of the first colour.
-        high: Value of the last one.
-        colours: The colour map.
-        log: Whether the colours follow the logarithm of the value, which must be positive.
-    """
-
-    low: float
-    high: float
+    low: float  # value of the first colour
+    high: float  # value of the last one
     colours: Colormap
-    log: bool = False
+    log: bool = False  # whether the colours follow the logarithm of the value, which must be positive
 
     @property
     def mappable(self) -> ScalarMappable:
@@ -65,7 +56,7 @@ def diverging() -> Colormap:
     linear sRGB.
     """
     steps = np.linspace(0, 1, 128)[:, None]
-    blue, grey, red = (np.array(colour) for colour in (_BLUE, _GREY, _RED))
+    blue, grey, red = np.array([(0.42, -0.035, -0.145), (0.955, 0.0, 0.0), (0.45, 0.165, 0.075)])
     lab = np.concatenate([blue + (grey - blue) * steps, grey + (red - grey) * steps])
     lms = lab @ np.array(
         [

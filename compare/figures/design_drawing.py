@@ -12,7 +12,7 @@ from matplotlib.patches import Circle
 from compare.figures import body
 from compare.figures.canvas import Extent
 from compare.figures.dimensions import CENTRE_LINE, Draughtsman, upright
-from compare.figures.style import arrow, axes_at, heading
+from compare.figures.style import arrow, axes_at, write_heading
 from geometry.arrays import FloatArray
 from geometry.figure import CONTACT, MEASURED, SMALL, WIDTH, Figure, figure
 from geometry.finger.design import Design
@@ -33,22 +33,6 @@ from geometry.section.thickness import inner_normals
 
 POINT = 8.5 / 72 / WIDTH
 """Height of the type as a share of the drawing's width."""
-LEFT, RIGHT, ABOVE, BELOW = 5.2, 1.6, 7.2, 3.2
-"""Room around a finger with parameters for its dimensions, in heights of the type."""
-AROUND = (3.0, 5.0, 6.0, 3.4)
-"""The same around any other finger: left, right, above and below."""
-TALLEST = 5.2
-"""Largest height of the drawing, inches."""
-HEAD, LINE = 0.28, 0.16
-"""Heights in inches: heading, a line of the legend."""
-NUMBERED = 60
-"""Largest number of markers that are numbered."""
-DIRECTIONS = 24
-"""Number of places around a marker that are tried for its number."""
-GAPS = (0.75, 1.4)
-"""Tried distances of a number from its marker, in heights of the type."""
-ENOUGH = 0.5
-"""Distance of a number's middle from all else beyond which more is not better, in heights of the type."""
 
 
 @singledispatch
@@ -61,7 +45,7 @@ def draw_design(finger: Finger) -> Figure:
     (left, bottom), (right, top) = bounds
     x, y = finger.section.front_point(finger.contact_abscissa).round(3) + 0.0
     notes = [f"contact’s middle at ({x:.4g}, {y:.4g}) mm", f"depth {finger.depth:.4g} mm"]
-    with _sheet(finger, bounds, AROUND, notes) as (drawn, pen):
+    with _sheet(finger, bounds, (3.0, 5.0, 6.0, 3.4), notes) as (drawn, pen):
         em = pen.em
         pen.between((left, top), (right, top), (0, 4.2 * em), f"{right - left:.4g} mm")
         pen.between((right, bottom), (right, top), (2.4 * em, 0), f"{top - bottom:.4g} mm")
@@ -76,8 +60,7 @@ def _(design: Design) -> Figure:
         rf"$N$ = {design.rib_count} ribs",
         rf"$W$ = {design.depth:.4g} mm (depth, out of the plane)",
     ]
-    room = (LEFT, RIGHT, ABOVE, BELOW)
-    with _sheet(design, bounds, room, [*ribs_and_depth, *_further(design)]) as (drawn, pen):
+    with _sheet(design, bounds, (5.2, 1.6, 7.2, 3.2), [*ribs_and_depth, *_further(design)]) as (drawn, pen):
         _lengths(pen, design)
         _thicknesses(pen, design)
         if design.rib_count:
@@ -91,19 +74,16 @@ def _sheet(
 ) -> Iterator[tuple[Figure, Draughtsman]]:
     """A drawing of a finger that is given its dimensions in the block, and then numbers and a legend.
 
-    Args:
-        finger: The finger.
-        bounds: Smallest and largest x and y of what is to be seen, shape (2, 2), mm.
-        room: Around it on the left, the right, above and below, in heights of the type.
-        notes: Further lines of the legend.
+    Around the bounds, smallest and largest x and y, shape (2, 2), mm, there is room on the left, the right,
+    above and below, in heights of the type. Notes are further lines of the legend.
     """
     labels = [f"{len(finger.markers)} markers ({finger.marker_layout})"]
     labels += [f"contact, {finger.contact_width:.4g} mm wide", *notes]
     extent, em = _page(bounds, room)
-    height, foot = WIDTH * extent.height / extent.width, LINE * -(-len(labels) // 2) + 0.1
-    with figure(HEAD + height + foot) as drawn:
-        heading(drawn, f"Design “{finger.name}”")
-        axes = axes_at(drawn, (0, HEAD, WIDTH, height))
+    head, height, foot = 0.28, WIDTH * extent.height / extent.width, 0.16 * -(-len(labels) // 2) + 0.1
+    with figure(head + height + foot) as drawn:
+        write_heading(drawn, f"Design “{finger.name}”")
+        axes = axes_at(drawn, (0, head, WIDTH, height))
         body.prepare(axes, extent)
         draw_section(axes, finger.section)
         pen = Draughtsman(axes, em)
@@ -123,10 +103,10 @@ def _sheet(
 
 
 def _page(bounds: FloatArray, room: Sequence[float]) -> tuple[Extent, float]:
-    """The extent of a drawing, mm, and the height of its type, mm, that leave the room around the bounds."""
+    """Extent of a drawing at most 5.2 inches high, and height of its type, mm, with room around."""
     left, right, above, below = room
     (width, height), (middle, _) = bounds[1] - bounds[0], bounds.mean(axis=0)
-    across = max(width / (1 - (left + right) * POINT), height / (TALLEST / WIDTH - (above + below) * POINT))
+    across = max(width / (1 - (left + right) * POINT), height / (5.2 / WIDTH - (above + below) * POINT))
     em = float(across * POINT)
     start = middle - (across + (left - right) * em) / 2
     return Extent(start, start + across, bounds[0, 1] - below * em, bounds[1, 1] + above * em), em
@@ -247,13 +227,13 @@ def _markers(pen: Draughtsman, finger: Finger) -> None:
     em, radius = pen.em, finger.marker_radius
     for place in finger.markers:
         pen.axes.add_patch(Circle(tuple(place), radius, fc=MEASURED, ec="white", lw=0.4, zorder=4))
-    if len(finger.markers) > NUMBERED:
+    if len(finger.markers) > 60:  # numbers would hide the drawing
         return
     drawn, numbers = [finger.section.polygon.boundary, *pen.drawn()], [shapely.Point()]
-    turns = np.pi * (np.arange(DIRECTIONS) / DIRECTIONS * 2 - 0.5)
+    turns = np.pi * (np.arange(24) / 12 - 0.5)
     turns = turns[np.argsort(-np.abs(np.sin(turns)).round(9), kind="stable")]  # below and above come first
     directions = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-    steps = np.concatenate([(radius + gap * em) * directions for gap in GAPS])
+    steps = np.concatenate([(radius + gap * em) * directions for gap in (0.75, 1.4)])
     others = shapely.buffer(shapely.points(finger.markers), radius)
     for number, place in enumerate(finger.markers):
         places, text = place + steps, str(number + 1)
@@ -261,6 +241,6 @@ def _markers(pen: Draughtsman, finger: Finger) -> None:
         taken = shapely.union_all([*drawn, *np.delete(others, number)])
         room = shapely.distance(shapely.points(places), taken)
         room = np.fmin(room, shapely.distance(shapely.points(places), shapely.union_all(numbers)) - half)
-        found = places[int(np.minimum(room, ENOUGH * em).round(6).argmax())]
+        found = places[int(np.minimum(room, 0.5 * em).round(6).argmax())]
         pen.text(found, text, size=SMALL, va="center", color=MEASURED)
         numbers.append(shapely.Point(found).buffer(half))

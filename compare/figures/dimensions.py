@@ -13,7 +13,7 @@ from compare.figures.style import HALO, arrow
 from geometry.arrays import FloatArray
 from geometry.figure import INK
 
-Point = Sequence[float] | FloatArray
+Place = Sequence[float] | FloatArray
 LINE = 0.6
 CENTRE_LINE = (0, (6, 2, 1, 2))
 """Dashes and dots of a line that is no edge."""
@@ -28,25 +28,13 @@ def upright(along: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class Draughtsman:
-    """Draws dimensions.
+    """Draws dimensions."""
 
-    Attributes:
-        axes: Where to draw; data coordinates are mm.
-        em: Height of the type, mm of the drawing: the measure of every gap.
-    """
+    axes: Axes  # their data coordinates are mm
+    em: float  # height of the type, mm of the drawing: the measure of every gap
 
-    axes: Axes
-    em: float
-
-    def between(self, start: Point, end: Point, away: Point, text: str) -> None:
-        """A length from `start` to `end`, drawn beside the body with extension lines.
-
-        Args:
-            start: First point, mm.
-            end: Second point, mm.
-            away: From the points to the dimension line, mm.
-            text: Symbol and value.
-        """
+    def between(self, start: Place, end: Place, away: Place, text: str) -> None:
+        """A length from `start` to `end` with extension lines to its dimension line, which is `away`, mm."""
         shift = np.asarray(away, dtype=np.float64)
         length = float(np.linalg.norm(shift))
         beyond = shift * (1 + 0.4 * self.em / length)
@@ -58,15 +46,10 @@ class Draughtsman:
         label = self.text((tail + head) / 2, text, rotation=turn, va="center", rotation_mode="anchor")
         label.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 1.2})
 
-    def thickness(self, outer: Point, inner: Point, elbow: Point, text: str, *, side: str = "left") -> None:
-        """A thickness between two faces, by arrows from outside and a leader to the text.
+    def thickness(self, outer: Place, inner: Place, elbow: Place, text: str, *, side: str = "left") -> None:
+        """A thickness between points on two faces, by arrows from outside and a leader from the outer one.
 
-        Args:
-            outer: Point on the face next to the text, mm.
-            inner: Point on the other face, mm.
-            elbow: Where the leader ends and the text stands, mm.
-            text: Symbol and value.
-            side: Which edge of the text is at the elbow: `left`, `right` or `center`.
+        The leader ends at the elbow, where the text stands with its `left`, `right` or `center`.
         """
         near, far = np.asarray(outer, dtype=np.float64), np.asarray(inner, dtype=np.float64)
         normal = (near - far) / np.linalg.norm(near - far)
@@ -79,17 +62,11 @@ class Draughtsman:
         self.text((elbow[0] + gap, elbow[1]), text, ha=side, va=vertical)
 
     def angle(
-        self, corner: Point, first: Point, second: Point, radius: float, text: str, *, side: str = "center"
+        self, corner: Place, first: Place, second: Place, radius: float, text: str, *, side: str = "center"
     ) -> None:
-        """The angle between two directions, as an arc at a distance from their corner.
+        """The angle between two unit vectors, as an arc of a radius, mm, around the corner where they start.
 
-        Args:
-            corner: Where both directions start, mm.
-            first: Unit vector.
-            second: Unit vector.
-            radius: From the corner to the arc, mm.
-            text: Symbol and value, set beyond the arc.
-            side: Which edge of the text is there: `left`, `right` or `center`.
+        The text stands beyond the arc with its `left`, `right` or `center`.
         """
         centre = np.asarray(corner, dtype=np.float64)
         for direction in (first, second):
@@ -103,12 +80,12 @@ class Draughtsman:
             centre + middle / np.linalg.norm(middle) * (radius + 1.2 * self.em), text, va="top", ha=side
         )
 
-    def text(self, where: Point, text: str, **options: Any) -> Text:
+    def text(self, where: Place, text: str, **options: Any) -> Text:
         """Text with a white halo, in the drawing's type."""
         settings: dict[str, Any] = {"ha": "center", "color": INK, "zorder": 7, "path_effects": HALO} | options
         return self.axes.text(float(where[0]), float(where[1]), text, **settings)
 
-    def line(self, start: Point, end: Point, style: Any = "-") -> None:
+    def line(self, start: Place, end: Place, style: Any = "-") -> None:
         """A thin line between two points, mm."""
         self.axes.plot(
             [start[0], end[0]], [start[1], end[1]], color=INK, linewidth=LINE, linestyle=style, zorder=5
@@ -124,5 +101,5 @@ class Draughtsman:
                 found.append(shapely.Point(text.get_position()).buffer(0.7 * self.em))
         return found
 
-    def _arrow(self, tail: Point, head: Point, style: str) -> None:
+    def _arrow(self, tail: Place, head: Place, style: str) -> None:
         arrow(self.axes, tail, head, style=f"{style},head_width=0.12,head_length=0.3", width=LINE)

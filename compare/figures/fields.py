@@ -13,7 +13,7 @@ from compare.evaluation.metrics import COMPONENTS
 from compare.figures import body
 from compare.figures.canvas import Canvas
 from compare.figures.colours import PERCENT, Scale, diverging, sequential, symmetric
-from compare.figures.style import axes_at, heading
+from compare.figures.style import axes_at, write_heading
 from compare.runtime.tables import percent, significant
 from geometry.arrays import FloatArray
 from geometry.figure import MUTED, SMALL, WIDTH, Figure, figure
@@ -27,24 +27,15 @@ DECADES = 4
 """Powers of ten on the colour scale of the excess energy."""
 
 
-class Quantity(NamedTuple):
-    """A scalar field to draw.
+class FieldQuantity(NamedTuple):
+    """A scalar field to draw."""
 
-    Attributes:
-        name: File name without suffix.
-        title: What the heading calls it.
-        symbol: For the colour bar, in mathematical notation without the dollar signs.
-        unit: `MPa` or `%`.
-        signed: Whether its scale is symmetric about zero; else it starts there.
-        values: From an evaluation to the field at the quadrature points, shape (q,).
-    """
-
-    name: str
+    name: str  # file name without suffix
     title: str
-    symbol: str
-    unit: str
-    signed: bool
-    values: Callable[[Evaluation], FloatArray]
+    symbol: str  # for the colour bar, in mathematical notation without the dollar signs
+    unit: str  # `MPa` or `%`
+    signed: bool  # whether its scale is symmetric about zero; else it starts there
+    values: Callable[[Evaluation], FloatArray]  # the field at the quadrature points, shape (q,)
 
 
 def max_principal(strain: FloatArray) -> FloatArray:
@@ -53,48 +44,49 @@ def max_principal(strain: FloatArray) -> FloatArray:
     return np.asarray(mean + np.hypot((strain[:, 0, 0] - strain[:, 1, 1]) / 2, strain[:, 0, 1]))
 
 
-def strain_percent(component: str) -> Callable[[Evaluation], FloatArray]:
-    """The function that gives one strain component, `xx`, `yy` or `xy`, in percent."""
+def _strain_component(component: str) -> FieldQuantity:
     row, column = COMPONENTS[component]
-    return lambda evaluation: 100 * evaluation.strain[:, row, column]
+    title, symbol = f"Strain component {component}", rf"\varepsilon_{{{component}}}"
+    name = f"strain_{component}"
+    return FieldQuantity(name, title, symbol, "%", True, lambda each: 100 * each.strain[:, row, column])
 
 
 QUANTITIES = (
-    Quantity("von_mises", "Von Mises stress", r"\sigma_\mathrm{vM}", "MPa", False, lambda e: e.von_mises),
-    Quantity(
+    FieldQuantity(
+        "von_mises", "Von Mises stress", r"\sigma_\mathrm{vM}", "MPa", False, lambda each: each.von_mises
+    ),
+    FieldQuantity(
         "strain_principal",
         "Largest in-plane principal strain",
         r"\varepsilon_1",
         "%",
         False,
-        lambda e: 100 * max_principal(e.strain),
+        lambda each: 100 * max_principal(each.strain),
     ),
-    Quantity("strain_xx", "Strain component xx", r"\varepsilon_{xx}", "%", True, strain_percent("xx")),
-    Quantity("strain_yy", "Strain component yy", r"\varepsilon_{yy}", "%", True, strain_percent("yy")),
-    Quantity("strain_xy", "Strain component xy", r"\varepsilon_{xy}", "%", True, strain_percent("xy")),
+    *map(_strain_component, ("xx", "yy", "xy")),
 )
 
 
-def triangle_values(quantity: Quantity, evaluation: Evaluation) -> FloatArray:
+def triangle_values(quantity: FieldQuantity, evaluation: Evaluation) -> FloatArray:
     """Mean of the quantity over each triangle, shape (t,), as it is drawn."""
     return evaluation.per_triangle(quantity.values(evaluation))
 
 
-def field_scale(quantity: Quantity, mesh: TriangleMesh, reference: Evaluation) -> Scale:
+def field_scale(quantity: FieldQuantity, mesh: TriangleMesh, reference: Evaluation) -> Scale:
     """The scale that every solver's field is drawn on: it covers the percentile of the reference's area."""
     values = triangle_values(quantity, reference)
     return symmetric([values], mesh.areas) if quantity.signed else sequential(values, mesh.areas)
 
 
 def difference_scale(
-    quantity: Quantity, mesh: TriangleMesh, evaluation: Evaluation, reference: Evaluation
+    quantity: FieldQuantity, mesh: TriangleMesh, evaluation: Evaluation, reference: Evaluation
 ) -> Scale:
     """The scale of a solver's difference, its own: beside one that is far away, a near one would be blank."""
     difference = triangle_values(quantity, evaluation) - triangle_values(quantity, reference)
     return symmetric([difference], mesh.areas)
 
 
-def draw_field(comparison: Comparison, quantity: Quantity) -> Figure:
+def draw_field(comparison: Comparison, quantity: FieldQuantity) -> Figure:
     """Draw a quantity on the undeformed body: a row a solver, its difference from the reference beside it.
 
     The last row is the truth where the markers are simulated.
@@ -111,7 +103,7 @@ def draw_field(comparison: Comparison, quantity: Quantity) -> Figure:
     largest = "largest magnitude" if quantity.signed else "largest"
 
     with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // 2) as canvas:
-        heading(drawn, f"{quantity.title}, undeformed body")
+        write_heading(drawn, f"{quantity.title}, undeformed body")
         for row, evaluation in enumerate(ordered):
             top = HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)
             axes = axes_at(drawn, (MARGIN, top, width, height))
@@ -182,7 +174,7 @@ def draw_excess(comparison: Comparison) -> Figure | None:
     scale = excess_scale(mesh, [certificate.density for _, certificate in entries])
     total = HEAD + rows * (PANEL_TITLE + height) + FOOT
     with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // 2) as canvas:
-        heading(drawn, "Excess energy over finite elements, undeformed body")
+        write_heading(drawn, "Excess energy over finite elements, undeformed body")
         for number, (label, certificate) in enumerate(entries):
             row, column = divmod(number, columns)
             top = HEAD + PANEL_TITLE + row * (PANEL_TITLE + height)

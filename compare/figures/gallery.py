@@ -12,26 +12,18 @@ from compare.evaluation.force_displacement import ForceCurve, force_curves
 from compare.evaluation.metrics import held_out_errors
 from compare.figures.colours import PERCENT
 from compare.figures.design_drawing import draw_design
-from compare.figures.energy_chart import draw_energy
-from compare.figures.fields import DECADES, QUANTITIES, Quantity, draw_excess, draw_field
-from compare.figures.force_chart import draw_force_displacement
-from compare.figures.loss_chart import draw_losses
+from compare.figures.fields import DECADES, QUANTITIES, FieldQuantity, draw_excess, draw_field
+from compare.figures.force_charts import draw_force_displacement
 from compare.figures.marker_chart import draw_marker_errors
 from compare.figures.mesh_drawing import draw_mesh, mesh_numbers
 from compare.figures.overlay import draw_overlay
+from compare.figures.record_charts import draw_energy, draw_losses
 from geometry.errors import UserError
 from geometry.figure import Figure
 
 
-class Drawing(NamedTuple):
-    """A picture with its title and caption.
-
-    Attributes:
-        figure: The picture.
-        title: Its subject, in a few words.
-        caption: What a reader must know to read it, in sentences.
-        alt: What it shows, in numbers, for those who cannot see it.
-    """
+class Illustration(NamedTuple):
+    """A picture with the words of `compare.figures.Picture`."""
 
     figure: Figure
     title: str
@@ -39,12 +31,11 @@ class Drawing(NamedTuple):
     alt: str
 
 
-def overlay(comparison: Comparison) -> Drawing:
-    """The deformed finger of every solver."""
+def _overlay(comparison: Comparison) -> Illustration:
     observations = comparison.observations
     cylinder = "" if comparison.load.radius is None else " Grey circle: the cylinder where it ends."
     circles = f"Circles: {observations.label} marker positions. " if observations.known else ""
-    return Drawing(
+    return Illustration(
         draw_overlay(comparison),
         "Deformed finger",
         f"The deformed body of each solver, coloured by displacement magnitude on one scale; the "
@@ -58,8 +49,7 @@ def overlay(comparison: Comparison) -> Drawing:
     )
 
 
-def marker_chart(comparison: Comparison) -> Drawing | None:
-    """Bars of the errors at the markers; none where no displacement is known."""
+def _marker_errors(comparison: Comparison) -> Illustration | None:
     observations = comparison.observations
     if not observations.known:
         return None
@@ -69,7 +59,7 @@ def marker_chart(comparison: Comparison) -> Drawing | None:
         if hidden
         else ""
     )
-    return Drawing(
+    return Illustration(
         draw_marker_errors(comparison),
         "Errors at the markers",
         f"Absolute difference between each solver’s displacement and the {observations.label} one, "
@@ -85,8 +75,7 @@ def marker_chart(comparison: Comparison) -> Drawing | None:
     )
 
 
-def field(comparison: Comparison, quantity: Quantity) -> Drawing:
-    """One scalar field of every solver, and its difference from the reference."""
+def _field(comparison: Comparison, quantity: FieldQuantity) -> Illustration:
     reference = comparison.reference.label
     mixed = (
         " The solvers have different laws: strain is Green-Lagrange where it is finite, stress is Cauchy."
@@ -101,7 +90,7 @@ def field(comparison: Comparison, quantity: Quantity) -> Drawing:
     )
     if comparison.truth is not None:
         beside += " Truth: the simulated finger of the markers."
-    return Drawing(
+    return Illustration(
         draw_field(comparison, quantity),
         quantity.title,
         f"{quantity.title} of every solver on the undeformed body, each triangle in the colour of its "
@@ -116,8 +105,7 @@ def field(comparison: Comparison, quantity: Quantity) -> Drawing:
     )
 
 
-def force_displacement(comparison: Comparison) -> Drawing | None:
-    """Force over displacement of the indenter, where a solver follows the load."""
+def _force_displacement(comparison: Comparison) -> Illustration | None:
     depth = comparison.design.depth
     if not (curves := force_curves(comparison.evaluations, comparison.load)):
         return None
@@ -125,7 +113,7 @@ def force_displacement(comparison: Comparison) -> Drawing | None:
     if comparison.truth is not None:
         truth = ForceCurve.of(comparison.truth, comparison.load)
         cross = " Cross: the force on the simulated finger, the truth that the solvers should reach."
-    return Drawing(
+    return Illustration(
         draw_force_displacement(curves, depth=depth, truth=truth),
         "Force over displacement",
         f"Force of the indenter along its travel: per mm of depth (left), and for the finger’s "
@@ -140,11 +128,10 @@ def force_displacement(comparison: Comparison) -> Drawing | None:
     )
 
 
-def excess(comparison: Comparison) -> Drawing | None:
-    """The density of the energy by which each certified solver is above finite elements."""
+def _excess(comparison: Comparison) -> Illustration | None:
     if (figure := draw_excess(comparison)) is None:
         return None
-    return Drawing(
+    return Illustration(
         figure,
         "Excess energy",
         f"Energy of the difference between each solver’s displacement, taken over to the elements of "
@@ -160,11 +147,10 @@ def excess(comparison: Comparison) -> Drawing | None:
     )
 
 
-def energy(comparison: Comparison) -> Drawing | None:
-    """The record of every solver that kept one."""
+def _energy(comparison: Comparison) -> Illustration | None:
     if (figure := draw_energy(comparison)) is None:
         return None
-    return Drawing(
+    return Illustration(
         figure,
         "Energy",
         f"Elastic energy per unit depth as each solver went on and, beside it, its relative distance "
@@ -175,11 +161,10 @@ def energy(comparison: Comparison) -> Drawing | None:
     )
 
 
-def losses(comparison: Comparison) -> Drawing | None:
-    """The terms of the loss of every network that is trained by gradients."""
+def _losses(comparison: Comparison) -> Illustration | None:
     if (figure := draw_losses(comparison)) is None:
         return None
-    return Drawing(
+    return Illustration(
         figure,
         "Losses",
         f"The paper’s Fig. 7, for all terms of the loss. L_PDE is the mean energy density: its least "
@@ -195,11 +180,10 @@ def losses(comparison: Comparison) -> Drawing | None:
     )
 
 
-def design(comparison: Comparison) -> Drawing:
-    """The finger with its dimensions."""
+def _design(comparison: Comparison) -> Illustration:
     finger = comparison.design
     symbols = " under the paper’s symbols" if any(symbol for _, symbol, _ in finger.facts()) else ""
-    return Drawing(
+    return Illustration(
         draw_design(finger),
         "Design",
         f"The finger “{finger.name}”, to scale, with its dimensions{symbols}, the clamped base (hatched), "
@@ -208,10 +192,9 @@ def design(comparison: Comparison) -> Drawing:
     )
 
 
-def mesh(comparison: Comparison) -> Drawing:
-    """The shared mesh."""
+def _mesh(comparison: Comparison) -> Illustration:
     numbers = mesh_numbers(comparison.mesh)
-    return Drawing(
+    return Illustration(
         draw_mesh(comparison.mesh),
         "Mesh",
         f"The mesh that every solver shares: {numbers['size']}, edges from {numbers['edges']}. Quality is "
@@ -221,29 +204,29 @@ def mesh(comparison: Comparison) -> Drawing:
     )
 
 
-DRAWINGS: dict[str, tuple[str, Callable[[Comparison], Drawing | None]]] = {
-    "overlay": ("picture of the deformed finger", overlay),
-    "marker_errors": ("chart of the errors at the markers", marker_chart),
-    **{each.name: (f"picture of {each.name}", partial(field, quantity=each)) for each in QUANTITIES},
-    "force_displacement": ("chart of force over displacement", force_displacement),
-    "excess": ("picture of the excess energy", excess),
-    "energy": ("chart of the energy", energy),
-    "losses": ("chart of the losses", losses),
-    "design": ("drawing of the design", design),
-    "mesh": ("picture of the mesh", mesh),
+GALLERY: dict[str, tuple[str, Callable[[Comparison], Illustration | None]]] = {
+    "overlay": ("picture of the deformed finger", _overlay),
+    "marker_errors": ("chart of the errors at the markers", _marker_errors),
+    **{each.name: (f"picture of {each.name}", partial(_field, quantity=each)) for each in QUANTITIES},
+    "force_displacement": ("chart of force over displacement", _force_displacement),
+    "excess": ("picture of the excess energy", _excess),
+    "energy": ("chart of the energy", _energy),
+    "losses": ("chart of the losses", _losses),
+    "design": ("drawing of the design", _design),
+    "mesh": ("picture of the mesh", _mesh),
 }
 """By file name: words for the progress line, and the function; it gives None if there is nothing to draw."""
 
 
-def draw(comparison: Comparison, name: str) -> Drawing:
+def draw(comparison: Comparison, name: str) -> Illustration:
     """One picture of a comparison by its name.
 
     Raises:
         UserError: If there is no such picture, or nothing to draw in it.
     """
-    if name not in DRAWINGS:
-        raise UserError(f"there is no picture {name!r}; there are {', '.join(DRAWINGS)}")
-    what, make = DRAWINGS[name]
+    if name not in GALLERY:
+        raise UserError(f"there is no picture {name!r}; there are {', '.join(GALLERY)}")
+    what, make = GALLERY[name]
     if (drawing := make(comparison)) is None:
         raise UserError(f"{name}: no solver of this comparison has data for the {what}")
     return drawing

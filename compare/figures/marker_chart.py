@@ -12,17 +12,13 @@ from matplotlib.ticker import MaxNLocator
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import MarkerErrors, held_out_errors, marker_errors
-from compare.figures.style import axes_at, heading, legend_below_heading, solver_colour
+from compare.figures.style import axes_at, legend_below_heading, solver_colour, write_heading
 from geometry.arrays import BoolArray
 from geometry.figure import INK, MUTED, SMALL, WIDTH, Figure, figure
 from geometry.observations import Observations
 
-HEAD, TITLE, HEIGHT, GAP, FOOT = 0.62, 0.19, 0.42, 0.09, 0.4
-"""Heights in inches: heading and legend; a solver's name; its bars; the space below; the lowest axis."""
-LEFT, MEANS = 0.56, 1.08
-"""Widths in inches beside the bars: their scale; their means."""
-TRAINING: dict[str, Any] = {"ls": "", "marker": "o", "ms": 3.2, "mfc": "white", "mew": 0.8}
-"""Look of a training error: a circle is seen even where the error vanishes."""
+CIRCLE: dict[str, Any] = {"ls": "", "marker": "o", "ms": 3.2, "mfc": "white", "mew": 0.8}
+"""Look of a training error, which is seen even where the error vanishes."""
 
 
 def draw_marker_errors(comparison: Comparison) -> Figure:
@@ -31,25 +27,25 @@ def draw_marker_errors(comparison: Comparison) -> Figure:
     Bars: at markers that the solver was not given. Circles: at markers that it was given.
     """
     evaluations, observations = comparison.evaluations, comparison.observations
-    width = WIDTH / 2 - LEFT - MEANS
-    step = TITLE + HEIGHT + GAP
+    head, title, height, gap, foot = 0.62, 0.19, 0.42, 0.09, 0.4  # inches: with legend; a solver's name; ...
+    left, step = 0.56, title + height + gap
+    width = WIDTH / 2 - left - 1.08  # where the means stand
     ceiling = _ceiling(evaluations, observations)
-    with figure(HEAD + len(evaluations) * step + FOOT) as drawn:
-        heading(drawn, f"Absolute error at the markers, against {observations.label} displacements")
+    with figure(head + len(evaluations) * step + foot) as drawn:
+        write_heading(drawn, f"Absolute error at the markers, against {observations.label} displacements")
         fitted = any(evaluation.in_sample for evaluation in evaluations)
         handles = [
             Patch(facecolor=MUTED, edgecolor=MUTED, label="held out: the solver was not given this marker"),
-            Line2D([], [], **TRAINING, color=MUTED, label="training: it was given this marker (†)"),
+            Line2D([], [], **CIRCLE, color=MUTED, label="training: it was given this marker (†)"),
         ]
         legend_below_heading(drawn, handles[: 1 + fitted], length=1.4)
         for row, evaluation in enumerate(evaluations):
             held_out = held_out_errors(evaluation, observations)
             given = marker_errors(evaluation, observations) if evaluation.in_sample else None
             for column, symbol in enumerate("uv"):
-                box = (LEFT + column * WIDTH / 2, HEAD + TITLE + row * step, width, HEIGHT)
-                axes = axes_at(drawn, box)
-                _bars(axes, symbol, held_out, given, solver_colour(row))
-                _scales(axes, observations.visible, ceiling)
+                axes = axes_at(drawn, (left + column * WIDTH / 2, head + title + row * step, width, height))
+                _draw_errors(axes, symbol, held_out, given, solver_colour(row))
+                _set_scales(axes, observations.visible, ceiling)
                 axes.set_ylabel(rf"$|\Delta {symbol}|$, mm", size=SMALL)
                 if row == 0:
                     axes.text(1.03, 1.06, "mean, mm", size=SMALL, color=INK, transform=axes.transAxes)
@@ -72,7 +68,7 @@ def _ceiling(evaluations: Sequence[Evaluation], observations: Observations) -> f
     return float(max(found)) or 1.0
 
 
-def _bars(
+def _draw_errors(
     axes: Axes, symbol: str, held_out: MarkerErrors | None, given: MarkerErrors | None, colour: str
 ) -> None:
     """The bars and circles of one solver and component, and their means beside."""
@@ -84,24 +80,23 @@ def _bars(
         marker = np.arange(1, len(values) + 1)
         seen = np.isfinite(values)
         if errors is given:
-            axes.plot(marker[seen], values[seen], **TRAINING, color=INK, clip_on=False, zorder=3)
+            axes.plot(marker[seen], values[seen], **CIRCLE, color=INK, clip_on=False, zorder=3)
         else:
             axes.bar(marker[seen], values[seen], 0.72, color=colour, edgecolor=colour, linewidth=0.6)
         words.append(f"{getattr(errors, f'mae_{symbol}'):.3f} {kind}")
     axes.text(1.03, 0.5, "\n".join(words), size=SMALL, va="center", color=MUTED, transform=axes.transAxes)
 
 
-def _scales(axes: Axes, visible: BoolArray, ceiling: float) -> None:
+def _set_scales(axes: Axes, visible: BoolArray, ceiling: float) -> None:
     count = len(visible)
     for marker in np.flatnonzero(~visible) + 1:
-        axes.text(
-            marker, 0.04, "×", size=SMALL, color=MUTED, ha="center", transform=axes.get_xaxis_transform()
-        )
+        place = axes.get_xaxis_transform()
+        axes.text(marker, 0.04, "×", size=SMALL, color=MUTED, ha="center", transform=place)
     axes.set_xticks(range(1, count + 1) if count <= 12 else range(1, count + 1, 5))
     axes.set_xlim(0.4, count + 0.6)
     axes.set_ylim(0, 1.04 * ceiling)
     axes.yaxis.set_major_locator(MaxNLocator(2))
     axes.yaxis.set_major_formatter("{x:g}")
     axes.tick_params(labelsize=SMALL)
-    axes.grid(axis="y", color="#dddddd", linewidth=0.5)
+    axes.grid(axis="y")
     axes.set_axisbelow(True)

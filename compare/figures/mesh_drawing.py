@@ -7,17 +7,14 @@ from matplotlib.patches import Rectangle
 
 from compare.figures import body
 from compare.figures.canvas import Extent
-from compare.figures.style import HALO, axes_at, heading
+from compare.figures.style import HALO, axes_at, write_heading
 from geometry.arrays import FloatArray
 from geometry.figure import CONTACT, INK, MEASURED, SMALL, WIDTH, Figure, figure
 from geometry.mesh.boundary import boundary_edges, edge_paths
 from geometry.mesh.triangle_mesh import TriangleMesh
 
-MARGIN = 0.1
-HEAD, INSET_TITLE = 0.48, 0.24
-TALLEST = 4.2
-"""Largest height of the whole mesh, inches."""
-LINE = "#3d5a80"
+HEAD, INSET_TITLE, MARGIN = 0.48, 0.24, 0.1
+"""Heights of the headings, and the margin, inches."""
 
 
 def mesh_numbers(mesh: TriangleMesh) -> dict[str, str]:
@@ -65,14 +62,14 @@ def draw_mesh(mesh: TriangleMesh) -> Figure:
     """Draw the whole mesh and two close-ups: the contact, and a re-entrant corner or an end of the base."""
     width = WIDTH - 2 * MARGIN
     size = float(np.ptp(mesh.points, axis=0).max())
-    whole = body.panel_extent(mesh.points, width, margin=0.025 * size, tallest=TALLEST)
+    whole = body.panel_extent(mesh.points, width, margin=0.025 * size, tallest=4.2)
     height = width * whole.height / whole.width
     inset_width, inset_height = (WIDTH - 3 * MARGIN) / 2, 1.5
     windows = _close_ups(mesh, inset_height / inset_width)
     numbers = mesh_numbers(mesh)
     note = f"{numbers['size']}; edges {numbers['edges']}; quality: {numbers['quality']}"
     with figure(HEAD + height + INSET_TITLE + inset_height + MARGIN) as drawn:
-        heading(drawn, "Mesh, shared by every solver", note)
+        write_heading(drawn, "Mesh, shared by every solver", note)
         axes = axes_at(drawn, (MARGIN, HEAD, width, height))
         _draw(axes, mesh, whole, 0.12)
         body.clamp(axes, body.base_lines(mesh), size=body.hatch_size(mesh.points))
@@ -140,9 +137,9 @@ def _draw(axes: Axes, mesh: TriangleMesh, window: Extent, width: float) -> None:
         ends.min(axis=1) > (window.right, window.top)
     )
     inside = ~beyond.any(axis=1)
-    axes.add_collection(LineCollection(list(ends[inside]), colors=LINE, linewidths=width), autolim=False)
+    axes.add_collection(LineCollection(list(ends[inside]), colors="#3d5a80", linewidths=width), autolim=False)
     boundary = edge_paths(boundary_edges(mesh.triangles))
-    body.outline(axes, boundary, mesh.points, colour=INK, width=0.5 if width < 0.3 else 1.0)
+    body.draw_outline(axes, boundary, mesh.points, colour=INK, width=0.5 if width < 0.3 else 1.0)
     contact = edge_paths(mesh.boundary("contact"))
-    body.outline(axes, contact, mesh.points, colour=CONTACT, width=2.2, zorder=4)
+    body.draw_outline(axes, contact, mesh.points, colour=CONTACT, width=2.2, zorder=4)
     axes.plot(*mesh.markers.T, "o", ms=2.5, mfc=MEASURED, mec="white", mew=0.5, zorder=4)

@@ -12,28 +12,22 @@ from compare.evaluation.metrics import held_out_errors, marker_errors
 from compare.figures import body
 from compare.figures.canvas import Canvas, Extent
 from compare.figures.colours import Scale
-from compare.figures.style import LEGEND_LINE, arrow, axes_at, heading, legend_below_heading
+from compare.figures.style import LEGEND_LINE, arrow, axes_at, legend_below_heading, write_heading
 from geometry.arrays import FloatArray
 from geometry.figure import INK, MEASURED, MUTED, WIDTH, Figure, figure
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 
-GIVEN = "† was given these markers and meets them; held out: each predicted from the others"
-"""Meaning of the mark of a solver that was given the markers."""
 MARGIN = 0.12
 HEAD, PANEL_TITLE, FOOT = 0.55, 0.27, 0.48
 """Heights in inches: heading and legend; the name above a panel; the colour bar."""
-TALLEST = 4.0
-"""Largest height of a panel, inches."""
-TALL = 0.7
-"""Height over length from which a body has its panels in two columns."""
 
 
 def draw_overlay(comparison: Comparison) -> Figure:
     """Draw every solver's deformed finger, one panel each, at true scale."""
     mesh, evaluations = comparison.mesh, comparison.evaluations
     across, up = np.ptp(mesh.points, axis=0)
-    columns = 1 if len(evaluations) <= 3 and up < TALL * across else 2
+    columns = 1 if len(evaluations) <= 3 and up < 0.7 * across else 2
     columns = min(columns, len(evaluations))
     rows = -(-len(evaluations) // columns)
     width = (WIDTH - MARGIN * (columns + 1)) / columns
@@ -41,11 +35,13 @@ def draw_overlay(comparison: Comparison) -> Figure:
     height = width * extent.height / extent.width
     high = max(float(_magnitude(mesh, evaluation).max()) for evaluation in evaluations)
     scale = Scale(0.0, high or 1.0, mpl.colormaps["viridis"])
-    given = GIVEN if any(evaluation.in_sample for evaluation in evaluations) else ""
+    given = ""
+    if any(evaluation.in_sample for evaluation in evaluations):
+        given = "† was given these markers and meets them; held out: each predicted from the others"
     head = HEAD + LEGEND_LINE * bool(given)
     total = head + rows * (PANEL_TITLE + height) + FOOT
     with figure(total) as drawn, Canvas(mesh, extent, width=body.PIXELS // columns) as canvas:
-        heading(drawn, "Deformed finger, true scale")
+        write_heading(drawn, "Deformed finger, true scale")
         for number, evaluation in enumerate(evaluations):
             row, column = divmod(number, columns)
             left = MARGIN + column * (width + MARGIN)
@@ -83,7 +79,7 @@ def overlay_extent(comparison: Comparison, width: float) -> Extent:
         if evaluation.converged
     ]
     margin = 0.03 * float(np.ptp(mesh.points, axis=0).max())
-    return body.panel_extent(np.concatenate(clouds), width, margin=margin, tallest=TALLEST)
+    return body.panel_extent(np.concatenate(clouds), width, margin=margin, tallest=4.0)
 
 
 def _magnitude(mesh: TriangleMesh, evaluation: Evaluation) -> FloatArray:
@@ -95,9 +91,9 @@ def _panel(axes: Axes, canvas: Canvas, scale: Scale, comparison: Comparison, eva
     mesh, observations = comparison.mesh, comparison.observations
     deformed = mesh.points + evaluation.node_displacement
     body.prepare(axes, canvas.extent)
-    body.outline(axes, canvas.outline, mesh.points, colour="#9a9a9a", width=0.6, zorder=0)
+    body.draw_outline(axes, canvas.outline, mesh.points, colour="#9a9a9a", width=0.6, zorder=0)
     body.show(axes, canvas, scale.paint(_magnitude(mesh, evaluation)), deformed)
-    body.outline(axes, canvas.outline, deformed, width=0.4)
+    body.draw_outline(axes, canvas.outline, deformed, width=0.4)
     body.clamp(axes, body.base_lines(mesh), size=body.hatch_size(mesh.points))
     seen = observations.visible
     observed = observations.points[seen] + observations.displacements[seen]
@@ -108,10 +104,10 @@ def _panel(axes: Axes, canvas: Canvas, scale: Scale, comparison: Comparison, eva
     axes.plot(*computed.T, "x", ms=4, color=INK, mew=0.9, zorder=5)
     axes.set_title(evaluation.label_at_markers, size=9, pad=3, y=1.0, weight="bold")
     if observations.known:
-        body.write_note(axes, canvas.extent, mean_errors(evaluation, observations))
+        body.write_note(axes, canvas.extent, errors_note(evaluation, observations))
 
 
-def mean_errors(evaluation: Evaluation, observations: Observations) -> str:
+def errors_note(evaluation: Evaluation, observations: Observations) -> str:
     """Mean absolute errors at the markers in words: held out where the solver tells, else what they are."""
     errors, kind = held_out_errors(evaluation, observations), "held out"
     if errors is None:

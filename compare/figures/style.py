@@ -19,7 +19,12 @@ SOLVER_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#56b4e9", "#d55e00", "#00000
 """Okabe and Ito's palette, safe for colour-blind readers, without its pink (see `MEASURED`), and two more."""
 
 
-def heading(drawn: Figure, text: str, note: str = "") -> None:
+def solver_colour(number: int) -> str:
+    """Colour of the solver with that number in the run's order."""
+    return SOLVER_COLOURS[number % len(SOLVER_COLOURS)]
+
+
+def write_heading(drawn: Figure, text: str, note: str = "") -> None:
     """Title at the top left of a figure, and under it, smaller, what the reader must know."""
     height = drawn.get_figheight()
     drawn.text(0.012, 1 - 0.06 / height, text, va="top", weight="bold", size=9.5, color=INK)
@@ -51,13 +56,9 @@ def arrow(
 
 
 def legend_below_heading(drawn: Figure, handles: Sequence[Artist], *, length: float, note: str = "") -> None:
-    """A legend in one line below the heading, and a note in the line below it.
+    """A legend in one line below the heading, and a note on marks in the figure in the line below it.
 
-    Args:
-        drawn: The figure.
-        handles: What is in the legend.
-        length: Of its handles, in heights of the type.
-        note: What the reader must know of marks in the figure, if there are any.
+    `length` is that of the handles, in heights of the type.
     """
     height = drawn.get_figheight()
     if note:
@@ -100,8 +101,3 @@ def legend_above(axes: Axes) -> None:
         borderpad=0.1,
         labelspacing=0.35,
     )
-
-
-def solver_colour(number: int) -> str:
-    """Colour of the solver with that number in the run's order."""
-    return SOLVER_COLOURS[number % len(SOLVER_COLOURS)]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from compare.evaluation.comparison import TRUTH, Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.figures.colours import diverging
-from compare.figures.fields import QUANTITIES, Quantity, difference_scale, field_scale, triangle_values
+from compare.figures.fields import QUANTITIES, FieldQuantity, difference_scale, field_scale, triangle_values
 from geometry.arrays import FloatArray
 from geometry.mesh.boundary import boundary_edges, edge_paths
 
@@ -27,7 +27,7 @@ FRAMES = 16
 """States along the load path that are kept of one solver."""
 STEPS = 65_535
 
-DISPLACEMENT = Quantity(
+DISPLACEMENT = FieldQuantity(
     "displacement",
     "Displacement magnitude",
     "|u|",
@@ -103,7 +103,7 @@ def viewer(comparison: Comparison) -> dict[str, Any] | None:
 
 
 def _solver(
-    evaluation: Evaluation, comparison: Comparison, quantities: Sequence[Quantity], packed: Packed
+    evaluation: Evaluation, comparison: Comparison, quantities: Sequence[FieldQuantity], packed: Packed
 ) -> dict[str, Any]:
     """A solver's fields: those of the reference as they are, those of others as differences from it."""
     mesh, reference = comparison.mesh, comparison.reference

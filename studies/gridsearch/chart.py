@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.patches import Rectangle
 
-from compare.figures.style import HALO, axes_at, heading
+from compare.figures.style import HALO, axes_at, write_heading
 from geometry.figure import INK, MUTED, SMALL, WIDTH, Figure, figure
 from studies.gridsearch.tables import best_of
 from studies.gridsearch.training_run import TrainingMetrics, TrainingRun
@@ -31,7 +31,7 @@ def draw_grid(runs: Sequence[TrainingRun]) -> Figure:
     }
     epochs = max((run.measured.epochs for run in runs if run.measured), default=0)
     with figure(HEAD + height + FOOT) as drawn:
-        heading(
+        write_heading(
             drawn,
             "Grid search of the paper's networks",
             f"{epochs:,} epochs. The frame marks the run nearest to fem.",

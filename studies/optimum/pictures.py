@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.collections import LineCollection
 
-from compare.figures.style import HALO, axes_at, heading
+from compare.figures.style import HALO, axes_at, write_heading
 from geometry.arrays import FloatArray, IntArray
 from geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
 from geometry.mesh.boundary import boundary_edges
@@ -24,7 +24,7 @@ def draw_front(optimum: Optimum, shown: Sequence[int]) -> Figure:
         solver = optimum.question.study.solver
         rest = f"the third objective, {third[0]}, is not drawn" if third else "every point is a run"
         note = f"{len(optimum.measurements)} runs of {solver}; {rest}"
-        heading(drawn, f"Pareto front: {senses}", note)
+        write_heading(drawn, f"Pareto front: {senses}", note)
         axes = axes_at(drawn, (0.7, 0.55, WIDTH - 0.9, 2.75))
         others = [each for each in optimum.measurements if each.number not in optimum.front and each.values]
         allowed = np.array([is_allowed(optimum.question, each) for each in others], dtype=bool)
@@ -56,7 +56,7 @@ def draw_growth(optimum: Optimum) -> Figure:
     """Draw the hypervolume over the number of runs."""
     start = len(optimum.measurements) // 3
     with figure(2.4) as drawn:
-        heading(
+        write_heading(
             drawn, "Hypervolume over the runs", f"the first {start} runs are samples, then come proposals"
         )
         axes = axes_at(drawn, (0.7, 0.5, WIDTH - 0.9, 1.4))
@@ -86,7 +86,7 @@ def draw_front_fingers(optimum: Optimum, solutions: dict[int, Solution]) -> Figu
     height = (width - 0.1) * (high[1] - low[1]) / (high[0] - low[0])
     label = 0.42
     with figure(0.55 + rows * (height + label)) as drawn:
-        heading(drawn, "Fingers on the front", "grey: at rest; black: under the load; all to one scale")
+        write_heading(drawn, "Fingers on the front", "grey: at rest; black: under the load; all to one scale")
         for place, (run, rest, moved, edges) in enumerate(shapes):
             row, column = divmod(place, columns)
             box = (0.1 + column * (width + 0.1), 0.5 + row * (height + label) + label, width - 0.1, height)

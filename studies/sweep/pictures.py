@@ -7,7 +7,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
-from compare.figures.style import axes_at, heading
+from compare.figures.style import axes_at, write_heading
 from geometry.arrays import FloatArray
 from geometry.drawing.definition import finger_from
 from geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
@@ -42,7 +42,7 @@ def draw_pairs(sweep: Sweep) -> Figure:
     width = (WIDTH - left - 0.1 - gap * (len(parameters) - 1)) / len(parameters)
     with figure(head + foot + (tall + gap) * len(names)) as drawn:
         note = f"{len(good)} of {len(sweep.good)} samples; line: medians of eight bins"
-        heading(drawn, f"Quantities over parameters: {sweep.study.name}", note)
+        write_heading(drawn, f"Quantities over parameters: {sweep.study.name}", note)
         for row, name in enumerate(names):
             values = np.array([each.values[name] for each in good])
             for column, parameter in enumerate(parameters):
@@ -78,7 +78,7 @@ def draw_sensitivity(found: Mapping[str, Sensitivity]) -> Figure:
     left, head, foot, tall = 1.25, 1.2, 0.3, 0.34
     width = WIDTH - left - 0.1
     with figure(head + foot + tall * len(names)) as drawn:
-        heading(
+        write_heading(
             drawn,
             "Share of each quantity's variance by parameter, %",
             "alone and with others; in brackets: alone",
@@ -118,7 +118,7 @@ def draw_fingers(sweep: Sweep, maker: TaskMaker) -> Figure:
     height = (width - 0.1) * (high[1] - low[1]) / (high[0] - low[0])
     head, label = 0.38, 0.4
     with figure(head + (height + label) * len(names)) as drawn:
-        heading(drawn, "Fingers with the least, the median and the largest value", "all to one scale")
+        write_heading(drawn, "Fingers with the least, the median and the largest value", "all to one scale")
         for place, (finger, number, name, value) in enumerate(chosen):
             row, column = divmod(place, COLUMNS)
             box = (0.1 + column * width, head + row * (height + label) + label, width - 0.1, height)
@@ -145,7 +145,9 @@ def draw_wrap(solution: Solution) -> Figure:
     height = (WIDTH - 0.2) * (high[1] - low[1] + 14) / (high[0] - low[0] + 16)
     with figure(0.5 + height) as drawn:
         angle = turn(moved) - turn(rest)
-        heading(drawn, f"Wrap angle {angle:.1f}°", "grey: at rest; the chords join base, contact and tip")
+        write_heading(
+            drawn, f"Wrap angle {angle:.1f}°", "grey: at rest; the chords join base, contact and tip"
+        )
         axes = axes_at(drawn, (0.1, 0.5, WIDTH - 0.2, height))
         for points, colour in ((mesh.points, "#c4c4c4"), (shape, INK)):
             for start, end in points[edges]:

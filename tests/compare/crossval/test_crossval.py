@@ -656,7 +656,7 @@ def test_simulated_markers_of_a_file_are_called_simulated_everywhere(
     from vision.measurements import write_measurements
 
     headings = []
-    monkeypatch.setattr("compare.crossval.charts.heading", lambda _, *texts: headings.extend(texts))
+    monkeypatch.setattr("compare.crossval.charts.write_heading", lambda _, *texts: headings.extend(texts))
     write_measurements(tmp_path / "markers.csv", replace(observations, simulated=True, source="made up"))
     line = f"--measurements {tmp_path / 'markers.csv'} --solvers fem,gp --schemes one-out --seeds 1"
     assert run(line, tmp_path / "out") == 0

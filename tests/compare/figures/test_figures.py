@@ -17,7 +17,7 @@ from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import held_out_errors, marker_errors
 from compare.figures import FORMATS, draw_all
 from compare.figures.fields import QUANTITIES, draw_field
-from compare.figures.gallery import DRAWINGS, Drawing, draw
+from compare.figures.gallery import GALLERY, Illustration, draw
 from compare.figures.overlay import overlay_extent
 from geometry.errors import UserError
 from geometry.figure import DPI, NOTEBOOK_DPI, WIDTH
@@ -51,22 +51,22 @@ def comparison(
 
 
 @pytest.fixture(scope="module")
-def drawings(comparison: Comparison) -> dict[str, Drawing]:
+def drawings(comparison: Comparison) -> dict[str, Illustration]:
     """All pictures of the comparison; no network of it has losses to draw."""
-    drawings = {name: draw(comparison) for name, (_, draw) in DRAWINGS.items()}
+    drawings = {name: draw(comparison) for name, (_, draw) in GALLERY.items()}
     return {name: drawing for name, drawing in drawings.items() if drawing is not None}
 
 
 @pytest.fixture(scope="module")
-def pages(drawings: dict[str, Drawing]) -> dict[str, Page]:
+def pages(drawings: dict[str, Illustration]) -> dict[str, Page]:
     return {name: page_of(drawing.figure) for name, drawing in drawings.items()}
 
 
 @pytest.mark.parametrize("kind", FORMATS)
 def test_every_picture_is_written_for_print_too(comparison, drawings, tmp_path, kind, monkeypatch) -> None:
     """In letters, not in pixels; and the same file every time."""
-    chosen = {"marker_errors": DRAWINGS["marker_errors"], "mesh": DRAWINGS["mesh"]}
-    monkeypatch.setattr("compare.figures.gallery.DRAWINGS", chosen)
+    chosen = {"marker_errors": GALLERY["marker_errors"], "mesh": GALLERY["mesh"]}
+    monkeypatch.setattr("compare.figures.gallery.GALLERY", chosen)
     first, second = (
         [path.read_bytes() for path in sorted(folder.glob(f"*.{kind}"))]
         for folder in (tmp_path / "first", tmp_path / "second")
@@ -91,7 +91,7 @@ ALL = ("overlay", "marker_errors", *FIELDS, "force_displacement", "excess", "ene
 
 
 def test_every_picture_is_written_in_the_order_of_the_report(
-    comparison: Comparison, drawings: dict[str, Drawing], tmp_path: Path
+    comparison: Comparison, drawings: dict[str, Illustration], tmp_path: Path
 ) -> None:
     """Each is as wide as a page, and not blank; progress goes from none to all."""
     said: list[float] = []
@@ -99,7 +99,7 @@ def test_every_picture_is_written_in_the_order_of_the_report(
     assert [picture.path.stem for picture in pictures] == list(ALL) == list(drawings)
     assert [picture.caption for picture in pictures] == [each.caption for each in drawings.values()]
     assert said == sorted(said)
-    assert (said[0], said[-1], len(said)) == (0.0, 1.0, len(DRAWINGS) + 1)
+    assert (said[0], said[-1], len(said)) == (0.0, 1.0, len(GALLERY) + 1)
     for picture in pictures:
         with Image.open(picture.path) as image:
             assert image.width == round(WIDTH * DPI)
@@ -107,7 +107,7 @@ def test_every_picture_is_written_in_the_order_of_the_report(
         assert (picture.path.stem, low < 60, high) == (picture.path.stem, True, 255)
 
 
-def test_a_picture_shows_itself_in_a_notebook(drawings: dict[str, Drawing]) -> None:
+def test_a_picture_shows_itself_in_a_notebook(drawings: dict[str, Illustration]) -> None:
     with Image.open(BytesIO(drawings["energy"].figure._repr_png_())) as image:
         assert (image.format, image.width) == ("PNG", round(WIDTH * NOTEBOOK_DPI))
 
@@ -126,7 +126,7 @@ def test_a_picture_that_there_is_not(comparison: Comparison, name: str, message:
 
 @pytest.mark.parametrize("name", ALL)
 def test_no_text_leaves_the_page_or_runs_into_another(
-    name: str, drawings: dict[str, Drawing], pages: dict[str, Page]
+    name: str, drawings: dict[str, Illustration], pages: dict[str, Page]
 ) -> None:
     assert drawings[name].caption.endswith(".")
     assert pages[name].cut_off() == []
@@ -205,7 +205,7 @@ def test_a_difference_has_its_scale_beside_its_name(pages: dict[str, Page]) -> N
 
 @pytest.mark.parametrize("name", ["overlay", "marker_errors"])
 def test_simulated_markers_are_called_simulated(
-    name: str, drawings: dict[str, Drawing], pages: dict[str, Page]
+    name: str, drawings: dict[str, Illustration], pages: dict[str, Page]
 ) -> None:
     assert "simulated" in pages[name].text
     assert "simulated by another solver" in drawings[name].caption

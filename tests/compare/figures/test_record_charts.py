@@ -6,7 +6,15 @@ import pytest
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
-from compare.figures.energy_chart import approaches_reference, draw_energy, readable, recorded, wants_log
+from compare.figures.record_charts import (
+    approaches_reference,
+    draw_energy,
+    draw_losses,
+    readable,
+    records_by_kind,
+    wants_log,
+)
+from tests.compare.figures.drawn_pages import page_of
 
 
 def test_records_are_grouped_by_their_first_column(
@@ -15,7 +23,7 @@ def test_records_are_grouped_by_their_first_column(
     steps = np.array([0.0, 1.0])
     other = evaluate("other", history={"load_fraction": steps, "reaction": steps, "energy": steps})
     loss = evaluate("loss", history={"seconds": steps, "loss": steps})
-    assert recorded([fem, pinn, other, loss]) == {
+    assert records_by_kind([fem, pinn, other, loss]) == {
         ("units", "energy"): [pinn],
         ("load_fraction", "energy"): [other],
         ("seconds", "loss"): [loss],
@@ -65,3 +73,26 @@ def test_two_results_are_joined_by_dots_and_no_curve(
     drawn = draw_energy(compared(fem, replace(pinn, history=short)))
     assert drawn is not None
     assert drawn.axes[0].lines[0].get_linestyle() == ":"
+
+
+EPOCHS = np.array([1.0, 2.0, 3.0])
+PLAIN = {"epoch": EPOCHS, "PDE": 1 / EPOCHS**4, "BC": EPOCHS, "total": EPOCHS, "energy": EPOCHS}
+
+
+def test_every_term_has_a_chart_with_the_solvers_that_have_it(
+    fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
+) -> None:
+    standard = replace(pinn, history=PLAIN)
+    given = replace(pinn, solver="pinn-asm", in_sample=True, history={**PLAIN, "ASM": 0.1 * EPOCHS})
+    page = page_of(draw_losses(compared(fem, standard, given)))
+    assert [len(axes.get_lines()) for axes in page.figure.axes] == [2, 2, 1]
+    assert [axes.get_yscale() for axes in page.figure.axes] == ["log", "linear", "linear"]
+    assert page.text.count("pinn-asm †") == 1
+    assert (page.cut_off(), page.overlaps()) == ([], [])
+
+
+def test_without_such_a_network_there_is_no_chart(
+    fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
+) -> None:
+    """The network that solves for its output layer has a record of its energy alone."""
+    assert draw_losses(compared(fem, pinn)) is None
