@@ -30,24 +30,16 @@ LEAST_TRAVEL = 1e-9
 
 
 class Material(CheckedModel):
-    """An isotropic elastic material.
+    """An isotropic elastic material; by default the paper's, Agilus30 and VeroUltra mixed to Shore 85A.
 
-    By default it is the paper's: Agilus30 and VeroUltra mixed to Shore 85A.
-
-    Attributes:
-        young: Young's modulus E, MPa.
-        poisson: Poisson's ratio (the paper's μ).
-        plane: Plane "strain" (thick finger) or plane "stress" (the equations that the paper prints).
-        law: "linear" (Hooke), or one of finite strain: "neo-hookean", "st-venant-kirchhoff" or "gent".
-
-    Raises:
-        UserError: If a constant is out of its range, or the law is not given for plane stress.
+    A `UserError` says that a constant is out of its range, or that the law is not given for plane stress.
     """
 
     young: float = Field(default=11.4, gt=0, description="Young's modulus, MPa")
     poisson: float = Field(default=0.45, gt=-1, lt=0.5, description="Poisson's ratio")
+    #: Plane "strain" (thick finger) or plane "stress" (the equations that the paper prints)
     plane: Literal["strain", "stress"] = "strain"
-    law: LawName = "linear"
+    law: LawName = "linear"  #: "linear" is Hooke's law; the others are of finite strain
 
     @field_validator("young")
     @classmethod
@@ -205,18 +197,15 @@ class Problem:
                 f"({size:.3g} mm); give mm"
             )
         left, right = contact_ends(self)
+        said = f"the contact from x = {left:.6g} to {right:.6g} mm is not"
         front = self.mesh.points[self.mesh.boundary("front").ravel(), 0]
         slack = 1e-9 * (front.max() - front.min())
         if left < front.min() - slack or right > front.max() + slack:
-            raise UserError(
-                f"the contact from x = {left:.6g} to {right:.6g} mm is not on the front face, "
-                f"which runs from {front.min():.6g} to {front.max():.6g} mm"
-            )
+            face = f"which runs from {front.min():.6g} to {front.max():.6g} mm"
+            raise UserError(f"{said} on the front face, {face}")
         if (gap := _gap_in_front(self.mesh, left, right)) is not None:
-            raise UserError(
-                f"the contact from x = {left:.6g} to {right:.6g} mm is not all on the front face, which has "
-                f"a gap at x = {gap:.6g} mm; move the contact or make it narrower"
-            )
+            advice = "move the contact or make it narrower"
+            raise UserError(f"{said} all on the front face, which has a gap at x = {gap:.6g} mm; {advice}")
 
     @property
     def digest(self) -> str:
@@ -249,15 +238,12 @@ def contact_nodes(problem: Problem) -> IntArray:
 
 
 def contact_functional(problem: Problem) -> tuple[FloatArray, FloatArray]:
-    """The linear functional of the load: prescribed = sum of weights times displacement at points.
+    """The load's linear functional: points (q, 2), mm, and weights (q,), of sum one, of their displacements.
 
     For `mean` the weight along the contact of width b, at distance s from its middle, both along x, is the
     raised cosine (1 + cos(2 pi s / b)) / b: smooth, zero at both ends, with integral one. On a curved front
     it weighs true lengths and is scaled to the integral one. For `point` it is the middle node, or the point
     at `position`.
-
-    Returns:
-        Points (q, 2), mm, and weights (q,) that sum to one.
     """
     mesh, load = problem.mesh, problem.load
     if load.kind == "point" and load.position is None:

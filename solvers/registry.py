@@ -99,10 +99,8 @@ def make_solver(name: str, **settings: Any) -> Solver:
     except Exception as error:  # the constructor of another package may raise anything
         raise UserError(f"solver {name!r} cannot be made with {typed}: {error}") from error
     if not isinstance(solver, Solver):
-        raise UserError(
-            f"solver {name!r} does not have the interface: "
-            "name, laws, loads, solve(problem, progress), settings()"
-        )
+        interface = "name, laws, loads, solve(problem, progress), settings()"
+        raise UserError(f"solver {name!r} does not have the interface: {interface}")
     check_name(solver.name)
     return solver
 

@@ -17,7 +17,6 @@ from geometry.observations import Observations
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, Status
 
-NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 RESERVED = "truth"
 """Name of the field of a simulated finger, which no solver can have."""
 
@@ -129,7 +128,8 @@ class Traits:
 
 def check_name(name: str) -> None:
     """Raise a `UserError` unless a name can name a file and is not reserved for the truth."""
-    if not (isinstance(name, str) and NAME.fullmatch(name)) or name == RESERVED:
+    fits = isinstance(name, str) and re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", name)
+    if not fits or name == RESERVED:
         taken = f"{RESERVED} is the simulated finger's" if name == RESERVED else "files are called so"
         raise UserError(
             f"a solver is called {name!r}: {taken}; take up to 64 letters, digits, '.', '_', '-', and begin "
@@ -225,9 +225,9 @@ def _fault(solution: Solution, problem: Problem) -> str | None:
         return f"Solution of {_named(solution.problem)}; it must have the problem that it was given"
     if solution.problem.mesh.digest != problem.mesh.digest:
         return "Solution on another mesh; it must be of the problem that it was given"
-    for part, columns in (("stats", solution.stats), ("history", solution.history)):
+    for part, columns in (("stats that are", solution.stats), ("history that is", solution.history)):
         if not isinstance(columns, Mapping):
-            return f"{part} that {'are' if part == 'stats' else 'is'} {_named(columns)}, not a dictionary"
+            return f"{part} {_named(columns)}, not a dictionary"
     for method in ("displacement", "gradient"):
         if not callable(getattr(solution.field, method, None)):
             return f"field that is {_named(solution.field)}, without a method {method}"
@@ -235,12 +235,11 @@ def _fault(solution: Solution, problem: Problem) -> str | None:
     if len(set(lengths.values())) > 1:
         return f"history whose columns differ in length: {lengths}"
     mesh, markers = problem.mesh, len(problem.observations.points) if problem.observations else 0
-    nodes, middles = mesh.at_nodes(), mesh.at_centroids()
     checks: list[tuple[str, ArrayLike | None, tuple[int, ...]]] = [
         ("energy", solution.energy, ()),
         ("reaction", solution.reaction, (2,)),
-        ("displacement", solution.field.displacement(nodes), (len(nodes.points), 2)),
-        ("gradient", solution.field.gradient(middles), (len(middles.points), 2, 2)),
+        ("displacement", solution.field.displacement(mesh.at_nodes()), (len(mesh.points), 2)),
+        ("gradient", solution.field.gradient(mesh.at_centroids()), (len(mesh.triangles), 2, 2)),
     ]
     if solution.left_out is not None:
         checks.append(("left_out", solution.left_out, (markers, 2)))
