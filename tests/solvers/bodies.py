@@ -8,12 +8,10 @@ import gmsh
 import numpy as np
 
 from geometry.mesh.boundary import boundary_edges
+from geometry.mesh.gmsh_model import add_section, session, triangulate
 from geometry.mesh.triangle_mesh import TriangleMesh, signed_areas
 from geometry.section.loop import Loop
 from geometry.section.section import Section
-
-ON_PIECE = 1e-6
-"""Largest distance of a node from the line or arc on which it lies, mm."""
 
 
 def ring(radius: float = 20.0, thickness: float = 3.0, clamped: float = 60.0) -> tuple[Section, float]:
@@ -138,10 +136,20 @@ def mesh_of(section: Section, middle: float, size: float, width: float) -> Trian
         if 1e-6 < fraction < 1 - 1e-6:
             outline = outline.split(which, [fraction])
             section = Section(outline, section.cavities)
-    points, triangles = _triangulate(section, size)
+    with session():
+        for option, value in (("MeshSizeMin", size), ("MeshSizeMax", size), ("Smoothing", 3)):
+            gmsh.option.setNumber(f"Mesh.{option}", value)
+        found = triangulate(add_section(section.loops, np.zeros((0, 2))))
+    points, triangles = found.points, found.triangles.copy()
+    clockwise = signed_areas(points, triangles) < 0
+    triangles[clockwise] = triangles[clockwise][:, [0, 2, 1]]
     edges = boundary_edges(triangles)
-    names = {name for name in outline.names if name}
-    boundaries = {name: edges[_on(outline, name, points)[edges].all(axis=1)] for name in sorted(names)}
+    keys = [len(points), 1]  # one number an edge, whichever way it runs
+    boundaries = {
+        name: edges[np.isin(np.sort(edges, axis=1) @ keys, np.sort(nodes, axis=1) @ keys)]
+        for name, nodes in found.edges.items()
+        if name
+    }
     x = points[boundaries["front"]].mean(axis=1)[:, 0]
     boundaries["contact"] = boundaries["front"][np.abs(x - middle) < width / 2]
     contact = np.unique(boundaries["contact"])
@@ -154,62 +162,6 @@ def mesh_of(section: Section, middle: float, size: float, width: float) -> Trian
         marker_nodes=spread,
         contact_node=int(contact[np.abs(points[contact, 0] - middle).argmin()]),
     )
-
-
-def _triangulate(section: Section, size: float) -> tuple[np.ndarray, np.ndarray]:
-    gmsh.initialize(argv=[], readConfigFiles=False, interruptible=False)
-    try:
-        for option, value in (("General.Terminal", 0), ("Mesh.RandomSeed", 1), ("Mesh.Smoothing", 3)):
-            gmsh.option.setNumber(option, value)
-        loops = [gmsh.model.geo.addCurveLoop(_curves(loop, size)) for loop in section.loops]
-        gmsh.model.geo.addPlaneSurface(loops)
-        gmsh.model.geo.synchronize()
-        gmsh.model.mesh.generate(2)
-        tags, coordinates, _ = gmsh.model.mesh.getNodes()
-        _, connectivity = gmsh.model.mesh.getElementsByType(2)
-    finally:
-        gmsh.finalize()
-    place = np.full(int(tags.max()) + 1, -1)
-    place[tags] = np.arange(len(tags))
-    used, triangles = np.unique(place[connectivity], return_inverse=True)
-    points, triangles = coordinates.reshape(-1, 3)[used, :2].copy(), triangles.reshape(-1, 3)
-    clockwise = signed_areas(points, triangles) < 0
-    triangles[clockwise] = triangles[clockwise][:, [0, 2, 1]]
-    return points, triangles
-
-
-def _curves(loop: Loop, size: float) -> list[int]:
-    geo = gmsh.model.geo
-    corners = [geo.addPoint(x, y, 0, size) for x, y in loop.points]
-    curves = []
-    for which, start in enumerate(corners):
-        end = corners[(which + 1) % len(corners)]
-        if which in loop.straight:
-            curves.append(geo.addLine(start, end))
-            continue
-        x, y = loop.circle(which)[0]
-        centre = geo.addPoint(x, y, 0, size)
-        middle = geo.addPoint(*loop.along(which, [0.5])[0], 0, size)  # Gmsh's arcs are below half a circle
-        curves += [geo.addCircleArc(start, centre, middle), geo.addCircleArc(middle, centre, end)]
-    return curves
-
-
-def _on(loop: Loop, name: str, points: np.ndarray) -> np.ndarray:
-    """Mask of the points on the pieces with a name."""
-    found = np.zeros(len(points), dtype=bool)
-    for which in loop.pieces(name):
-        start, end = loop.ends[which]
-        if which in loop.straight:
-            along = (end - start) / np.linalg.norm(end - start)
-            place = (points - start) @ along
-            off = np.abs((points - start) @ [-along[1], along[0]])
-            found |= (off < ON_PIECE) & (place > -ON_PIECE) & (place < np.linalg.norm(end - start) + ON_PIECE)
-            continue
-        centre, radius = loop.circle(which)
-        on_circle = np.abs(np.linalg.norm(points - centre, axis=1) - radius) < ON_PIECE
-        right = (end - start)[1] * (points - start)[:, 0] - (end - start)[0] * (points - start)[:, 1]
-        found |= on_circle & (np.sign(loop.bulges[which]) * right >= -ON_PIECE)
-    return found
 
 
 def _circle(centre: tuple[float, float], radius: float) -> Loop:

@@ -12,7 +12,8 @@ from geometry.mesh.settings import MeshSettings
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.fem.linear import FemSolver
-from solvers.problem import Problem
+from solvers.problem import Material, Problem
+from solvers.solution import Solution
 
 SHORT = Design(height=50, rib_count=1, tip_length=12, contact_position=20)
 """A short finger with one rib."""
@@ -77,3 +78,18 @@ def bar_mesh(
         },
         contact_node=int(nodes[np.argmin(np.abs(mesh.points[nodes, 0] - sum(contact) / 2))]),
     )
+
+
+def beam_compliance(material: Material, modulus: float, *, height: float, arm: float) -> float:
+    """Deflection of Timoshenko's cantilever under a unit force per depth at its arm, mm per N/mm."""
+    shear = material.young / (2 * (1 + material.poisson))
+    return arm**3 / (3 * modulus * height**3 / 12) + arm / (5 / 6 * shear * height)
+
+
+def check_gradient(solution: Solution, points: np.ndarray, tolerance: float = 1e-6) -> None:
+    """The gradient at points (n, 2), mm, is that of central differences of the displacement."""
+    step = 1e-5
+    for axis in range(2):
+        shift = step * np.eye(2)[axis]
+        rise = solution.displacement(points + shift) - solution.displacement(points - shift)
+        np.testing.assert_allclose(solution.gradient(points)[:, :, axis], rise / (2 * step), atol=tolerance)

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.observations import Observations
 from solvers.pinn.finite_basis.presets import PinnAsmSolver, PinnLocalSolver, PinnStdSolver
 from solvers.pinn.finite_basis.sparse_cholesky import BlockMatrix
 from solvers.problem import Load, Problem
 from solvers.shared_work import SharedWork, shared
+from tests.solvers.conftest import observed_at
 
 QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3, "tolerance": 0.05}
 
@@ -32,10 +32,7 @@ def factorisations(monkeypatch):
 def observed(coarse_mesh) -> Problem:
     markers = coarse_mesh.markers
     moved = [0.2, -6.5] * (markers[:, :1] / 90) ** 2
-    seen = np.ones(len(markers), dtype=bool)
-    return Problem(
-        coarse_mesh, observations=Observations(markers, moved, 0 * moved, seen, "by a test", True, 0.8)
-    )
+    return Problem(coarse_mesh, observations=observed_at(markers, moved, 0.0))
 
 
 def test_a_result_is_made_once_and_is_gone_outside():

@@ -139,15 +139,17 @@ def test_what_raised_an_exception_or_was_left_out_is_named(
     assert {"mine failed: it broke.", "gp was left out: no markers."} <= set(answer.sentences)
 
 
-@pytest.mark.parametrize("converged", [True, False])
-def test_a_network_stands_beside_its_twin_whether_it_converged_or_not(
+@pytest.mark.parametrize(("converged", "twin"), [(True, True), (False, True), (True, False)])
+def test_a_network_stands_beside_its_twin_whether_both_converged_or_not(
     compared: Callable[..., Comparison],
     fem: Evaluation,
     given: Evaluation,
     evaluate: Callable[..., Evaluation],
     converged: bool,
+    twin: bool,
 ) -> None:
     network = evaluate("pinn-asm", 1.02, converged=converged)
     network = replace(network, in_sample=True, left_out=given.left_out, twin="fem-asm")
-    sentences = asked(compared(fem, given, network))[TRUST].sentences
-    assert any("fem-asm, its twin by finite elements, 0.100 mm" in said for said in sentences)
+    sentences = asked(compared(fem, replace(given, converged=twin), network))[TRUST].sentences
+    name = "fem-asm" if twin else "fem-asm (not converged)"
+    assert any(f"{name}, its twin by finite elements, 0.100 mm" in said for said in sentences)

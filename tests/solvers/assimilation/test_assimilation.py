@@ -9,7 +9,6 @@ import shapely
 from geometry.errors import UserError
 from geometry.finger.presets import load_design
 from geometry.mesh.boundary import boundary_edges
-from geometry.observations import Observations
 from solvers.assimilation.misfit import (
     MIN_STANDARD_DEVIATION,
     MarkerSettings,
@@ -21,23 +20,19 @@ from solvers.assimilation.misfit import (
 )
 from solvers.problem import Problem
 from solvers.registry import make_solver
+from tests.solvers.conftest import observed_at
 
 
 @pytest.fixture
 def problem(coarse_mesh):
     """Nine markers, of which the third was not seen."""
-    points = coarse_mesh.markers
-    random = np.random.default_rng(3)
-    visible = np.ones(len(points), dtype=bool)
-    visible[2] = False
+    points, random = coarse_mesh.markers, np.random.default_rng(3)
     displacements = random.normal(size=points.shape)
     displacements[2] = 1e6
     deviations = random.uniform(0.01, 0.1, points.shape)
     deviations[0] = 0.0
-    return Problem(
-        coarse_mesh,
-        observations=Observations(points, displacements, deviations, visible, "by a test", True, 0.8),
-    )
+    seen = observed_at(points, displacements, deviations, np.arange(len(points)) != 2)
+    return Problem(coarse_mesh, observations=seen)
 
 
 def test_what_is_not_given_is_as_documented():

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from geometry.observations import Observations
 from solvers.assimilation.marker_forces import MarkerForces
 from solvers.assimilation.marker_weighting import FACTORS, MarkerWeighting
 from solvers.assimilation.misfit import misfit_of
 from solvers.problem import Load, Material, Problem
+from tests.solvers.conftest import observed_at
 
 PAPER = MarkerWeighting(solver_name="a-solver")
 PRECISE = replace(PAPER, weights="precision", scale=0.3)
@@ -27,11 +27,8 @@ def forces() -> MarkerForces:
 
 @pytest.fixture
 def problem(coarse_mesh) -> Problem:
-    count = len(coarse_mesh.markers)
-    given = (np.full((count, 2), 0.1), np.full((count, 2), 0.02), np.ones(count, dtype=bool))
-    return Problem(
-        coarse_mesh, observations=Observations(coarse_mesh.markers, *given, "by a test", True, 0.5)
-    )
+    moved = np.full_like(coarse_mesh.markers, 0.1)
+    return Problem(coarse_mesh, observations=observed_at(coarse_mesh.markers, moved, 0.02))
 
 
 def test_four_factors_a_decade_from_a_billionth_to_a_thousand():

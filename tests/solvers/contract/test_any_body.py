@@ -198,7 +198,8 @@ def test_a_cylinder_starts_where_it_touches_a_curved_front_from_outside():
     assert contact.centre == pytest.approx([0.0, 5.0], abs=1e-3)
     side = Problem(mesh, Material(law="neo-hookean"), load.model_copy(update={"position": 8.0}))
     x, y = CylinderContact.of(side, LagrangeSpace(mesh, 2)).centre
-    assert np.hypot(x, y + 20.0) == pytest.approx(25.0, abs=2e-3), "edges are chords"
+    # Between two nodes 0.4 mm apart the circles come closer by 0.4^2 / 8 (1 / 20 + 1 / 5) mm.
+    assert np.hypot(x, y + 20.0) == pytest.approx(25.0, abs=5e-3)
     solution = make_solver("fem-nonlinear").solve(top)
     assert solution.status.converged
     assert solution.reaction[1] < 0

@@ -12,8 +12,10 @@ from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Problem
 from solvers.registry import make_solver
 from solvers.solver import Refittable, refitter
+from tests.solvers.conftest import observed_at
 
 QUICK = {"wall_spacing": 1.2, "corner_spacing": 0.3, "neurons": 3, "tolerance": 0.05}
+PRECISE = {"preset": "local", "weights": "precision"}
 SOLVERS: dict[str, dict[str, object]] = {
     "fem-asm": {"degree": 1},
     "fem-asm, weights chosen": {"degree": 1, "weights": "precision", "choose": "left-out"},
@@ -22,14 +24,8 @@ SOLVERS: dict[str, dict[str, object]] = {
     "gp": {},
     "statfem": {"degree": 1},
     "pinn-asm": QUICK,
-    "pinn-asm, weights chosen": {
-        **QUICK,
-        **{"preset": "local", "weights": "precision", "choose": "left-out"},
-    },
-    "pinn-asm, a soft contact": {
-        **QUICK,
-        **{"preset": "local", "weights": "precision", "contact_deviation": 1.0},
-    },
+    "pinn-asm, weights chosen": QUICK | PRECISE | {"choose": "left-out"},
+    "pinn-asm, a soft contact": QUICK | PRECISE | {"contact_deviation": 1.0},
 }
 
 
@@ -40,7 +36,7 @@ def observed(coarse_mesh: TriangleMesh) -> list[Observations]:
     points = coarse_mesh.markers
     true = FemSolver(degree=1, estimate=False).solve(other).displacement(points)
     noise = np.random.default_rng(1).normal(0, 0.05, true.shape)
-    every = Observations(points, true, np.full_like(true, 0.05), np.ones(9, dtype=bool), "a test", True, 0.8)
+    every = observed_at(points, true, 0.05)
     return [
         every,
         replace(every, displacements=true + noise, visible=~np.isin(np.arange(9), (2, 5))),

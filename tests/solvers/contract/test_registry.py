@@ -94,12 +94,22 @@ def test_a_missing_library_is_said_and_the_other_solvers_work(monkeypatch):
         assert "pinn-std" in usable_solvers()
 
 
-def test_a_broken_package_warns_and_the_rest_goes_on(tmp_path, monkeypatch):
-    info = tmp_path / "broken-0.1.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 0.1\n")
-    (info / "entry_points.txt").write_text("[pinnray.solvers]\nbroken = no_such_module:Solver\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
+@pytest.fixture
+def offer(tmp_path, monkeypatch):
+    """`offer(name, place)`: a package that offers a solver by an entry point."""
+
+    def offered(name: str, place: str) -> None:
+        info = tmp_path / f"{name}-0.1.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 0.1\n")
+        (info / "entry_points.txt").write_text(f"[pinnray.solvers]\n{name} = {place}\n")
+        monkeypatch.syspath_prepend(str(tmp_path))
+
+    return offered
+
+
+def test_a_broken_package_warns_and_the_rest_goes_on(offer):
+    offer("broken", "no_such_module:Solver")
     with pytest.warns(UserWarning, match="solver 'broken' is left out: .*no_such_module"):
         assert "fem" in usable_solvers()
     with pytest.raises(UserError, match="cannot be loaded"):
@@ -116,11 +126,7 @@ def test_a_name_that_no_file_can_have_is_refused(name, plugin_folder, monkeypatc
         make_solver("skfem-p2")
 
 
-def test_an_object_without_the_interface_is_refused(tmp_path, monkeypatch):
-    info = tmp_path / "odd-0.1.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: odd\nVersion: 0.1\n")
-    (info / "entry_points.txt").write_text("[pinnray.solvers]\nodd = collections:OrderedDict\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
+def test_an_object_without_the_interface_is_refused(offer):
+    offer("odd", "collections:OrderedDict")
     with pytest.raises(UserError, match="does not have the interface"):
         make_solver("odd")

@@ -86,13 +86,27 @@ def dense(problem, solver):
     return nodal.reshape(-1, 2), 0.5 * nodal @ stiffness @ nodal, reaction[moved].sum(axis=0)
 
 
-def test_it_is_the_minimiser_by_dense_algebra(problem):
-    solver = replace(SOFT, degree=1)
-    solution = solver.solve(problem)
+def check_minimiser(solution, problem, solver):
     nodal, energy, reaction = dense(problem, solver)
     assert np.abs(solution.field.values - nodal).max() < 1e-8 * np.abs(nodal).max()
     assert solution.energy == pytest.approx(energy, rel=1e-8)
     np.testing.assert_allclose(solution.reaction, reaction, atol=1e-8 * np.abs(reaction).max())
+
+
+def check_left_out(solution, problem, solver, marker):
+    """The prediction of a marker is its disc's mean displacement when solved again without it."""
+    observations = problem.observations
+    only = np.arange(len(observations.points)) == marker
+    without = replace(observations, visible=observations.visible & ~only)
+    again = solver.solve(replace(problem, observations=without))
+    disc = misfit_of(replace(problem, observations=replace(observations, visible=only)))
+    points, weights = replace(disc, radius=misfit_of(problem).radius).sampling()
+    np.testing.assert_allclose(solution.left_out[[marker]], weights @ again.displacement(points), atol=1e-8)
+
+
+def test_it_is_the_minimiser_by_dense_algebra(problem):
+    solver = replace(SOFT, degree=1)
+    check_minimiser(solver.solve(problem), problem, solver)
 
 
 @pytest.mark.parametrize("problem", ["mean", "point"], indirect=True)
@@ -100,41 +114,20 @@ def test_a_contact_that_is_not_certain_is_one_on_springs(problem):
     """By the same dense algebra; markers left out as if solved again are left out of this too."""
     solver = replace(SOFT, degree=1, contact_deviation=0.8)
     solution = solver.solve(problem)
-    nodal, energy, reaction = dense(problem, solver)
-    assert np.abs(solution.field.values - nodal).max() < 1e-8 * np.abs(nodal).max()
-    assert solution.energy == pytest.approx(energy, rel=1e-8)
-    np.testing.assert_allclose(solution.reaction, reaction, atol=1e-8 * np.abs(reaction).max())
+    check_minimiser(solution, problem, solver)
     contact, functional = contact_functional(problem)
     moved = functional @ solution.displacement(contact)
-    np.testing.assert_allclose(
-        solver.scale / solver.contact_deviation**2 * (problem.load.values - moved),
-        solution.reaction,
-        rtol=1e-6,
-    )
-    observations = problem.observations
-    visible = observations.visible & (np.arange(9) != 5)
-    again = solver.solve(replace(problem, observations=replace(observations, visible=visible)))
-    here = replace(misfit_of(problem), points=observations.points[[5]])
-    points, weights = replace(here, observed=here.observed[:1], weights=here.weights[:1]).sampling()
-    np.testing.assert_allclose(solution.left_out[[5]], weights @ again.displacement(points), atol=1e-8)
+    pulled_back = solver.scale / solver.contact_deviation**2 * (problem.load.values - moved)
+    np.testing.assert_allclose(pulled_back, solution.reaction, rtol=1e-6)
+    check_left_out(solution, problem, solver, 5)
 
 
 def test_leaving_a_marker_out_in_closed_form_is_solving_again_without_it(problem):
     """The weights of the others stay: the precision of an observation is its own."""
     solution = SOFT.solve(problem)
-    observations = problem.observations
-    for marker in range(9):
-        if not observations.visible[marker]:
-            assert np.isnan(solution.left_out[marker]).all()
-            continue
-        visible = observations.visible.copy()
-        visible[marker] = False
-        again = SOFT.solve(replace(problem, observations=replace(observations, visible=visible)))
-        only = np.arange(9) == marker
-        disc = misfit_of(replace(problem, observations=replace(observations, visible=only)))
-        points, weights = replace(disc, radius=misfit_of(problem).radius).sampling()
-        expected = weights @ again.displacement(points)
-        np.testing.assert_allclose(solution.left_out[[marker]], expected, atol=1e-8)
+    for marker in (0, 4, 8):
+        check_left_out(solution, problem, SOFT, marker)
+    assert np.isnan(solution.left_out[~problem.observations.visible]).all()
 
 
 def test_weak_weights_give_fem(problem):
@@ -154,31 +147,6 @@ def test_strong_weights_go_through_the_markers(problem):
 
 
 @pytest.mark.parametrize("problem", ["mean"], indirect=True)
-def test_energy_plus_misfit_is_least(problem):
-    """Taylor: no slope at the minimiser in any direction that keeps the conditions, and a curvature."""
-    solution = SOFT.solve(problem)
-    misfit = misfit_of(problem, MarkerSettings(weights="precision", scale=SOFT.scale))
-    points, weights = misfit.sampling()
-    space = solution.field.space
-    elasticity = LinearElasticity.of(problem, space)
-    at = weights @ space.shape_functions(problem.mesh.locate(points)).toarray()
-
-    def total(nodal):
-        return 0.5 * (nodal * elasticity.internal_force(nodal)).sum() + misfit.value(at @ nodal)
-
-    least = total(solution.field.values)
-    plain = FemSolver(estimate=False).solve(replace(problem, observations=None))
-    other = FemSolver(estimate=False).solve(
-        replace(problem, observations=None, load=Load(kind="patch", displacement=(0.0, -10.0)))
-    )
-    for direction in (plain.field.values - solution.field.values, other.field.values - plain.field.values):
-        rises = [total(solution.field.values + step * direction) - least for step in (1e-2, 1e-3, -1e-3)]
-        assert rises[0] > 0
-        assert rises[0] == pytest.approx(100 * rises[1], rel=1e-4)
-        assert rises[2] == pytest.approx(rises[1], rel=1e-4)
-
-
-@pytest.mark.parametrize("problem", ["mean"], indirect=True)
 def test_the_curve_is_what_other_weights_give(problem):
     curve = SOFT.solve(problem).history
     plain = FemSolver(estimate=False).solve(replace(problem, observations=None))
@@ -191,34 +159,8 @@ def test_the_curve_is_what_other_weights_give(problem):
     # Assimilation costs energy, and the more the markers weigh, the more.
     assert (np.diff(curve["curve_energy"]) > 0).all()
     assert (np.diff(curve["curve_in_sample_mm"]) < 0).all()
-
-
-@pytest.mark.parametrize("problem", ["mean"], indirect=True)
-@pytest.mark.parametrize("choose", ["left-out", "evidence"])
-def test_the_chosen_weights_are_the_best_on_the_curve(problem, choose):
-    solution = replace(SOFT, choose=choose).solve(problem)
-    curve = solution.history
-    score = -curve["curve_left_out_mm"] if choose == "left-out" else curve["curve_log_evidence"]
-    assert solution.stats["weight_factor"] == FACTORS[score.argmax()]
-    assert 0 < score.argmax() < len(FACTORS) - 1
-
-
-@pytest.mark.parametrize("problem", ["mean"], indirect=True)
-def test_the_evidence_is_the_normal_density_of_the_markers(problem):
-    """By SciPy, with the covariance of the prior from the compliance."""
-    from scipy.stats import multivariate_normal
-
-    finger, misfit = SOFT.prepare(problem)
-    forces = finger.forces(misfit)
-    variances = problem.observations.standard_deviations[problem.observations.visible].ravel() ** 2
-    expected = [
-        multivariate_normal.logpdf(
-            forces.prior_residual.ravel(), cov=factor * SOFT.scale * forces.compliance + np.diag(variances)
-        )
-        for factor in (0.01, 1.0)
-    ]
-    rise = forces.log_evidence(SOFT.scale, 0.01) - forces.log_evidence(SOFT.scale)
-    assert rise == pytest.approx(expected[0] - expected[1], rel=1e-9)
+    chosen = replace(SOFT, choose="left-out").solve(problem)
+    assert chosen.stats["weight_factor"] == FACTORS[curve["curve_left_out_mm"].argmin()] != 1
 
 
 def test_without_markers_it_is_fem(coarse_mesh):
@@ -229,23 +171,11 @@ def test_without_markers_it_is_fem(coarse_mesh):
     assert solution.left_out is None
 
 
-@pytest.mark.parametrize("problem", ["patch"], indirect=True)
-def test_a_patch_is_certain(problem):
-    with pytest.raises(UserError, match="every point of a patch moves as prescribed"):
-        replace(SOFT, contact_deviation=1.0).solve(problem)
-
-
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
         ({"degree": 3}, "degree 1 and 2, not 3"),
-        ({"weights": "equal"}, "weights must be paper or precision"),
-        ({"choose": "best"}, "choose must be given or left-out or evidence"),
-        ({"choose": "evidence"}, "needs weights=precision"),
-        ({"asm_weight": -1.0}, "fem-asm: asm_weight must be zero or more, got -1"),
-        ({"scale": float("nan")}, "fem-asm: scale must be zero or more, got nan"),
-        ({"marker_radius": -0.8}, "fem-asm: marker_radius must be zero or more, got -0.8"),
-        ({"contact_deviation": -1.0}, "fem-asm: contact_deviation must be zero or more, got -1"),
+        ({"weights": "equal"}, "fem-asm: weights must be paper or precision"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(settings, said):

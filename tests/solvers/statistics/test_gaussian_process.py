@@ -7,19 +7,16 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from geometry.errors import UserError
-from geometry.observations import Observations
 from solvers.problem import Load, Problem
 from solvers.registry import make_solver
 from solvers.statistics.gaussian_process import GaussianProcessSolver
+from tests.solvers.conftest import check_gradient, observed_at
 from tests.solvers.pinn.kernels import matern
 
 
 def observed(mesh, displacement, *, deviation=0.01, hidden=()):
-    points = mesh.markers
-    visible = np.ones(len(points), dtype=bool)
-    visible[list(hidden)] = False
-    deviations = np.full(points.shape, deviation)
-    return Observations(points, displacement(points), deviations, visible, "by a test", True, 0.8)
+    visible = ~np.isin(np.arange(len(mesh.markers)), hidden)
+    return observed_at(mesh.markers, displacement(mesh.markers), deviation, visible)
 
 
 def bump(points):
@@ -65,13 +62,7 @@ def test_mean_and_deviation_are_those_of_the_process(solution, coarse_mesh):
 
 
 def test_gradient_is_the_derivative(solution, coarse_mesh):
-    points, step = coarse_mesh.at_centroids().points[::40], 1e-5
-    for axis in (0, 1):
-        shift = step * np.eye(2)[axis]
-        difference = (solution.displacement(points + shift) - solution.displacement(points - shift)) / (
-            2 * step
-        )
-        np.testing.assert_allclose(solution.gradient(points)[:, :, axis], difference, atol=1e-7)
+    check_gradient(solution, coarse_mesh.at_centroids().points[::40], 1e-7)
 
 
 def test_it_goes_through_the_markers_and_knows_least_far_from_them(solution, coarse_mesh):
@@ -82,14 +73,6 @@ def test_it_goes_through_the_markers_and_knows_least_far_from_them(solution, coa
     deviations = solution.field.standard_deviation(coarse_mesh.locate(back))
     at_markers = solution.field.standard_deviation(coarse_mesh.locate(observations.points))
     assert deviations.max() > 20 * at_markers[observations.visible].max()
-
-
-def test_energy_is_the_integral_of_its_density(solution, coarse_mesh):
-    from geometry.mesh.quadrature import body_quadrature
-
-    rule = body_quadrature(coarse_mesh, 2)
-    total = (rule.weights * solution.state(rule.location).energy_density).sum()
-    assert solution.energy == pytest.approx(total, rel=1e-3)
 
 
 def test_a_marker_that_is_left_out_has_no_say_at_all(problem, solution):

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from geometry.observations import Observations
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.problem import Load, Material, Problem
 from solvers.statistics.statistical_fem import StatFemSolver
 from solvers.statistics.statistical_posterior import log_root_determinant
+from tests.solvers.conftest import check_gradient, observed_at
 from tests.solvers.pinn.kernels import matern
 
 
@@ -26,11 +26,8 @@ def units(coarse_mesh):
 
 
 def observing(mesh, displacements, *, deviation=0.01, hidden=()):
-    visible = np.ones(len(mesh.markers), dtype=bool)
-    visible[list(hidden)] = False
-    deviations = np.full(mesh.markers.shape, deviation)
-    observations = Observations(mesh.markers, displacements, deviations, visible, "by a test", True, 0.8)
-    return Problem(mesh, observations=observations)
+    visible = ~np.isin(np.arange(len(mesh.markers)), hidden)
+    return Problem(mesh, observations=observed_at(mesh.markers, displacements, deviation, visible))
 
 
 @pytest.fixture(scope="module")
@@ -79,13 +76,7 @@ def test_mean_and_deviation_are_those_of_the_posterior(solution, units, coarse_m
 
 
 def test_gradient_is_the_derivative(solution, coarse_mesh):
-    points, step = coarse_mesh.at_centroids().points[::60], 1e-5
-    for axis in (0, 1):
-        shift = step * np.eye(2)[axis]
-        difference = (solution.displacement(points + shift) - solution.displacement(points - shift)) / (
-            2 * step
-        )
-        np.testing.assert_allclose(solution.gradient(points)[:, :, axis], difference, atol=1e-6)
+    check_gradient(solution, coarse_mesh.at_centroids().points[::60])
 
 
 def test_no_other_constants_are_more_likely(solution, units):
@@ -112,16 +103,15 @@ def test_no_other_constants_are_more_likely(solution, units):
 
 
 def test_a_load_that_is_off_is_found_where_nothing_else_is_wrong(coarse_mesh, units):
-    made = -1.0 * units[0].displacement(coarse_mesh.markers) - 10.0 * units[1].displacement(
-        coarse_mesh.markers
-    )
-    solution = SOLVER.solve(observing(coarse_mesh, made))
+    def exact(points):
+        return -1.0 * units[0].displacement(points) - 10.0 * units[1].displacement(points)
+
+    solution = SOLVER.solve(observing(coarse_mesh, exact(coarse_mesh.markers)))
     stats = solution.stats
     assert stats["factor"] * stats["load_u"] == pytest.approx(-1.0, abs=0.05)
     assert stats["factor"] * stats["load_v"] == pytest.approx(-10.0, abs=0.05)
     centroids = coarse_mesh.at_centroids()
-    exact = -1.0 * units[0].displacement(centroids) - 10.0 * units[1].displacement(centroids)
-    assert np.abs(solution.displacement(centroids) - exact).max() < 0.1
+    assert np.abs(solution.displacement(centroids) - exact(centroids)).max() < 0.1
 
 
 def test_a_marker_that_is_left_out_has_no_say_at_all(problem, solution):
