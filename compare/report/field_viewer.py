@@ -23,9 +23,6 @@ from geometry.mesh.boundary import boundary_edges, edge_paths
 
 BUDGET = 6_000_000
 """Bytes of packed fields: with a finer mesh or more solvers there are fewer quantities to choose from."""
-FRAMES = 16
-"""States along the load path that are kept of one solver."""
-STEPS = 65_535
 
 DISPLACEMENT = FieldQuantity(
     "displacement",
@@ -45,23 +42,20 @@ class Packed:
         self._length = 0
 
     def add(self, values: NDArray[Any]) -> dict[str, Any]:
-        """Append an array of float32 or uint32."""
-        return self._append(values.ravel(), str(values.dtype))
-
-    def add_steps(self, values: FloatArray) -> dict[str, Any]:
-        """Append values as steps of their range: value = low + step * number."""
-        low, high = float(values.min()), float(values.max())
-        step = (high - low) / STEPS or 1.0
-        steps = np.round((values.ravel() - low) / step).astype("<u2")
-        return self._append(steps, "uint16") | {"low": low, "step": step}
-
-    def _append(self, values: NDArray[Any], kind: str) -> dict[str, Any]:
+        """Append an array of float32, uint32 or uint16."""
         data = values.tobytes()
-        place = {"kind": kind, "offset": self._length, "length": len(values)}
+        place = {"kind": str(values.dtype), "offset": self._length, "length": values.size}
         data += bytes(-len(data) % 4)
         self._pieces.append(data)
         self._length += len(data)
         return place
+
+    def add_steps(self, values: FloatArray) -> dict[str, Any]:
+        """Append values as steps of their range: value = low + step * number."""
+        low, high = float(values.min()), float(values.max())
+        step = (high - low) / 65_535 or 1.0
+        steps = np.round((values - low) / step).astype("<u2")
+        return self.add(steps) | {"low": low, "step": step}
 
     def text(self) -> str:
         """All of it, compressed, in Base64."""
@@ -71,7 +65,7 @@ class Packed:
 def viewer(comparison: Comparison) -> dict[str, Any] | None:
     """Manifest, packed arrays and library of the viewer; None where there is no field to show.
 
-    Solvers whose field is not finite are left out, and so are quantities beyond the `BUDGET`.
+    There are no solvers whose field is not finite, and no quantities beyond the `BUDGET`.
     """
     mesh, reference = comparison.mesh, comparison.reference
     shown = [each for each in comparison.shown_fields if each.finite]
@@ -80,11 +74,10 @@ def viewer(comparison: Comparison) -> dict[str, Any] | None:
     if not quantities or not reference.finite:
         return None
     packed = Packed()
-    paths = edge_paths(boundary_edges(mesh.triangles))
     manifest = {
         "points": packed.add(mesh.points.astype("<f4")),
         "triangles": packed.add(mesh.triangles.astype("<u4")),
-        "outlines": [path.tolist() for path in paths],
+        "outlines": [path.tolist() for path in edge_paths(boundary_edges(mesh.triangles))],
         "reference": reference.label,
         "differences": [_stop(share) for share in np.linspace(0, 1, 17)],
         "quantities": [
@@ -131,7 +124,7 @@ def _load_path(evaluation: Evaluation) -> tuple[list[float], FloatArray, str]:
     """Fractions of the load, the nodes' displacements there, shape (k, n, 2), mm, and a word on them."""
     path, fractions = evaluation.path, evaluation.history.get("load_fraction")
     if path is not None and fractions is not None and len(path) == len(fractions) > 1:
-        chosen = np.unique(np.linspace(0, len(path) - 1, min(FRAMES, len(path))).round().astype(int))
+        chosen = np.unique(np.linspace(0, len(path) - 1, min(16, len(path))).round().astype(int))
         word = f"load path of {len(path) - 1} equilibria that the solver found"
         return np.asarray(fractions)[chosen].tolist(), path[chosen], word
     word = (

@@ -16,15 +16,11 @@ from compare.figures.fields import QUANTITIES
 from compare.report import text
 from compare.report.field_viewer import viewer
 from compare.report.metrics_json import metrics
-from compare.report.sentences import certificate_sentences, truth_sentences
 from compare.report.summary import answers
 from compare.report.tables import millimetres, printed_rows, seconds, table_one
 from compare.runtime.html import picture_urls, template_environment
 from compare.runtime.tables import distance, number, percent
 from geometry.atomic import write_text
-
-FIELDS = {quantity.name for quantity in QUANTITIES}
-"""File names, without their suffix, of the pictures of fields."""
 
 
 def write_report(
@@ -34,23 +30,24 @@ def write_report(
     provenance: Mapping[str, object],
     numbers: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write the report as one HTML file, atomically.
-
-    `provenance` are facts of the run (seed, versions, hashes, times); a mapping in it becomes a group.
-    `numbers` are the comparison's `metrics`, where they are known already.
-    """
-    write_text(path, render(comparison, pictures, provenance, numbers))
+    """Write the report as one HTML file, atomically; arguments as for `report_html`."""
+    write_text(path, report_html(comparison, pictures, provenance, numbers))
 
 
-def render(
+def report_html(
     comparison: Comparison,
     pictures: Sequence[Picture],
     provenance: Mapping[str, object],
     numbers: Mapping[str, Any] | None = None,
 ) -> str:
-    """The report as HTML text."""
+    """The report as HTML text.
+
+    `provenance` are facts of the run (seed, versions, hashes, times); a mapping in it becomes a group.
+    `numbers` are the comparison's `metrics`, where they are known already.
+    """
     numbers = metrics(comparison) if numbers is None else numbers
     reference, design = comparison.reference, comparison.design
+    stills = {quantity.name for quantity in QUANTITIES}
     return _template().render(
         comparison=comparison,
         observations=comparison.observations,
@@ -60,10 +57,10 @@ def render(
         own=reference.uncertainty,
         own_error=text.own_error_sentence(reference),
         beside=text.beside,
-        record=text.record,
+        numbers_of=text.solve_numbers,
         table_one=table_one(comparison),
         printed=printed_rows(design),
-        truth_sentences=truth_sentences(comparison),
+        truth_sentences=text.truth_sentences(comparison),
         entries=[_entry(evaluation, comparison) for evaluation in comparison.evaluations],
         presets=text.preset_meanings(comparison.settings),
         unsupported=[*unsupported_remarks(comparison.unsupported), *comparison.failed.values()],
@@ -86,8 +83,8 @@ def render(
         source=text.source_sentence(comparison.observations),
         viewer=viewer(comparison),
         urls=picture_urls([picture.path for picture in pictures]),
-        pictures=[picture for picture in pictures if picture.path.stem not in FIELDS],
-        stills=[picture for picture in pictures if picture.path.stem in FIELDS],
+        pictures=[picture for picture in pictures if picture.path.stem not in stills],
+        stills=[picture for picture in pictures if picture.path.stem in stills],
         provenance=text.grouped(provenance),
     )
 
@@ -125,5 +122,5 @@ def _entry(evaluation: Evaluation, comparison: Comparison) -> dict[str, object]:
         "reaction": text.without_rounding(evaluation.reaction),
         "seconds": seconds(evaluation),
         "certificate": evaluation.certificate,
-        "certificate_sentences": certificate_sentences(evaluation, comparison.load.kind),
+        "certificate_sentences": text.certificate_sentences(evaluation, comparison.load.kind),
     }

@@ -25,7 +25,7 @@ def metrics(comparison: Comparison) -> dict[str, Any]:
     """The content of `metrics.json`.
 
     `markers` compares with every marker that was seen. `held_out` compares with markers that the solver was
-    not given: those same markers for a solver that was given none; each marker left out in its turn for one
+    not given: those same markers for a solver that was given none; each marker held out in its turn for one
     that assimilated them, null if it does not tell. Markers that were not seen are NaN.
     `to_truth` is null where the markers were measured, since nobody knows the fields of a real finger.
     """

@@ -9,7 +9,7 @@ from typing import Any
 
 from compare.evaluation.metrics import MEANS
 from compare.report.metrics_json import SCHEMA
-from compare.report.summary import Answer, answers
+from compare.report.summary import RunAnswer, answers
 from compare.runtime.html import picture_urls, write_page
 from compare.runtime.output_folder import RUN_FILE, check_links
 from compare.runtime.tables import NONE, Cell, TextTable, number, percent, write_csv
@@ -18,28 +18,19 @@ from geometry.errors import UserError
 TABLE = "runs.csv"
 PICTURES = {"overlay.png": "Deformed finger", "von_mises.png": "Von Mises stress"}
 """Pictures of a run that stand side by side."""
-MOST_PICTURES = 12
-"""Runs beyond which the page has no pictures, so that it stays small."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """A finished run.
+    """A finished run."""
 
-    Attributes:
-        name: Its name on the page.
-        folder: Its output folder.
-        metrics: Content of `metrics.json`.
-        record: Content of `run.json`.
-    """
-
-    name: str
+    name: str  # on the page
     folder: Path
-    metrics: Mapping[str, Any]
-    record: Mapping[str, Any]
+    metrics: Mapping[str, Any]  # content of `metrics.json`
+    record: Mapping[str, Any]  # content of `run.json`
 
     @property
-    def answers(self) -> list[Answer]:
+    def answers(self) -> list[RunAnswer]:
         """The answers that its report opens with."""
         unsupported, failed = (self.record.get(key) or {} for key in ("left_out", "failed"))
         return answers(self.metrics, unsupported=unsupported, failed=failed)
@@ -187,19 +178,13 @@ def _text(value: Cell, share: bool) -> str:
     return percent(float(value), 3, sign=False) if share else number(float(value), 4)
 
 
+def _mean_columns(kind: str) -> dict[str, str]:
+    return {name.removeprefix("mae_"): f"{kind}_{name}_mm" for name in MEANS}
+
+
 GROUPS = {
-    "Errors at markers that the solver was not given (held out), mm": {
-        "u": "held_out_mae_u_mm",
-        "v": "held_out_mae_v_mm",
-        "sum": "held_out_mae_sum_mm",
-        "rss": "held_out_mae_rss_mm",
-    },
-    "Errors at markers that the solver was given (training errors), mm": {
-        "u": "given_mae_u_mm",
-        "v": "given_mae_v_mm",
-        "sum": "given_mae_sum_mm",
-        "rss": "given_mae_rss_mm",
-    },
+    "Errors at markers that the solver was not given (held out), mm": _mean_columns("held_out"),
+    "Errors at markers that the solver was given (training errors), mm": _mean_columns("given"),
     "Distance from the simulated finger over the whole body, relative L², and error of the force, %": {
         "displacement": "to_truth_displacement_rel_l2",
         "von Mises": "to_truth_von_mises_rel_l2",
@@ -246,7 +231,7 @@ def write_side_by_side(folder: Path, runs: Sequence[Run]) -> tuple[Path, Path]:
             if (run.folder / "figures" / file).is_file()
         }
         for file, title in PICTURES.items()
-        if len(runs) <= MOST_PICTURES
+        if len(runs) <= 12  # so that the page stays small
     }
     page = write_page(
         folder / "runs.html",

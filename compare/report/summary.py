@@ -9,48 +9,28 @@ from typing import Any, NamedTuple
 
 from compare.runtime.tables import NONE, TextTable, number, percent
 
-Numbers = Mapping[str, Any]
-"""A part of `metrics.json`, or of what `metrics` gives."""
-
-MODEL_SHARE = 0.1
-"""Ratio of the distances from reference and simulated finger below which the latter is the model's error."""
-
+Metrics = Mapping[str, Any]
+"""`metrics.json`, or a part of it."""
 
 FIELDS = ("displacement", "von Mises stress", "force")
-"""What is compared with the simulated finger, in the order of `_to_truth`."""
-
-HELD_OUT = (
-    "Held out: mean |Δu| + |Δv| at markers that the solver was not given, each predicted from the others. "
-    "The range is over neighbouring markers under one load and no confidence interval; those are from "
-    "pinnray crossval."
-)
+"""Quantities that are compared with the simulated finger, in the order of `_to_truth`."""
 
 
-class Answer(NamedTuple):
-    """An answer to a question about a run.
-
-    Attributes:
-        question: The question.
-        verdict: The answer in a sentence.
-        sentences: The numbers that it rests on, each in a sentence.
-        table: A table of them, if there is one.
-    """
+class RunAnswer(NamedTuple):
+    """An answer to a question about a run."""
 
     question: str
-    verdict: str
-    sentences: list[str]
-    table: TextTable | None = None
+    verdict: str  # the answer in a sentence
+    sentences: list[str]  # the numbers that it rests on
+    table: TextTable | None = None  # more numbers, if there are any
 
 
 def answers(
-    metrics: Numbers, *, unsupported: Mapping[str, str] | None = None, failed: Mapping[str, str] | None = None
-) -> list[Answer]:
-    """The answers of a run.
+    metrics: Metrics, *, unsupported: Mapping[str, str] | None = None, failed: Mapping[str, str] | None = None
+) -> list[RunAnswer]:
+    """The answers of a run, from its metrics.
 
-    Args:
-        metrics: The content of `metrics.json`.
-        unsupported: Reasons why solvers do not support the problem, by their names.
-        failed: Messages of solvers that raised an exception, by their names.
+    Reasons why solvers do not support the problem, and messages of those that failed, come by their names.
     """
     label = {
         name: name if own["status"] == "converged" else f"{name} (not converged)"
@@ -69,16 +49,14 @@ def answers(
     return [answer for answer in found if answer is not None]
 
 
-def _warnings(metrics: Numbers) -> Answer | None:
+def _warnings(metrics: Metrics) -> RunAnswer | None:
     """The warnings of the run, before any number of it; a run of an earlier version has kept none."""
-    said = [
-        f"{text.rstrip('. ')}." for text in metrics.get("warnings", ())
-    ]  # many begin with a solver's name
+    said = [f"{text.rstrip('. ')}." for text in metrics.get("warnings", ())]
     count = "One warning" if len(said) == 1 else f"{len(said)} warnings"
-    return Answer("What speaks against these numbers?", f"{count}:", said) if said else None
+    return RunAnswer("What speaks against these numbers?", f"{count}:", said) if said else None
 
 
-def _trust(metrics: Numbers) -> Answer | None:
+def _trust(metrics: Metrics) -> RunAnswer | None:
     """Whether the networks that were given no markers solve the equations of the reference."""
     solvers, reference = metrics["solvers"], metrics["reference"]
     networks = {name: own for name, own in solvers.items() if own.get("family") == "neural network"}
@@ -90,10 +68,10 @@ def _trust(metrics: Numbers) -> Answer | None:
     for name, own in networks.items():
         if name not in plain and (twin := own["twin"]):
             sentences.append(_beside_twin(name, own, twin, solvers[twin], metrics["measurements"]["source"]))
-    return Answer("May the network be trusted here?", " ".join(verdicts), list(filter(None, sentences)))
+    return RunAnswer("May the network be trusted here?", " ".join(verdicts), list(filter(None, sentences)))
 
 
-def _verdict(name: str, own: Numbers, metrics: Numbers) -> str:
+def _verdict(name: str, own: Metrics, metrics: Metrics) -> str:
     reference, to = metrics["reference"], own["to_reference"]
     if own["status"] != "converged":
         return f"No, not with {name}."
@@ -109,7 +87,7 @@ def _verdict(name: str, own: Numbers, metrics: Numbers) -> str:
     return f"As a solver to {away}: that far is {name} from {reference} in displacement."
 
 
-def _against_reference(name: str, own: Numbers, metrics: Numbers) -> list[str]:
+def _against_reference(name: str, own: Metrics, metrics: Metrics) -> list[str]:
     reference, to, certificate = metrics["reference"], own["to_reference"], own["certificate"]
     known = to["reference_uncertainty"] or {}
     fields = ", ".join(
@@ -127,13 +105,13 @@ def _against_reference(name: str, own: Numbers, metrics: Numbers) -> list[str]:
             f"In displacement, von Mises stress and force, {name} is {_truth_numbers(own)} away from the "
             f"simulated finger, {reference} {_truth_numbers(model)}."
         )
-        if to["rel_l2_displacement"] < MODEL_SHARE * true["displacement"]["rel_l2"]:
+        if to["rel_l2_displacement"] < 0.1 * true["displacement"]["rel_l2"]:
             sentence += " That is the error of the model and its load, not of the network."
         said.append(sentence)
     return said
 
 
-def _beside_twin(name: str, own: Numbers, twin: str, other: Numbers, source: str) -> str:
+def _beside_twin(name: str, own: Metrics, twin: str, other: Metrics, source: str) -> str:
     if not (own["held_out"] and other["held_out"]):
         return ""
     off, of_twin = own["held_out"]["mae_sum"], other["held_out"]["mae_sum"]
@@ -143,7 +121,7 @@ def _beside_twin(name: str, own: Numbers, twin: str, other: Numbers, source: str
     )
 
 
-def _markers(metrics: Numbers) -> Answer | None:
+def _markers(metrics: Metrics) -> RunAnswer | None:
     """Whether solvers that were given the markers are nearer than the reference, at held-out markers."""
     solvers, reference = metrics["solvers"], metrics["reference"]
     plain, source = solvers[reference], metrics["measurements"]["source"]
@@ -167,7 +145,12 @@ def _markers(metrics: Numbers) -> Answer | None:
         inside.append(f"in {field} {_those(better, given)}")
     if inside:
         nearer.append(f"over the simulated body {', '.join(inside)}")
-    sentences = [HELD_OUT] if told else []
+    held_out = (
+        "Held out: mean |Δu| + |Δv| at markers that the solver was not given, each predicted from the others. "
+        "The range is over neighbouring markers under one load and no confidence interval; those are from "
+        "pinnray crossval."
+    )
+    sentences = [held_out] if told else []
     if not plain["to_truth"]:
         sentences.append("Whether stress and force are nearer is unknown: no camera tells them.")
     sentences += filter(None, (_force_interval(name, own, metrics) for name, own in given.items()))
@@ -179,10 +162,10 @@ def _markers(metrics: Numbers) -> Answer | None:
     if plain["to_truth"]:
         caption += ", and distance from the simulated finger over the whole body"
     rows = [list(row) for row in zip(*columns, strict=True)]
-    return Answer("Did the markers help?", verdict, sentences, TextTable(caption, heads, rows))
+    return RunAnswer("Did the markers help?", verdict, sentences, TextTable(caption, heads, rows))
 
 
-def _held_out(own: Numbers) -> tuple[float, float, float]:
+def _held_out(own: Metrics) -> tuple[float, float, float]:
     """Mean, least and largest |Δu| + |Δv| at held-out markers, mm; NaN where there are none."""
     means = own["held_out"]
     if not means:
@@ -192,12 +175,12 @@ def _held_out(own: Numbers) -> tuple[float, float, float]:
     return means["mae_sum"], min(each), max(each)
 
 
-def _held_out_cells(own: Numbers) -> list[str]:
+def _held_out_cells(own: Metrics) -> list[str]:
     mean, least, largest = _held_out(own)
     return [f"{mean:.3f}", f"{least:.3f} to {largest:.3f}"] if isfinite(least) else [NONE, NONE]
 
 
-def _force_interval(name: str, own: Numbers, metrics: Numbers) -> str:
+def _force_interval(name: str, own: Metrics, metrics: Metrics) -> str:
     """The force that a solver found, with its 95 % interval, beside the true one where that is known."""
     low, high = own["stats"].get("force_low"), own["stats"].get("force_high")
     if low is None or high is None:
@@ -212,7 +195,7 @@ def _force_interval(name: str, own: Numbers, metrics: Numbers) -> str:
     return f"{said} from the {source} markers; that of the simulated finger is {number(true, 3)}, {where} it."
 
 
-def _convergence(metrics: Numbers, unsupported: Mapping[str, str], failed: Mapping[str, str]) -> Answer:
+def _convergence(metrics: Metrics, unsupported: Mapping[str, str], failed: Mapping[str, str]) -> RunAnswer:
     """The solvers that did not converge, and how far the others are from the exact solution."""
     solvers, reference = metrics["solvers"], metrics["reference"]
     faulty = {name: own["message"] for name, own in solvers.items() if own["status"] != "converged"}
@@ -244,16 +227,16 @@ def _convergence(metrics: Numbers, unsupported: Mapping[str, str], failed: Mappi
     without = [name for name, entry in solvers.items() if not entry["certificate"]]
     if without:
         sentences.append(f"By their own criterion alone, without a certificate: {_listed(without)}.")
-    return Answer("What is not converged?", verdict, sentences)
+    return RunAnswer("What is not converged?", verdict, sentences)
 
 
-def _to_truth(own: Numbers) -> tuple[float, float, float]:
+def _to_truth(own: Metrics) -> tuple[float, float, float]:
     """Relative distances from the simulated finger in displacement, von Mises stress and force."""
     true = own["to_truth"]
     return true["displacement"]["rel_l2"], true["von_mises"]["rel_l2"], own["force_to_truth_rel"]
 
 
-def _truth_numbers(own: Numbers) -> str:
+def _truth_numbers(own: Metrics) -> str:
     return _listed(
         [_signed(share, field == "force") for share, field in zip(_to_truth(own), FIELDS, strict=True)]
     )

@@ -30,19 +30,12 @@ Means = tuple[float, float, float | None, float]
 
 
 class Row(NamedTuple):
-    """One solver's errors in Table I.
+    """One solver's errors in Table I."""
 
-    Attributes:
-        solver: Its label.
-        source: Where the displacements of the markers come from.
-        given: Errors at markers that it was given; None if it was given none.
-        held_out: Errors at markers that it was not given: all, or each left out in its turn; None if unknown.
-    """
-
-    solver: str
-    source: str
-    given: Means | None
-    held_out: Means | None
+    solver: str  # its label
+    source: str  # of the displacements of the markers
+    given: Means | None  # at markers that it was given; None if it was given none
+    held_out: Means | None  # at markers that it was not given: all, or each in its turn; None if unknown
 
 
 PAPER = "paper"
@@ -95,36 +88,32 @@ def write_table_one(path: Path, comparison: Comparison) -> None:
 
 
 def write_markers(path: Path, comparison: Comparison) -> None:
-    """Write a row a marker: where it was, how it moved, what each solver says and how far off that is.
+    """Write a row a marker: its place and observed motion, every solver's displacement and its errors.
 
     The cells of observations and errors are empty at markers that were not seen; those of held-out errors
     are also empty where a solver that was given the marker does not tell its prediction without it.
     """
-    observations, evaluations = comparison.observations, comparison.evaluations
-    rows: list[dict[str, Cell]] = []
+    observations = comparison.observations
     errors = [
-        (marker_errors(evaluation, observations), held_out_errors(evaluation, observations))
-        for evaluation in evaluations
+        (each, marker_errors(each, observations), held_out_errors(each, observations))
+        for each in comparison.evaluations
     ]
-    for marker, (x, y) in enumerate(observations.points):
+    rows: list[dict[str, Cell]] = []
+    for marker, (x, y) in enumerate(observations.points.tolist()):
         seen = bool(observations.visible[marker])
-        u, v = observations.displacements[marker]
-        row: dict[str, Cell] = {"marker": marker + 1, "x_mm": float(x), "y_mm": float(y)}
+        u, v = observations.displacements[marker].tolist()
+        row: dict[str, Cell] = {"marker": marker + 1, "x_mm": x, "y_mm": y}
         row |= {"observations": observations.label, "visible": int(seen)}
-        row |= {"observed_u_mm": float(u) if seen else "", "observed_v_mm": float(v) if seen else ""}
-        for evaluation, (error, held_out) in zip(evaluations, errors, strict=True):
-            name = evaluation.solver
-            own_u, own_v = (float(value) for value in evaluation.marker_displacement[marker])
-            row |= {
-                f"{name}_converged": int(evaluation.converged),
-                f"{name}_in_sample": int(evaluation.in_sample),
-            }
+        row |= {"observed_u_mm": u if seen else "", "observed_v_mm": v if seen else ""}
+        for each, error, held_out in errors:
+            name, (own_u, own_v) = each.solver, each.marker_displacement[marker].tolist()
+            row |= {f"{name}_converged": int(each.converged), f"{name}_in_sample": int(each.in_sample)}
             row |= {f"{name}_u_mm": own_u, f"{name}_v_mm": own_v}
-            row[f"{name}_ae_u_mm"] = float(error.ae_u[marker]) if seen else ""
-            row[f"{name}_ae_v_mm"] = float(error.ae_v[marker]) if seen else ""
-            for axis in "uv":
-                found = getattr(held_out, f"ae_{axis}")[marker] if held_out and seen else ""
-                row[f"{name}_held_out_ae_{axis}_mm"] = found if found == "" else float(found)
+            for kind, found in (("ae", error), ("held_out_ae", held_out)):
+                for axis in "uv":
+                    known = found is not None and seen
+                    value = float(getattr(found, f"ae_{axis}")[marker]) if known else ""
+                    row[f"{name}_{kind}_{axis}_mm"] = value
         rows.append(row)
     write_csv(path, rows)
 

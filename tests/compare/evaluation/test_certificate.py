@@ -19,7 +19,7 @@ from compare.evaluation.certificate import (
 from compare.evaluation.certification import Certifier, body_regions, with_certificate, with_certificates
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import reference_differences
-from compare.report.sentences import certificate_sentences
+from compare.report.text import certificate_sentences
 from geometry.arrays import FloatArray, IntArray
 from geometry.cache import finger_mesh
 from geometry.finger.design import Design

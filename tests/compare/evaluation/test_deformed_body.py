@@ -9,7 +9,7 @@ import pytest
 
 from compare.evaluation.deformed_body import DeformedBody, with_body_checks
 from compare.evaluation.evaluation import Evaluation
-from compare.report.html_report import render
+from compare.report.html_report import report_html
 from compare.report.metrics_json import metrics
 from geometry import MeshSettings, finger_mesh, load_design
 from geometry.arrays import FloatArray
@@ -128,7 +128,7 @@ def test_the_warning_names_all_and_the_simulated_finger(fem, pinn, mesh, compare
     )
     comparison = compared(*checked, warnings=remarks)
     assert metrics(comparison)["warnings"] == remarks
-    page = render(comparison, [], {})
+    page = report_html(comparison, [], {})
     assert f"<li>fem, pinn-std, the simulated finger: {SELF};" in page
     assert (
         page.index("What speaks against these numbers?")

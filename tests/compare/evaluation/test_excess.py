@@ -9,7 +9,7 @@ from compare.evaluation.certificate import Certificate, Region
 from compare.evaluation.certification import with_certificate
 from compare.evaluation.evaluation import Evaluation
 from compare.figures.fields import DECADES, draw_excess, excess_scale
-from compare.report.sentences import certificate_sentences
+from compare.report.text import certificate_sentences
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 

@@ -10,7 +10,7 @@ from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import evaluated
 from compare.figures.gallery import draw
-from compare.report.html_report import render
+from compare.report.html_report import report_html
 from geometry.finger.finger import Finger
 from geometry.finger.presets import load_design
 from geometry.mesh.mesher import build_mesh
@@ -112,7 +112,7 @@ def test_the_base_is_hatched_along_each_of_its_parts(comparison: Comparison) -> 
 
 
 def test_the_report_of_a_finger_without_parameters_has_its_facts_and_no_symbols() -> None:
-    text = render(compared(ring()), [], {})
+    text = report_html(compared(ring()), [], {})
     assert "60 mm by 60 mm" in text
     assert "1 cavity" in text
     assert ring().section.digest in text
@@ -122,7 +122,7 @@ def test_the_report_of_a_finger_without_parameters_has_its_facts_and_no_symbols(
 
 
 def test_the_report_of_a_finger_with_parameters_has_the_symbols_of_the_paper() -> None:
-    text = render(compared(load_design("csiro")), [], {})
+    text = report_html(compared(load_design("csiro")), [], {})
     assert "<sub>tip</sub>" in text
     assert "in 2 pieces" in text
 

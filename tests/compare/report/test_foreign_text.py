@@ -14,7 +14,7 @@ from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.figures import Picture
 from compare.pipeline.job import Job, checked
-from compare.report.html_report import render
+from compare.report.html_report import report_html
 from compare.report.metrics_json import metrics
 from compare.report.runs import read_runs, write_side_by_side
 from compare.runtime.html import PNG, SMALL, template_environment
@@ -75,8 +75,8 @@ def test_the_report_escapes_every_text_of_others(hostile: Comparison, tmp_path: 
     path = tmp_path / 'a <b> & "c".png'
     path.write_bytes(PNG)
     picture = Picture(path, HOSTILE, HOSTILE, HOSTILE)
-    page = render(hostile, [picture], {HOSTILE: HOSTILE, "group": {HOSTILE: HOSTILE}})
-    found, plain = Elements(page), Elements(render(hostile, [], {}))
+    page = report_html(hostile, [picture], {HOSTILE: HOSTILE, "group": {HOSTILE: HOSTILE}})
+    found, plain = Elements(page), Elements(report_html(hostile, [], {}))
     assert "x-evil" not in found.names
     assert found.running == []
     assert page.count("<script") == page.count("</script>") == 4

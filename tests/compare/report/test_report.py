@@ -13,7 +13,7 @@ from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.figures import Picture
 from compare.report import html_report
-from compare.report.text import record, sentence, stat
+from compare.report.text import sentence, solve_numbers, stat
 from compare.runtime.tables import distance, number, percent
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
@@ -73,7 +73,7 @@ def render(
     pictures: Sequence[Picture] = (),
     provenance: Mapping[str, object] = {"seed": 17, "versions": {"numpy": "1.26.4"}},
 ) -> str:
-    return html_report.render(comparison, pictures, provenance)
+    return html_report.report_html(comparison, pictures, provenance)
 
 
 def test_the_page_is_balanced_and_whole(content: Comparison) -> None:
@@ -296,7 +296,7 @@ def test_what_a_solver_found_is_told_apart_from_its_other_numbers() -> None:
         "young_modulus": 2,
         "law": "gent",
     }
-    found, rest = record(stats)
+    found, rest = solve_numbers(stats)
     assert found == [("force", ["0.2500", "–", "0.2000", "0.3000", "–"])]
     assert rest == [("young modulus", "2"), ("law", "gent")]
 

@@ -9,7 +9,7 @@ import pytest
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.report.metrics_json import metrics
-from compare.report.summary import Answer, answers
+from compare.report.summary import RunAnswer, answers
 from geometry.observations import Observations
 
 TRUST, MARKERS, CONVERGED = (
@@ -19,7 +19,7 @@ TRUST, MARKERS, CONVERGED = (
 )
 
 
-def asked(comparison: Comparison, **said: dict[str, str]) -> dict[str, Answer]:
+def asked(comparison: Comparison, **said: dict[str, str]) -> dict[str, RunAnswer]:
     return {answer.question: answer for answer in answers(metrics(comparison), **said)}
 
 

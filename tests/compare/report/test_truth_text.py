@@ -3,7 +3,7 @@ from dataclasses import replace
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
-from compare.report.sentences import truth_sentences
+from compare.report.text import truth_sentences
 
 
 def test_what_the_markers_change_is_said_of_displacement_stress_and_force(

@@ -9,7 +9,7 @@ import pytest
 from compare.crossval.true_fields import FieldSampler
 from compare.evaluation.certification import with_certificates
 from compare.evaluation.evaluation import Evaluation
-from compare.report.sentences import certificate_sentences
+from compare.report.text import certificate_sentences
 from geometry.errors import UserError
 from solvers.extrusion import ExtrudedSpace
 from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
