@@ -146,9 +146,9 @@ def _markers(metrics: Metrics) -> RunAnswer | None:
     if inside:
         nearer.append(f"over the simulated body {', '.join(inside)}")
     held_out = (
-        "Held out: mean |Δu| + |Δv| at markers that the solver was not given, each predicted from the others. "
-        "The range is over neighbouring markers under one load and no confidence interval; those are from "
-        "pinnray crossval."
+        "Held out: mean |Δu| + |Δv| at markers that the solver was not given, each predicted from the "
+        "others. The range is over neighbouring markers under one load and no confidence interval; those are "
+        "from pinnray crossval."
     )
     sentences = [held_out] if told else []
     if not plain["to_truth"]:

@@ -10,7 +10,7 @@ from compare.runtime.tables import NONE, percent, terminal_table
 
 
 def marker_table(comparison: Comparison) -> Table:
-    """Mean absolute errors at the markers; below, for the paper's finger, the numbers of the paper's Table I."""
+    """Mean absolute errors at the markers; below, for the paper's finger, the paper's own numbers."""
     observations, printed = comparison.observations, printed_rows(comparison.design)
     seen, count = int(observations.visible.sum()), len(observations.visible)
     markers = f"{count} marker{'s' * (count > 1)}" if seen == count else f"{seen} of {count} markers"
