@@ -4,19 +4,15 @@ import csv
 import json
 import sys
 from dataclasses import replace
-from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.truths import TRUTHS
 from compare.evaluation.virtual_experiment import UnfinishedExperimentError, virtual_experiment
 from compare.pipeline.job import Job
-from compare.pipeline.pipeline import run
-from compare.runtime.stages import Stages
 from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.finger.design import Design
@@ -26,6 +22,7 @@ from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
 from solvers.solution import Solution, Status
+from tests.compare.pipeline.runs import compare
 from tests.meshes import permuted
 
 
@@ -217,9 +214,8 @@ def unfinished(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _compared(out: Path, *names: str, spare: tuple[str, ...] = ()) -> Comparison:
-    job = Job(Design(), [make_solver(name) for name in names], spare, MeshSettings(size=1.0), out=out)
-    with Stages(Console(file=StringIO()), quiet=True) as stages:
-        return run(job, stages)
+    solvers = [make_solver(name) for name in names]
+    return compare(Job(Design(), solvers, spare, MeshSettings(size=1.0), out=out))
 
 
 def test_a_comparison_goes_on_without_a_truth(tmp_path, unfinished):

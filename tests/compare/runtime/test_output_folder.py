@@ -56,14 +56,11 @@ def attempt(out: Path, *, keep: tuple[str, ...] = (), **what: object) -> None:
         write(folder, **what)
 
 
-def test_the_new_folder_takes_the_place_of_the_old_one(out):
+def test_the_new_folder_takes_the_place_of_the_old_one_or_is_made(out):
     attempt(out)
     assert tree(out.parent) == {"run/report.html": "new report"}
-
-
-def test_missing_parents_are_made(tmp_path):
-    attempt(tmp_path / "a" / "b" / "run")
-    assert tree(tmp_path) == {"a/b/run/report.html": "new report"}
+    attempt(out.parent / "a" / "b")
+    assert tree(out.parent / "a") == {"b/report.html": "new report"}
 
 
 @pytest.mark.parametrize("error", [RuntimeError(), KeyboardInterrupt()], ids=["error", "Ctrl-C"])
@@ -84,21 +81,24 @@ def test_an_error_before_anything_was_finished_leaves_nothing(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_only_solutions_that_are_asked_for_outlive_an_earlier_attempt(out):
-    with pytest.raises(RuntimeError):
-        attempt(out, solutions=("fem", "pinn-std"), error=RuntimeError())
+@pytest.mark.parametrize(
+    ("keep", "left"),
+    [
+        ((), {}),
+        (("fem",), {"solutions/fem.npz": "new solution"}),
+        (
+            ("pinn",),
+            {"solutions/pinn.npz": "new solution", "training/pinn/checkpoint": "epoch 7"},
+        ),
+    ],
+)
+def test_only_solutions_and_checkpoints_that_are_asked_for_outlive_an_earlier_attempt(out, keep, left):
+    with pytest.raises(KeyboardInterrupt):
+        attempt(out, solutions=("fem", "pinn"), training="pinn", error=KeyboardInterrupt())
     (out.with_name("run.partial") / "figures").mkdir()
-    with replaced_folder(out, keep=("fem",)) as folder:
-        assert tree(folder) == {"solutions/fem.npz": "new solution"}
+    with replaced_folder(out, keep=keep) as folder:
+        assert tree(folder) == left
         assert not (folder / "figures").exists()
-
-
-def test_a_checkpoint_outlives_an_earlier_attempt_if_its_solver_is_asked_for(out):
-    for kept, left in ((("pinn-std",), {"training/pinn-std/checkpoint": "epoch 7"}), (("fem",), {})):
-        with pytest.raises(KeyboardInterrupt):
-            attempt(out, training="pinn-std", error=KeyboardInterrupt())
-        with replaced_folder(out, keep=kept) as folder:
-            assert tree(folder) == left
 
 
 def test_what_a_training_left_is_copied_in_place_of_another(out, tmp_path):
@@ -110,13 +110,6 @@ def test_what_a_training_left_is_copied_in_place_of_another(out, tmp_path):
     take_training("pinn-std", tmp_path, tmp_path)
     take_training("fem", out, tmp_path)
     assert [path.name for path in (tmp_path / "training").iterdir()] == ["pinn-std"]
-
-
-def test_nothing_outlives_an_earlier_attempt_unless_asked(out):
-    with pytest.raises(RuntimeError):
-        attempt(out, solutions=("fem",), error=RuntimeError())
-    with replaced_folder(out) as folder:
-        assert tree(folder) == {}
 
 
 def test_two_runs_do_not_write_the_same_folder(out):
@@ -172,10 +165,7 @@ def test_our_own_result_an_empty_folder_and_none_may_be_replaced(out, tmp_path):
         (lambda out: (out / "run.json").write_text("{}"), "is damaged"),  # another program's run.json
         (lambda out: (out / "run.json").write_text("[1]"), "is damaged"),
         (lambda out: (out / "run.json").write_bytes(b"\xff"), "is damaged"),
-        (
-            lambda out: (out / "run.json").write_text('{"files_sha256": {'),
-            "its run.json is damaged, .* files of yours",
-        ),
+        (lambda out: (out / "run.json").write_text('{"files_sha256": {'), "is damaged, .* files of yours"),
         (lambda out: (out / "run.json").unlink(), r"holds solutions/fem.npz, and it has no run.json"),
     ],
 )
@@ -185,26 +175,22 @@ def test_what_no_comparison_wrote_is_not_lost(out, spoil, message):
         check_output(out)
 
 
-def test_a_folder_called_partial_that_no_unfinished_run_has_left_is_not_lost(out):
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("run.partial", r"run\.partial would be replaced, but it is not of an unfinished run"),
+        (".run.previous", r"run\.previous would be replaced, but no run has left it"),
+    ],
+)
+def test_a_folder_that_no_unfinished_run_has_left_is_not_lost(out, name, message):
     """It may be the user's, or the result of a design called `run.partial`."""
-    partial = out.with_name("run.partial")
-    partial.mkdir()
-    (partial / "thesis.tex").write_text("mine")
-    before = tree(out.parent)
-    with pytest.raises(
-        UserError, match=r"run\.partial would be replaced, but it is not of an unfinished run"
-    ):
+    mine = out.with_name(name)
+    mine.mkdir()
+    (mine / "thesis.tex").write_text("mine")
+    with pytest.raises(UserError, match=message):
         attempt(out)
-    assert tree(out.parent) == before
-
-
-def test_a_hidden_folder_of_the_user_is_not_lost(out):
-    previous = out.with_name(".run.previous")
-    previous.mkdir()
-    (previous / "thesis.tex").write_text("mine")
-    with pytest.raises(UserError, match=r"run\.previous"):
-        attempt(out)
-    assert (previous / "thesis.tex").read_text() == "mine"
+    assert tree(mine) == {"thesis.tex": "mine"}
+    assert (out / "run.json").is_file()
 
 
 @pytest.mark.parametrize("place", ["solutions", "training", "training/pinn-std", "."])
@@ -222,16 +208,12 @@ def test_a_link_in_an_unfinished_folder_of_others_loses_no_file(tmp_path, place)
     assert tree(mine) == {"thesis.tex": "mine"}
 
 
-def test_a_link_in_a_result_of_others_is_not_followed(out):
+def test_a_link_in_a_result_of_others_is_not_followed_and_a_file_is_not_replaced(out):
     (out / "training").symlink_to(out.parent, target_is_directory=True)
     with pytest.raises(UserError, match=r"run/training is a link, which no run has made"):
         check_output(out)
-
-
-def test_a_file_is_not_replaced_by_a_folder(tmp_path):
-    (tmp_path / "file").write_text("mine")
     with pytest.raises(UserError, match="is a file"):
-        check_output(tmp_path / "file")
+        check_output(out / "run.json")
 
 
 @pytest.mark.parametrize("inside", [".", "solutions"])
