@@ -450,9 +450,8 @@ def test_the_docs_have_every_file_of_a_grid_search(tmp_path):
     actual = [
         path.relative_to(tmp_path / "search").as_posix() for path in tmp_path.rglob("*") if path.is_file()
     ]
-    documented = [
-        name.replace("NAME", "lr-0.001_bc-10.0") for name in names(table(TRAIN, "file of a search"))
-    ]
+    run = "learning_rate-0.001_bc_weight-10.0"
+    documented = [name.replace("NAME", run) for name in names(table(TRAIN, "file of a search"))]
     assert sorted(documented) == sorted(actual)
 
 

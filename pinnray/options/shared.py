@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import inf
 from pathlib import Path
 from typing import Annotated, Literal
@@ -179,6 +179,11 @@ class PhysicsOptions:
             young=self.young, poisson=self.poisson, plane=self.plane, law=self.law or "linear"
         )
         return material, load
+
+    def values(self, preset: str | None = None) -> dict[str, bool | float | str]:
+        """Material and load by the names of a study."""
+        given = {**asdict(self), "load": self.load or job_defaults(preset).load}
+        return {name: value for name, value in given.items() if value is not None}
 
     def check_law(self, solvers: Sequence[Solver]) -> None:
         """Raise a `UserError` if none of the solvers has the law."""

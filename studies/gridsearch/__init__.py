@@ -1,4 +1,1 @@
-"""The paper's grid search for a learning rate and a weight of the boundary conditions.
-
-Imports `compare.evaluation`, `compare.figures`, `compare.runtime`.
-"""
+"""The paper's grid search: a sweep over learning rate and weight of the boundary conditions."""

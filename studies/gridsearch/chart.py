@@ -1,6 +1,6 @@
 """A grid search as two maps: distance from `fem`, and violation of the boundary conditions."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib import colormaps
@@ -10,8 +10,7 @@ from matplotlib.patches import Rectangle
 
 from compare.figures.style import HALO, axes_at, write_heading
 from geometry.figure import INK, MUTED, SMALL, WIDTH, Figure, figure
-from studies.gridsearch.tables import best_of
-from studies.gridsearch.training_run import TrainingMetrics, TrainingRun
+from studies.gridsearch.search import TrainingRun, best_of
 
 HEAD, CELL, FOOT, LEFT, GAP = 0.68, 0.34, 0.5, 0.85, 0.25
 """Heights, the left margin and the gap between the maps, inches."""
@@ -25,20 +24,20 @@ def draw_grid(runs: Sequence[TrainingRun]) -> Figure:
     weights = sorted({run.point.bc_weight for run in runs})
     height = CELL * len(weights)
     width = (WIDTH - LEFT - GAP - 0.1) / 2
-    maps: dict[str, Callable[[TrainingMetrics], float]] = {
-        "Displacement: relative L² to fem, %": lambda measured: measured.rel_l2_displacement,
-        "Violation of base or load, % of stroke": lambda measured: measured.boundary_violation,
+    maps = {
+        "Displacement: relative L² to fem, %": "rel_l2_displacement",
+        "Violation of base or load, % of stroke": "boundary_violation",
     }
-    epochs = max((run.measured.epochs for run in runs if run.measured), default=0)
+    epochs = max((int(run.measured["epochs"]) for run in runs if run.measured), default=0)
     with figure(HEAD + height + FOOT) as drawn:
         write_heading(
             drawn,
             "Grid search of the paper's networks",
             f"{epochs:,} epochs. The frame marks the run nearest to fem.",
         )
-        for column, (title, value) in enumerate(maps.items()):
+        for column, (title, quantity) in enumerate(maps.items()):
             axes = axes_at(drawn, (LEFT + column * (width + GAP), HEAD, width, height))
-            _map(axes, runs, value)
+            _map(axes, runs, quantity)
             axes.set_title(title, fontsize=8.5)
             axes.set_xlabel("learning rate")
             if column:
@@ -48,7 +47,7 @@ def draw_grid(runs: Sequence[TrainingRun]) -> Figure:
     return drawn
 
 
-def _map(axes: Axes, runs: Sequence[TrainingRun], value: Callable[[TrainingMetrics], float]) -> None:
+def _map(axes: Axes, runs: Sequence[TrainingRun], quantity: str) -> None:
     rates = sorted({run.point.learning_rate for run in runs})
     weights = sorted({run.point.bc_weight for run in runs})
     table = np.full((len(weights), len(rates)), np.nan)
@@ -56,7 +55,7 @@ def _map(axes: Axes, runs: Sequence[TrainingRun], value: Callable[[TrainingMetri
         x, y = rates.index(run.point.learning_rate), weights.index(run.point.bc_weight)
         words, colour = run.status, MUTED
         if run.measured:
-            table[y, x] = max(100 * value(run.measured), SMALLEST)
+            table[y, x] = max(100 * run.measured[quantity], SMALLEST)
             words, colour = f"{table[y, x]:.3g}", INK
         axes.text(x, y, words, ha="center", va="center", size=SMALL, color=colour, path_effects=HALO)
     if np.isfinite(table).any():

@@ -1,170 +1,179 @@
-"""The paper's grid search for a learning rate and a weight of the boundary conditions."""
+"""The paper's grid search: a sweep over two settings of its network, ranked by the distance from `fem`."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import product
-from pathlib import Path
-from typing import Any
+from math import inf
 
-from compare.runtime.output_folder import locked
-from compare.runtime.provenance import cores
-from compare.runtime.resumable_folder import check_resumable_folder, job_definition
-from compare.runtime.stages import Stages, in_stages
+from rich.table import Table
+
+from compare.runtime.resumable_folder import job_definition
+from compare.runtime.stages import Stages
+from compare.runtime.tables import NONE, Cell, terminal_table, write_csv
 from geometry.atomic import write_json
 from geometry.cache import finger_mesh
-from geometry.finger.finger import Finger
-from geometry.mesh.settings import MeshSettings
-from geometry.processes import ProcessFailed
-from solvers.problem import Load, Material, Problem
-from solvers.registry import make_solver
-from solvers.solver import Solver, check_load
-from studies.gridsearch.tables import best_of, ranked, run_note, write_runs
-from studies.gridsearch.training_run import (
-    FAILED,
-    RESULT_FILE,
-    GridPoint,
-    ReferenceSolution,
-    TrainingRun,
-    TrainingTask,
-    train,
-)
+from geometry.drawing.definition import finger_from
+from solvers.problem import Problem
+from studies.sweep.measurement import Measurement
+from studies.sweep.quantities import TRAINING, heading
+from studies.sweep.study import Range, Study, Value, load_of, material_of
+from studies.sweep.sweep import SweepJob, run_sweep
 
-SEARCH_FILE = "search.json"
+SOLVER = "pinn-std"
+TRAINED, DIVERGED, FAILED = "trained", "diverged", "failed"
 
 
 @dataclass(frozen=True)
-class GridSearch:
-    """A grid search to run, and its output folder.
+class GridPoint:
+    """A learning rate of the optimiser and a weight of the boundary conditions, MPa/mm²."""
 
-    Attributes:
-        design: The finger.
-        mesh: Element sizes.
-        material: The elastic law.
-        load: The prescribed displacement of the contact.
-        learning_rates: Learning rates of the optimiser.
-        bc_weights: Weights of the boundary conditions in the loss, MPa/mm².
-        settings: The other settings of `pinn-std`, its preset `paper` among them.
-        out: Output folder; runs that an earlier search with the same settings finished there are reused.
-        processes: Runs trained at a time.
-        picture_formats: Formats of the picture besides PNG.
-    """
+    learning_rate: float
+    bc_weight: float
 
-    design: Finger
-    mesh: MeshSettings
-    material: Material
-    load: Load
-    learning_rates: Sequence[float]
-    bc_weights: Sequence[float]
-    settings: Mapping[str, object]
-    out: Path
-    processes: int
-    picture_formats: Sequence[str] = ()
+
+@dataclass(frozen=True)
+class TrainingRun:
+    """The end of the training at a point of the grid: the quantities of `TRAINING`, None unless trained."""
+
+    point: GridPoint
+    status: str
+    message: str
+    measured: Mapping[str, float] | None = None
+
+    @classmethod
+    def of(cls, point: GridPoint, ended: Measurement) -> "TrainingRun":
+        """The run of a sample."""
+        if measured := {name: ended.values[name] for name in TRAINING if name in ended.values}:
+            measured["epochs"] = int(measured["epochs"])
+            return cls(point, TRAINED, ended.message, measured)
+        return cls(point, DIVERGED if ended.state == "not converged" else FAILED, ended.message)
 
     @property
-    def points(self) -> list[GridPoint]:
-        """The points of the grid."""
-        return [GridPoint(*pair) for pair in product(self.learning_rates, self.bc_weights)]
-
-    def folder(self, point: GridPoint) -> Path:
-        """Folder of a point's checkpoints and result."""
-        return self.out / "runs" / point.name
-
-    def solver(self, point: GridPoint) -> Solver:
-        """The solver of a point."""
-        return make_solver("pinn-std", **self.settings, **asdict(point))
+    def distance(self) -> float:
+        """Relative L2 difference of the displacement from `fem`; infinite unless trained."""
+        return self.measured["rel_l2_displacement"] if self.measured else inf
 
 
-def search_grid(search: GridSearch, stages: Stages | None = None) -> list[TrainingRun]:
+def grid_study(
+    name: str,
+    settings: Mapping[str, Value],
+    physics: Mapping[str, Value],
+    learning_rates: Sequence[float],
+    bc_weights: Sequence[float],
+) -> Study:
+    """The study of a grid search.
+
+    Args:
+        name: The finger's.
+        settings: The other settings of `pinn-std`, its preset `paper` among them.
+        physics: Material and load, by the names of a study.
+        learning_rates: Learning rates of the optimiser.
+        bc_weights: Weights of the boundary conditions in the loss, MPa/mm².
+    """
+    return Study(
+        name=name[:48],
+        solver=SOLVER,
+        settings=dict(settings),
+        sampling="grid",
+        fixed=dict(physics),
+        varied={
+            f"{SOLVER}.learning_rate": Range(values=tuple(learning_rates)),
+            f"{SOLVER}.bc_weight": Range(values=tuple(bc_weights)),
+        },
+    )
+
+
+def search_grid(
+    job: SweepJob, stages: Stages | None = None, formats: Sequence[str] = ()
+) -> list[TrainingRun]:
     """Train at every point of the grid that has no result yet, and write tables and picture.
 
     Args:
-        search: The grid and the shared settings.
+        job: Of a `grid_study`.
         stages: Shows the progress; None shows nothing.
+        formats: Formats of the picture besides PNG.
 
     Returns:
-        The runs, the one nearest to `fem` first.
+        The runs, the one nearest to `fem` first; losses do not compare between weights.
 
     Raises:
         UserError: If the search cannot be done, or the folder holds something else.
     """
-    stages = stages or Stages(quiet=True)
-    solver, *_ = (search.solver(point) for point in search.points)
-    check_load(solver, search.load)
-    definition = _definition(search, solver)
-    check_resumable_folder(search.out / SEARCH_FILE, definition, job="grid search")
-    with stages.stage("mesh"):
-        problem = Problem(finger_mesh(search.design, settings=search.mesh), search.material, search.load)
-    search.out.mkdir(parents=True, exist_ok=True)
-    with locked(search.out):
-        write_json(search.out / SEARCH_FILE, definition)
-        files = {point: search.folder(point) / RESULT_FILE for point in search.points}
-        results = {point: TrainingRun.load(path) for point, path in files.items() if path.exists()}
-        if missing := [point for point in search.points if point not in results]:
-            results |= _trained(search, missing, problem, stages)
-        runs = ranked(list(results.values()))
-        write_runs(search.out / "gridsearch.csv", runs)
-        with stages.stage("picture"):
-            from studies.gridsearch.chart import draw_grid
+    from studies.gridsearch.chart import draw_grid
 
-            draw_grid(runs=runs).save(search.out / "gridsearch.png", search.picture_formats)
-        best = best_of(runs)
-        write_json(
-            search.out / "gridsearch.json",
-            {
-                **definition,
-                "learning_rates": list(search.learning_rates),
-                "bc_weights": list(search.bc_weights),
-                "ranked_by": "rel_l2_displacement: relative L2 difference from fem on the same mesh",
-                "best": best and asdict(best),
-                "runs": [asdict(run) for run in runs],
-                "problem_sha256": problem.digest,
-                **stages.record(),
-            },
-        )
+    stages = stages or Stages(quiet=True)
+    task = job.maker().task(0, {})
+    finger, material, load = finger_from(task.definition), material_of(task), load_of(task)
+    sweep = run_sweep(job, stages)
+    problem = Problem(finger_mesh(finger, settings=task.mesh), material, load)
+    points = [GridPoint(*map(float, sample.values())) for sample in sweep.samples]
+    runs = [TrainingRun.of(points[each.number], each) for each in sweep.measurements]
+    runs.sort(key=lambda run: run.distance)
+    write_csv(job.out / "gridsearch.csv", [_row(rank, run) for rank, run in enumerate(runs, start=1)])
+    with stages.stage("picture"):
+        draw_grid(runs).save(job.out / "gridsearch.png", formats)
+    best = best_of(runs)
+    rates, weights = (values.values for values in job.study.varied.values())
+    content = {
+        **job_definition(finger, task.mesh, material, load, __name__),
+        "solver": task.settings,
+        "learning_rates": rates,
+        "bc_weights": weights,
+        "ranked_by": "rel_l2_displacement: relative L2 difference from fem on the same mesh",
+        "best": best and asdict(best),
+        "runs": [asdict(run) for run in runs],
+        "problem_sha256": problem.digest,
+        **stages.record(),
+    }
+    write_json(job.out / "gridsearch.json", content)
     return runs
 
 
-def _definition(search: GridSearch, solver: Solver) -> dict[str, Any]:
-    """Everything that the result of a run depends on, except its point of the grid."""
-    searched = {"learning_rate", "bc_weight"}
-    return job_definition(search.design, search.mesh, search.material, search.load, __name__) | {
-        "solver": {key: value for key, value in solver.settings().items() if key not in searched}
+def best_of(runs: Sequence[TrainingRun]) -> TrainingRun | None:
+    """The run nearest to `fem`; None if none was trained."""
+    return min((run for run in runs if run.measured), key=lambda run: run.distance, default=None)
+
+
+def _row(rank: int, run: TrainingRun) -> dict[str, Cell]:
+    row: dict[str, Cell] = {
+        "rank": rank,
+        "learning_rate": run.point.learning_rate,
+        "bc_weight_MPa_per_mm2": run.point.bc_weight,
+        "status": run.status,
     }
+    measured = run.measured or {}
+    row |= {heading(name): measured.get(name, "") for name in TRAINING}
+    return row | {"message": run.message}
 
 
-def _trained(
-    search: GridSearch, points: Sequence[GridPoint], problem: Problem, stages: Stages
-) -> dict[GridPoint, TrainingRun]:
-    """Train at points of the grid, each in a process of its own."""
-    with stages.stage("fem") as progress:
-        reference = ReferenceSolution.of(make_solver("fem").solve(problem, progress))
-    mesh = search.out / "mesh.npz"
-    problem.mesh.save(mesh)
-    tasks = {
-        point.name: TrainingTask(
-            point=point,
-            settings=search.settings,
-            mesh=mesh,
-            material=search.material,
-            load=search.load,
-            reference=reference,
-            folder=search.folder(point),
-            threads=max(1, cores() // search.processes),
-        )
-        for point in points
-    }
-
-    def run_of(name: str, answer: TrainingRun | ProcessFailed) -> TrainingRun:
-        if isinstance(answer, ProcessFailed):
-            return TrainingRun(tasks[name].point, FAILED, answer.message)
-        return answer
-
-    answers = in_stages(
-        train,
-        tasks,
-        processes=search.processes,
-        stages=stages,
-        kind="runs",
-        note=lambda name, answer: run_note(run_of(name, answer)),
+def runs_table(runs: Sequence[TrainingRun]) -> Table:
+    """The runs for the terminal."""
+    rows = []
+    for run in runs:
+        numbers = [NONE] * 5
+        if measured := run.measured:
+            numbers = [
+                f"{100 * run.distance:.3g}",
+                f"{1 + measured['rel_energy']:.3g}",
+                f"{100 * measured['boundary_violation']:.3g}",
+                f"{measured['loss']:.3g}",
+                f"{measured['seconds']:.0f}",
+            ]
+        else:
+            numbers[0] = run.status
+        rows.append([f"{run.point.learning_rate:g}", f"{run.point.bc_weight:g}", *numbers])
+    return terminal_table(
+        "Runs by their distance from fem",
+        [
+            "learning\nrate",
+            "BC weight\nMPa/mm²",
+            "L²\n%",
+            "energy\nof fem's",
+            "violation\n%",
+            "loss\nMPa",
+            "time\ns",
+        ],
+        rows,
+        caption="L²: relative difference of the displacement field from fem on the same mesh. Violation: of "
+        "base or load, over the stroke. Losses do not compare between weights; the order of short trainings "
+        "need not be that of long ones.",
     )
-    return {tasks[name].point: run_of(name, answer) for name, answer in answers}

@@ -14,7 +14,6 @@ from geometry.cache import finger_mesh
 from geometry.drawing.definition import finger_from
 from geometry.errors import UserError
 from geometry.finger.design import Design
-from geometry.mesh.settings import MeshSettings
 from solvers.problem import Problem
 from solvers.registry import make_solver
 from solvers.solution import Solution
@@ -147,7 +146,7 @@ def spread(optimum: Optimum, count: int = DRAWN) -> list[int]:
 def _solved(task: Task) -> Solution:
     """The solution of a task once more, for its picture."""
     finger = finger_from(task.definition)
-    mesh = finger_mesh(finger, settings=MeshSettings(size=task.mesh_size))
+    mesh = finger_mesh(finger, settings=task.mesh)
     solver = make_solver(task.solver, **task.settings)
     material = with_law(material_of(task), solver)
     return solved(solver, Problem(mesh, material, load_of(task), finger=finger))

@@ -13,9 +13,9 @@ from geometry.drawing.definition import finger_from
 from geometry.errors import UserError
 from geometry.finger.parameters import Parameters
 from geometry.finger.validation import broken_rule
-from geometry.mesh.settings import MeshSettings
 from solvers.problem import Problem
 from solvers.registry import make_solver
+from solvers.solver import Solver, TrainedSolver, TrainingContext, TrainingDiverged
 from studies.sweep.quantities import FRACTIONS, quantities
 from studies.sweep.study import Task, load_of, material_of
 
@@ -63,12 +63,16 @@ def measured(task: Task) -> Measurement:
             return ended("refused", fault)
         finger = finger_from(task.definition)
         material, load = material_of(task), load_of(task)
-        mesh = finger_mesh(finger, settings=MeshSettings(size=task.mesh_size), keep=False)
+        mesh = finger_mesh(finger, settings=task.mesh, keep=task.checkpoints is not None)
         problem = Problem(mesh, material, load, finger=finger)
-        solver = make_solver(task.solver, **task.settings)
+        solver: Solver = make_solver(task.solver, **task.settings)
+        if task.checkpoints and isinstance(solver, TrainedSolver):
+            solver = solver.in_context(TrainingContext(task.checkpoints, resume=True))
         solution, values = quantities(finger, problem, solver, density=task.density)
+    except TrainingDiverged as error:
+        return ended("not converged", str(error))
     except UserError as error:
-        return ended("refused", str(error))
+        return ended("failed" if task.checkpoints else "refused", str(error))
     except Exception as error:
         return ended("failed", f"{type(error).__name__}: {error}")
     status, _ = DeformedBody(mesh).status(solution)

@@ -6,16 +6,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from compare.evaluation.differences import field_difference
 from geometry.arrays import FloatArray
 from geometry.finger.finger import Finger
 from geometry.mesh.boundary import mean_thickness, singular_points
+from geometry.mesh.quadrature import body_quadrature, edge_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.section.section import Section
 from geometry.section.thickness import cavity_widths, wall_thickness
 from solvers.fem.linear import FactorisedProblem, FemSolver
-from solvers.problem import Load, Problem, contact_ends, contact_nodes, front_points
+from solvers.problem import Load, Problem, contact_ends, contact_functional, contact_nodes, front_points
 from solvers.solution import Solution, State
-from solvers.solver import Solver, solved, with_law
+from solvers.solver import Solver, TrainedSolver, solved, with_law
 
 FRACTIONS = {"force_25": 0.25, "force_50": 0.5, "force_75": 0.75}
 """Points of the force-stroke curve, as fractions of the stroke."""
@@ -56,10 +58,23 @@ QUANTITIES: Mapping[str, Quantity] = {
 }
 """Every quantity, in the order of the tables."""
 
+TRAINING: Mapping[str, Quantity] = {
+    "rel_l2_displacement": Quantity("", "relative L2 difference of the displacement from that by fem"),
+    "rel_energy": Quantity("", "signed relative difference of the energy from fem's"),
+    "boundary_violation": Quantity("", "the larger of the next two over the stroke"),
+    "base_violation": Quantity("mm", "root mean square of the displacement along the base"),
+    "load_violation": Quantity("mm", "distance of the load's functional from its prescribed value"),
+    "energy": Quantity("N_mm/mm", "elastic energy per depth"),
+    "loss": Quantity("MPa", "last value of the total loss"),
+    "epochs": Quantity("", "epochs trained"),
+    "seconds": Quantity("s", "time of the training"),
+}
+"""What a training gives besides, compared with `fem`."""
+
 
 def heading(name: str) -> str:
     """Column heading of a quantity: its name with the unit, such as `force_N`."""
-    unit = QUANTITIES[name].unit.replace("/", "_per_")
+    unit = {**QUANTITIES, **TRAINING}[name].unit.replace("/", "_per_")
     return f"{name}_{unit}" if unit else name
 
 
@@ -97,7 +112,41 @@ def quantities(
         **{"area": finger.section.area, "mass": finger.section.area * finger.depth * density / 1000},
         **{"thinnest_wall": thinnest_wall(finger.section), "narrowest_gap": narrowest_gap(finger.section)},
     }
-    return solution, {name: found[name] for name in QUANTITIES}
+    values = {name: found[name] for name in QUANTITIES}
+    return solution, values | (training(solution) if isinstance(solver, TrainedSolver) else {})
+
+
+def training(solution: Solution) -> dict[str, float]:
+    """The quantities of `TRAINING`, for a solver that records its loss."""
+    problem = solution.problem
+    fem = FemSolver().solve(replace(problem, material=problem.material.model_copy(update={"law": "linear"})))
+    rule = body_quadrature(problem.mesh)
+    own, reference = (each.displacement(rule.location) for each in (solution, fem))
+    base, load = boundary_violations(solution)
+    return {
+        "rel_l2_displacement": field_difference(own, reference, rule.weights).rel_l2,
+        "rel_energy": float(solution.energy) / float(fem.energy) - 1,
+        "boundary_violation": max(base, load) / float(np.linalg.norm(problem.load.values)),
+        "base_violation": base,
+        "load_violation": load,
+        "energy": float(solution.energy),
+        "loss": float(solution.history["total"][-1]),
+        "epochs": float(solution.stats["epochs"]),
+        "seconds": float(solution.stats["seconds"]),
+    }
+
+
+def boundary_violations(solution: Solution) -> tuple[float, float]:
+    """Root mean square of the displacement along the base, and the error of the load's functional, mm."""
+    problem = solution.problem
+    points, lengths = edge_quadrature(problem.mesh, "base")
+    squares = (solution.displacement(points) ** 2).sum(axis=1)
+    contact, weights = contact_functional(problem)
+    mean = (weights @ solution.displacement(contact))[problem.load.prescribed]
+    return (
+        float(np.sqrt(lengths @ squares / lengths.sum())),
+        float(np.linalg.norm(mean - problem.load.values)),
+    )
 
 
 def forces(solution: Solution, depth: float) -> dict[str, float]:

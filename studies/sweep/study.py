@@ -3,13 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Self
+from types import MappingProxyType
+from typing import Any, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
 from geometry.cache import drawn_finger
 from geometry.drawing.description import description_beside, load_description
 from geometry.errors import UserError
+from geometry.finger.finger import Finger
 from geometry.finger.parameters import (
     SYMBOLS,
     CheckedModel,
@@ -19,6 +21,7 @@ from geometry.finger.parameters import (
     unknown_parameter,
 )
 from geometry.finger.presets import load_design
+from geometry.mesh.settings import MeshSettings
 from geometry.text_files import read_toml
 from solvers.problem import Load, LoadKind, Material
 from solvers.registry import make_solver
@@ -39,6 +42,7 @@ MOST = 1_000_000
 """Largest number of samples of a study."""
 
 Value = bool | int | float | str
+T = TypeVar("T")
 
 
 class Range(CheckedModel):
@@ -86,7 +90,8 @@ class Study(CheckedModel):
         samples: Number of samples, unless on a grid.
         seed: Of the samples.
         fixed: Parameters with one value for all samples.
-        varied: Parameters with a range of values.
+        varied: Parameters with a range of values, among them settings of the solver, such as
+            `pinn-std.learning_rate`.
     """
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,47}$")
@@ -125,8 +130,10 @@ class Study(CheckedModel):
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
+        settings = self.settings_of(self.varied)
         for name in (*self.fixed, *self.varied):
-            _check_name(name, drawn="section" in {*self.fixed, *self.varied})
+            if name.removeprefix(f"{self.solver}.") not in settings:
+                _check_name(name, drawn="section" in {*self.fixed, *self.varied})
         if both := sorted(self.fixed.keys() & self.varied.keys()):
             raise ValueError(f"{both[0]} is both fixed and varied; give it once")
         for name, values in self.varied.items():
@@ -136,12 +143,23 @@ class Study(CheckedModel):
                 raise ValueError("a grid has no samples to choose; leave samples out")
         elif self.samples is None:
             raise ValueError(f"sampling = {self.sampling}: give the number of samples, such as samples = 256")
-        self.made_solver()
+        ends = {name: (values.values or (values.low,))[0] for name, values in settings.items()}
+        self.made_solver({name: value for name, value in ends.items() if value is not None})
         return self
 
-    def made_solver(self) -> Solver:
-        """The solver with its settings."""
-        solver = make_solver(self.solver, **self.settings)
+    @property
+    def settings_alone(self) -> bool:
+        """Whether only settings of the solver are varied."""
+        return len(self.settings_of(self.varied)) == len(self.varied)
+
+    def settings_of(self, values: Mapping[str, T]) -> dict[str, T]:
+        """Entries that belong to settings of the solver, by the settings' names."""
+        own = f"{self.solver}."
+        return {name.removeprefix(own): value for name, value in values.items() if name.startswith(own)}
+
+    def made_solver(self, settings: Mapping[str, Value] = MappingProxyType({})) -> Solver:
+        """The solver with its settings, of which some may be those of a sample."""
+        solver = make_solver(self.solver, **{**self.settings, **settings})
         if Traits.of(solver).assimilates:
             raise UserError(f"solver {self.solver} needs measured markers, which a study does not have")
         return solver
@@ -154,22 +172,24 @@ class Task:
     Attributes:
         number: Of the sample in its study.
         definition: Of the finger; rules are checked by the worker.
-        mesh_size: Element size in walls and ribs, mm.
+        mesh: Element sizes.
         material: Values of `Material`.
         load: Arguments of `Load.of_travel`.
         solver: Name of the solver.
         settings: Its settings.
         density: Of the material, g/cm^3.
+        checkpoints: Folder of a training that can be resumed; None for none.
     """
 
     number: int
     definition: dict[str, Any]
-    mesh_size: float
+    mesh: MeshSettings
     material: dict[str, Any]
     load: dict[str, Any]
     solver: str
     settings: dict[str, Value]
     density: float
+    checkpoints: Path | None = None
 
 
 def load_study(path: Path) -> Study:
@@ -191,40 +211,63 @@ class TaskMaker:
     Args:
         study: The study.
         folder: Folder from which paths in the study are meant.
+        finger: The finger from which the samples differ, in place of the study's design.
+        mesh: Element sizes, in place of the study's size.
+        checkpoints: Folder of trainings that can be resumed, if only settings of the solver are varied.
 
     Raises:
         UserError: If a file cannot be read, or the solver does not take the load.
     """
 
-    def __init__(self, study: Study, folder: Path) -> None:
+    def __init__(
+        self,
+        study: Study,
+        folder: Path,
+        finger: Finger | None = None,
+        mesh: MeshSettings | None = None,
+        checkpoints: Path | None = None,
+    ) -> None:
         self._study = study
         self._folder = folder
+        self.mesh = mesh or MeshSettings(size=study.mesh_size)
+        self._checkpoints = checkpoints
         self._drawn: dict[tuple[str, ...], dict[str, Any]] = {}
         near = folder / study.design
-        self._base = load_design(near if near.suffix == ".toml" and near.is_file() else study.design)
+        self._base = finger or load_design(
+            near if near.suffix == ".toml" and near.is_file() else study.design
+        )
         kinds = study.varied["load"].values if "load" in study.varied else None
         for kind in kinds or (study.fixed.get("load", "mean"),):
             check_load(study.made_solver(), Load.of_travel(_kind(kind)))
 
     def task(self, number: int, sample: Mapping[str, Value]) -> Task:
         """The task of a sample."""
+        settings = self._study.settings_of(sample)
         values = {**self._study.fixed, **sample}
+        values = {
+            name: value for name, value in values.items() if not name.startswith(f"{self._study.solver}.")
+        }
         material = {name: values[name] for name in MATERIAL if name in values}
         load = {"kind" if name == "load" else name: values[name] for name in LOAD if name in values}
         shape = {name: value for name, value in values.items() if name not in PHYSICS}
         if "section" in shape:
             definition = self._drawing(shape)
+        elif self._study.settings_alone:
+            definition = {**self._base.definition(), **shape}
         else:
             definition = {**self._base.definition(), **shape, "name": f"{self._study.name}-{number}"}
         return Task(
             number,
             definition,
-            self._study.mesh_size,
+            self.mesh,
             material,
             load,
             self._study.solver,
-            self._study.settings,
+            {**self._study.settings, **settings},
             self._study.density,
+            self._checkpoints / "_".join(f"{key}-{value}" for key, value in settings.items())
+            if self._checkpoints and self._study.settings_alone
+            else None,
         )
 
     def _drawing(self, shape: Mapping[str, Value]) -> dict[str, Any]:
@@ -288,7 +331,7 @@ def _check_range(name: str, values: Range, sampling: str) -> None:
     if values.values is None:
         if name in ("plane", "law", "load", "slide", "section", "rib_reference", "marker_layout"):
             raise ValueError(f"{name} has no numbers between two others; give values = [...]")
-        for end in (values.low, values.high):
+        for end in () if "." in name else (values.low, values.high):
             low, high = parameter_limits(name)
             if end is not None and not low <= end <= high:
                 raise ValueError(

@@ -15,6 +15,8 @@ from compare.runtime.stages import Stages
 from geometry.atomic import write_json
 from geometry.content_hash import sources_digest
 from geometry.errors import UserError
+from geometry.finger.finger import Finger
+from geometry.mesh.settings import MeshSettings
 from geometry.text_files import read_json
 from solvers.solver import Progress, silent
 from studies.sweep.measurement import Measurement
@@ -39,6 +41,9 @@ class SweepJob:
         out: Output folder; samples that an earlier start finished there are kept.
         processes: Worker processes on this machine.
         scheduler: Address of a Dask scheduler whose workers are used instead.
+        finger: The finger of all samples, in place of the study's design.
+        mesh: Its element sizes, in place of the study's size.
+        kind: What messages call the job.
     """
 
     study: Study
@@ -46,6 +51,13 @@ class SweepJob:
     out: Path
     processes: int
     scheduler: str | None = None
+    finger: Finger | None = None
+    mesh: MeshSettings | None = None
+    kind: str = "sweep"
+
+    def maker(self) -> TaskMaker:
+        """The maker of the samples' tasks."""
+        return TaskMaker(self.study, self.folder, self.finger, self.mesh, self.out / "runs")
 
 
 @dataclass(frozen=True)
@@ -90,13 +102,17 @@ def run_sweep(job: SweepJob, stages: Stages | None = None) -> Sweep:
     """
     stages = stages or Stages(quiet=True)
     all_samples = samples(job.study)
-    maker = TaskMaker(job.study, job.folder)
+    maker = job.maker()
     tasks = {number: maker.task(number, sample) for number, sample in enumerate(all_samples)}
-    definition = _definition(job, tasks[0].definition)
+    definition = _definition(job, tasks[0])
     free = {"study.samples"} if job.study.sampling == "sobol" else set()  # which may be continued
-    check_resumable_folder(job.out / STUDY_FILE, definition, job="sweep", free=free)
+    if trainings := job.study.settings_alone:
+        free = {"study.varied"}  # the trainings of another grid go on from their checkpoints
+    check_resumable_folder(job.out / STUDY_FILE, definition, job=job.kind, free=free)
     job.out.mkdir(parents=True, exist_ok=True)
     with locked(job.out), ExitStack() as stack:
+        if trainings and (job.out / JOURNAL).exists() and _study_in(job.out).varied != job.study.varied:
+            (job.out / JOURNAL).unlink()
         write_json(job.out / STUDY_FILE, definition)  # first: a folder without it is taken for someone's
         journal = stack.enter_context(opened(job.out / JOURNAL))
         journal.forget("failed")
@@ -124,12 +140,13 @@ def finish(
         progress(len(known) / len(tasks), f"{len(known)} of {len(tasks)} samples")
 
 
-def _definition(job: SweepJob, first: dict[str, Any]) -> dict[str, Any]:
+def _definition(job: SweepJob, first: Task) -> dict[str, Any]:
     """The study, and everything else on which its results depend."""
     return {
         "schema": 1,
         "study": job.study.model_dump(mode="json", by_alias=True, exclude_none=True),
-        "finger": {name: value for name, value in first.items() if name not in job.study.varied},
+        "finger": {name: of for name, of in first.definition.items() if name not in job.study.varied},
+        "mesh": job.mesh and job.mesh.model_dump(),
         "versions": package_versions(),
         "program_sha256": sources_digest(__name__, type(job.study.made_solver()).__module__),
     }
@@ -143,12 +160,17 @@ def load_sweep(folder: Path) -> Sweep:
     """
     if not (folder / JOURNAL).is_file():
         raise UserError(f"{folder} holds no sweep; make one by `pinnray sweep STUDY.toml`")
-    try:
-        study = Study(**read_json(folder / STUDY_FILE, "sweep")["study"])
-    except (KeyError, TypeError):
-        raise UserError(f"{folder / STUDY_FILE} is no description of a sweep") from None
+    study = _study_in(folder)
     check_links(folder)
     every = samples(study)
     with opened(folder / JOURNAL) as journal:
         found = [each for each in journal.measurements() if each.number < len(every)]
     return Sweep(study, every, found)
+
+
+def _study_in(folder: Path) -> Study:
+    """The study of a sweep's folder."""
+    try:
+        return Study(**read_json(folder / STUDY_FILE, "sweep")["study"])
+    except (KeyError, TypeError):
+        raise UserError(f"{folder / STUDY_FILE} is no description of a sweep") from None

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from math import isfinite
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
@@ -50,29 +51,30 @@ def gridsearch(
         out: Output folder; default out/gridsearch-DESIGN.
     """
     from compare.runtime.stages import Stages
-    from studies.gridsearch.search import GridSearch, search_grid
-    from studies.gridsearch.tables import best_of, runs_table
-    from studies.gridsearch.training_run import FAILED
+    from studies.gridsearch.search import FAILED, best_of, grid_study, runs_table, search_grid
+    from studies.sweep.sweep import SweepJob
 
     design, mesh = finger.read(options.preset)
     finger.check_cost(design, mesh, ["fem"])
-    material, load = physics.read(options.preset)
-    job = GridSearch(
-        design=design,
-        mesh=mesh,
-        material=material,
-        load=load,
-        learning_rates=read_values("learning-rates", learning_rates),
-        bc_weights=read_values("bc-weights", bc_weights),
-        settings=read_settings(options, epochs),
-        out=out or Path("out") / f"gridsearch-{design.name}",
-        processes=read_processes(processes),
-        picture_formats=read_formats(pictures),
+    physics.read(options.preset)  # or says what is wrong with it
+    rates, weights = read_values("learning-rates", learning_rates), read_values("bc-weights", bc_weights)
+    study = grid_study(
+        design.name, read_settings(options, epochs), physics.values(options.preset), rates, weights
     )
-    physics.check_law([job.solver(point) for point in job.points])
+    physics.check_law([study.made_solver()])
+    job = SweepJob(
+        study,
+        Path(),
+        out or Path("out") / f"gridsearch-{design.name}",
+        read_processes(processes),
+        finger=design,
+        mesh=mesh,
+        kind="grid search",
+    )
+    formats = read_formats(pictures)
     try:
         with Stages() as stages:
-            runs = search_grid(job, stages)
+            runs = search_grid(job, stages, formats)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"the same command goes on from what {job.out} keeps") from None
     Console().print(runs_table(runs))
@@ -80,11 +82,14 @@ def gridsearch(
         print(job.out / name)
     failed = [run for run in runs if run.status == FAILED]
     for run in failed:
-        say(f"error: {run.point.name} failed, and is tried again by the same command: {run.message}")
+        say(
+            f"error: learning rate {run.point.learning_rate:g} with weight {run.point.bc_weight:g} failed, "
+            f"and is tried again by the same command: {run.message}"
+        )
     return 0 if best_of(runs) and not failed else NOT_CONVERGED
 
 
-def read_settings(options: SolverOptions, epochs: int | None) -> dict[str, object]:
+def read_settings(options: SolverOptions, epochs: int | None) -> dict[str, Any]:
     """The settings of the paper's network that all runs share."""
     if options.preset not in (None, "paper"):
         raise UserError(f"--preset {options.preset}: the search is for the settings of the preset paper")

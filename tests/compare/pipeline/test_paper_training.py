@@ -21,12 +21,9 @@ from compare.runtime.exits import NOT_CONVERGED
 from compare.runtime.stages import Stages
 from geometry.errors import UserError
 from geometry.mesh.settings import MeshSettings
-from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.fem.linear import FemSolver
-from solvers.problem import Load, Material, Problem
+from solvers.problem import Load
 from solvers.registry import make_solver
-from solvers.solver import Progress, silent
-from studies.gridsearch.training_run import GridPoint, ReferenceSolution, TrainingRun, TrainingTask, train
+from solvers.solver import Progress
 from tests.compare.pipeline.runs import compare
 from tests.pinnray.commands.programs import WITHOUT_PICTURES
 
@@ -128,51 +125,3 @@ def test_a_killed_run_ends_as_if_it_had_not_been(measured, tmp_path):
     assert resumed.wait() == whole.wait() == NOT_CONVERGED
     assert bits(out) == bits(tmp_path / "whole")
     assert record(out / "training" / "pinn-std")[: len(before)] == before
-
-
-@pytest.fixture
-def search_task(tmp_path: Path, coarse_mesh: TriangleMesh) -> Callable[..., TrainingTask]:
-    """`search_task(name, learning_rate, epochs)`: a run of a grid search in a folder of that name."""
-    coarse_mesh.save(tmp_path / "mesh.npz")
-    reference = ReferenceSolution.of(FemSolver(degree=1).solve(Problem(coarse_mesh)))
-
-    def make(name: str, learning_rate: float = 1e-3, epochs: int = 20) -> TrainingTask:
-        return TrainingTask(
-            GridPoint(learning_rate, 10.0),
-            {**TINY, "epochs": epochs},
-            tmp_path / "mesh.npz",
-            Material(),
-            Load(),
-            reference,
-            tmp_path / name,
-            threads=1,
-        )
-
-    return make
-
-
-def test_an_interrupted_run_of_a_search_ends_as_if_it_had_not_been(search_task):
-    """In this process; `test_processes` interrupts those of a search."""
-
-    def interrupted(fraction: float, note: str) -> None:
-        if fraction >= 0.5:
-            raise KeyboardInterrupt
-
-    whole, task = train(search_task("whole"), silent), search_task("run")
-    with pytest.raises(KeyboardInterrupt):
-        train(task, interrupted)
-    assert not (task.folder / "result.json").exists()
-    before = record(task.folder)
-    resumed = train(task, silent)
-    assert record(task.folder)[: len(before)] == before
-    assert whole.measured is not None
-    assert resumed.measured is not None
-    assert replace(resumed.measured, seconds=0.0) == replace(whole.measured, seconds=0.0)
-
-
-def test_a_run_of_a_search_that_diverges_is_recorded(search_task):
-    task = search_task("run", learning_rate=1e30)
-    diverged = train(task, silent)
-    assert diverged.status == "diverged"
-    assert "learning_rate" in diverged.message
-    assert TrainingRun.load(task.folder / "result.json") == diverged

@@ -3,25 +3,16 @@
 from matplotlib.patches import Rectangle
 
 from studies.gridsearch.chart import draw_grid
-from studies.gridsearch.training_run import DIVERGED, TRAINED, GridPoint, TrainingMetrics, TrainingRun
+from studies.gridsearch.search import DIVERGED, TRAINED, GridPoint, TrainingRun
+from studies.sweep.quantities import TRAINING
 from tests.compare.figures.drawn_pages import page_of
 
 
 def run_of(rate: float, weight: float, distance: float | None) -> TrainingRun:
     if distance is None:
         return TrainingRun(GridPoint(rate, weight), DIVERGED, "loss became nan")
-    worth = TrainingMetrics(
-        rel_l2_displacement=distance,
-        rel_energy=1.0,
-        boundary_violation=distance / 2,
-        base_violation=0.1,
-        load_violation=0.1,
-        energy=1.0,
-        loss=1.0,
-        epochs=2000,
-        seconds=1.0,
-    )
-    return TrainingRun(GridPoint(rate, weight), TRAINED, "", worth)
+    own = {"rel_l2_displacement": distance, "boundary_violation": distance / 2, "epochs": 2000}
+    return TrainingRun(GridPoint(rate, weight), TRAINED, "", {**dict.fromkeys(TRAINING, 1.0), **own})
 
 
 GRID = [

@@ -102,3 +102,21 @@ def test_a_design_beside_the_study_is_meant_from_there(tmp_path: Path) -> None:
     (tmp_path / "own.toml").write_text("height = 77\n", encoding="utf-8")
     study = load_study(written(tmp_path, 'design = "own.toml"\n' + GOOD))
     assert TaskMaker(study, tmp_path).task(0, samples(study)[0]).definition["height"] == 77
+
+
+def test_settings_of_the_solver_are_varied_like_parameters(tmp_path: Path) -> None:
+    text = 'sampling = "grid"\n[varied]\n"fem.degree" = {values = [1, 2]}\nrib_count = {values = [3, 4]}\n'
+    study = load_study(written(tmp_path, text))
+    tasks = [TaskMaker(study, tmp_path).task(number, each) for number, each in enumerate(samples(study))]
+    assert [(task.settings["degree"], task.definition["rib_count"]) for task in tasks] == [
+        (1, 3),
+        (1, 4),
+        (2, 3),
+        (2, 4),
+    ]
+
+
+def test_a_setting_that_the_solver_does_not_have_is_refused(tmp_path: Path) -> None:
+    text = 'sampling = "grid"\n[varied]\n"fem.degrees" = {values = [1, 2]}\n'
+    with pytest.raises(UserError, match="fem has no setting 'degrees'; it has"):
+        load_study(written(tmp_path, text))

@@ -87,7 +87,7 @@ def test_what_goes_wrong_with_a_sample_is_its_answer(tmp_path: Path) -> None:
         "1 of 2 samples (1): THE BODY GOES THROUGH ITSELF",
         "1 of 2 samples (0): this looks like",
     ]
-    object.__setattr__(task, "mesh_size", "broken")
+    object.__setattr__(task, "mesh", "broken")
     assert measured(task).state in ("refused", "failed")
 
 
