@@ -6,7 +6,7 @@ The commands, which take most of a second to import, are imported when Ctrl-C no
 import os
 import sys
 
-from compare.runtime.interruption import ending_at_once, interruptible
+from compare.runtime.exits import ending_at_once, interruptible
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 """The matrices are small: more threads of the linear algebra only cost a core, waiting for one another.

@@ -17,21 +17,13 @@ REACTIONS = ("reaction_x", "reaction_y")
 
 @dataclass(frozen=True, eq=False)
 class ForceCurve:
-    """Equilibria of one solver along the load.
+    """Equilibria of one solver along the load."""
 
-    Attributes:
-        evaluation: The solver's result at the end of the curve.
-        fraction: Of the load, shape (k,).
-        travel: How far the indenter has moved, shape (k,), mm.
-        reaction: Force of the indenter on the finger, shape (k, 2), N/mm.
-        force: Its component along the travel, shape (k,), N/mm: what does the work.
-    """
-
-    evaluation: Evaluation
-    fraction: FloatArray
-    travel: FloatArray
-    reaction: FloatArray
-    force: FloatArray
+    evaluation: Evaluation  #: The solver's result at the end of the curve.
+    fraction: FloatArray  #: Of the load, shape (k,).
+    travel: FloatArray  #: Distance that the indenter has moved, shape (k,), mm.
+    reaction: FloatArray  #: Force of the indenter on the finger, shape (k, 2), N/mm.
+    force: FloatArray  #: Its component along the travel, shape (k,), N/mm, which does the work.
 
     @classmethod
     def of(cls, evaluation: Evaluation, load: Load) -> "ForceCurve":
@@ -75,6 +67,5 @@ def write_force_displacement(path: Path, curves: Sequence[ForceCurve], load: Loa
             row |= {"indenter_u_mm": moved[0], "indenter_v_mm": moved[1], "travel_mm": float(travel)}
             row |= {"reaction_u_N_per_mm": float(reaction[0]), "reaction_v_N_per_mm": float(reaction[1])}
             row |= {"force_along_travel_N_per_mm": float(force)}
-            row |= {"force_along_travel_of_the_depth_N": float(force * depth)}
-            rows.append(row)
+            rows.append(row | {"force_along_travel_of_the_depth_N": float(force * depth)})
     write_csv(path, rows)

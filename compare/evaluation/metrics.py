@@ -54,14 +54,8 @@ def _errors(displacement: FloatArray, observations: Observations) -> MarkerError
     error = np.abs(displacement - observations.displacements)
     error[~observations.visible] = np.nan
     mae_u, mae_v = error[observations.visible].mean(axis=0).tolist() if observations.known else 2 * [np.nan]
-    return MarkerErrors(
-        ae_u=error[:, 0],
-        ae_v=error[:, 1],
-        mae_u=mae_u,
-        mae_v=mae_v,
-        mae_sum=mae_u + mae_v,
-        mae_rss=float(np.hypot(mae_u, mae_v)),
-    )
+    mae_rss = float(np.hypot(mae_u, mae_v))
+    return MarkerErrors(error[:, 0], error[:, 1], mae_u, mae_v, mae_u + mae_v, mae_rss)
 
 
 def reference_differences(evaluation: Evaluation, reference: Evaluation) -> ReferenceDifferences:
@@ -71,10 +65,8 @@ def reference_differences(evaluation: Evaluation, reference: Evaluation) -> Refe
 
 def _differences(evaluation: Evaluation, reference: Evaluation) -> ReferenceDifferences:
     def differ(name: str, index: tuple[int, ...] = ()) -> FieldDifference:
-        chosen = (slice(None), *index)
-        return field_difference(
-            getattr(evaluation, name)[chosen], getattr(reference, name)[chosen], reference.weights
-        )
+        values, other = (getattr(each, name)[:, *index] for each in (evaluation, reference))
+        return field_difference(values, other, reference.weights)
 
     markers = np.abs(evaluation.marker_displacement - reference.marker_displacement).sum(axis=1)
     return ReferenceDifferences(
@@ -132,11 +124,8 @@ def evaluated(solution: Solution, mesh: TriangleMesh, markers: ArrayLike | None 
         return own
     energy = solution.energy * (1 - error.energy_norm**2)
     better = Evaluation.of(replace(solution, field=error.field, energy=energy, states=()), mesh, markers)
-    return replace(
-        own,
-        uncertainty=_differences(better, own),
-        marker_uncertainty=np.abs(better.marker_displacement - own.marker_displacement),
-    )
+    at_markers = np.abs(better.marker_displacement - own.marker_displacement)
+    return replace(own, uncertainty=_differences(better, own), marker_uncertainty=at_markers)
 
 
 def indistinct(differences: ReferenceDifferences, uncertainty: ReferenceDifferences | None) -> list[str]:

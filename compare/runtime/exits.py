@@ -1,7 +1,21 @@
-"""Exit codes, and messages of one line on standard error."""
+"""Ends of a command: exit codes, messages of one line on standard error, and interruption.
 
+A command is interrupted by Ctrl-C, SIGTERM of a batch system or container, or SIGHUP of a closed terminal. A
+signal that is ignored when the program starts, as SIGINT in a shell's background and SIGHUP under nohup,
+stays ignored.
+"""
+
+import os
+import signal
 import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import NoReturn
 from unicodedata import category
+
+from geometry.processes import leave_signals_alone
 
 BAD_INPUT, NOT_CONVERGED, INTERRUPTED, UNREAD = 2, 3, 130, 141
 
@@ -12,9 +26,46 @@ def say(message: str) -> None:
 
 
 def shown(text: str) -> str:
-    """A text of others for a terminal, which obeys control characters: those but line ends are replaced.
-
-    So are the formatting ones of Unicode, which can show a text in another order.
-    """
+    """A text of others without control characters, line ends apart, and without marks that reorder it."""
     hidden = {each for each in text if category(each) in ("Cc", "Cf")} - {"\n"}
     return text.translate(dict.fromkeys(map(ord, hidden), "\N{REPLACEMENT CHARACTER}"))
+
+
+@contextmanager
+def ending_at_once() -> Iterator[None]:
+    """End the program with one line if the block is interrupted; for imports, which have nothing to undo.
+
+    A library that is interrupted while it is imported may say that it is missing.
+    """
+
+    def end(number: int, frame: FrameType | None) -> NoReturn:
+        say("interrupted")
+        os._exit(INTERRUPTED)
+
+    with _handled(end):
+        yield
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Raise KeyboardInterrupt in the block for every signal that asks the program to end."""
+    leave_signals_alone(os.environ)
+    with _handled(signal.default_int_handler):
+        yield
+
+
+@contextmanager
+def _handled(handler: Callable[[int, FrameType | None], NoReturn]) -> Iterator[None]:
+    """The block with a handler of the signals; only the main thread can have one."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    ours = [number for number, former in before.items() if former is not signal.SIG_IGN]
+    for number in ours:
+        signal.signal(number, handler)
+    try:
+        yield
+    finally:
+        for number in ours:
+            signal.signal(number, before[number])

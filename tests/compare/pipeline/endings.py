@@ -12,7 +12,7 @@ import numpy as np
 
 from compare.pipeline import solving
 from compare.pipeline.job import Job
-from compare.runtime.interruption import interruptible
+from compare.runtime.exits import interruptible
 from geometry.cache import finger_mesh
 from geometry.errors import UserError
 from geometry.finger.design import Design
