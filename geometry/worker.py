@@ -74,7 +74,7 @@ def _work(kind: str) -> Callable[[Mapping[str, Any]], Any]:
         from geometry.drawing.load import load_drawing
 
         return lambda task: load_drawing(task["file"], Description(**task["description"]))
-    from geometry.drawing.definition import finger_from
+    from geometry.drawing.drawn_finger import finger_from
 
     if kind == "mesh":
         from geometry.mesh.mesher import build_mesh

@@ -58,7 +58,7 @@ def predict(sweep: str | Path, fingers: Sequence[Mapping[str, object]]) -> "pd.D
     Raises:
         UserError: If the sweep has too few samples, or a finger is outside its ranges.
     """
-    from studies.emulator.emulator import emulator_of
+    from studies.emulator.store import emulator_of
     from studies.emulator.tables import table
 
     emulator = emulator_of(Path(sweep))

@@ -16,6 +16,7 @@ from geometry.content_hash import content_hash
 from geometry.drawing.checks import thinnest_wall
 from geometry.drawing.placement import Placement
 from geometry.errors import UserError
+from geometry.finger.design import Design
 from geometry.finger.finger import Finger
 from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.notebook import fact_table, png_image
@@ -27,6 +28,12 @@ if TYPE_CHECKING:
 
 KIND = "drawing"
 """Value of `kind` in the definition."""
+
+PLAIN = (
+    *("name", "contact_abscissa", "contact_width", "depth", "marker_diameter", "marker_height"),
+    *("file", "sha256", "note", "unit"),
+)
+"""Texts and numbers of the definition."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,19 +134,15 @@ class DrawnFinger:
 
     def definition(self) -> dict[str, Any]:
         """Everything that defines the finger, for JSON; of the file's own mesh only the digest."""
-        numbers = {
-            key: getattr(self, key)
-            for key in (
-                *("name", "contact_abscissa", "contact_width", "depth", "marker_diameter", "marker_height"),
-                *("file", "sha256", "note", "unit"),
-            )
-        }
         return {
             "kind": KIND,
-            **numbers,
-            "section": [_loop_definition(loop) for loop in self.section.loops],
+            **{key: getattr(self, key) for key in PLAIN},
+            "section": [
+                {"points": loop.points.tolist(), "bulges": loop.bulges.tolist(), "names": list(loop.names)}
+                for loop in self.section.loops
+            ],
             "markers": self.markers.tolist(),
-            "placement": self.placement.definition(),
+            "placement": {"matrix": self.placement.matrix.tolist(), "shift": self.placement.shift.tolist()},
             "sources": dict(self.sources),
             "reading": dict(self.reading),
             "mesh": self.mesh.digest if self.mesh else None,
@@ -172,10 +175,10 @@ class DrawnFinger:
         values = dict(definition)
         if values.pop("kind", None) != KIND:
             raise UserError("this is no definition of a finger from a drawing")
-        outline, *cavities = (Loop(**_loop_values(loop)) for loop in values.pop("section"))
+        loops = [Loop(**{**loop, "names": tuple(loop["names"])}) for loop in values.pop("section")]
         mesh = values.pop("mesh")
         return cls(
-            section=Section(outline, tuple(cavities)),
+            section=Section(loops[0], tuple(loops[1:])),
             placement=Placement(**values.pop("placement")),
             mesh=TriangleMesh(**mesh) if isinstance(mesh, Mapping) else None,
             **values,
@@ -211,7 +214,7 @@ class DrawnFinger:
         """The section with clamp, contact and numbered markers in the file's axes, as a matplotlib figure."""
         from geometry.drawing.picture import plot_drawing
 
-        return plot_drawing(self)
+        return plot_drawing(self, self.placement)
 
     def _source(self, key: str) -> str:
         source = self.sources.get(key)
@@ -221,14 +224,6 @@ class DrawnFinger:
         """The section and the facts, in a notebook."""
         facts = {meaning: value for meaning, _, value in self.facts()}
         return fact_table(f"Finger “{self.name}”", facts, png_image(self.plot()._repr_png_()))
-
-
-def _loop_definition(loop: Loop) -> dict[str, Any]:
-    return {"points": loop.points.tolist(), "bulges": loop.bulges.tolist(), "names": list(loop.names)}
-
-
-def _loop_values(definition: Mapping[str, Any]) -> dict[str, Any]:
-    return {**definition, "names": tuple(definition["names"])}
 
 
 def _mesh_definition(mesh: TriangleMesh) -> dict[str, Any]:
@@ -267,3 +262,14 @@ def description_lines(finger: Finger) -> str:
         source = sources.get(key)
         lines.append(f"{key} = {json.dumps(value)}" + (f"  # {source}" if source else ""))
     return "\n".join([*lines, ""])
+
+
+def finger_from(definition: Mapping[str, Any]) -> Finger:
+    """The finger that `Finger.definition` describes.
+
+    Raises:
+        UserError: If the parameters break a rule.
+    """
+    if "section" in definition:
+        return DrawnFinger.from_definition(definition)
+    return Design(**definition)

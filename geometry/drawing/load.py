@@ -1,12 +1,14 @@
 """Reads a drawing, settles its clamp, contact and markers, and places it in the finger's frame."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from geometry.arrays import FloatArray
+from geometry.content_hash import file_digest
 from geometry.drawing import proposal
 from geometry.drawing.checks import body, check_contact, check_markers
 from geometry.drawing.description import Description, description_beside, load_description
@@ -22,28 +24,13 @@ from geometry.section.section import Section
 
 SUFFIXES = (".step", ".stp", ".dxf", ".svg", ".msh")
 
-DEPTH = 20.0
-"""Proposed depth where neither drawing nor description has one, mm."""
 
-NARROWEST = 1e-6
-"""Least width of a contact, mm."""
+class ContactPlace(NamedTuple):
+    """The contact in the drawing's frame."""
 
-MARKER_HEIGHT = 0.6
-"""Proposed depth of the markers' inlay, mm."""
-
-
-class Contact(NamedTuple):
-    """The contact in the drawing's frame.
-
-    Attributes:
-        middle: Shape (2,), mm.
-        ends: Both ends where the drawing has them, shape (2, 2), mm, or None.
-        source: `given`, `drawn` or `proposed`.
-    """
-
-    middle: FloatArray
-    ends: FloatArray | None
-    source: str
+    middle: FloatArray  # (2,), mm
+    ends: FloatArray | None  # (2, 2), mm, where the drawing has them
+    source: str  # `given`, `drawn` or `proposed`
 
 
 def load_drawing(path: str | Path, description: Description | None = None) -> DrawnFinger:
@@ -86,29 +73,33 @@ def read_drawing(path: Path, units: str | None = None, plane: str | None = None)
         raise UserError(f"there is no drawing {path}")
     if plane is not None and suffix not in (".step", ".stp"):
         raise UserError(f"{path.name} is plane already; a plane cuts solids of STEP files only")
-    if suffix in (".step", ".stp"):
-        from geometry.drawing.formats.step import read_step
+    try:
+        digest = file_digest(path)
+        if suffix in (".step", ".stp"):
+            from geometry.drawing.formats.step import read_step
 
-        return read_step(path, units, plane)
-    if suffix == ".dxf":
-        from geometry.drawing.formats.dxf import read_dxf
+            drawing = read_step(path, units, plane)
+        elif suffix == ".dxf":
+            from geometry.drawing.formats.dxf import read_dxf
 
-        return read_dxf(path, units)
-    if suffix == ".svg":
-        from geometry.drawing.formats.svg import read_svg
+            drawing = read_dxf(path, units)
+        elif suffix == ".svg":
+            from geometry.drawing.formats.svg import read_svg
 
-        return read_svg(path, units)
-    from geometry.drawing.formats.msh import read_msh
+            drawing = read_svg(path, units)
+        else:
+            from geometry.drawing.formats.msh import read_msh
 
-    return read_msh(path, units)
+            drawing = read_msh(path, units)
+    except OSError as error:
+        raise UserError(f"cannot read the drawing {path}: {error.strerror}") from None
+    except UserError as error:
+        raise UserError(f"{path.name}: {error}") from None
+    return replace(drawing, file=path.name, sha256=digest)
 
 
 def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
-    """The finger of a drawing with a description.
-
-    Raises:
-        UserError: If the drawing is no sound section, or the description does not fit it.
-    """
+    """The finger of a drawing with a description; a `UserError` says what does not fit."""
     labelled = body(drawing.loops)
     outline, clamp_source = _clamped(labelled.outline, description, drawing.unit)
     cavities = tuple(straightened(renamed(loop, [""] * len(loop.points))) for loop in labelled.cavities)
@@ -126,18 +117,18 @@ def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
     else:
         ends = placement(contact.ends)[:, 0]
         x, width, width_source = float(ends.mean()), float(np.ptp(ends)), contact.source
-        if width < NARROWEST:
+        if width < 1e-6:
             raise UserError(
                 f"the contact begins and ends at {place(contact.ends[0])}; call only the part contact that "
                 "the indenter touches"
             )
     depth, depth_source = _first(
-        given=_scaled(description.depth, drawing.unit), drawn=drawing.depth, proposed=DEPTH
+        given=_scaled(description.depth, drawing.unit), drawn=drawing.depth, proposed=20.0
     )
     height, height_source = _first(
         given=_scaled(description.marker_height, drawing.unit),
         drawn=drawing.marker_height,
-        proposed=MARKER_HEIGHT,
+        proposed=0.6,
     )
     markers = placement(points)
     markers = markers[np.lexsort((-markers[:, 1], markers[:, 0]))]
@@ -170,11 +161,7 @@ def finger_of(drawing: Drawing, description: Description) -> DrawnFinger:
 
 
 def _clamped(outline: Loop, description: Description, unit: float) -> tuple[Loop, str]:
-    """The outline with its clamp as the pieces `base` and no other name, and the clamp's source.
-
-    Raises:
-        UserError: If the clamp is not on the outline, or holds all or nothing of it.
-    """
+    """The outline with its clamp as the pieces `base` and no other name, and the clamp's source."""
     given = description.clamp
     if isinstance(given, tuple):
         outline = straightened(renamed(outline, [""] * len(outline.points)))
@@ -197,23 +184,22 @@ def _clamped(outline: Loop, description: Description, unit: float) -> tuple[Loop
     return outline, source
 
 
-def _contact(drawing: Drawing, labelled: Loop, section: Section, description: Description) -> Contact:
-    """Raises a `UserError` if no piece of the outline has the given label."""
+def _contact(drawing: Drawing, labelled: Loop, section: Section, description: Description) -> ContactPlace:
     given = description.contact
     if isinstance(given, tuple):
-        return Contact(drawing.unit * np.array(given), None, "given")
+        return ContactPlace(drawing.unit * np.array(given), None, "given")
     label = label_of(given) if given else "contact"
     pieces = list(labelled.pieces(label))
     if pieces:
         middle, ends = _run(labelled, pieces)
-        return Contact(middle, ends, "given" if given else "drawn")
+        return ContactPlace(middle, ends, "given" if given else "drawn")
     if drawing.contact is not None and label == "contact":
-        return Contact(drawing.contact, None, "given" if given else "drawn")
+        return ContactPlace(drawing.contact, None, "given" if given else "drawn")
     if given:
         raise UserError(
             f"no contact: no piece of the outline is called {given!r}; give contact as a point of it"
         )
-    return Contact(proposal.contact_point(section), None, "proposed")
+    return ContactPlace(proposal.contact_point(section), None, "proposed")
 
 
 def _run(loop: Loop, pieces: list[int]) -> tuple[FloatArray, FloatArray]:
@@ -234,11 +220,7 @@ def _run(loop: Loop, pieces: list[int]) -> tuple[FloatArray, FloatArray]:
 def _markers(
     drawing: Drawing, section: Section, description: Description
 ) -> tuple[FloatArray, float, Mapping[str, str]]:
-    """Centres (m, 2) and diameter of the markers, mm, and the sources of both.
-
-    Raises:
-        UserError: If a marker is not in the body, or the file has no markers though the description says so.
-    """
+    """Centres (m, 2) and diameter of the markers, mm, and the sources of both."""
     given = description.markers
     if isinstance(given, str) and (label_of(given) != "markers" or not len(drawing.markers)):
         raise UserError(f"the file has no markers called {given!r}; give their centres or their number")

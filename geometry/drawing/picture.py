@@ -1,29 +1,20 @@
 """A drawn finger as a picture in the axes of its file: what is held, touched and marked."""
 
 import numpy as np
-from matplotlib.patches import Circle, PathPatch
-from matplotlib.path import Path as Outline
+from matplotlib.patches import Circle
 
 from geometry.arrays import FloatArray
-from geometry.drawing.drawn_finger import DrawnFinger
-from geometry.figure import BODY, CONTACT, INK, MEASURED, SMALL, Figure, body_figure
+from geometry.drawing.placement import Placement
+from geometry.figure import CONTACT, INK, MEASURED, SMALL, Figure, body_figure
+from geometry.finger.finger import Finger
+from geometry.finger.picture import draw_section
 from geometry.section.loop import Loop
-from geometry.section.section import Section
 from geometry.section.thickness import inner_normals
 
-SMOOTH = 0.01
-"""Largest distance of the drawn polygon from an arc, mm."""
 
-TALLEST = 0.8
-"""Largest height of the picture as a share of its width."""
-
-HATCHES = 40
-"""Hatches along the longer side of the picture."""
-
-
-def plot_drawing(finger: DrawnFinger) -> Figure:
+def plot_drawing(finger: Finger, placement: Placement) -> Figure:
     """The section in the file's axes, mm: the clamp hatched, an arrow at the contact, numbered markers."""
-    place = finger.placement.inverse
+    place = placement.inverse
     section = place.section(finger.section)
     extent = float(np.ptp(section.bounds, axis=0).max())
     contact = finger.section.front_point(finger.contact_abscissa)
@@ -31,10 +22,10 @@ def plot_drawing(finger: DrawnFinger) -> Figure:
     hatched = section.bounds + 0.03 * extent * np.array([[-1], [1]])
     shown = _not_tall(np.concatenate([hatched, tip[None], tail[None]]))
     with body_figure(shown, f"Drawing “{finger.name}”") as (drawn, axes):
-        axes.add_patch(PathPatch(_path(section), fc=BODY, ec=INK, lw=0.7, zorder=1))
+        draw_section(axes, section, deviation=0.01, width=0.7)
         for loop, which in section.named("base"):
             axes.plot(*loop.along(which, np.linspace(0, 1, 60)).T, color=INK, lw=2.2, zorder=3)
-            axes.plot(*_hatches(loop, which, extent / HATCHES), color=INK, lw=0.6, zorder=2)
+            axes.plot(*_hatches(loop, which, extent / 40), color=INK, lw=0.6, zorder=2)
         front = np.linspace(*finger.contact_ends, 30)
         touched = place(np.array([finger.section.front_point(x) for x in front]))
         axes.plot(*touched.T, color=CONTACT, lw=2.5, solid_capstyle="butt", zorder=4)
@@ -54,18 +45,11 @@ def plot_drawing(finger: DrawnFinger) -> Figure:
 
 
 def _not_tall(points: FloatArray) -> FloatArray:
-    """Points (n, 2) with two more that make their extent at most as high as `TALLEST` times its width."""
+    """Points (n, 2) with two more that make their extent at most 0.8 times as high as wide."""
     (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
-    half = max(right - left, (top - bottom) / TALLEST) / 2
+    half = max(right - left, (top - bottom) / 0.8) / 2
     middle = 0.5 * (left + right)
     return np.concatenate([points, [[middle - half, bottom], [middle + half, top]]])
-
-
-def _path(section: Section) -> Outline:
-    rings = [loop.flattened(SMOOTH)[0] for loop in section.loops]
-    return Outline.make_compound_path(
-        *(Outline(np.concatenate([ring, ring[:1]]), closed=True) for ring in rings)
-    )
 
 
 def _hatches(loop: Loop, which: int, step: float) -> FloatArray:

@@ -1,7 +1,6 @@
 """Rotation, reflection and shift of a drawing into the finger's frame."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -67,10 +66,6 @@ class Placement:
         x, y = (float(value) + 0.0 for value in np.round(self.shift, 9))
         words += [f"shifted by ({x:.6g}, {y:.6g}) mm"] if x or y else []
         return ", ".join(words) or "none"
-
-    def definition(self) -> dict[str, Any]:
-        """For JSON."""
-        return {"matrix": self.matrix.tolist(), "shift": self.shift.tolist()}
 
 
 def placed(section: Section, which: int, fraction: float) -> tuple[Section, Placement]:

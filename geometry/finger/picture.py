@@ -22,9 +22,9 @@ def plot_finger(finger: Finger) -> Figure:
     return drawn
 
 
-def draw_section(axes: Axes, shape: Section) -> None:
-    """Draw the section, in mm; cavities are empty."""
-    rings = [loop.flattened()[0] for loop in shape.loops]
+def draw_section(axes: Axes, shape: Section, *, deviation: float = 1e-3, width: float = 0.9) -> None:
+    """Draw the section, in mm, with an edge of a width in points; cavities are empty."""
+    rings = [loop.flattened(deviation)[0] for loop in shape.loops]
     paths = [Outline(np.concatenate([ring, ring[:1]]), closed=True) for ring in rings]
     whole = Outline.make_compound_path(*paths)
-    axes.add_patch(PathPatch(whole, fc=BODY, ec=INK, lw=0.9, zorder=1))
+    axes.add_patch(PathPatch(whole, fc=BODY, ec=INK, lw=width, zorder=1))

@@ -189,9 +189,16 @@ class TriangleMesh:
 
     def plot(self) -> "Figure":
         """Every triangle, the contact and the markers, as a matplotlib figure."""
-        from geometry.mesh.picture import plot_mesh
+        from geometry.figure import CONTACT, INK, MEASURED, body_figure
 
-        return plot_mesh(self)
+        title = f"Mesh, {len(self.points)} nodes, {len(self.triangles)} triangles"
+        touched = self.points[np.unique(self.boundary("contact"))]
+        with body_figure(self.points, title) as (drawn, axes):
+            axes.triplot(*self.points.T, self.triangles, color=INK, lw=0.2)
+            axes.plot(*touched.T, color=CONTACT, lw=2.5, label="contact")
+            axes.plot(*self.markers.T, "o", ms=3, color=MEASURED, label="markers")
+            axes.legend(loc="lower right")
+        return drawn
 
     def _repr_html_(self) -> str:
         """Counts, sizes and the picture, in a notebook."""

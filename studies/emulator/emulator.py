@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -12,12 +11,11 @@ from geometry.errors import UserError
 from geometry.finger.parameters import Parameters
 from geometry.finger.section import finger_section
 from geometry.section.section import Section
-from geometry.text_files import read_json
 from studies.emulator.gaussian_process import GaussianProcess
 from studies.emulator.inputs import Inputs, Numbers
 from studies.sweep.quantities import QUANTITIES, narrowest_gap, thinnest_wall
 from studies.sweep.study import Study, Value
-from studies.sweep.sweep import STUDY_FILE, Sweep, load_sweep
+from studies.sweep.sweep import Sweep
 
 FEWEST = 60
 """Least number of converged samples."""
@@ -165,30 +163,6 @@ def fitted(sweep: Sweep, inputs: Inputs, stages: Stages | None = None, *, fewest
             learnt[name] = _learnt(known[name], name, numbers)
         progress(1.0, f"{len(order)} samples")
     return Emulator(inputs, learnt, ratios, len(order))
-
-
-def emulator_of(folder: Path, *, refit: bool = False, stages: Stages | None = None) -> Emulator:
-    """The emulator of a sweep's folder: the one that is kept there, or fitted and kept.
-
-    Args:
-        folder: Of the sweep.
-        refit: Fit again although the one kept there is of the same samples.
-        stages: Shows the progress of a fit.
-
-    Raises:
-        UserError: If the folder holds no sweep, too few samples, or a study that cannot be emulated; or if
-            the file of the emulator is damaged.
-    """
-    from studies.emulator.store import FILE, digest_of, load, save
-
-    sweep = load_sweep(folder)
-    inputs = Inputs(sweep.study, read_json(folder / STUDY_FILE, "sweep").get("finger", {}))
-    file, digest = folder / FILE, digest_of(sweep, inputs)
-    kept = None if refit else load(file, inputs, digest)
-    if kept is None:
-        kept = fitted(sweep, inputs, stages)
-        save(file, kept, digest)
-    return kept
 
 
 def _learnt(values: FloatArray, name: str, numbers: Numbers) -> Learnt:

@@ -8,17 +8,41 @@ import numpy as np
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save as to_bytes
 
+from compare.runtime.stages import Stages
 from geometry.arrays import FloatArray
 from geometry.atomic import write_bytes
 from geometry.content_hash import content_hash, sources_digest
 from geometry.errors import UserError
-from studies.emulator.emulator import Emulator, Learnt
+from geometry.text_files import read_json
+from studies.emulator.emulator import Emulator, Learnt, fitted
 from studies.emulator.gaussian_process import GaussianProcess
 from studies.emulator.inputs import Inputs
-from studies.sweep.sweep import Sweep
+from studies.sweep.sweep import STUDY_FILE, Sweep, load_sweep
 
 FILE = "emulator.safetensors"
 PARTS = ("inputs", "weights", "factor", "lengths", "numbers")
+
+
+def emulator_of(folder: Path, *, refit: bool = False, stages: Stages | None = None) -> Emulator:
+    """The emulator of a sweep's folder: the one that is kept there, or fitted and kept.
+
+    Args:
+        folder: Of the sweep.
+        refit: Fit again although the one kept there is of the same samples.
+        stages: Shows the progress of a fit.
+
+    Raises:
+        UserError: If the folder holds no sweep, too few samples, or a study that cannot be emulated; or if
+            the file of the emulator is damaged.
+    """
+    sweep = load_sweep(folder)
+    inputs = Inputs(sweep.study, read_json(folder / STUDY_FILE, "sweep").get("finger", {}))
+    file, digest = folder / FILE, digest_of(sweep, inputs)
+    kept = None if refit else load(file, inputs, digest)
+    if kept is None:
+        kept = fitted(sweep, inputs, stages)
+        save(file, kept, digest)
+    return kept
 
 
 def digest_of(sweep: Sweep, inputs: Inputs) -> str:

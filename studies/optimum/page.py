@@ -11,7 +11,7 @@ from compare.runtime.html import write_page
 from compare.runtime.tables import TextTable
 from geometry.atomic import write_text
 from geometry.cache import finger_mesh
-from geometry.drawing.definition import finger_from
+from geometry.drawing.drawn_finger import finger_from
 from geometry.errors import UserError
 from geometry.finger.design import Design
 from solvers.problem import Problem

@@ -9,7 +9,7 @@ import numpy as np
 from compare.evaluation.deformed_body import THROUGH_ITSELF, DeformedBody
 from compare.evaluation.plausibility import unit_remarks
 from geometry.cache import finger_mesh
-from geometry.drawing.definition import finger_from
+from geometry.drawing.drawn_finger import finger_from
 from geometry.errors import UserError
 from geometry.finger.parameters import Parameters
 from geometry.finger.validation import broken_rule

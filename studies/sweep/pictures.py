@@ -9,7 +9,7 @@ from matplotlib.colors import Normalize
 
 from compare.figures.style import axes_at, write_heading
 from geometry.arrays import FloatArray
-from geometry.drawing.definition import finger_from
+from geometry.drawing.drawn_finger import finger_from
 from geometry.figure import CONTACT, INK, MUTED, SMALL, WIDTH, Figure, figure
 from geometry.finger.picture import draw_section
 from geometry.mesh.boundary import boundary_edges

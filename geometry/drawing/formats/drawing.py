@@ -2,13 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
-from geometry.content_hash import file_digest
-from geometry.errors import UserError
 from geometry.section.loop import Loop
 
 LABELS = {"clamp": "base", "base": "base", "front": "front", "contact": "contact", "markers": "markers"}
@@ -20,19 +17,11 @@ UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 
 @dataclass(frozen=True, eq=False)
 class MeshInFile:
-    """A plane triangle mesh of a file.
-
-    Attributes:
-        points: Nodes, shape (n, 2), mm.
-        triangles: Node numbers, shape (t, 3).
-        edges: Edges of the physical groups, each of shape (k, 2).
-        marker_nodes: Node numbers of the physical group `markers`, shape (m,).
-    """
+    """A plane triangle mesh of a file: nodes (n, 2), mm, triangles (t, 3), and edges (k, 2) of each group."""
 
     points: FloatArray
     triangles: IntArray
     edges: Mapping[str, IntArray]
-    marker_nodes: IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +29,6 @@ class Drawing:
     """Closed curves of a file, mm, in the file's own frame.
 
     Attributes:
-        file: Name of the file.
-        sha256: Hash of its content, in hexadecimal.
         loops: Closed curves; the name of a piece is its label in lower case.
         unit: Length of one unit of the file's coordinates, mm.
         note: How the file was read, in words.
@@ -51,10 +38,10 @@ class Drawing:
         contact: Point that the file calls contact, shape (2,), mm, or None.
         depth: Depth of the extrusion, mm, or None.
         mesh: The triangle mesh, where the file holds a ready one with its boundaries named.
+        file: Name of the file.
+        sha256: Hash of its content, in hexadecimal.
     """
 
-    file: str
-    sha256: str
     loops: tuple[Loop, ...]
     unit: float = 1.0
     note: str = ""
@@ -64,23 +51,13 @@ class Drawing:
     contact: FloatArray | None = None
     depth: float | None = None
     mesh: MeshInFile | None = None
+    file: str = ""
+    sha256: str = ""
 
 
 def label_of(text: str) -> str:
     """A label in lower case."""
     return text.strip().lower()
-
-
-def sha256_of(path: Path) -> str:
-    """Hash of a file, in hexadecimal.
-
-    Raises:
-        UserError: If it cannot be read.
-    """
-    try:
-        return file_digest(path)
-    except OSError as error:
-        raise UserError(f"cannot read the drawing {path}: {error.strerror}") from None
 
 
 def place(point: FloatArray) -> str:

@@ -1,6 +1,7 @@
 """Reads the curves of a DXF file. Its layers are the labels."""
 
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -10,25 +11,15 @@ import numpy as np
 from ezdxf.lldxf.const import DXFError
 
 from geometry.arrays import FloatArray
-from geometry.drawing.formats.drawing import UNITS, Drawing, label_of, sha256_of
+from geometry.drawing.formats.drawing import UNITS, Drawing, label_of
 from geometry.drawing.formats.marks import Marks
-from geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, circle, line
+from geometry.drawing.formats.pieces import Curve, Piece, arc_through, arcs_along, circle, line
 from geometry.errors import UserError
 
 HEADER_UNITS = {1: "in", 4: "mm", 5: "cm", 6: "m", 13: "um"}
 """Units of length by `$INSUNITS` of the header."""
 
-WITHOUT_GEOMETRY = {
-    "TEXT",
-    "MTEXT",
-    "DIMENSION",
-    "LEADER",
-    "MULTILEADER",
-    "HATCH",
-    "IMAGE",
-    "ATTDEF",
-    "ATTRIB",
-}
+WITHOUT_GEOMETRY = re.compile("TEXT|MTEXT|DIMENSION|(MULTI)?LEADER|HATCH|IMAGE|ATTDEF|ATTRIB|POINT")
 """Entities that show or annotate and bound nothing."""
 
 
@@ -46,26 +37,25 @@ def read_dxf(path: Path, units: str | None = None) -> Drawing:
     Raises:
         UserError: If it cannot be read, holds other entities, or its curves do not close.
     """
-    digest = sha256_of(path)
     try:
         document = ezdxf.filemanagement.readfile(path)
     except (OSError, DXFError, UnicodeDecodeError) as error:
-        raise UserError(f"cannot read {path.name} as DXF: {str(error).splitlines()[0]}") from None
+        raise UserError(f"it cannot be read as DXF: {str(error).splitlines()[0]}") from None
     except Exception:  # a damaged file can make ezdxf raise anything
-        raise UserError(f"cannot read {path.name} as DXF: it is damaged") from None
+        raise UserError("it cannot be read as DXF: it is damaged") from None
     declared = HEADER_UNITS.get(document.units)
     unit = UNITS[units or declared or "mm"]
-    marks = Marks(path.name)
-    pieces: list[Piece] = []
+    marks, pieces = Marks(), list[Piece]()
     for entity in _plain(list(document.modelspace())):
         layer = label_of(_layer(entity))
-        if layer == "defpoints" or _hidden(document, _layer(entity)):
+        entry = document.layers.get(_layer(entity)) if _layer(entity) in document.layers else None
+        if layer == "defpoints" or (entry and (entry.is_off() or entry.is_frozen())):
             continue
         if not marks.took(*_mark(entity, unit), layer):
-            pieces += _pieces(entity, layer, unit, path.name)
+            pieces += _pieces(entity, layer, unit)
     origin = "given" if units else "of the header" if declared else "assumed"
     note = f"DXF, {units or declared or 'mm'} ({origin})"
-    return marks.drawing(pieces, digest, unit=unit, note=note)
+    return marks.drawing(pieces, unit=unit, note=note)
 
 
 def _plain(entities: list[Any]) -> Iterator[Any]:
@@ -85,13 +75,6 @@ def _layer(entity: Any) -> str:
         return "0"
 
 
-def _hidden(document: Any, layer: str) -> bool:
-    if layer not in document.layers:
-        return False
-    entry = document.layers.get(layer)
-    return bool(entry.is_off() or entry.is_frozen())
-
-
 def _mark(entity: Any, unit: float) -> tuple[FloatArray | None, float]:
     """Centre, mm, and diameter, mm, of a circle or a point; None for another entity."""
     if entity.dxftype() == "POINT":
@@ -101,7 +84,7 @@ def _mark(entity: Any, unit: float) -> tuple[FloatArray | None, float]:
     return None, 0.0
 
 
-def _pieces(entity: Any, layer: str, unit: float, file: str) -> Iterator[Piece]:
+def _pieces(entity: Any, layer: str, unit: float) -> Iterator[Piece]:
     kind = entity.dxftype()
     if kind == "LINE":
         yield line(_flat(entity.dxf.start), _flat(entity.dxf.end), layer).scaled(unit)
@@ -123,24 +106,18 @@ def _pieces(entity: Any, layer: str, unit: float, file: str) -> Iterator[Piece]:
         first, last = entity.dxf.start_param, entity.dxf.end_param
         last += 2 * np.pi if last <= first else 0.0
 
-        def along(parameters: FloatArray) -> FloatArray:
-            return np.array([_flat(point) for point in entity.vertices(parameters)])
-
-        yield from (piece.scaled(unit) for piece in arcs_along(along, first, last, layer, unit))
+        for piece in arcs_along(_flattened(entity.vertices), first, last, layer, unit):
+            yield piece.scaled(unit)
     elif kind == "SPLINE":
         spline = entity.construction_tool()
-
-        def on_spline(parameters: FloatArray) -> FloatArray:
-            return np.array([_flat(point) for point in spline.points(parameters)])
-
         knots = np.unique(spline.knots())
         inside = knots[(knots >= spline.knots()[spline.order - 1]) & (knots <= spline.knots()[spline.count])]
         for first, last in pairwise(inside.tolist()):
-            for piece in arcs_along(on_spline, first, last, layer, unit):
+            for piece in arcs_along(_flattened(spline.points), first, last, layer, unit):
                 yield piece.scaled(unit)
-    elif kind not in (*WITHOUT_GEOMETRY, "POINT"):
+    elif not WITHOUT_GEOMETRY.fullmatch(kind):
         raise UserError(
-            f"{file}: cannot read the {kind} on layer {_layer(entity)!r}; draw the boundary by lines, "
+            f"cannot read the {kind} on layer {_layer(entity)!r}; draw the boundary by lines, "
             "arcs, circles, polylines, ellipses and splines, or freeze that layer"
         )
 
@@ -148,6 +125,11 @@ def _pieces(entity: Any, layer: str, unit: float, file: str) -> Iterator[Piece]:
 def _world(entity: Any, point: Any) -> Any:
     """A point of an entity's own coordinate system in the drawing's."""
     return entity.ocs().to_wcs(ezdxf.math.Vec3(point))
+
+
+def _flattened(points: Callable[[FloatArray], Iterable[Any]]) -> Curve:
+    """A curve in the plane from one in space."""
+    return lambda parameters: np.array([_flat(point) for point in points(parameters)])
 
 
 def _flat(point: Any) -> FloatArray:

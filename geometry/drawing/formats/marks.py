@@ -18,18 +18,13 @@ MARKINGS = frozenset(label for label in LABELS if label != "markers")
 class Marks:
     """Markers and contact, as a reader comes across them."""
 
-    def __init__(self, file: str) -> None:
-        self._file = file
+    def __init__(self) -> None:
         self._centres: list[FloatArray] = []
         self._diameters: list[float] = []
         self._contact: FloatArray | None = None
 
     def took(self, centre: FloatArray | None, diameter: float, label: str) -> bool:
-        """Keep a circle or, with no diameter, a point as a mark; False if it is none.
-
-        Raises:
-            UserError: If there is a second contact.
-        """
+        """Keep a circle or, with no diameter, a point as a mark; False if it is none."""
         if centre is None:
             return False
         if label == "markers":
@@ -37,38 +32,25 @@ class Marks:
             self._diameters.append(diameter)
         elif label == "contact":
             if self._contact is not None:
-                raise UserError(
-                    f"{self._file}: two points are called contact, {place(self._contact)} and {place(centre)}"
-                )
+                raise UserError(f"two points are called contact, {place(self._contact)} and {place(centre)}")
             self._contact = centre
         return label in ("markers", "contact")
 
-    def drawing(self, pieces: Sequence[Piece], sha256: str, **facts: Any) -> Drawing:
+    def drawing(self, pieces: Sequence[Piece], **facts: Any) -> Drawing:
         """The drawing with its curves closed.
 
         Raises:
             UserError: If a curve does not close, the markers differ in diameter, or one is no circle.
         """
-        file = self._file
-        strange = next((piece for piece in pieces if piece.label == "markers"), None)
-        if strange is not None:
-            raise UserError(
-                f"{file}: the marker at {place(strange.start)} is no circle; draw circles or points"
-            )
+        if strange := next((piece for piece in pieces if piece.label == "markers"), None):
+            raise UserError(f"the marker at {place(strange.start)} is no circle; draw circles or points")
         sizes = [diameter for diameter in self._diameters if diameter > 0]
         if sizes and np.ptp(sizes) > 1e-3:
             raise UserError(
-                f"{file}: the markers have diameters from {min(sizes):.4g} to {max(sizes):.4g} mm; "
-                "give all the same"
+                f"the markers have diameters from {min(sizes):.4g} to {max(sizes):.4g} mm; give all the same"
             )
-        try:
-            loops = closed_loops(pieces, MARKINGS)
-        except UserError as error:
-            raise UserError(f"{file}: {error}") from None
         return Drawing(
-            file=file,
-            sha256=sha256,
-            loops=loops,
+            loops=closed_loops(pieces, MARKINGS),
             markers=np.array(self._centres).reshape(-1, 2),
             marker_diameter=float(np.mean(sizes)) if sizes else None,
             contact=self._contact,

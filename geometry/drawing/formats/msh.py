@@ -13,9 +13,9 @@ import numpy as np
 
 from geometry.arrays import FloatArray, IntArray
 from geometry.drawing.formats.chain import closed_loops, straightened
-from geometry.drawing.formats.drawing import LABELS, UNITS, Drawing, MeshInFile, label_of, sha256_of
-from geometry.drawing.formats.frames import axes_across, plane_text
+from geometry.drawing.formats.drawing import LABELS, UNITS, Drawing, MeshInFile, label_of
 from geometry.drawing.formats.pieces import line
+from geometry.drawing.formats.planes import axes_across, plane_text
 from geometry.errors import UserError
 from geometry.mesh.gmsh_model import session
 
@@ -46,21 +46,13 @@ STARTS = (b"$MeshFormat", b"$Comments")
 
 
 class RawMesh(NamedTuple):
-    """Nodes and elements of a file.
+    """Nodes and elements of a file."""
 
-    Attributes:
-        points: Shape (n, 3), in the file's unit.
-        cells: Corners of the elements of the highest dimension by their number, each of shape (k, corners).
-        dimension: That dimension, 2 or 3.
-        edges: Edges of the physical curves by name, each of shape (k, 2).
-        nodes: Nodes of the physical points by name.
-    """
-
-    points: FloatArray
-    cells: Mapping[int, IntArray]
-    dimension: int
-    edges: Mapping[str, IntArray]
-    nodes: Mapping[str, IntArray]
+    points: FloatArray  # (n, 3), mm
+    cells: Mapping[int, IntArray]  # of the highest dimension by the number of corners, (k, corners) each
+    dimension: int  # 2 or 3
+    edges: Mapping[str, IntArray]  # of the physical curves by name, (k, 2) each
+    nodes: Mapping[str, IntArray]  # of the physical points by name
 
 
 def read_msh(path: Path, units: str | None = None) -> Drawing:
@@ -77,18 +69,12 @@ def read_msh(path: Path, units: str | None = None) -> Drawing:
     Raises:
         UserError: If it cannot be read, or is neither plane nor of an extruded body.
     """
-    digest, unit = sha256_of(path), UNITS[units or "mm"]
-    raw = _raw(path)
-    raw = raw._replace(points=raw.points * unit)
-    try:
-        if raw.dimension == 2:
-            return _plane_mesh(raw, path.name, digest, unit)
-        return _extruded_mesh(raw, path.name, digest, unit)
-    except UserError as error:
-        raise UserError(f"{path.name}: {error}") from None
+    unit = UNITS[units or "mm"]
+    raw = _raw(path, unit)
+    return _plane_mesh(raw, unit) if raw.dimension == 2 else _extruded_mesh(raw, unit)
 
 
-def _plane_mesh(raw: RawMesh, file: str, digest: str, unit: float) -> Drawing:
+def _plane_mesh(raw: RawMesh, unit: float) -> Drawing:
     extent = np.ptp(raw.points, axis=0)
     across = int(extent.argmin())
     if extent[across] > FLAT:
@@ -111,11 +97,8 @@ def _plane_mesh(raw: RawMesh, file: str, digest: str, unit: float) -> Drawing:
             points=points[used],
             triangles=triangles.reshape(-1, 3),
             edges={name: number[edges] for name, edges in raw.edges.items()},
-            marker_nodes=number[markers],
         )
     return Drawing(
-        file=file,
-        sha256=digest,
         loops=loops,
         unit=unit,
         note="MSH, triangles as they are" if ready else "MSH, boundary of a plane mesh",
@@ -125,7 +108,7 @@ def _plane_mesh(raw: RawMesh, file: str, digest: str, unit: float) -> Drawing:
     )
 
 
-def _extruded_mesh(raw: RawMesh, file: str, digest: str, unit: float) -> Drawing:
+def _extruded_mesh(raw: RawMesh, unit: float) -> Drawing:
     faces = _once([face for count, cells in raw.cells.items() for face in _faces(cells, count)])
     if not faces:
         raise UserError("its elements have no outer face; is each there twice?")
@@ -150,8 +133,6 @@ def _extruded_mesh(raw: RawMesh, file: str, digest: str, unit: float) -> Drawing
         sides = [side for which in caps[0] for side in _sides(np.array([faces[which]]), len(faces[which]))]
         pieces = [line(points[first], points[last], "") for first, last in _once(sides)]
         return Drawing(
-            file=file,
-            sha256=digest,
             loops=tuple(straightened(loop, FLAT) for loop in closed_loops(pieces)),
             unit=unit,
             note=f"MSH, extruded by {high - low:.6g} mm, at {plane_text(normal, low)}",
@@ -210,7 +191,7 @@ def _once(parts: Sequence[tuple[int, ...]]) -> list[tuple[int, ...]]:
     return [key if len(key) == 2 else first[key] for key, count in times.items() if count == 1]
 
 
-def _raw(path: Path) -> RawMesh:
+def _raw(path: Path, unit: float) -> RawMesh:
     with _opened(path) as mesh:
         tags, coordinates, _ = mesh.getNodes()
         number = np.full(int(tags.max(initial=0)) + 1, -1)
@@ -220,28 +201,28 @@ def _raw(path: Path) -> RawMesh:
             for kind in mesh.getElementTypes(dimension):
                 if kind not in CORNERS:
                     name = mesh.getElementProperties(kind)[0]
-                    raise UserError(f"{path.name} holds elements of type {name}, which cannot be read")
+                    raise UserError(f"it holds elements of type {name}, which cannot be read")
                 _, nodes = mesh.getElementsByType(kind)
                 whole = int(mesh.getElementProperties(kind)[3])
-                cells = _numbers(number, nodes.reshape(-1, whole)[:, : CORNERS[kind]], path)
+                cells = _numbers(number, nodes.reshape(-1, whole)[:, : CORNERS[kind]])
                 by_dimension[dimension].setdefault(CORNERS[kind], []).append(cells)
         dimension = 3 if by_dimension[3] else 2
         if not by_dimension[dimension]:
-            raise UserError(f"{path.name} holds no triangles, quadrilaterals or solid elements")
+            raise UserError("it holds no triangles, quadrilaterals or solid elements")
         return RawMesh(
-            points=coordinates.reshape(-1, 3),
+            points=unit * coordinates.reshape(-1, 3),
             cells={count: np.concatenate(parts) for count, parts in by_dimension[dimension].items()},
             dimension=dimension,
-            edges={name: _numbers(number, nodes.reshape(-1, 2), path) for name, nodes in _groups(1)},
-            nodes={name: _numbers(number, nodes.ravel(), path) for name, nodes in _groups(0)},
+            edges={name: _numbers(number, nodes.reshape(-1, 2)) for name, nodes in _groups(1)},
+            nodes={name: _numbers(number, nodes.ravel()) for name, nodes in _groups(0)},
         )
 
 
-def _numbers(number: IntArray, tags: IntArray, path: Path) -> IntArray:
+def _numbers(number: IntArray, tags: IntArray) -> IntArray:
     """Numbers of nodes by their tags; `number` has -1 for a tag that no node has."""
     tags = tags.astype(np.int64)
     if tags.max(initial=0) >= len(number) or number[tags].min(initial=0) < 0:
-        raise UserError(f"{path.name}: an element has a node that the file lacks")
+        raise UserError("an element has a node that the file lacks")
     return np.asarray(number[tags])
 
 
@@ -260,23 +241,19 @@ def _groups(dimension: int) -> Iterator[tuple[str, IntArray]]:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    """Gmsh's mesh of a file, of which Gmsh gets a copy: it also runs what stands beside it in FILE.opt.
-
-    Raises:
-        UserError: If Gmsh cannot read it.
-    """
+    """Gmsh's mesh of a file. Gmsh gets a copy, because it runs a script FILE.opt that lies beside a mesh."""
     with session(), TemporaryDirectory() as folder:
         copy = Path(folder) / "mesh.msh"
         shutil.copyfile(path, copy)
         with copy.open("rb") as file:
             if not file.read(16).startswith(STARTS):
-                raise UserError(f"{path.name} is no Gmsh mesh: its first line is not $MeshFormat")
+                raise UserError("it is no Gmsh mesh: its first line is not $MeshFormat")
         try:
             gmsh.merge(str(copy))
         except Exception as error:  # Gmsh raises no narrower class
             reason = str(error).replace(str(copy), path.name)
-            raise UserError(f"cannot read {path.name} as a Gmsh mesh: {reason}") from None
+            raise UserError(f"it cannot be read as a Gmsh mesh: {reason}") from None
         try:
             yield gmsh.model.mesh
         except UnicodeDecodeError:  # from Gmsh's Python layer
-            raise UserError(f"{path.name}: the name of a physical group is not in UTF-8; rename it") from None
+            raise UserError("the name of a physical group is not in UTF-8; rename it") from None

@@ -16,9 +16,9 @@ from OCP.STEPControl import STEPControl_Reader
 
 from geometry.arrays import FloatArray
 from geometry.drawing.formats.chain import closed_loops
-from geometry.drawing.formats.drawing import UNITS, Drawing, sha256_of
-from geometry.drawing.formats.frames import axes_across, plane_of, plane_text
+from geometry.drawing.formats.drawing import UNITS, Drawing
 from geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, circle, line
+from geometry.drawing.formats.planes import axes_across, plane_of, plane_text
 from geometry.errors import UserError
 
 MARKER = re.compile(r"marker[-_ ]?\d+$", re.IGNORECASE)
@@ -29,19 +29,12 @@ PARALLEL = 1e-6
 
 
 class Cut(NamedTuple):
-    """A plane section of a solid.
-
-    Attributes:
-        faces: Its planar faces.
-        normal: Unit normal of the plane, shape (3,).
-        offset: Distance of the plane from the origin along the normal, mm.
-        depth: Depth of the extrusion along the normal, mm; None for a solid that is not extruded.
-    """
+    """A plane section of a solid."""
 
     faces: Sequence[cq.Face]
-    normal: FloatArray
-    offset: float
-    depth: float | None
+    normal: FloatArray  # of the plane, unit vector (3,)
+    offset: float  # of the plane from the origin along the normal, mm
+    depth: float | None  # of the extrusion, mm; None for a solid that is not extruded
 
 
 def read_step(path: Path, units: str | None = None, plane: str | None = None) -> Drawing:
@@ -55,20 +48,16 @@ def read_step(path: Path, units: str | None = None, plane: str | None = None) ->
     Raises:
         UserError: If it cannot be read, holds several bodies, or a solid is not extruded and no plane given.
     """
-    digest = sha256_of(path)
     bodies, markers = _parts(path)
     if len(bodies) != 1:
         found = ", ".join(f"{name or 'without name'} ({solid.Volume():.4g} mm3)" for name, solid in bodies)
         raise UserError(
-            f"{path.name} holds {len(bodies)} solids besides markers{': ' + found if found else ''}; keep "
+            f"it holds {len(bodies)} solids besides markers{': ' + found if found else ''}; keep "
             "one, and call the others marker-1, marker-2, ... if they are markers"
         )
     solid = _filled(bodies[0][1], markers)
     unit = UNITS[units or "mm"]
-    try:
-        cut = _cut_at(solid, *plane_of(plane)) if plane else _across(solid)
-    except UserError as error:
-        raise UserError(f"{path.name}: {error}") from None
+    cut = _cut_at(solid, *plane_of(plane)) if plane else _across(solid)
     axes = axes_across(cut.normal)
     pieces = [
         piece.scaled(unit)
@@ -77,16 +66,10 @@ def read_step(path: Path, units: str | None = None, plane: str | None = None) ->
         for edge in wire.Edges()
         for piece in _pieces(edge, axes, unit)
     ]
-    try:
-        loops = closed_loops(pieces)
-    except UserError as error:
-        raise UserError(f"{path.name}: {error}") from None
     centres, diameters, heights = _discs(markers, axes, cut.normal)
     how = f"extruded by {cut.depth * unit:.6g} mm" if cut.depth else "cut"
     return Drawing(
-        file=path.name,
-        sha256=digest,
-        loops=loops,
+        loops=closed_loops(pieces),
         unit=unit,
         note=f"STEP, {how}, at {plane_text(cut.normal, cut.offset)}",
         markers=centres * unit,
@@ -97,11 +80,7 @@ def read_step(path: Path, units: str | None = None, plane: str | None = None) ->
 
 
 def _parts(path: Path) -> tuple[list[tuple[str, cq.Solid]], list[cq.Solid]]:
-    """Solids with their names, and those that are markers.
-
-    Raises:
-        UserError: If the file cannot be read, or refers to other files.
-    """
+    """Solids with their names, and those that are markers."""
     _check_whole(path)
     try:
         named = [(name.rsplit("/", 1)[-1], shape) for shape, name, _, _ in cq.Assembly.importStep(str(path))]
@@ -110,10 +89,10 @@ def _parts(path: Path) -> tuple[list[tuple[str, cq.Solid]], list[cq.Solid]]:
             found = cq.importers.importStep(str(path)).vals()
             named = [("", shape) for shape in found if isinstance(shape, cq.Shape)]
         except ValueError as error:
-            raise UserError(f"cannot read {path.name} as STEP: {error}") from None
+            raise UserError(f"it cannot be read as STEP: {error}") from None
     solids = [(name, solid) for name, shape in named for solid in shape.Solids()]
     if not solids:
-        raise UserError(f"cannot read {path.name} as STEP: it holds no solid; export the body as a solid")
+        raise UserError("it holds no solid; export the body as a solid")
     bodies = [(name, solid) for name, solid in solids if not MARKER.match(name)]
     return bodies, [solid for name, solid in solids if MARKER.match(name)]
 
@@ -126,7 +105,7 @@ def _check_whole(path: Path) -> None:
         others.LoadExternRefs()
         if others.NbExternRefs():
             raise UserError(
-                f"{path.name} refers to another file, {others.FileName(1)!r}, which is not read; export the "
+                f"it refers to another file, {others.FileName(1)!r}, which is not read; export the "
                 "whole as one file"
             )
 
@@ -141,9 +120,6 @@ def _across(solid: cq.Solid) -> Cut:
     """The section of an extruded solid: of a box, across z, else across the smallest of its sides.
 
     Pockets that do not reach half the depth, as for markers, are left out.
-
-    Raises:
-        UserError: If the solid is not extruded.
     """
     normals = _directions(solid)
     fitting = [normal for normal in normals if _is_extruded(solid, normal)]
@@ -190,11 +166,7 @@ def _is_extruded(solid: cq.Solid, normal: FloatArray) -> bool:
 
 
 def _cut_at(solid: cq.Solid, normal: FloatArray, offset: float) -> Cut:
-    """The cut of a solid with a plane; with its depth, where the solid is extruded across the plane.
-
-    Raises:
-        UserError: If the plane misses the solid.
-    """
+    """The cut of a solid with a plane; with its depth, where the solid is extruded across the plane."""
     low, high = _extent(solid, normal)
     if not low < offset < high:
         raise UserError(
@@ -262,7 +234,7 @@ def _pieces(edge: cq.Edge, axes: FloatArray, unit: float) -> Iterator[Piece]:
 def _discs(
     markers: Sequence[cq.Solid], axes: FloatArray, normal: FloatArray
 ) -> tuple[FloatArray, list[float], list[float]]:
-    """Centres (m, 2), diameters and heights of markers, as of cylinders of their volume and height."""
+    """Centres (m, 2), diameters and heights of markers; each is taken for a cylinder of its volume."""
     centres = [axes @ _array(marker.Center()) for marker in markers]
     heights = [high - low for low, high in (_extent(marker, normal) for marker in markers)]
     diameters = [

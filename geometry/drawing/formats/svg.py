@@ -11,7 +11,7 @@ import numpy as np
 import svgelements
 
 from geometry.arrays import FloatArray
-from geometry.drawing.formats.drawing import LABELS, UNITS, Drawing, label_of, sha256_of
+from geometry.drawing.formats.drawing import LABELS, UNITS, Drawing, label_of
 from geometry.drawing.formats.marks import Marks
 from geometry.drawing.formats.pieces import Piece, arc_through, arcs_along, circle, line
 from geometry.errors import UserError
@@ -40,42 +40,38 @@ def read_svg(path: Path, units: str | None = None) -> Drawing:
     Raises:
         UserError: If it cannot be read or its curves do not close.
     """
-    digest = sha256_of(path)
     try:
         root = ET.parse(path).getroot()
-        _check_copies(root, path.name)
+        _check_copies(root)
         parsed = svgelements.SVG.parse(str(path), reify=False)
     except (OSError, ET.ParseError, ValueError, UnicodeDecodeError) as error:
-        raise UserError(f"cannot read {path.name} as SVG: {error}") from None
+        raise UserError(f"it cannot be read as SVG: {error}") from None
     except RecursionError:
-        raise UserError(f"cannot read {path.name} as SVG: it is nested too deeply") from None
+        raise UserError("it cannot be read as SVG: it is nested too deeply") from None
     except (ArithmeticError, AttributeError, LookupError, TypeError):  # of svgelements, at what is no SVG
-        raise UserError(f"cannot read {path.name} as SVG: an attribute has no sound value") from None
+        raise UserError("it cannot be read as SVG: an attribute has no sound value") from None
     if not isinstance(parsed, svgelements.SVG):
-        raise UserError(f"cannot read {path.name} as SVG: its outermost element is {_tag(root)}, not svg")
-    _check_view_box(parsed, path.name)
+        raise UserError(f"it cannot be read as SVG: its outermost element is {_tag(root)}, not svg")
+    _check_view_box(parsed)
     try:
         back = ~svgelements.Matrix(parsed.viewbox_transform or "")
     except ZeroDivisionError:
-        raise UserError(f"{path.name}: its width or height is zero, or no length") from None
-    unit = UNITS[units] if units else _unit(parsed, path.name)
-    marks = Marks(path.name)
-    pieces: list[Piece] = []
+        raise UserError("its width or height is zero, or no length") from None
+    unit = UNITS[units] if units else _unit(parsed)
+    marks, pieces = Marks(), list[Piece]()
     for element, label in _shapes(parsed, ""):
         place = _Transformation(element.transform * back, unit)
         if not place.is_finite:
-            raise UserError(f"{path.name}: the transformation of {_described(element)} is not finite")
+            raise UserError(f"the transformation of {_described(element)} is not finite")
         try:
             if not marks.took(*_mark(element, place), label):
                 pieces += _pieces(element.segments(transformed=False), label, place)
         except TypeError:  # svgelements reads a coordinate that is no number as None
-            raise UserError(f"{path.name}: a coordinate of {_described(element)} is no number") from None
-    return marks.drawing(
-        pieces, digest, note=f"SVG, {unit:.6g} mm in a user unit{' (given)' if units else ''}"
-    )
+            raise UserError(f"a coordinate of {_described(element)} is no number") from None
+    return marks.drawing(pieces, note=f"SVG, {unit:.6g} mm in a user unit{' (given)' if units else ''}")
 
 
-def _check_copies(root: ET.Element, file: str) -> None:
+def _check_copies(root: ET.Element) -> None:
     """Refuse elements that contain themselves, and copies of copies whose number grows without limit."""
     by_id = {element.get("id"): element for element in root.iter()}
     sizes: dict[ET.Element, float] = {}
@@ -85,17 +81,13 @@ def _check_copies(root: ET.Element, file: str) -> None:
             sizes[element] = inf  # while it is open, that is, if it contains itself
             # svgelements, too, takes any sign in place of the link's #
             link = element.get("href", element.get(LINK, ""))[1:]
-            copied = by_id.get(link) if _is_copy(element) else None
+            copied = by_id.get(link) if _tag(element) == "use" else None
             sizes[element] = 1 + sum(map(size, element)) + (0 if copied is None else size(copied))
         return sizes[element]
 
     if (count := size(root)) > MOST_ELEMENTS:
         what = "an element contains itself" if count == inf else f"its copies make {count:.0f} elements"
-        raise UserError(f"cannot read {file} as SVG: {what}; draw each curve once")
-
-
-def _is_copy(element: ET.Element) -> bool:
-    return _tag(element) == "use"
+        raise UserError(f"{what}; draw each curve once")
 
 
 def _tag(element: ET.Element) -> str:
@@ -103,7 +95,7 @@ def _tag(element: ET.Element) -> str:
     return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
 
 
-def _check_view_box(parsed: Any, file: str) -> None:
+def _check_view_box(parsed: Any) -> None:
     """Raise a `UserError` for a viewBox that is not four numbers, which the parser would pass over."""
     if (given := parsed.values.get("viewBox")) is None:
         return
@@ -113,7 +105,7 @@ def _check_view_box(parsed: Any, file: str) -> None:
         numbers, width, height = [], 0.0, 0.0
     if len(numbers) != 4 or not (0 < width < inf and 0 < height < inf):
         raise UserError(
-            f"{file}: viewBox = {str(given)!r} is not four numbers with width and height, such as 0 0 60 10"
+            f"viewBox = {str(given)!r} is not four numbers with width and height, such as 0 0 60 10"
         )
 
 
@@ -124,12 +116,8 @@ def _described(element: Any) -> str:
     return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind} without an id"
 
 
-def _unit(parsed: Any, file: str) -> float:
-    """Length of a user unit, mm.
-
-    Raises:
-        UserError: If width and height give two different ones or are no lengths.
-    """
+def _unit(parsed: Any) -> float:
+    """Length of a user unit, mm; refused if width and height give two different ones or are no lengths."""
     box = parsed.viewbox
     units = []
     for text, extent in (
@@ -143,13 +131,13 @@ def _unit(parsed: Any, file: str) -> float:
             except ValueError:
                 length = 0.0
             if not 0 < length < inf:
-                raise UserError(f"{file}: {text!r} is no width or height; write for instance 60mm")
+                raise UserError(f"{text!r} is no width or height; write for instance 60mm")
             units.append(length * LENGTHS[found[2]] / float(extent) if extent else LENGTHS[""])
     if not units:
         return LENGTHS[""]
     if max(units) > min(units) * 1.001:
         raise UserError(
-            f"{file}: width and height give {units[0]:.6g} and {units[1]:.6g} mm in a user unit; "
+            f"width and height give {units[0]:.6g} and {units[1]:.6g} mm in a user unit; "
             "make them agree with the viewBox"
         )
     return float(units[0])

@@ -37,7 +37,7 @@ def predict(
     """
     from compare.runtime.stages import Stages
     from geometry.atomic import write_text
-    from studies.emulator.emulator import emulator_of
+    from studies.emulator.store import emulator_of
     from studies.emulator.tables import table
 
     if bool(set) == (csv is not None):

@@ -127,7 +127,7 @@ def test_a_coordinate_must_be_a_number(tmp_path):
 )
 def test_a_damaged_header_of_a_dxf_file_is_one_line(tmp_path, text):
     (tmp_path / "a.dxf").write_text(text)
-    with pytest.raises(UserError, match=r"cannot read a\.dxf as DXF"):
+    with pytest.raises(UserError, match=r"a\.dxf: it cannot be read as DXF"):
         load_drawing(tmp_path / "a.dxf")
 
 
@@ -176,7 +176,7 @@ def test_numbers_without_bounds_are_one_line(tmp_path, head, body, message):
 def test_the_outermost_element_must_be_svg(tmp_path):
     path = tmp_path / "a.svg"
     path.write_text('<path xmlns="http://www.w3.org/2000/svg" d="M0 0H60V10H0Z"/>')
-    with pytest.raises(UserError, match=r"cannot read a\.svg as SVG: its outermost element is path, not svg"):
+    with pytest.raises(UserError, match=r"a\.svg: it cannot be read as SVG: its outermost element is path"):
         load_drawing(path)
 
 
@@ -191,7 +191,7 @@ def test_an_unknown_entity_of_a_dxf_file_is_named(tmp_path):
 @pytest.mark.parametrize("link", ["#a", "'a"])  # svgelements takes any sign for that before a name
 def test_an_element_that_contains_itself_is_one_line(tmp_path, link):
     path = write_svg(tmp_path / "a.svg", f'<g id="a" transform="scale(2)"><use href="{link}"/><rect/></g>')
-    with pytest.raises(UserError, match=r"a\.svg as SVG: an element contains itself"):
+    with pytest.raises(UserError, match=r"a\.svg: it cannot be read as SVG: an element contains itself"):
         load_drawing(path)
 
 
@@ -199,7 +199,7 @@ def test_copies_of_copies_are_counted_before_they_are_made(tmp_path):
     """Thirty lines would make a thousand million rectangles."""
     levels = "".join(f'<g id="g{n + 1}">{2 * f"""<use href="#g{n}"/>"""}</g>' for n in range(30))
     path = write_svg(tmp_path / "a.svg", f'<g id="g0"><rect width="9" height="3"/></g>{levels}')
-    with pytest.raises(UserError, match=r"a\.svg as SVG: its copies make \d+ elements"):
+    with pytest.raises(UserError, match=r"a\.svg: it cannot be read as SVG: its copies make \d+ elements"):
         load_drawing(path)
 
 
@@ -220,7 +220,7 @@ def test_a_step_file_that_was_cut_off_is_one_line(tmp_path):
     """OpenCASCADE prints about it to the standard output, on which the child process answers."""
     path = tmp_path / "cut.stp"
     path.write_bytes((FINRAY / "Finray_8.stp").read_bytes()[:3000])
-    with pytest.raises(UserError, match=r"cannot read cut\.stp as STEP: STEP File could not be loaded"):
+    with pytest.raises(UserError, match=r"cut\.stp: it cannot be read as STEP: STEP File could not"):
         drawn_finger(path, Description(), cache_dir=tmp_path / "cache")
 
 
@@ -237,7 +237,7 @@ def test_a_step_file_reads_no_other_file(tmp_path, monkeypatch):
     writer.Transfer(document, STEPControl_StepModelType.STEPControl_AsIs, "part-")
     writer.Write("whole.step")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["part-body.stp", "whole.step"]
-    with pytest.raises(UserError, match=r"whole\.step refers to another file, 'part-body\.stp'"):
+    with pytest.raises(UserError, match=r"whole\.step: it refers to another file, 'part-body\.stp'"):
         read_drawing(Path("whole.step"))
 
 

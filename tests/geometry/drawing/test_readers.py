@@ -217,11 +217,11 @@ def test_no_script_of_gmsh_is_run(tmp_path, name):
     ("name", "content", "message"),
     [
         ("a.stl", "", "cannot read a.stl as a drawing; there are .step, .stp, .dxf, .svg, .msh"),
-        ("a.dxf", "no drawing", "cannot read a.dxf as DXF"),
-        ("a.svg", "<svg", "cannot read a.svg as SVG"),
-        ("a.step", "ISO", "cannot read a.step as STEP"),
-        ("a.msh", "$Mesh", "a.msh is no Gmsh mesh: its first line is not"),
-        ("a.msh", "$MeshFormat", "cannot read a.msh as a Gmsh mesh"),
+        ("a.dxf", "no drawing", "a.dxf: it cannot be read as DXF"),
+        ("a.svg", "<svg", "a.svg: it cannot be read as SVG"),
+        ("a.step", "ISO", "a.step: it cannot be read as STEP"),
+        ("a.msh", "$Mesh", "a.msh: it is no Gmsh mesh: its first line is not"),
+        ("a.msh", "$MeshFormat", "a.msh: it cannot be read as a Gmsh mesh"),
     ],
 )
 def test_unreadable_files(tmp_path, name, content, message):
@@ -247,7 +247,7 @@ def test_names_of_groups_are_utf_8(tmp_path):
     [
         (["1 4 2 1 1 1 2 3 4", "2 4 2 1 1 1 2 3 4"], "its elements have no outer face; is each there twice"),
         (["1 2 2 1 1 1 2 3", "2 2 2 1 1 1 2 3"], "there is no line or arc in it"),
-        (["1 4 2 1 1 1 2 3 9"], "cannot read a.msh as a Gmsh mesh: Wrong node index 9"),
+        (["1 4 2 1 1 1 2 3 9"], "a.msh: it cannot be read as a Gmsh mesh: Wrong node index 9"),
     ],
 )
 def test_meshes_without_a_boundary_are_refused(tmp_path, elements, message):
@@ -263,9 +263,9 @@ def test_meshes_without_a_boundary_are_refused(tmp_path, elements, message):
 def test_nodes_that_the_file_lacks_are_refused(tag):
     """Gmsh gives such tags, as it finds them in its memory, for damaged files of version 2."""
     number = np.array([-1, 0, 1, -1, 2])  # of the nodes 1, 2 and 4
-    assert msh._numbers(number, np.array([[1, 2, 4]], np.uint64), Path("a.msh")).tolist() == [[0, 1, 2]]
-    with pytest.raises(UserError, match=r"a\.msh: an element has a node that the file lacks"):
-        msh._numbers(number, np.array([[1, 2, tag]], np.uint64), Path("a.msh"))
+    assert msh._numbers(number, np.array([[1, 2, 4]], np.uint64)).tolist() == [[0, 1, 2]]
+    with pytest.raises(UserError, match="an element has a node that the file lacks"):
+        msh._numbers(number, np.array([[1, 2, tag]], np.uint64))
 
 
 def test_a_plane_cuts_solids_only(tmp_path):

@@ -13,8 +13,8 @@ from geometry.errors import UserError
 from geometry.finger.design import Design
 from pinnray.cli import main
 from studies.emulator import emulator as module
-from studies.emulator.emulator import Emulator, emulator_of
-from studies.emulator.store import FILE
+from studies.emulator.emulator import Emulator
+from studies.emulator.store import FILE, emulator_of
 from studies.sweep.quantities import narrowest_gap, thinnest_wall
 from studies.sweep.sampling import samples
 from studies.sweep.store import opened
