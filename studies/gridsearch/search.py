@@ -11,7 +11,7 @@ from compare.runtime.stages import Stages
 from compare.runtime.tables import NONE, Cell, terminal_table, write_csv
 from geometry.atomic import write_json
 from geometry.cache import finger_mesh
-from geometry.drawing.definition import finger_from
+from geometry.drawing.drawn_finger import finger_from
 from solvers.problem import Problem
 from studies.sweep.measurement import Measurement
 from studies.sweep.quantities import TRAINING, heading
