@@ -38,8 +38,7 @@ def check_output(out: Path) -> None:
         raise UserError(f"{out} is a file; name an output folder")
     if Path.cwd().is_relative_to(out.resolve()):
         raise UserError(
-            f"the output folder is replaced as a whole, so the program cannot run inside it ({out}); "
-            "name another output folder"
+            f"{out} is replaced as a whole: the program cannot run inside it; name another folder"
         )
     check_links(out)
     files = [path.relative_to(out) for path in out.rglob("[!.]*") if path.is_file()]
@@ -52,13 +51,13 @@ def check_output(out: Path) -> None:
         )
     if foreign := next((path for path in files if path.as_posix() not in ours), None):
         raise UserError(
-            f"{out} holds {foreign}, which no run has written and which would be lost; "
-            "move it, or name another output folder"
+            f"{out} holds {foreign}, which no run has written and which would be lost; move it, or name "
+            "another output folder"
         )
 
 
 def check_links(folder: Path) -> None:
-    """Raise a `UserError` if a folder of others holds a symbolic link, through which a run would write."""
+    """Raise a `UserError` if a folder holds a symbolic link, through which a run would write elsewhere."""
     if found := next((path for path in folder.rglob("*") if path.is_symlink()), None):
         raise UserError(
             f"{found} is a link, which no run has made and which leads to files elsewhere; remove it, or "
@@ -82,7 +81,7 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
     missing = [folder for folder in partial.parents if not folder.exists()]
     if partial.is_symlink():
         raise UserError(
-            f"{partial} is a link, which no run has made; remove it, or choose another output folder"
+            f"{partial} is a link, which no run has made; remove it, or name another output folder"
         )
     check_links(partial)
     try:
@@ -94,7 +93,7 @@ def replaced_folder(out: Path, *, keep: Collection[str] = ()) -> Iterator[Path]:
         if not ours and any(partial.iterdir()):
             raise UserError(
                 f"{partial} would be replaced, but it is not of an unfinished run; move it, or name another "
-                "output folder"
+                "folder"
             )
         (partial / MARK).touch()
         _restore(out)
