@@ -38,11 +38,7 @@ def moved(
 
 @pytest.mark.parametrize(
     ("turns", "through"),
-    [
-        (0.0001, False),  # nearly straight
-        (0.9, False),  # a ring with a gap
-        (1.2, True),  # its end lies in its start
-    ],
+    [(0.0001, False), (0.9, False), (1.2, True)],  # straight; a ring with a gap; its end lies in its start
 )
 def test_a_strip_rolled_by_more_than_a_turn_goes_through_itself(turns, through, mesh):
     assert bool(len(DeformedBody(mesh).crossings(rolled(mesh.points, turns)))) is through
@@ -116,25 +112,15 @@ def test_the_warning_names_all_and_the_simulated_finger(fem, pinn, mesh, compare
     through = [moved(each, mesh, lambda points: rolled(points, 1.2)) for each in (fem, pinn)]
     checked, remarks = with_body_checks(through, mesh, truth=through[0])
     assert [each.converged for each in checked] == [True, True]  # each solved what it was asked
-    assert (
-        len(
-            [
-                remark
-                for remark in remarks
-                if remark.startswith(f"fem, pinn-std, the simulated finger: {SELF}")
-            ]
-        )
-        == 1
-    )
+    named = f"fem, pinn-std, the simulated finger: {SELF}"
+    assert [remark.startswith(named) for remark in remarks].count(True) == 1
     comparison = compared(*checked, warnings=remarks)
     assert metrics(comparison)["warnings"] == remarks
     page = report_html(comparison, [], {})
-    assert f"<li>fem, pinn-std, the simulated finger: {SELF};" in page
-    assert (
-        page.index("What speaks against these numbers?")
-        < page.index(SELF)
-        < page.index("What is not converged?")
+    against, after = (
+        page.index(f"What {what}?") for what in ("speaks against these numbers", "is not converged")
     )
+    assert against < page.index(f"<li>{named};") < after
 
 
 def test_a_stroke_through_the_back_is_said_everywhere(tmp_path, capsys, without_pictures):

@@ -48,10 +48,7 @@ def test_a_good_result_in_words(pinn, certificate):
         ({"excess": 0.4}, "pinn-std (not converged) is not to be relied on"),
         ({"excess": 0.0, "weak_residual": 0.0}, "is the finite-element solution itself"),
         ({"missed": 0.1}, "It reports 2.50 % less energy than that least: its quadrature misses energy."),
-        (
-            {"missed": 0.01},
-            "0.250 % less energy than that least: it is nearer to the exact solution than",
-        ),
+        ({"missed": 0.01}, "0.250 % less energy than that least: it is nearer to the exact solution than"),
     ],
     ids=["too much energy", "fem", "much less energy", "a little less energy"],
 )
