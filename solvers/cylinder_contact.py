@@ -24,7 +24,7 @@ CONTACT_AT_END = (
 
 @dataclass(frozen=True, eq=False)
 class ContactState:
-    """A stage of the load; of the displacements only those of the front's nodes are read."""
+    """A stage of the load; only the front's nodal displacements are read."""
 
     fraction: float  # Fraction of the load
     nodal: FloatArray  # Displacements, shape (N, d), mm

@@ -1,6 +1,6 @@
 """Constitutive laws, in the plane and in space, for NumPy arrays, torch tensors and UFL expressions alike.
 
-Gradients are those of the displacement, `H[..., i, j] = du_i/dx_j`, of 2 by 2 or 3 by 3. Linear elasticity is
+A gradient is `H[..., i, j] = du_i/dx_j` of the displacement, 2 by 2 or 3 by 3. Linear elasticity is
 Hooke's law (Timoshenko and Goodier, Theory of Elasticity, 3rd ed., chapter 2). The laws of finite strain, for
 plane strain or three dimensions, are compressible neo-Hookean and St Venant-Kirchhoff (Bonet and Wood,
 Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed., section 6.4.3 and chapter 6), and

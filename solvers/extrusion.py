@@ -4,10 +4,10 @@ A triangle times a layer is a prism of three tetrahedra. Its corners in one orde
 a < b < c below and a', b', c' above, give the tetrahedra (a, b, c, c'), (a, b, b', c'), (a, a', b', c'): the
 diagonal of a face between two prisms starts at its first corner below in both (J. Dompierre, P. Labbé,
 M.-G. Vallet, R. Camarero, How to subdivide pyramids, prisms and hexahedra into tetrahedra, 8th International
-Meshing Roundtable, 1999). The order is that of x, then y, and does not depend on the numbering.
+Meshing Roundtable, 1999). Corners are ordered by x, then y, whatever their numbers.
 
-The nodes of all quadratic tetrahedra are those of the quadratic triangles at every level, the layers' faces
-and middles: a lattice.
+The quadratic tetrahedra have their nodes above the quadratic triangles' nodes, at the layers' faces and
+middles: a lattice.
 """
 
 from dataclasses import dataclass

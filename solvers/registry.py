@@ -1,4 +1,4 @@
-"""Solvers by name: ours, and those of other packages by the entry-point group `pinnray.solvers`."""
+"""Solvers by name: ours, and other packages' by the entry-point group `pinnray.solvers`."""
 
 import warnings
 from collections.abc import Mapping

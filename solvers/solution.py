@@ -23,11 +23,9 @@ class DisplacementField(Protocol):
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement at `location.points`, shape (n, 2), mm."""
-        ...
 
     def gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient H[i, j] = du_i/dx_j at `location.points`, shape (n, 2, 2)."""
-        ...
 
 
 @runtime_checkable
@@ -36,7 +34,6 @@ class SolidField(DisplacementField, Protocol):
 
     def solid_gradient(self, location: LocatedPoints) -> FloatArray:
         """Displacement gradient du_i/dx_j at `location.points`, shape (n, 3, 3)."""
-        ...
 
 
 @runtime_checkable
@@ -45,7 +42,6 @@ class MovedWallsField(DisplacementField, Protocol):
 
     def displacement_in_space(self, location: LocatedPoints) -> FloatArray:
         """Displacement of the material that is at `location.points` before the load, shape (n, 2), mm."""
-        ...
 
 
 class Uncertainty(NamedTuple):

@@ -60,25 +60,20 @@ class Solver(Protocol):
     @property
     def name(self) -> str:
         """Its name on the command line."""
-        ...
 
     @property
     def laws(self) -> tuple[str, ...]:
         """Supported material laws (`Material.law`), the default first."""
-        ...
 
     @property
     def loads(self) -> tuple[str, ...]:
         """Supported kinds of load (`Load.kind`)."""
-        ...
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Solve `problem`; an `UnsupportedProblemError` says that the solver does not support it."""
-        ...
 
     def settings(self) -> dict[str, object]:
         """Every setting that changes the result, as JSON-ready values; recorded with the result."""
-        ...
 
 
 class FieldSettings:
@@ -277,7 +272,6 @@ class TrainedSolver(Solver, Protocol):
 
     def in_context(self, context: TrainingContext) -> Solver:
         """The same solver with this context, which is no setting."""
-        ...
 
 
 @runtime_checkable
@@ -286,7 +280,6 @@ class Refittable(Protocol):
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
         """A function that solves the problem with other observations, like `solve` but without `left_out`."""
-        ...
 
 
 @runtime_checkable
@@ -295,7 +288,6 @@ class Transferable(Protocol):
 
     def transferred(self, solution: Solution, problem: Problem, other: Problem) -> Solution:
         """The solution of another problem with the parameters estimated in a solution of the first."""
-        ...
 
 
 def refitter(solver: Solver, problem: Problem) -> Callable[[Observations], Solution]:

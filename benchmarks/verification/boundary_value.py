@@ -15,7 +15,7 @@ from geometry.arrays import BoolArray, FloatArray
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import Quadrature, edge_quadrature
 from geometry.mesh.triangle_mesh import TriangleMesh
-from solvers.fem.linear import LinearElasticity
+from solvers.fem.equilibrium import DiscreteEquilibrium
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Material, Problem
 from solvers.solution import State
@@ -61,9 +61,9 @@ class BoundaryValue:
         """The finite-element solution."""
         space = LagrangeSpace(self.mesh, degree)
         held, nodal = self._given(space)
-        elasticity = LinearElasticity.of(Problem(self.mesh, self.material), space)
-        factors = elasticity.factorise(held)
-        nodal = nodal + factors.solve(self._forces(space) - elasticity.internal_force(nodal))
+        equilibrium = DiscreteEquilibrium(Problem(self.mesh, self.material), space)
+        factors = equilibrium.factorised(held)
+        nodal = nodal + factors.solve(self._forces(space) - equilibrium.internal_force(nodal))
         factors.destroy()
         return LagrangeField(space, nodal)
 

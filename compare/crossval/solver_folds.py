@@ -24,7 +24,7 @@ from geometry.observations import Observations
 from solvers.assimilation.marker_forces import root_mean_square
 from solvers.assimilation.marker_weighting import FACTORS
 from solvers.fem.assimilating import FemAsmSolver
-from solvers.lagrange import LagrangeField
+from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import Solution
 from solvers.solver import (
@@ -261,7 +261,7 @@ def sweep_weights(task: SolverTask, progress: Progress = silent) -> dict[str, li
     problem = replace(runner.problem, observations=task.observations[0][0])
     solution = solver.solve(problem)
     finger, misfit = solver.prepare(problem)
-    forces, space = finger.forces(misfit), finger.equilibrium.elasticity.distributed.space
+    forces, space = finger.forces(misfit), LagrangeSpace(problem.mesh, solver.degree)
     rows = []
     for number, factor in enumerate(FACTORS.tolist()):
         progress(number / len(FACTORS), f"{factor:.3g} times the weight")

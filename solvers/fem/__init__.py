@@ -1,5 +1,4 @@
-"""Finite elements with DOLFINx: `fem`, its error estimate and refinement; `fem-asm`.
+"""Finite elements with DOLFINx: `fem`, its error estimate and refinement, `fem-asm`, `fem-3d`, `fem-id`.
 
-Sub-packages: `finite_strain` (`fem-nonlinear`), `identification` (`fem-id`). Imports
-`solvers.assimilation` and the modules of `solvers`.
+Sub-package: `finite_strain` (`fem-nonlinear`). Imports `solvers.assimilation`, `solvers.identification`.
 """

@@ -118,11 +118,11 @@ def largest(shares: FloatArray, part: float) -> BoolArray:
 
 def _solve(problem: Problem, degree: int, tolerance: float) -> tuple[RefinementRound, FloatArray]:
     """One solution: its estimate, and every triangle's contribution to the functional's error, shape (t,)."""
-    from solvers.fem.linear import LinearElasticity, LinearEquilibrium  # needs DOLFINx
+    from solvers.fem.equilibrium import DiscreteEquilibrium  # needs DOLFINx
 
     mesh, space = problem.mesh, LagrangeSpace(problem.mesh, degree)
-    equilibrium = LinearEquilibrium.of(LinearElasticity.of(problem, space))
-    nodal, estimator = equilibrium.solution(), ErrorEstimator(problem, space)
+    equilibrium = DiscreteEquilibrium(problem, space)
+    nodal, estimator = equilibrium.linear_guess(1.0).nodal, ErrorEstimator(problem, space)
     error = estimator.estimate(nodal, equilibrium.response)
     functional = np.zeros_like(nodal)
     functional[mesh.marker_nodes] = np.sign(error.markers) * (np.abs(error.markers) > tolerance)

@@ -21,11 +21,11 @@ from solvers.assimilation.marker_forces import MarkerForces, residual_phrase
 from solvers.assimilation.marker_weighting import MarkerWeighting
 from solvers.assimilation.misfit import Choice, Misfit, Weighting, leave_one_out_displacements
 from solvers.constrained_elimination import ConstrainedElimination
-from solvers.fem.boundary_conditions import marker_functionals, reaction_by_residual_work
-from solvers.fem.finite_strain.equilibrium import DisplacementConstraints
+from solvers.fem.boundary_conditions import DisplacementConstraints, reaction_by_residual_work
+from solvers.fem.equilibrium import DiscreteEquilibrium
 from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver, LinearElasticity, LinearEquilibrium
+from solvers.fem.linear import FemSolver
 from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
@@ -37,7 +37,7 @@ from solvers.solver import Family, FieldSettings, Progress, check_problem, silen
 class MarkerCompliance:
     """Finite-element displacements, free and under forces at m markers."""
 
-    equilibrium: LinearEquilibrium  # The factorised problem; its factors are to be destroyed after use
+    equilibrium: DiscreteEquilibrium  # The factorised problem; its factors are to be destroyed after use
     undisturbed: FloatArray  # Nodal displacements without forces at the markers, shape (N, 2), mm
     # The 2 m displacements of the markers as functionals, and the nodal displacements under their unit
     # forces, while base and load hold at zero
@@ -113,10 +113,11 @@ class FemAsmSolver(FieldSettings):
         Further weights and markers cost no solve. Without markers that weigh anything it is a `UserError`.
         """
         misfit, space = self._misfit(problem), LagrangeSpace(problem.mesh, self.degree)
-        equilibrium = LinearEquilibrium.of(LinearElasticity.of(problem, space), self.weighting.slack)
-        rows = marker_functionals(misfit, space)
+        constraints = DisplacementConstraints.of(problem, space, self.weighting.slack)
+        equilibrium = DiscreteEquilibrium(problem, space, constraints)
+        rows = DisplacementConstraints.springs(misfit, space).functionals
         markers = ConstrainedElimination(rows, equilibrium.responses(rows))
-        return MarkerCompliance(equilibrium, equilibrium.solution(), markers), misfit
+        return MarkerCompliance(equilibrium, equilibrium.linear_guess(1.0).nodal, markers), misfit
 
     def refitter(self, problem: Problem) -> Callable[[Observations], Solution]:
         """See `Refittable`; one factorisation for all observations if the law is linear."""
@@ -154,9 +155,8 @@ class FemAsmSolver(FieldSettings):
         forces = finger.forces(misfit)
         factor = self.weighting.factor(forces)
         fit = forces.fit(factor)
-        nodal, elasticity = finger.under(fit.forces), finger.equilibrium.elasticity
-        space = elasticity.distributed.space
-        residual = elasticity.internal_force(nodal)
+        nodal, space = finger.under(fit.forces), LagrangeSpace(problem.mesh, self.degree)
+        residual = finger.equilibrium.internal_force(nodal)
         return Solution(
             solver=self.name,
             problem=problem,
@@ -169,7 +169,7 @@ class FemAsmSolver(FieldSettings):
                 "unknowns": nodal.size,
                 "triangles": len(problem.mesh.triangles),
                 "degree": self.degree,
-                "ranks": elasticity.distributed.comm.size,
+                "ranks": finger.equilibrium.distributed.comm.size,
                 "weight_factor": factor,
                 "misfit": factor * misfit.value(misfit.observed - fit.residual),
                 "marker_force": float(np.linalg.norm(fit.forces, axis=1).max()),

@@ -16,7 +16,7 @@ from geometry.observations import Observations
 from solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
 from solvers.fem.boundary_conditions import dirichlet_mask
 from solvers.fem.dolfinx_compat import DistributedSpace
-from solvers.fem.finite_strain.equilibrium import QUADRATURE_DEGREE
+from solvers.fem.equilibrium import QUADRATURE_DEGREE
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear_solvers import Factorisation
 from solvers.identification.body import Linearised

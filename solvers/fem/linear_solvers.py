@@ -67,8 +67,8 @@ class StiffnessSolver:
 class Factorisation(StiffnessSolver):
     """A symmetric matrix factorised by MUMPS.
 
-    Solutions are checked if the matrix is `positive_definite`; those of a tangent that may be indefinite only
-    are steps of an iteration.
+    Solutions are checked if the matrix is `positive_definite`. A tangent that may be indefinite only gives
+    steps of an iteration.
     """
 
     message: ClassVar[str] = "solved directly"

@@ -14,7 +14,7 @@ from geometry.machine_memory import free_memory_gb
 from geometry.mesh.point_location import LocatedPoints
 from solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
 from solvers.extrusion import ExtrudedSpace
-from solvers.fem.finite_strain.equilibrium import LoadState
+from solvers.fem.equilibrium import LoadState
 from solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear_solvers import LinearSolver
@@ -43,7 +43,7 @@ class FaceField:
     def slopes(self) -> FloatArray:
         """Their derivatives along z, shape (P, 3), by a parabola through the three nodes of a layer.
 
-        In the middle plane symmetry leaves only that of u_z.
+        In the middle plane symmetry leaves only the derivative of u_z.
         """
         levels = [-1, -2, -3] if self.face == "side" else [0, 1, 2]
         own, half, whole = (self.space.at_level(self.nodal, level) for level in levels)

@@ -1,4 +1,1 @@
-"""Gaussian processes: `gp` (markers only) and `statfem` (finite elements plus a model error).
-
-Imports `solvers.assimilation`, `solvers.fem`.
-"""
+"""Gaussian processes: `gp` and `statfem`; imports `solvers.assimilation` and `solvers.fem`."""

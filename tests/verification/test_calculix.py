@@ -11,7 +11,7 @@ from geometry.cache import finger_mesh
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from solvers.extrusion import ExtrudedSpace
-from solvers.fem.finite_strain import equilibrium
+from solvers.fem import equilibrium
 from solvers.problem import Load, Material, Problem
 
 SHORT = Design(height=50, rib_count=1, tip_length=12, contact_position=20, depth=6.0)

@@ -10,7 +10,7 @@ from benchmarks.verification.cases.manufactured import MANUFACTURED
 from benchmarks.verification.cases.plate_with_hole import KIRSCH
 from geometry.errors import UserError
 from solvers import elasticity
-from solvers.fem import linear
+from solvers.fem import equilibrium
 from solvers.problem import Material
 
 pytestmark = pytest.mark.slow
@@ -27,11 +27,11 @@ def too_much(lame):
     return lame._replace(λ=1.01 * lame.λ)
 
 
-def too_much_λ(law, gradient, lame):
+def too_much_λ(law, gradient, lame, log):
     return elasticity.energy_density_of(law, gradient, too_much(lame))
 
 
-def half_the_shear(law, gradient, lame):
+def half_the_shear(law, gradient, lame, log):
     shear = elasticity.strain_of(law, gradient)[0][1]
     return elasticity.energy_density_of(law, gradient, lame) - lame.μ * shear * shear
 
@@ -42,7 +42,7 @@ def plane_strain_always(young, poisson, plane):
 
 @pytest.mark.parametrize(("mistake", "case"), [(too_much_λ, MANUFACTURED), (half_the_shear, CANTILEVER)])
 def test_wrong_law(mistake, case, monkeypatch):
-    monkeypatch.setattr(linear, "energy_density_of", mistake)
+    monkeypatch.setattr(equilibrium, "energy_density_of", mistake)
     assert not passes(case.measure(), degree=2)
 
 
@@ -62,7 +62,7 @@ def test_plane_strain_for_plane_stress(case, monkeypatch):
 
 def test_too_few_integration_points(monkeypatch):
     """One point a triangle leaves P2 motions without energy: MUMPS fails, or rounding spoils its solution."""
-    monkeypatch.setattr(linear.ufl, "dx", ufl.dx(metadata={"quadrature_degree": 1}))
+    monkeypatch.setattr(equilibrium.ufl, "dx", ufl.dx(metadata={"quadrature_degree": 1}))
     rows, refused = (), ""
     try:
         rows = MANUFACTURED.measure()

@@ -1,4 +1,1 @@
-"""`fem-nonlinear`: equilibrium at finite strain, contact, the load path and Newton's method.
-
-Imports the shared modules of `solvers.fem`.
-"""
+"""`fem-nonlinear`: the load path and Newton's method; imports the shared modules of `solvers.fem`."""

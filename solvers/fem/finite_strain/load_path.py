@@ -11,9 +11,10 @@ from geometry.arrays import BoolArray, FloatArray
 from geometry.errors import UserError
 from solvers.cylinder_contact import ContactRegion
 from solvers.extrusion import NodalSpace
-from solvers.fem.boundary_conditions import reaction_by_residual_work
-from solvers.fem.finite_strain.equilibrium import DisplacementConstraints, FiniteStrainEquilibrium, LoadState
+from solvers.fem.boundary_conditions import DisplacementConstraints, reaction_by_residual_work
+from solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
 from solvers.fem.finite_strain.newton import ConstrainedNewton
+from solvers.fem.linear_solvers import LinearSolver
 from solvers.problem import Problem
 from solvers.solver import Progress
 from solvers.stability import aside, descended
@@ -59,7 +60,8 @@ class LoadPath:
         max_iterations: int,
     ) -> None:
         self._first_step, self._min_step, self._space, self._guide = first_step, min_step, space, guide
-        self.equilibrium = FiniteStrainEquilibrium(problem, space, constraints, iterative=iterative)
+        method: LinearSolver = "iterative" if iterative else "direct"
+        self.equilibrium = DiscreteEquilibrium(problem, space, constraints, method)
         self._begin = partial(
             ConstrainedNewton,
             self.equilibrium,

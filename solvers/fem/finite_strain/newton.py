@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from geometry.arrays import FloatArray
-from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium, LoadState
+from solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
 from solvers.petsc import PETSc
 
 
@@ -21,7 +21,7 @@ class NewtonResult:
 
 
 class ConstrainedNewton:
-    """SNES on the unknowns [c; f] of a `FiniteStrainEquilibrium`.
+    """SNES on the unknowns [c; f] of a `DiscreteEquilibrium`.
 
         R(c, f) = [dΠ/dc - f_k b_k;  s (d_k - b_k . c - s_k f_k)]      J = [K, -b;  -s b^T, -s diag(s_k)]
 
@@ -33,7 +33,7 @@ class ConstrainedNewton:
     """
 
     def __init__(
-        self, equilibrium: FiniteStrainEquilibrium, *, scale: float, tolerance: float, max_iterations: int
+        self, equilibrium: DiscreteEquilibrium, *, scale: float, tolerance: float, max_iterations: int
     ) -> None:
         self._equilibrium, self._scale, self._tolerance = equilibrium, scale, tolerance
         self._state = equilibrium.rest

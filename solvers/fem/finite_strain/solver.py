@@ -11,8 +11,8 @@ import numpy as np
 from geometry.arrays import FloatArray
 from geometry.errors import UserError
 from solvers.cylinder_contact import CONTACT_AT_END, ContactRegion, contact_of
+from solvers.fem.boundary_conditions import DisplacementConstraints
 from solvers.fem.error_estimate import ErrorEstimator, locking_advice
-from solvers.fem.finite_strain.equilibrium import DisplacementConstraints
 from solvers.fem.finite_strain.load_path import LoadPath, check_tolerance
 from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
@@ -185,7 +185,7 @@ def _status(path: LoadPath, regions: Sequence[ContactRegion | None], unstable: i
 
 
 def _place_history(path: LoadPath) -> dict[str, FloatArray]:
-    """The force's abscissa, mm; without a force, at rest, that of the next equilibrium with one."""
+    """The force's abscissa, mm; a state without a force, such as rest, has the next one's."""
     found = [path.force_abscissa(point) for point in path.points]
     known = [number for number, abscissa in enumerate(found) if abscissa is not None]
     if not known:

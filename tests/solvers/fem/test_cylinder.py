@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import trapezoid
 
 from geometry.errors import UserError
-from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium
+from solvers.fem.equilibrium import DiscreteEquilibrium
 from solvers.fem.finite_strain.load_path import PENETRATION
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
@@ -33,7 +33,7 @@ def test_cylinder_presses_without_friction_and_only_where_it_touches(pressed):
     space = pressed.field.space
     nodes = space.boundary_nodes("front")
     nodes = nodes[space.nodes[nodes, 0] > 0]  # the clamp has forces of its own
-    forces = FiniteStrainEquilibrium(pressed.problem, space).internal_force(pressed.field.values)[nodes]
+    forces = DiscreteEquilibrium(pressed.problem, space).internal_force(pressed.field.values)[nodes]
     middle = np.mean(contact_ends(pressed.problem))
     away = space.nodes[nodes] + pressed.field.values[nodes] - [middle, 5.0 - 10.0]
     gap = np.linalg.norm(away, axis=1) - 5.0

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solvers.fem.finite_strain.equilibrium import FiniteStrainEquilibrium, LoadState
+from solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
 from solvers.fem.finite_strain.newton import ConstrainedNewton, NewtonResult
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem
@@ -15,14 +15,12 @@ LAWS = ("neo-hookean", "st-venant-kirchhoff")
 STEPS = 0.1 * 0.5 ** np.arange(4)
 
 
-def equilibrium(law, load=Load(kind="patch")) -> FiniteStrainEquilibrium:
+def equilibrium(law, load=Load(kind="patch")) -> DiscreteEquilibrium:
     mesh = bar_mesh(8.0, 2.0, 8, 2, contact=(3.0, 5.0))
-    return FiniteStrainEquilibrium(
-        Problem(mesh, Material(law=law, poisson=0.3), load), LagrangeSpace(mesh, 2)
-    )
+    return DiscreteEquilibrium(Problem(mesh, Material(law=law, poisson=0.3), load), LagrangeSpace(mesh, 2))
 
 
-def fields(problem: FiniteStrainEquilibrium, *seeds: int, size: float = 0.02) -> list[np.ndarray]:
+def fields(problem: DiscreteEquilibrium, *seeds: int, size: float = 0.02) -> list[np.ndarray]:
     """Random displacements that are zero where clamped, smooth enough to turn no element inside out."""
     return [
         np.where(problem.clamped, 0.0, np.random.default_rng(seed).normal(size=problem.clamped.shape)) * size
@@ -30,7 +28,7 @@ def fields(problem: FiniteStrainEquilibrium, *seeds: int, size: float = 0.02) ->
     ]
 
 
-def times_tangent(problem: FiniteStrainEquilibrium, direction: np.ndarray) -> np.ndarray:
+def times_tangent(problem: DiscreteEquilibrium, direction: np.ndarray) -> np.ndarray:
     vector, product = problem.matrix.createVecs()
     problem.distributed.distribute(direction, vector)
     problem.matrix.mult(vector, product)
@@ -85,11 +83,11 @@ def test_a_rotated_body_has_the_same_energy_and_rotated_forces(law):
     )
 
 
-def newton(problem: FiniteStrainEquilibrium, iterations: int = 12) -> ConstrainedNewton:
+def newton(problem: DiscreteEquilibrium, iterations: int = 12) -> ConstrainedNewton:
     return ConstrainedNewton(problem, scale=11.4, tolerance=1e-8, max_iterations=iterations)
 
 
-def started(solver: ConstrainedNewton, problem: FiniteStrainEquilibrium) -> NewtonResult:
+def started(solver: ConstrainedNewton, problem: DiscreteEquilibrium) -> NewtonResult:
     """From the linear guess to the full load."""
     return solver.solve(problem.linear_guess(1.0))
 

@@ -7,9 +7,10 @@ import pytest
 
 from geometry.cache import finger_mesh
 from geometry.mesh.settings import MeshSettings
+from solvers.fem.equilibrium import DiscreteEquilibrium
 from solvers.fem.error_estimate import ErrorEstimator
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver, LinearElasticity, LinearEquilibrium
+from solvers.fem.linear import FemSolver
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Material, Problem
 from solvers.solution import Solution, State
@@ -83,7 +84,7 @@ def test_the_estimate_of_a_smooth_problem_is_exact_in_the_limit(degree):
     mesh = bar_mesh(8.0, 3.0, 32, 12, contact=(2.0, 6.0))
     problem, space = Problem(mesh), LagrangeSpace(mesh, degree)
     estimator = ErrorEstimator(problem, space)
-    elasticity, rule = LinearElasticity.of(problem, space), estimator.rule
+    equilibrium, rule = DiscreteEquilibrium(problem, space), estimator.rule
 
     def exact(points):
         x, y = points.T
@@ -100,8 +101,8 @@ def test_the_estimate_of_a_smooth_problem_is_exact_in_the_limit(degree):
     edge = ((np.abs(space.nodes - low) < 1e-9) | (np.abs(space.nodes - high) < 1e-9)).any(axis=1)
     held = np.stack([edge, edge], axis=1)
     given = np.where(held, exact(space.nodes), 0.0)
-    factors = elasticity.factorise(held)
-    nodal = given + factors.solve(force - elasticity.internal_force(given))
+    factors = equilibrium.factorised(held)
+    nodal = given + factors.solve(force - equilibrium.internal_force(given))
     error = estimator.estimate(nodal, factors.solve)
     state = State.from_gradient(gradient, problem)
     off = State.from_gradient(gradient - LagrangeField(space, nodal).gradient(rule.location), problem)
@@ -112,8 +113,8 @@ def test_the_estimate_of_a_smooth_problem_is_exact_in_the_limit(degree):
 def test_one_solve_gives_what_the_dual_problem_of_each_marker_gives(short_mesh):
     """c(R u, R z) with the dual solution z of the functional, against the estimated error at the marker."""
     problem, space = Problem(short_mesh), LagrangeSpace(short_mesh, 2)
-    equilibrium = LinearEquilibrium.of(LinearElasticity.of(problem, space))
-    nodal, estimator = equilibrium.solution(), ErrorEstimator(problem, space)
+    equilibrium = DiscreteEquilibrium(problem, space)
+    nodal, estimator = equilibrium.linear_guess(1.0).nodal, ErrorEstimator(problem, space)
     error = estimator.estimate(nodal, equilibrium.response)
     stress = State.from_gradient(estimator.gradient_error(nodal), problem).stress
     for marker, axis in ((0, 0), (2, 1)):

@@ -9,8 +9,9 @@ from geometry.errors import UserError
 from solvers.assimilation.marker_weighting import FACTORS
 from solvers.assimilation.misfit import MarkerSettings, misfit_of
 from solvers.fem.assimilating import FemAsmSolver
+from solvers.fem.equilibrium import DiscreteEquilibrium
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
-from solvers.fem.linear import FemSolver, LinearElasticity
+from solvers.fem.linear import FemSolver
 from solvers.lagrange import LagrangeSpace
 from solvers.problem import Load, Material, Problem, contact_functional
 from tests.solvers.conftest import observed_at
@@ -42,13 +43,10 @@ SOFT = FemAsmSolver(weights="precision", scale=0.05)
 def dense(problem, solver):
     """The minimiser by Lagrange multipliers on the whole stiffness, without the solver's algebra."""
     space = LagrangeSpace(problem.mesh, solver.degree)
-    elasticity = LinearElasticity.of(problem, space)
-    free = np.zeros((len(space.nodes), 2), dtype=bool)
-    distributed = elasticity.distributed
-    matrix = distributed.assemble_matrix(elasticity.stiffness, distributed.clamp(free))
+    equilibrium, size = DiscreteEquilibrium(problem, space), space.nodes.size
+    matrix = equilibrium.distributed.assemble_matrix(equilibrium.tangent, [])
     matrix.convert("dense")
-    size = free.size
-    node_of_dof = np.repeat(elasticity.distributed._node_of_dof, 2) * 2 + np.tile([0, 1], len(space.nodes))
+    node_of_dof = np.repeat(equilibrium.distributed._node_of_dof, 2) * 2 + np.tile([0, 1], len(space.nodes))
     stiffness = np.zeros((size, size))
     stiffness[np.ix_(node_of_dof, node_of_dof)] = matrix.getDenseArray()
     misfit = misfit_of(problem, MarkerSettings(weights=solver.weights, scale=solver.scale))

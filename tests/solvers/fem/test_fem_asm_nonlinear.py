@@ -8,7 +8,8 @@ import pytest
 from geometry.mesh.quadrature import body_quadrature
 from solvers.assimilation.misfit import MarkerSettings, misfit_of
 from solvers.fem.assimilating import FemAsmSolver
-from solvers.fem.finite_strain.equilibrium import DisplacementConstraints, FiniteStrainEquilibrium
+from solvers.fem.boundary_conditions import DisplacementConstraints
+from solvers.fem.equilibrium import DiscreteEquilibrium
 from solvers.fem.finite_strain.load_path import LoadPath
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.problem import Load, Material, Problem, contact_functional
@@ -78,7 +79,7 @@ def functional(problem, space, slack):
     constraints = DisplacementConstraints.of(problem, space, slack)
     misfit = misfit_of(problem, MarkerSettings(weights="precision", scale=SOFT.scale))
     constraints = constraints.joined(DisplacementConstraints.springs(misfit, space))
-    equilibrium = FiniteStrainEquilibrium(problem, space, constraints)
+    equilibrium = DiscreteEquilibrium(problem, space, constraints)
     points, weights = misfit.sampling()
     sampling = weights @ space.shape_functions(problem.mesh.locate(points)).toarray()
     contact, average = contact_functional(problem)

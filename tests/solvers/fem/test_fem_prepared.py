@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from geometry.errors import UserError
-from solvers.fem import linear, linear_solvers
-from solvers.fem.linear import Factorisation, FemSolver, LinearElasticity
+from solvers.fem import equilibrium, linear_solvers
+from solvers.fem.equilibrium import DiscreteEquilibrium
+from solvers.fem.linear import FemSolver
+from solvers.fem.linear_solvers import Factorisation
 from solvers.problem import Load, Problem
 
 
@@ -16,13 +18,13 @@ from solvers.problem import Load, Problem
 def factorised(monkeypatch):
     """The masks of held components of every factorisation of the test."""
     masks = []
-    factorise = LinearElasticity.factorise
+    factorise = DiscreteEquilibrium.factorised
 
     def counted(system, clamped):
         masks.append(clamped)
         return factorise(system, clamped)
 
-    monkeypatch.setattr(LinearElasticity, "factorise", counted)
+    monkeypatch.setattr(DiscreteEquilibrium, "factorised", counted)
     return masks
 
 
@@ -89,7 +91,7 @@ def test_iterations_that_do_not_converge_are_an_error(coarse_mesh, monkeypatch):
 
 
 def test_many_unknowns_are_solved_by_iterations(coarse_mesh, monkeypatch):
-    monkeypatch.setattr(linear, "ITERATIVE_BEYOND", 2 * len(coarse_mesh.points))
+    monkeypatch.setattr(equilibrium, "ITERATIVE_BEYOND", 2 * len(coarse_mesh.points))
     chosen = [
         FemSolver(degree, estimate=False).solve(Problem(coarse_mesh)).stats["linear_solver"]
         for degree in (1, 2)

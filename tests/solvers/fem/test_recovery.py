@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from solvers.fem.gradient_recovery import GradientRecovery
+from solvers.fem.error_estimate import GradientRecovery
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from tests.solvers.conftest import bar_mesh
 

@@ -1,4 +1,4 @@
-"""The discrete finite-strain problem: potential, forces, tangent and constraints.
+"""The discrete problem, linear or of finite strain: potential, forces, tangent and constraints.
 
 With displacements c, multipliers f of the constraints, which may be springs of the compliance s_k, and the
 potential Π of the elastic energy and, for a cylinder, of contact, equilibrium is
@@ -8,31 +8,32 @@ potential Π of the elastic energy and, for a cylinder, of contact, equilibrium 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 import ufl
 
 from geometry.arrays import BoolArray, FloatArray
-from solvers.assimilation.misfit import Misfit
 from solvers.constrained_elimination import ConstrainedElimination
 from solvers.cylinder_contact import ContactState, CylinderContact
 from solvers.elasticity import deformation_jacobian, energy_density_of
 from solvers.extrusion import NodalSpace
-from solvers.fem.boundary_conditions import (
-    dirichlet_displacement,
-    dirichlet_mask,
-    load_functionals,
-    load_targets,
-    marker_functionals,
-)
+from solvers.fem.boundary_conditions import DisplacementConstraints, dirichlet_displacement, dirichlet_mask
 from solvers.fem.dolfinx_compat import DistributedSpace
-from solvers.fem.linear_solvers import Factorisation, Multigrid
-from solvers.lagrange import LagrangeSpace
+from solvers.fem.linear_solvers import Factorisation, LinearSolver, Multigrid
 from solvers.problem import Problem
 from solvers.stability import ShiftedStep
 
 QUADRATURE_DEGREE = 4
-"""Exact for the quadratic part of the law on quadratic elements."""
+"""For laws of finite strain: exact for their quadratic part on quadratic elements."""
+
+ITERATIVE_BEYOND = 10_000_000
+"""Unknowns beyond which "auto" means "iterative" for the linear law.
+
+MUMPS is ten times as fast at 3.9 million, but its memory (1.8 GB a million there) grows faster than the
+iterations' (1.4 GB).
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,57 +43,12 @@ class LoadState(ContactState):
     forces: FloatArray  # Multipliers of the constraints, shape (k,), N/mm
 
 
-@dataclass(frozen=True, eq=False)
-class DisplacementConstraints:
-    """Constraints b_k . c + s_k f_k = d_k on the displacements c, with forces f_k."""
-
-    functionals: FloatArray  # b_k, shape (k, N, d)
-    targets: FloatArray  # d_k under the full load, shape (k,), mm
-    # s_k, shape (k,), mm per N/mm: zero where the value is prescribed, else the compliance of a spring with
-    # the energy (d_k - b_k . c)^2 / (2 s_k)
-    slacks: FloatArray
-
-    @classmethod
-    def of(cls, problem: Problem, space: NodalSpace, slack: float = 0.0) -> "DisplacementConstraints":
-        """The constraints of a `mean` or `point` load, all of one slack; else none."""
-        targets = load_targets(problem)
-        return cls(load_functionals(problem, space), targets, np.full(len(targets), slack))
-
-    @classmethod
-    def springs(cls, misfit: Misfit, space: LagrangeSpace) -> "DisplacementConstraints":
-        """Springs between markers and observed positions, whose energy is the misfit; u v u v ..."""
-        return cls(marker_functionals(misfit, space), misfit.observed.ravel(), 1 / misfit.weights.ravel())
-
-    def joined(self, other: "DisplacementConstraints") -> "DisplacementConstraints":
-        """Both, in this order."""
-        return DisplacementConstraints(
-            np.concatenate([self.functionals, other.functionals]),
-            np.concatenate([self.targets, other.targets]),
-            np.concatenate([self.slacks, other.slacks]),
-        )
-
-    def only(self, kept: BoolArray) -> "DisplacementConstraints":
-        """Subset selected by a mask of shape (k,)."""
-        return DisplacementConstraints(self.functionals[kept], self.targets[kept], self.slacks[kept])
-
-    def values(self, nodal: FloatArray) -> FloatArray:
-        """b_k . c of displacements of shape (N, d), mm: shape (k,)."""
-        return np.asarray(np.einsum("knx,nx->k", self.functionals, nodal))
-
-    def at_nodes(self, forces: FloatArray) -> FloatArray:
-        """f_k b_k of forces of shape (k,), N/mm: shape (N, d)."""
-        return np.asarray(np.einsum("k,knx->nx", forces, self.functionals))
-
-    def residual(self, nodal: FloatArray, forces: FloatArray, fraction: float) -> FloatArray:
-        """Residual of the constraints at a fraction of the load, shape (k,), mm."""
-        return np.asarray(fraction * self.targets - self.values(nodal) - self.slacks * forces)
-
-
-class FiniteStrainEquilibrium:
+class DiscreteEquilibrium:
     """The discrete problem; nodal arrays of shape (N, d) are the same on every rank.
 
     `clamped` is the mask of components with a Dirichlet condition, and `prescribed` their displacement under
-    the full load, mm; `elimination` solves with the constraints and the tangent factorised last.
+    the full load, mm; `elimination` solves with the constraints and the tangent factorised last, which is the
+    stiffness for the linear law.
     """
 
     def __init__(
@@ -100,35 +56,60 @@ class FiniteStrainEquilibrium:
         problem: Problem,
         space: NodalSpace,
         constraints: DisplacementConstraints | None = None,
-        *,
-        iterative: bool = False,
+        linear_solver: LinearSolver = "auto",
     ) -> None:
-        """Compile the forms; without constraints they are the load's."""
+        """Compile the forms, and factorise at rest; without constraints they are the load's."""
+        self.problem, self.linear = problem, problem.material.law == "linear"
+        self.iterative = linear_solver == "iterative"
+        if linear_solver == "auto" and self.linear:
+            self.iterative = space.nodes.size > ITERATIVE_BEYOND
         self.distributed = DistributedSpace(space)
         self.clamped: BoolArray = dirichlet_mask(problem, space)
         self.prescribed = dirichlet_displacement(problem, space)
         self.constraints = constraints or DisplacementConstraints.of(problem, space)
         self.contact = CylinderContact.of(problem, space) if problem.load.kind == "cylinder" else None
-        self._young = problem.material.young
         material, gradient = problem.material, ufl.grad(self.distributed.function)
         lame = material.solid_lame if self.distributed.dimension == 3 else material.lame
         density = energy_density_of(material.law, gradient, self.distributed.moduli(lame), ufl.ln)
-        measure = ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
-        energy = density / space.thickness * measure
-        self._energy = self.distributed.form(energy)
-        inverted = ufl.conditional(ufl.gt(deformation_jacobian(gradient), 0), 0.0, 1.0)
-        self._inverted = self.distributed.form(inverted * measure)
-        self._force, self._tangent = self.distributed.derivatives(energy)
-        self._conditions = self.distributed.clamp(self.clamped)
-        self.matrix = self.distributed.assemble_matrix(self._tangent, self._conditions)
-        system = self.distributed, self.matrix, self.clamped
-        self.factors: Factorisation | Multigrid
-        if not iterative:
-            self.factors = Factorisation(*system, positive_definite=False)
-        elif material.law == "linear":
-            self.factors = Multigrid(*system)
-        else:  # What a step of Newton's method leaves, the next one takes.
-            self.factors = Multigrid(*system, tolerance=1e-4, tangent=True)
+        measure = ufl.dx if self.linear else ufl.dx(metadata={"quadrature_degree": QUADRATURE_DEGREE})
+        self._integrand = density / space.thickness * measure
+        self._inside_out = ufl.conditional(ufl.gt(deformation_jacobian(gradient), 0), 0.0, 1.0) * measure
+        self._force, self.tangent = self.distributed.derivatives(self._integrand)
+        self.factors = self.factorised(self.clamped)
+        self.elimination = self._elimination()
+
+    @cached_property
+    def _energy(self) -> Any:
+        return self.distributed.form(self._integrand)
+
+    @cached_property
+    def _inverted(self) -> Any:
+        return self.distributed.form(self._inside_out)
+
+    def factorised(self, clamped: BoolArray) -> Factorisation | Multigrid:
+        """Factors of the tangent at the displacements set last, with a mask of clamped components, (N, d)."""
+        self._conditions = self.distributed.clamp(clamped)
+        self.matrix = self.distributed.assemble_matrix(self.tangent, self._conditions)
+        system = self.distributed, self.matrix, clamped
+        if not self.iterative:
+            return Factorisation(*system, positive_definite=self.linear)
+        if self.linear:
+            return Multigrid(*system)
+        # What a step of Newton's method leaves, the next one takes.
+        return Multigrid(*system, tolerance=1e-4, tangent=True)
+
+    def prescribe(self, problem: Problem) -> None:
+        """Take another load of a body of linear law; keeps the factors and responses that still hold."""
+        if problem.load == self.problem.load:
+            return
+        space, functionals = self.distributed.space, self.constraints.functionals
+        clamped, self.constraints = dirichlet_mask(problem, space), DisplacementConstraints.of(problem, space)
+        self.problem, self.prescribed = problem, dirichlet_displacement(problem, space)
+        if not np.array_equal(clamped, self.clamped):
+            self.factors.destroy()
+            self.clamped, self.factors = clamped, self.factorised(clamped)
+        elif np.array_equal(functionals, self.constraints.functionals):
+            return
         self.elimination = self._elimination()
 
     def energy(self, nodal: FloatArray) -> float:
@@ -141,6 +122,13 @@ class FiniteStrainEquilibrium:
         self.distributed.set_function(nodal)
         return self.distributed.assemble_nodal(self._force)
 
+    def _stiff(self, nodal: FloatArray) -> FloatArray:
+        """Stiffness at rest times displacements, shape (N, d), N/mm."""
+        if self.linear:
+            return self.internal_force(nodal)
+        step = 1e-4
+        return (self.internal_force(step * nodal) - self.internal_force(-step * nodal)) / (2 * step)
+
     def residual(self, state: LoadState) -> tuple[FloatArray, float]:
         """Residual force, shape (N, d), N/mm, zero where clamped, and the largest internal force."""
         internal = self.internal_force(state.nodal)
@@ -152,7 +140,7 @@ class FiniteStrainEquilibrium:
     def factorise(self, state: LoadState, shift: float = 0.0) -> None:
         """Factorise the tangent at a state, with a shift of its diagonal, N/mm per mm."""
         self.distributed.set_function(state.nodal)
-        self.distributed.assemble_matrix(self._tangent, self._conditions, into=self.matrix)
+        self.distributed.assemble_matrix(self.tangent, self._conditions, into=self.matrix)
         if self.contact is not None:
             free = ~self.clamped[self.contact.nodes]
             inner = self.contact.tangent(state)
@@ -171,6 +159,22 @@ class FiniteStrainEquilibrium:
     def response(self, force: FloatArray) -> FloatArray:
         """Displacements, mm, under nodal forces, N/mm, by the factorised tangent: both (N, d)."""
         return self.elimination.solution(self.factors.solve(force))[0]
+
+    def responses(self, forces: FloatArray) -> FloatArray:
+        """Responses to several at once, shape (r, N, d)."""
+        return np.array([self.elimination.solution(free)[0] for free in self.factors.solve_all(forces)])
+
+    def minimiser(self, given: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Displacements (N, d), mm, of least energy by the tangent at rest, which must be factorised.
+
+        Args:
+            given: Displacements whose clamped components are taken, shape (N, d), mm.
+            values: Of the constraints, shape (k,), mm. Their forces, N/mm, are returned, too.
+        """
+        nodal = np.where(self.clamped, given, 0.0)
+        if nodal.any():
+            nodal = nodal + self.factors.solve(-self._stiff(nodal))
+        return self.elimination.solution(nodal, values)
 
     @property
     def unstable(self) -> int | None:
@@ -191,10 +195,10 @@ class FiniteStrainEquilibrium:
         return direction
 
     def step_at(self, about: LoadState) -> Callable[[FloatArray, float], ShiftedStep | None]:
-        """Newton's step at displacements, the load that of a state, and a shift over Young's modulus."""
+        """Newton's step, under the load of a state, by displacements and a shift over Young's modulus."""
 
         def step(nodal: FloatArray, shift: float) -> ShiftedStep | None:
-            self.factorise(replace(about, nodal=nodal), shift * self._young)
+            self.factorise(replace(about, nodal=nodal), shift * self.problem.material.young)
             force = np.where(self.clamped, 0.0, -self.internal_force(nodal))
             gaps = about.fraction * self.constraints.targets - self.constraints.values(nodal)
             change, _ = self.elimination.solution(self.factors.solve(force), gaps)
@@ -203,7 +207,7 @@ class FiniteStrainEquilibrium:
         return step
 
     def energy_with_springs(self, about: LoadState) -> Callable[[FloatArray], float]:
-        """Energy per depth, with that of springs, under the load of a state; infinite if inadmissible."""
+        """Energy per depth, springs included, under the load of a state; infinite if inadmissible."""
         soft = self.constraints.slacks > 0
 
         def energy(nodal: FloatArray) -> float:
@@ -229,19 +233,13 @@ class FiniteStrainEquilibrium:
         return LoadState(0.0, np.zeros(self.clamped.shape), np.zeros(contact), forces)
 
     def linear_guess(self, fraction: float) -> LoadState:
-        """The linear solution at a fraction of the load, by the undeformed tangent, which must be factorised.
+        """The linear solution at a fraction of the load, by `minimiser`.
 
         A cylinder touches only the node nearest to it, and the nodes above it along z.
         """
         if self.contact is not None:
             return self._pressed_at_one_node(self.contact, fraction)
-        nodal = fraction * self.prescribed
-        if nodal.any():
-            probe = 1e-4  # fraction of the load in the finite difference of the internal forces at rest
-            step = probe * self.prescribed
-            stiffness = (self.internal_force(step) - self.internal_force(-step)) / (2 * probe)
-            nodal = nodal + self.factors.solve(-fraction * stiffness)
-        nodal, forces = self.elimination.solution(nodal, fraction * self.constraints.targets)
+        nodal, forces = self.minimiser(fraction * self.prescribed, fraction * self.constraints.targets)
         return LoadState(fraction, nodal, np.zeros(0), forces)
 
     def _pressed_at_one_node(self, contact: CylinderContact, fraction: float) -> LoadState:
