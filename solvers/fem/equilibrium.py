@@ -239,8 +239,8 @@ class DiscreteEquilibrium:
         """
         if self.contact is not None:
             return self._pressed_at_one_node(self.contact, fraction)
-        nodal, forces = self.minimiser(fraction * self.prescribed, fraction * self.constraints.targets)
-        return LoadState(fraction, nodal, np.zeros(0), forces)
+        nodal, forces = self.minimiser(self.prescribed, self.constraints.targets)
+        return LoadState(fraction, fraction * nodal, np.zeros(0), fraction * forces)
 
     def _pressed_at_one_node(self, contact: CylinderContact, fraction: float) -> LoadState:
         rest = replace(self.rest, fraction=fraction)
