@@ -79,15 +79,18 @@
     return a.localeCompare(b);
   }
 
-  // Sorts the first body; rows below it, as of a paper, stay. Cells without a value come last either way.
+  // Sorts each body; names of groups and rows of the paper stay. Cells without a value come last either way.
   function sort(table, column, head) {
     const falling = head.getAttribute("aria-sort") === "ascending";
     for (const cell of table.tHead.querySelectorAll("[aria-sort]")) cell.setAttribute("aria-sort", "none");
     head.setAttribute("aria-sort", falling ? "descending" : "ascending");
     const empty = (text) => text === "" || text === "–";
-    const rows = [...table.tBodies[0].rows].map((row) => [words(row.cells[column]), row]);
-    rows.sort(([a], [b]) => empty(a) - empty(b) || (empty(a) ? 0 : compare(a, b) * (falling ? -1 : 1)));
-    table.tBodies[0].append(...rows.map(([, row]) => row));
+    for (const body of table.tBodies) {
+      const moved = [...body.rows].filter((row) => !row.matches(".group, .printed"));
+      const rows = moved.map((row) => [words(row.cells[column]), row]);
+      rows.sort(([a], [b]) => empty(a) - empty(b) || (empty(a) ? 0 : compare(a, b) * (falling ? -1 : 1)));
+      body.append(...rows.map(([, row]) => row));
+    }
   }
 
   function button(text, label, act) {

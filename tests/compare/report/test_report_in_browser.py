@@ -17,8 +17,13 @@ from compare.evaluation.evaluation import Evaluation
 from compare.figures import Picture
 from compare.figures.gallery import draw
 from compare.report.html_report import write_report
+from compare.runtime.html import write_page
+from compare.runtime.tables import TextTable
 from geometry.mesh.triangle_mesh import TriangleMesh
 from tests.compare.report.browser import SOFTWARE_WEBGL, TIMEOUT, Opened, chromium, opened
+
+TITLES = {"marker_errors": "Errors at the markers", "von_mises": "Von Mises stress"}
+"""Beginnings of the alternative texts of the pictures."""
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +49,7 @@ def written(
     followed = replace(failed, path=path, history={"load_fraction": fractions})
     comparison = compared(estimated, pinn, followed, given, truth=evaluate("fem-nonlinear", 1.05))
     pictures = []
-    for name in ("marker_errors", "von_mises"):
+    for name in TITLES:
         drawing = draw(comparison, name)
         picture = drawing.figure.save(folder / f"{name}.png")
         pictures.append(Picture(picture, drawing.title, drawing.caption, drawing.alt))
@@ -149,10 +154,21 @@ def test_the_page_complains_of_nothing_and_asks_for_nothing(desk: Opened, viewer
     assert desk.asked == []
 
 
-def test_every_picture_is_drawn(desk: Opened) -> None:
-    widths = desk.page.evaluate("[...document.images].map((image) => image.naturalWidth)")
-    assert len(widths) > 0
-    assert min(widths) > 0
+@pytest.mark.parametrize("name", ["marker_errors", "von_mises"])
+def test_a_picture_on_the_page_is_the_one_that_was_written(desk: Opened, written: Path, name: str) -> None:
+    """Its pixels, and its proportions, as the reader sees them."""
+    with Image.open(written.with_name(f"{name}.png")) as file:
+        picture = file.convert("RGB")
+    shown = desk.page.get_by_alt_text(re.compile(TITLES[name]))
+    shown.evaluate("(image) => { image.closest('details').open = true; }")  # the viewer folds them away
+    natural = shown.evaluate("(image) => [image.naturalWidth, image.naturalHeight]")
+    assert tuple(natural) == picture.size
+    box = shown.evaluate("(image) => [image.clientWidth, image.clientHeight]")
+    assert box[0] > 400
+    assert box[1] / box[0] == pytest.approx(picture.height / picture.width, rel=0.01)
+    seen = Image.open(io.BytesIO(shown.screenshot())).convert("RGB").resize((64, 64))
+    off = np.abs(np.asarray(seen, dtype=int) - np.asarray(picture.resize((64, 64)), dtype=int))
+    assert off.mean() < 5
 
 
 def test_nothing_is_wider_than_a_phone(desk: Opened) -> None:
@@ -182,6 +198,25 @@ def test_a_table_is_sorted_by_a_key(desk: Opened) -> None:
     assert values == sorted(values, reverse=True)
     assert sorted(column(desk, 1)) == sorted(before)
     assert column(desk, 1) != before
+
+
+def test_rows_are_sorted_below_the_name_of_their_group(browser: Browser, tmp_path: Path) -> None:
+    rows = [["front", ""], ["gp", "2"], ["fem", "1"], ["joints", ""], ["gp", "4"], ["fem", "3"]]
+    table = TextTable("Errors", ["solver", "error"], rows)
+    page = write_page(
+        tmp_path / "page.html",
+        "designs.html.j2",
+        title="",
+        sentences=[],
+        tables=[table],
+        pictures={},
+        note="",
+    )
+    shown = opened(browser, page).page
+    shown.locator("th .sort").nth(1).click()
+    names = [text.strip() for text in shown.locator("tbody th").all_inner_texts()]
+    assert names == ["front", "fem", "gp", "joints", "fem", "gp"]
+    shown.close()
 
 
 def test_a_table_is_copied_as_csv_and_latex(desk: Opened) -> None:

@@ -1,0 +1,301 @@
+"""The command: its files, what it says of several layouts and truths, and what it refuses."""
+
+import csv
+import json
+import re
+import shlex
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from compare.crossval.cross_validation import cross_validate
+from compare.crossval.folds import ALL, ONE
+from compare.crossval.study import CrossvalStudy, solver_variants
+from geometry.errors import UserError
+from geometry.finger.design import Design
+from geometry.mesh.settings import MeshSettings
+from pinnray.cli import main
+from solvers.fem.linear import FemSolver
+from solvers.problem import Load, Material, Problem
+from solvers.registry import BUILT_IN, make_solver
+from solvers.solution import Solution, Status
+from solvers.solver import Progress, silent
+from tests.compare.crossval.conftest import NOISE
+from tests.solvers.conftest import observed_at
+from vision.measurements import write_measurements
+
+
+def run(line: str, out: Path) -> int:
+    return main([*shlex.split(f"crossval {line} --mesh-size 1"), "--out", str(out)])
+
+
+def layouts_of(out: Path, truth: str = "sliding") -> dict[str, Any]:
+    """The layouts of a truth in `crossval.json`."""
+    return json.loads((out / "crossval.json").read_text())["truths"][truth]["layouts"]
+
+
+def rows_of(file: Path, *keys: str) -> dict[tuple[str, ...], dict[str, str]]:
+    """The rows of a CSV file by some of their cells."""
+    with file.open() as opened:
+        return {tuple(row[key] for key in keys): row for row in csv.DictReader(opened)}
+
+
+@pytest.mark.slow
+def test_the_command_writes_what_the_guide_says_and_goes_on(tmp_path, capsys, in_line):
+    line = "--solvers fem,gp,fem-asm --schemes tip-out --solver-set fem-asm.choose=given"
+    assert run(f"{line} --seeds 1 --pictures pdf", tmp_path) == 0
+    assert {path.name for path in tmp_path.glob("*.pdf")} == {"fields.pdf", "l_curve.pdf"}
+    said = " ".join(capsys.readouterr().out.split())
+    assert "the third of the markers nearest the tip held out together; simulated markers, mm" in said
+    joints = layouts_of(tmp_path)["joints"]
+    assert list(joints["solvers"]) == ["fem", "gp", "fem-asm"]
+    assert joints["solvers"]["fem"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["low"] is None
+    before = joints["solvers"]["gp"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["mean"]
+    assert "simulated by fem-nonlinear" in joints["measurements"]["description"]
+    curve = rows_of(tmp_path / "l_curve.csv", "truth", "layout")
+    assert list(curve) == [("sliding", "joints")]
+
+    assert run(f"{line} --seeds 2", tmp_path) == 0
+    assert not [*tmp_path.glob("*.pdf")]  # of the earlier study
+    solvers = layouts_of(tmp_path)["joints"]["solvers"]
+    against = solvers["fem-asm"]["against"]["fem"]["tip-out"]
+    assert (against["mae_sum"]["verdict"], against["von_mises"]["verdict"]) == ("better", "worse")
+    predictions, stresses = json.loads((tmp_path / "crossval.json").read_text())["answers"].values()
+    assert predictions == [
+        f"{label} against {baseline}: {schemes['tip-out']['mae_sum']['verdict']} in tip-out."
+        for label in ("gp", "fem-asm")
+        for baseline, schemes in solvers[label]["against"].items()
+    ]
+    assert any("von Mises stress" in sentence for sentence in stresses)
+    rows = rows_of(tmp_path / "held_out.csv", "solver", "scheme")
+    mean = solvers["gp"]["schemes"]["tip-out"]["held_out"]["mae_sum"]["mean"]
+    assert float(rows["gp", "tip-out"]["held_out_mae_sum_mm"]) == mean != before
+    assert rows["fem", "all"]["in_sample_mae_sum_mm"] == ""
+
+    assert run(f"{line} --seeds 1 --noise 0.02", tmp_path) == 2
+    assert "holds a cross-validation with other settings (noise_mm)" in capsys.readouterr().err
+
+
+def test_layouts_sample_one_truth_and_stay_apart(tmp_path, capsys, in_line):
+    """`fem` has one field, so its distance from the truth is the same; its errors at markers are not."""
+    line = "--solvers fem,gp --schemes one-out --seeds 1"
+    assert run(f"{line} --layouts front,joints", tmp_path) == 0
+    said = capsys.readouterr().out
+    assert all(f"markers: {layout}" in said for layout in ("front", "joints"))
+    rows = rows_of(tmp_path / "held_out.csv", "layout", "solver", "scheme")
+    assert list(rows)[::4] == [("front", "fem", "all"), ("joints", "fem", "all")]
+    layouts = layouts_of(tmp_path)
+    errors, fields = (
+        [float(layouts[name]["solvers"]["fem"]["schemes"][ONE][kind][what]["mean"]) for name in layouts]
+        for kind, what in (("held_out", "mae_v"), ("fields", "displacement"))
+    )
+    assert fields[0] == pytest.approx(fields[1], rel=1e-9)
+    assert errors == pytest.approx([0.43, 0.53], abs=0.02)  # where the front wall alone is seen, and all
+    assert "Do these verdicts depend on the layout of the markers?" in (tmp_path / "report.html").read_text()
+
+    # One layout alone reuses its folds, and has what it had beside the other.
+    kept = tmp_path / "runs" / "sliding" / "front" / "gp" / "seed-0.json"
+    before = kept.stat().st_mtime_ns
+    assert run(f"{line} --layouts front", tmp_path) == 0
+    assert kept.stat().st_mtime_ns == before
+    assert layouts_of(tmp_path) == {"front": layouts["front"]}
+
+
+def test_solvers_are_judged_by_several_truths(tmp_path, capsys, in_line):
+    """`fem` has one field: the same error in all truths would mean that there is one."""
+    line = "--truth cylinder,base --solvers fem,gp --schemes one-out --seeds 1"
+    assert run(line, tmp_path) == 0
+    said = capsys.readouterr().out
+    assert all(len(each) <= 80 for each in said.splitlines() if not each.startswith(str(tmp_path)))
+    words = " ".join(said.split())
+    assert "solver cylinder base" in words
+    assert "fem against gp: worse with every truth in held-out error; better with every truth in" in words
+    assert "base: other law, walls and load than every solver" in words
+    rows = rows_of(tmp_path / "truths.csv", "truth", "solver")
+    assert list(rows) == [(truth, name) for truth in ("cylinder", "base") for name in ("fem", "gp")]
+    assert rows["cylinder", "fem"]["mae_sum_against_gp"] == "worse"
+    content = json.loads((tmp_path / "crossval.json").read_text())
+    assert content["schema"] == 3
+    for (truth, name), row in rows.items():
+        each, contact = content["truths"][truth]["layouts"]["joints"], content["truths"][truth]["contact"]
+        schemes = each["solvers"][name]["schemes"]
+        assert float(row["true_force_N_mm"]) == contact["true_force_N_mm"]
+        assert float(row["held_out_mae_sum_mm"]) == schemes[ONE]["held_out"]["mae_sum"]["mean"]
+        assert float(row["force_error"]) == schemes[ALL]["force"]["mean"]
+        assert ("cylinder" in each["measurements"]["description"]) == (truth == "cylinder")
+    forces = [float(rows[truth, "fem"]["force_error"]) for truth in ("cylinder", "base")]
+    assert abs(forces[0] - forces[1]) > 0.05
+    names = [f"{name}-{truth}.png" for name in ("fields", "held_out") for truth in ("base", "cylinder")]
+    assert sorted(path.name for path in tmp_path.glob("*.png")) == names
+    report = (tmp_path / "report.html").read_text()
+    assert "Truth: cylinder" in report
+    assert "With which truths is a solver better" in report
+
+    assert run(line.replace("cylinder,base", "base"), tmp_path) == 0
+    assert layouts_of(tmp_path, "base") == content["truths"]["base"]["layouts"]
+    assert sorted(path.name for path in tmp_path.glob("*.png")) == ["fields.png", "held_out.png"]
+
+
+@pytest.mark.slow
+def test_force_and_place_that_a_solver_identifies_are_near_those_of_the_truth(tmp_path, in_line):
+    """At finite strain `fem-id` finds both from the markers, and says how well."""
+    assert run("--truth cylinder --solvers fem-id --schemes tip-out --seeds 1", tmp_path) == 0
+    (row,) = rows_of(tmp_path / "truths.csv", "solver").values()
+    assert abs(float(row["force_error"])) < 0.05
+    assert abs(float(row["position_error_mm"])) < 0.5
+    assert float(row["von_mises_within_stated"]) > 0.5  # on a mesh whose own error is 4 % of the stress
+    assert {row["force_within_stated"], row["position_within_stated"]} <= {"0.0", "1.0"}
+
+
+def test_measured_markers_have_no_truth(tmp_path, capsys, in_line, observations):
+    file, out = tmp_path / "markers.csv", tmp_path / "out"
+    write_measurements(file, replace(observations, simulated=False, visible=np.arange(9) != 4))
+    assert run(f"--measurements {file} --solvers fem,gp --schemes one-out,load-out --seeds 1", out) == 0
+    printed = capsys.readouterr()
+    assert "load-out needs a truth at other loads, and is skipped" in printed.err
+    assert str(out / "held_out.csv") in printed.out
+    assert "fields.csv" not in printed.out
+    assert list(json.loads((out / "crossval.json").read_text())["schemes"]) == ["all", "one-out"]
+    gp = layouts_of(out, "measured")["measured"]["solvers"]["gp"]["schemes"]["one-out"]
+    assert (len(gp["per_marker"]), gp["fields"]) == (8, {})
+    assert not [*out.glob("fields.*")]
+
+
+class Stopped(FemSolver):
+    """`fem`, which says that it was not finished."""
+
+    name = "stopped"
+
+    def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
+        return replace(super().solve(problem), status=Status(False, "stopped early; take more epochs"))
+
+
+def test_what_speaks_against_a_result_is_said_everywhere(tmp_path, capsys, monkeypatch, in_line, truth):
+    """A body that goes through itself, a solver that did not converge, and a modulus in pascals."""
+    monkeypatch.setitem(BUILT_IN, "stopped", f"{__name__}:Stopped")
+    points = truth.problem.mesh.markers
+    file, out = tmp_path / "markers.csv", tmp_path / "out"
+    write_measurements(
+        file, replace(observed_at(points, 6 * truth.displacement(points), NOISE), simulated=False)
+    )
+    line = f"--measurements {file} --solvers fem,stopped --schemes tip-out --seeds 1"
+    assert run(f"{line} --stroke 60 --young 1e6", out) == 3
+    printed = " ".join(capsys.readouterr().err.split())
+    assert "Young's modulus of 1e+06 MPa is no rubber's or plastic's; this looks like pascals" in printed
+    page = (out / "report.html").read_text()
+    through = "2 of 2 folds and seeds, the first of them: {0}: THE BODY GOES THROUGH ITSELF"
+    said = [f"{name}, {through.format(name)}" for name in ("fem", "stopped")]
+    for text in (*said, "did not converge: stopped early"):
+        assert text in printed
+        assert text in page
+    assert len(layouts_of(out, "measured")["measured"]["remarks"]) == 2
+
+
+def test_simulated_markers_of_a_file_are_called_simulated_everywhere(
+    tmp_path, capsys, monkeypatch, in_line, observations
+):
+    headings = []
+    monkeypatch.setattr("compare.crossval.charts.write_heading", lambda _, *texts: headings.extend(texts))
+    file, out = tmp_path / "markers.csv", tmp_path / "out"
+    write_measurements(file, replace(observations, simulated=True, source="made up"))
+    assert run(f"--measurements {file} --solvers fem,gp --schemes one-out --seeds 1", out) == 0
+    printed = capsys.readouterr()
+    assert "simulated markers, mm" in " ".join(printed.out.split())
+    assert "against simulated displacements" in " ".join(headings)
+    assert "displacements are simulated: made up." in (out / "report.html").read_text()
+    written = [path for path in out.rglob("*") if path.suffix in (".json", ".csv", ".html")]
+    assert len(written) > 5
+    for path in written:
+        assert "measured" not in str(path.relative_to(tmp_path)), path
+        assert not re.search(r"\bmeasured\b", path.read_text()), path
+    for name in ("held_out.csv", "folds.csv"):
+        assert set(rows_of(out / name, "truth", "layout")) == {("simulated", "simulated")}, name
+    assert "measured" not in printed.out + printed.err
+
+
+@pytest.mark.filterwarnings("default:cannot write to the cache folder")
+def test_a_cache_that_cannot_be_written_is_a_warning_and_the_study_keeps_its_truths(
+    tmp_path, capsys, monkeypatch, in_line
+):
+    (tmp_path / "cache").touch()  # a file, not a folder
+    monkeypatch.setenv("PINNRAY_CACHE", str(tmp_path / "cache"))
+    line, out = "--solvers gp --schemes one-out --seeds 1", tmp_path / "out"
+    assert run(line, out) == 0
+    said = r"warning: cannot write to the cache folder .*cache \(File exists\), so that the virtual exp"
+    assert re.search(said, capsys.readouterr().err)
+    (kept,) = (out / "truths").iterdir()
+    before = kept.stat().st_mtime_ns
+    assert run(line, out) == 0
+    assert kept.stat().st_mtime_ns == before
+    assert "virtual experiment" not in capsys.readouterr().err
+
+
+def test_a_study_runs_from_python_and_prints_nothing(tmp_path, capsys, in_line, observations):
+    study = CrossvalStudy(
+        design=Design(),
+        variants=solver_variants([make_solver("gp")], Material()),
+        out=tmp_path / "out",
+        mesh=MeshSettings(size=1.0),
+        schemes=[ONE],
+        seeds=1,
+        measurements=replace(observations, simulated=False),
+    )
+    result = cross_validate(study)
+    assert capsys.readouterr() == ("", "")
+    row = result.table().loc["measured", "measured", "gp", ONE]
+    assert (
+        row["held_out_mae_sum_mm"]
+        == result.cases["measured", "measured"].scores["gp"][ONE].held_out["mae_sum"].mean
+    )
+    assert np.isnan(row["from_fem_mean_mm"])  # fem is not in the study
+    with pytest.raises(UserError, match="there is no scheme 'two-out'"):
+        cross_validate(replace(study, schemes=["two-out"]))
+    with pytest.raises(UserError, match="a truth is for a simulated experiment"):
+        cross_validate(replace(study, truths=["stvk"]))
+    pulled = replace(study, measurements=None, truths=["mixed"], load=Load(displacement=(1.0, 0.0)))
+    with pytest.raises(UserError, match="truth mixed: a cylinder presses on the finger: prescribe a v"):
+        cross_validate(pulled)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("--seeds 0", "seeds 0: give a whole number from 1"),
+        ("--noise -1", "noise -1: give a standard deviation of zero or more"),
+        ("--schemes tip", "there is no scheme 'tip'; there are one-out, tip-out, random, load-out"),
+        ("--load patch --solvers fem,gp", "load-out presses elsewhere on the same mesh"),
+        ("--solvers fem,fem", "a solver is named twice: fem, fem"),
+        ("--measurements nowhere.csv", "there is no file nowhere.csv"),
+        ("--layouts front,back", "marker_layout = 'back': input should be 'front' or 'joints'"),
+        ("--truth tip", "there is no truth 'tip'; there are all, sliding, stvk, gent, print, base, cylinder"),
+        ("--truth base,base", "truth: name at least one of sliding, stvk, gent, print, base, cylinder"),
+        ("--layouts front,front", "layouts: a layout is named twice: front, front"),
+        ("--layouts joints --set rib_count=0 --set name=plain", "needs 3 markers, not the 1 of the layout"),
+    ],
+)
+def test_bad_input_is_one_line(tmp_path, capsys, line, said):
+    assert run(line, tmp_path / "out") == 2
+    (error,) = [text for text in capsys.readouterr().err.splitlines() if text.startswith("error")]
+    assert said in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_solver_that_chooses_its_weights_is_there_in_three_ways():
+    from pinnray.commands.comparison.crossval import read_variants
+    from pinnray.options.shared import SolverOptions
+
+    variants = read_variants(SolverOptions(), "fem,fem-asm", Material())
+    assert [variant.label for variant in variants] == [
+        "fem",
+        "fem-asm",
+        "fem-asm left-out",
+        "fem-asm evidence",
+    ]
+    assert [variant.settings.get("choose") for variant in variants] == [None, "given", "left-out", "evidence"]
+    fixed = SolverOptions(solver_set=("fem-asm.choose=left-out",))
+    assert [variant.label for variant in read_variants(fixed, "fem-asm", Material())] == ["fem-asm"]
+    stiff = Material(law="neo-hookean")  # for which there is nothing to choose
+    assert [variant.label for variant in read_variants(SolverOptions(), "fem-asm", stiff)] == ["fem-asm"]

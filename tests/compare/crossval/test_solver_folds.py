@@ -1,0 +1,226 @@
+"""A solver in folds: it does not see what is held out; finished folds are kept."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compare.crossval.folds import ALL, LOAD, ONE, RANDOM, Fold, FoldResult, LoadCase
+from compare.crossval.scores import score
+from compare.crossval.solver_folds import SolverTask, run_folds, sweep_weights
+from compare.crossval.study import CrossvalStudy, SolverVariant
+from compare.crossval.true_fields import FieldSampler, TrueContact, TrueField
+from geometry.arrays import FloatArray
+from geometry.finger.design import Design
+from geometry.mesh.point_location import LocatedPoints
+from geometry.mesh.quadrature import body_quadrature
+from geometry.mesh.triangle_mesh import TriangleMesh
+from geometry.observations import Observations
+from solvers.assimilation.misfit import misfit_of
+from solvers.problem import Load, Material, Problem
+from solvers.registry import make_solver
+from solvers.solution import Estimated, IdentifiedForce, Solution, State, Uncertainty
+from tests.compare.crossval.conftest import NOISE
+
+QUICK = {"degree": 1, "law": "given", "parameters": "normal_force,position"}
+SETTINGS: dict[str, dict[str, object]] = {"gp": {}, "fem-id": QUICK}
+"""Settings other than linear elements."""
+
+
+@pytest.fixture
+def task(
+    tmp_path: Path, coarse_mesh: TriangleMesh, truth: Solution, observations: Observations
+) -> SolverTask:
+    """`gp` and one fold of each kind, at the full load and half of it."""
+    coarse_mesh.save(tmp_path / "mesh.npz")
+    sampled = FieldSampler.of(coarse_mesh, coarse_mesh.markers, 0.8).of_solution(truth, coarse_mesh)
+    paths = [tmp_path / f"truth-{share}.npz" for share in (1.0, 0.5)]
+    for path, share in zip(paths, (1.0, 0.5), strict=True):
+        u, v = (share * truth.reaction).tolist()
+        TrueField(sampled * share, TrueContact((u, v), 35.0, 34.0, 2.0)).save(path)
+    half = replace(observations, displacements=0.5 * observations.displacements)
+    return SolverTask(
+        study=CrossvalStudy(design=Design(), variants=[], out=tmp_path),
+        layout="joints",
+        variant=variant("gp"),
+        load_cases=[
+            LoadCase("full", Load(), 1.0, 35.0),
+            LoadCase("half", Load(displacement=(0.0, -5.0)), 0.5, 35.0),
+        ],
+        truths=paths,
+        observations=[[observations, half]],
+        folds=[Fold(ALL, "all", ()), Fold(ONE, "marker 4", (3,)), Fold(LOAD, "half", (), 1)],
+    )
+
+
+def variant(name: str, **settings: object) -> SolverVariant:
+    return SolverVariant(name, name, make_solver(name, **settings).settings())
+
+
+def judged(task: SolverTask) -> list[FoldResult]:
+    (outcomes,) = run_folds(task)
+    return outcomes
+
+
+@pytest.mark.parametrize("name", ["gp", "fem-asm", "fem-id", "statfem"])
+def test_predictions_do_not_depend_on_what_is_held_out(task, observations, name):
+    """A marker that is held out is moved by 5 mm: so is its error, and no prediction changes."""
+    fold = Fold(ONE, "marker 4", (3,))
+    settings = SETTINGS.get(name, {"degree": 1})
+    if name == "fem-asm":
+        settings = {**settings, "weights": "precision", "choose": "left-out"}
+    own = replace(task, variant=variant(name, **settings), folds=[fold])
+    moved = observations.displacements.copy()
+    moved[3] += [5.0, -5.0]
+    other = replace(observations, displacements=moved)
+    before = judged(own)[0]
+    relabelled = replace(own.variant, label="moved")  # so that the kept folds are not taken
+    after = judged(replace(own, variant=relabelled, observations=[[other, other]]))[0]
+    change = np.zeros((9, 2))
+    change[3] = [-5.0, 5.0]
+    np.testing.assert_allclose(np.array(after.errors) - before.errors, change, atol=1e-12)
+    assert after.fields == before.fields
+
+
+@pytest.mark.parametrize("name", ["gp", "fem-asm", "statfem"])
+def test_a_fold_is_the_solver_s_own_solution_without_what_is_held_out(
+    task, coarse_mesh, observations, truth, name
+):
+    """By `solve`, with what the command shares between folds left aside; errors and distances by hand."""
+    held = (1, 3)
+    settings = SETTINGS.get(name, {"degree": 1})
+    folds = [Fold(ALL, "all", ()), Fold(RANDOM, "draw 1", held)]  # the second one finds shared work
+    _, outcome = judged(replace(task, variant=variant(name, **settings), folds=folds))
+    visible = ~np.isin(np.arange(9), held)
+    problem = Problem(coarse_mesh, observations=replace(observations, visible=visible))
+    solution = make_solver(name, **settings).solve(problem)
+    disc = misfit_of(Problem(coarse_mesh, observations=observations))
+    points, means = disc.sampling()
+    np.testing.assert_allclose(
+        outcome.errors, means @ solution.displacement(points) - observations.displacements, atol=1e-7
+    )
+    rule = body_quadrature(coarse_mesh)
+    mine, true = (each.displacement(rule.location) for each in (solution, truth))
+    squares = [(rule.weights[:, None] * values**2).sum() for values in (mine - true, true)]
+    assert outcome.fields["displacement"] == pytest.approx(np.sqrt(squares[0] / squares[1]), rel=1e-6)
+    finite = replace(truth.problem, material=Material(law="neo-hookean"))
+    true = State.from_gradient(truth.field.gradient(rule.location), finite).von_mises
+    mine = solution.state(rule.location).von_mises
+    squares = [(rule.weights * values**2).sum() for values in (mine - true, true)]
+    assert outcome.fields["von_mises"] == pytest.approx(np.sqrt(squares[0] / squares[1]), rel=1e-6)
+    if name in ("gp", "statfem"):
+        spread = solution.field.standard_deviation(coarse_mesh.locate(observations.points))
+        np.testing.assert_allclose(outcome.deviations, np.hypot(spread, NOISE), rtol=1e-5)
+    else:
+        assert outcome.deviations is None
+
+
+@pytest.mark.parametrize("name", ["gp", "fem-asm", "statfem"])
+def test_what_was_learnt_is_carried_to_half_the_load(task, name):
+    """All of it is linear, and so is this truth: half the load has half the errors."""
+    settings = SETTINGS.get(name, {"degree": 1})
+    outcomes = judged(replace(task, variant=variant(name, **settings)))
+    np.testing.assert_allclose(outcomes[2].errors, 0.5 * np.array(outcomes[0].errors), atol=1e-6)
+    assert outcomes[2].held == list(range(9))
+    assert len(outcomes[2].in_sample) == 0
+    assert outcomes[2].fields["displacement"] == pytest.approx(outcomes[0].fields["displacement"], rel=1e-5)
+
+
+def test_an_identified_finger_is_carried_to_half_the_load(task, coarse_mesh, observations):
+    """By the solver's own `transferred`."""
+    solver = make_solver("fem-id", **SETTINGS["fem-id"])
+    own = replace(task, variant=variant("fem-id", **SETTINGS["fem-id"]), folds=[Fold(LOAD, "half", (), 1)])
+    (outcome,) = judged(own)
+    problem = Problem(coarse_mesh, Material(law="neo-hookean"), observations=observations)
+    half = replace(problem, load=task.load_cases[1].load)
+    carried = solver.transferred(solver.solve(problem), problem, half)
+    points, means = misfit_of(problem).sampling()
+    errors = means @ carried.displacement_in_space(points) - 0.5 * observations.displacements
+    np.testing.assert_allclose(outcome.errors, errors, atol=1e-6)
+
+
+def test_a_solver_that_is_given_nothing_has_nothing_in_sample(task):
+    outcomes = judged(replace(task, variant=variant("fem", degree=1, estimate=False)))
+    assert [len(outcome.in_sample) for outcome in outcomes] == [0, 0, 0]
+    assert [len(outcome.held_out) for outcome in outcomes] == [0, 1, 9]
+    assert outcomes[0].errors == outcomes[1].errors
+
+
+def deviation(location: LocatedPoints) -> FloatArray:
+    """The von Mises stress is known exactly near the base, and not at all elsewhere."""
+    return np.where(location.points[:, 0] < 30.0, 0.0, 1e9)
+
+
+def test_force_place_and_stated_intervals_are_judged_by_the_truth(task, coarse_mesh, truth, monkeypatch):
+    """The truth's own field with twice its force, a contact 1.5 mm off, and intervals by hand."""
+    force = float(np.linalg.norm(truth.reaction))
+    stating = replace(
+        truth,
+        reaction=2 * truth.reaction,
+        identified=IdentifiedForce(Estimated(force, 0.9 * force, 1.1 * force), Estimated(36.5, 35.5, 37.5)),
+        uncertainty=Uncertainty(lambda location: np.zeros_like(location.points), deviation),
+    )
+    monkeypatch.setattr("compare.crossval.solver_folds.refitter", lambda *_: lambda observations: stating)
+    full, one, _ = judged(task)
+    assert full.force == pytest.approx(1.0)
+    assert full.position == pytest.approx(1.5)
+    assert full.force_within is True
+    assert full.position_within is False
+    rule = body_quadrature(coarse_mesh)
+    beyond = rule.location.points[:, 0] >= 30.0  # the linear stress is nowhere exactly the neo-Hookean one
+    assert full.von_mises_coverage == pytest.approx(np.average(beyond, weights=rule.weights), abs=1e-12)
+    assert (one.force, one.force_within, one.von_mises_coverage) == (None, None, None)
+    found = score([[full]])
+    assert found.force.mean == pytest.approx(1.0)
+    assert (found.force_within, found.position_within) == (1.0, 0.0)
+
+
+def test_the_stress_is_that_of_the_material_that_a_solver_has_found(task, truth, monkeypatch):
+    softer = replace(truth.problem, material=Material(young=5.7))
+    monkeypatch.setattr(
+        "compare.crossval.solver_folds.refitter", lambda *_: lambda _: replace(truth, problem=softer)
+    )
+    halved = judged(task)[0].fields
+    monkeypatch.setattr("compare.crossval.solver_folds.refitter", lambda *_: lambda _: truth)
+    own = judged(replace(task, variant=replace(task.variant, label="own")))[0].fields
+    assert halved["displacement"] == own["displacement"]
+    assert halved["von_mises"] > own["von_mises"] + 0.1  # 0.69 and 0.48
+
+
+def test_finished_folds_are_kept_and_those_of_other_settings_are_not(task, monkeypatch):
+    first = judged(task)
+
+    def again(*_: object) -> None:
+        raise RuntimeError("solved again")
+
+    monkeypatch.setattr("compare.crossval.solver_folds.refitter", again)
+    assert [outcome.errors for outcome in judged(task)] == [outcome.errors for outcome in first]
+    with pytest.raises(RuntimeError, match="solved again"):
+        judged(replace(task, variant=variant("gp", clamp=True)))
+
+
+def test_the_curve_of_weights_is_what_solving_again_with_them_gives(task, coarse_mesh, observations):
+    own = replace(task, variant=variant("fem-asm", degree=1))
+    curve = sweep_weights(own)
+    number = 24
+    assert curve["factor"][number] == pytest.approx(1e-3)
+    (outcome,) = judged(
+        replace(own, variant=variant("fem-asm", degree=1, asm_weight=1.0), folds=[Fold(ALL, "all", ())])
+    )
+    missed = np.sqrt((np.array(outcome.errors) ** 2).mean())
+    assert curve["in_sample_mm"][number] == pytest.approx(missed, rel=1e-6)
+    assert {name: curve[name][number] for name in outcome.fields} == pytest.approx(
+        outcome.fields, nan_ok=True
+    )
+
+
+def test_an_error_that_is_no_number_is_in_no_mean(task, monkeypatch):
+    """A displacement that is not finite at the markers alone, where no mesh node is."""
+    monkeypatch.setattr(
+        "compare.crossval.solver_folds.FieldSampler.of_solution",
+        lambda *_: replace(TrueField.load(task.truths[0]).sampled, markers=np.full((9, 2), np.nan)),
+    )
+    assert run_folds(replace(task, variant=variant("fem"))) == (
+        "fem: its displacement is not finite at every marker"
+    )
