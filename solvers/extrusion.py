@@ -12,6 +12,7 @@ middles: a lattice.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -30,6 +31,7 @@ class ExtrudedSpace:
     section: LagrangeSpace  # Quadratic elements on the shared mesh
     faces: FloatArray  # Places of the layers' faces, from 0 to half of the depth, shape (layers + 1,), mm
     held: bool = False  # Whether the side faces cannot move along z, so that the body is in plane strain
+    degree: ClassVar[int] = 2
 
     @classmethod
     def of(cls, mesh: TriangleMesh, layers: int, grading: float, held: bool = False) -> "ExtrudedSpace":
@@ -45,11 +47,6 @@ class ExtrudedSpace:
     def mesh(self) -> TriangleMesh:
         """The section's mesh."""
         return self.section.mesh
-
-    @property
-    def degree(self) -> int:
-        """Degree of the elements, 2."""
-        return self.section.degree
 
     @property
     def thickness(self) -> float:

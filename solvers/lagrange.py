@@ -6,6 +6,7 @@ finite-element solution is an array that does not depend on how they number thin
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -27,6 +28,8 @@ class LagrangeSpace:
 
     mesh: TriangleMesh
     degree: int  # 1 or 2
+    thickness: ClassVar[float] = 1.0  # By which integrals are divided, mm, as they are per depth
+    shares: ClassVar[FloatArray] = np.ones(1)  # Weights in a mean over the levels of an extrusion, here one
 
     @cached_property
     def nodes(self) -> FloatArray:
@@ -46,19 +49,9 @@ class LagrangeSpace:
         return np.arange(len(self.mesh.points))
 
     @property
-    def thickness(self) -> float:
-        """Extent out of the plane by which integrals are divided: 1 mm, as they are per depth."""
-        return 1.0
-
-    @property
     def section(self) -> "LagrangeSpace":
         """Itself."""
         return self
-
-    @property
-    def shares(self) -> FloatArray:
-        """Weights in a mean over the levels of an extrusion: one level, shape (1,)."""
-        return np.ones(1)
 
     @property
     def mirrored(self) -> BoolArray:

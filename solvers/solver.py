@@ -80,6 +80,10 @@ class FieldSettings:
     """Base of our solvers: frozen dataclasses whose fields are their settings."""
 
     name: ClassVar[str]
+    family: ClassVar[Family]
+    laws: ClassVar[tuple[str, ...]]
+    loads: ClassVar[tuple[str, ...]]
+    assimilates: ClassVar[bool] = False
     preset: ClassVar[str | None] = None  # Of a solver that is one preset of several
 
     def settings(self) -> dict[str, object]:
@@ -100,10 +104,16 @@ class FieldSettings:
             if (value := getattr(self, name)) is not None and not 0 <= value < inf:
                 raise UserError(f"{self.name}: {name} must be zero or more, got {value}")
 
-    def check_degree(self, degree: int) -> None:
-        """Raise a `UserError` unless there are elements of a degree."""
-        if degree not in (1, 2):
-            raise UserError(f"{self.name} has elements of degree 1 and 2, not {degree}")
+
+@dataclass(frozen=True)
+class ElementSettings(FieldSettings):
+    """Settings of a solver by Lagrange elements."""
+
+    degree: int = 2  # Of the elements, 1 or 2
+
+    def __post_init__(self) -> None:
+        if self.degree not in (1, 2):
+            raise UserError(f"{self.name} has elements of degree 1 and 2, not {self.degree}")
 
 
 @dataclass(frozen=True)

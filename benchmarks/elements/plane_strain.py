@@ -157,7 +157,7 @@ def missed(plane: Solution, solid: Solution, face: str) -> tuple[float, ...]:
     """Errors on a face: mean and worst at the markers, mm; relative in displacement and von Mises stress."""
     if not isinstance(solid.field, FaceField):
         raise TypeError("the solution in three dimensions has no faces")
-    there, mesh = replace(solid, field=solid.field.on(face)), solid.problem.mesh
+    there, mesh = replace(solid, field=replace(solid.field, face=face)), solid.problem.mesh
     rule = body_quadrature(mesh)
     gaps = plane.displacement(mesh.markers) - there.displacement(mesh.markers)
     relative = (

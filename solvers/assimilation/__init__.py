@@ -1,4 +1,1 @@
-"""Shared parts of assimilating solvers: misfit to the markers, marker forces, weights, parameter estimation.
-
-Imports the problem, the solution and the solver interface; no finite elements, no networks.
-"""
+"""Misfit to the markers, marker forces, weights, parameter estimation; no finite elements, no networks."""

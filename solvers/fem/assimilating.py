@@ -10,7 +10,6 @@ solution without its two springs and, where that does not converge, from rest.
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from geometry.errors import UserError
 from geometry.observations import Observations
 from solvers.assimilation.marker_forces import MarkerForces, residual_phrase
 from solvers.assimilation.marker_weighting import MarkerWeighting
-from solvers.assimilation.misfit import Choice, Misfit, Weighting, leave_one_out_displacements
+from solvers.assimilation.misfit import MarkerSettings, Misfit, leave_one_out_displacements
 from solvers.constrained_elimination import ConstrainedElimination
 from solvers.fem.boundary_conditions import DisplacementConstraints, reaction_by_residual_work
 from solvers.fem.equilibrium import DiscreteEquilibrium
@@ -30,7 +29,7 @@ from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import Solution, Status
-from solvers.solver import Family, FieldSettings, Progress, check_problem, silent
+from solvers.solver import ElementSettings, Progress, check_problem, silent
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,28 +59,19 @@ class MarkerCompliance:
 
 
 @dataclass(frozen=True)
-class FemAsmSolver(FieldSettings):
+class FemAsmSolver(MarkerSettings, ElementSettings):
     """`fem` with the markers' misfit: one factorisation, and one solve for each component of a marker.
 
-    For a law of finite strain it is `fem-nonlinear` with the misfit, solved again without each marker. The
-    settings of the misfit are explained in `MarkerSettings`.
+    For a law of finite strain it is `fem-nonlinear` with the misfit, solved again without each marker.
     """
 
-    degree: int = 2  # Of the elements, 1 or 2
-    weights: Weighting = "paper"
-    asm_weight: float = 1000.0
-    scale: float = 1.0
-    marker_radius: float | None = None
-    contact_deviation: float = 0.0
-    choose: Choice = "given"
-    name: ClassVar[str] = "fem-asm"
-    family: ClassVar[Family] = "finite elements"
-    laws: ClassVar[tuple[str, ...]] = FemSolver.laws + FemNonlinearSolver.laws
-    loads: ClassVar[tuple[str, ...]] = FemSolver.loads
-    assimilates: ClassVar[bool] = True
+    name = "fem-asm"
+    family = "finite elements"
+    laws = FemSolver.laws + FemNonlinearSolver.laws
+    loads = FemSolver.loads
 
     def __post_init__(self) -> None:
-        self.check_degree(self.degree)
+        super().__post_init__()
         _ = self.weighting
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:

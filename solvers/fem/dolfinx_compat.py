@@ -31,7 +31,7 @@ with chdir(Path(dolfinx.__file__).parent):
     for package in (dolfinx.jit, ffcx):
         (getattr(package, "get_options", None) or package.get_parameters)()  # until 0.5
 
-EDGES = {
+DOLFINX_EDGES = {
     2: np.array([[1, 2], [0, 2], [0, 1]]),
     3: np.array([[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]]),
 }
@@ -66,14 +66,14 @@ def _vector_space(mesh: Any, degree: int) -> Any:
 def _nodes_of_dofs(space: NodalSpace, domain: Any, dolfinx_space: Any) -> IntArray:
     """The node of the `NodalSpace` at every blocked degree of freedom of this rank.
 
-    A cell of DOLFINx has its degrees of freedom at its corners and, for degree 2, at the middles of `EDGES`.
+    A cell of DOLFINx has them at its corners and, for degree 2, at the middles of `DOLFINX_EDGES`.
     """
     dimension = space.nodes.shape[1]
     geometry = domain.geometry
     table = geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap  # until 0.10
     nodes = space.vertices[np.asarray(geometry.input_global_indices)[_rows(table, dimension + 1)]]
     if space.degree == 2:
-        nodes = np.concatenate([nodes, space.edge_nodes(nodes[:, EDGES[dimension]])], axis=1)
+        nodes = np.concatenate([nodes, space.edge_nodes(nodes[:, DOLFINX_EDGES[dimension]])], axis=1)
     positions = dolfinx_space.tabulate_dof_coordinates()[:, :dimension]
     node_of_dof = np.zeros(len(positions), dtype=np.int64)
     node_of_dof[_rows(dolfinx_space.dofmap.list, nodes.shape[1])] = nodes
@@ -87,10 +87,10 @@ def _rows(table: Any, width: int) -> IntArray:
     return np.asarray(getattr(table, "array", table)).reshape(-1, width)
 
 
-T = TypeVar("T")
+Built = TypeVar("Built")
 
 
-def _compiled(build: Callable[[], T]) -> T:
+def _compiled(build: Callable[[], Built]) -> Built:
     """The result of a call of DOLFINx, without the build log that distutils prints through the root logger.
 
     An interruption leaves nothing half compiled, for which later runs would wait and fail. A kill does; what

@@ -2,7 +2,7 @@
 
 import time
 from dataclasses import dataclass, replace
-from typing import ClassVar, get_args
+from typing import get_args
 
 from geometry.errors import UserError
 from solvers.fem.boundary_conditions import reaction_by_residual_work
@@ -13,11 +13,11 @@ from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Load, Problem
 from solvers.solution import ErrorEstimate, Solution, Status
-from solvers.solver import Family, FieldSettings, Progress, check_problem, silent
+from solvers.solver import ElementSettings, Progress, check_problem, silent
 
 
 @dataclass(frozen=True)
-class FemSolver(FieldSettings):
+class FemSolver(ElementSettings):
     """Lagrange elements on exactly the shared mesh.
 
     A `mean` or `point` load is one linear functional b_k per prescribed component: K x_k = b_k is solved once
@@ -25,18 +25,17 @@ class FemSolver(FieldSettings):
     condition.
     """
 
-    degree: int = 2  # Of the elements, 1 or 2
     estimate: bool = True  # Whether to estimate the discretisation error, at half the cost of the solution
     # "direct" (MUMPS), "iterative" (conjugate gradients with algebraic multigrid) or "auto", which iterates
     # beyond ten million unknowns
     linear_solver: LinearSolver = "auto"
-    name: ClassVar[str] = "fem"
-    family: ClassVar[Family] = "finite elements"
-    laws: ClassVar[tuple[str, ...]] = ("linear",)
-    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
+    name = "fem"
+    family = "finite elements"
+    laws = ("linear",)
+    loads = ("mean", "point", "patch")
 
     def __post_init__(self) -> None:
-        self.check_degree(self.degree)
+        super().__post_init__()
         if self.linear_solver not in get_args(LinearSolver):
             known = ", ".join(get_args(LinearSolver))
             raise UserError(f"fem has the linear solvers {known}, not {self.linear_solver!r}")

@@ -12,9 +12,6 @@ from solvers.petsc import PETSc
 
 LinearSolver = Literal["auto", "direct", "iterative"]
 
-TOLERANCE = 1e-10
-"""Residual force over the right-hand side at which the iteration ends."""
-
 MAX_ITERATIONS = 1000
 
 LARGEST_RESIDUAL = 1e-3
@@ -191,7 +188,7 @@ class Multigrid(StiffnessSolver):
         matrix: PETSc.Mat,
         clamped: BoolArray,
         *,
-        tolerance: float = TOLERANCE,
+        tolerance: float = 1e-10,
         tangent: bool = False,
     ) -> None:
         super().__init__(space, matrix, clamped)

@@ -33,7 +33,7 @@ POLL_S = 0.005
 
 TaskResult = TypeVar("TaskResult")
 
-Task = Callable[[Problem, Progress], TaskResult]
+CollectiveTask = Callable[[Problem, Progress], TaskResult]
 """A collective task: a method of an object that can be pickled, or a function of a module."""
 
 
@@ -43,7 +43,7 @@ def communicator() -> MPI.Comm:
     return MPI.COMM_WORLD if pool is None or pool.busy else MPI.COMM_SELF
 
 
-def on_all_ranks(task: Task[TaskResult], problem: Problem, progress: Progress) -> TaskResult:
+def on_all_ranks(task: CollectiveTask[TaskResult], problem: Problem, progress: Progress) -> TaskResult:
     """Do a task; rank 0 of a pool has the others do it too. The progress is called on this rank."""
     pool = _pool.get()
     if pool is None or pool.busy:
@@ -78,7 +78,8 @@ def lead(command: Callable[[], Any], guarded: Callable[[Callable[[], Any]], int]
     if pool.broken:
         MPI.COMM_WORLD.Abort(code)
     if leads:
-        pool.dismiss(code)
+        for rank in range(1, pool.comm.size):
+            pool.comm.send(code, dest=rank, tag=DISMISSAL)
     return code
 
 
@@ -90,7 +91,7 @@ class RankPool:
     busy: bool = False  # Whether this rank is in a collective task
     broken: bool = False  # Whether another rank may be waiting for this one in a task that this one has left
 
-    def call(self, task: Task[TaskResult], problem: Problem, progress: Progress) -> TaskResult:
+    def call(self, task: CollectiveTask[TaskResult], problem: Problem, progress: Progress) -> TaskResult:
         """Do a task on all ranks, of which this is rank 0."""
         for rank in range(1, self.comm.size):
             self.comm.send((task, problem), dest=rank, tag=TASK)
@@ -112,12 +113,7 @@ class RankPool:
                 if self.broken:
                     raise
 
-    def dismiss(self, code: int) -> None:
-        """End the other ranks with an exit code."""
-        for rank in range(1, self.comm.size):
-            self.comm.send(code, dest=rank, tag=DISMISSAL)
-
-    def _do(self, task: Task[TaskResult], problem: Problem, progress: Progress) -> TaskResult:
+    def _do(self, task: CollectiveTask[TaskResult], problem: Problem, progress: Progress) -> TaskResult:
         self.broken = self.busy = True
         try:
             answer = task(problem, progress)

@@ -2,9 +2,9 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from solvers.fem.linear_solvers import LinearSolver
 from solvers.fem.ranks import communicator, on_all_ranks
 from solvers.problem import Problem
 from solvers.solution import Solution, Status, unstable_phrase
-from solvers.solver import Family, FieldSettings, Progress, check_problem, silent
+from solvers.solver import FieldSettings, Progress, check_problem, silent
 
 Face = Literal["side", "middle"]
 
@@ -52,10 +52,6 @@ class FaceField:
         if self.face == "middle":
             slopes[:, :2] = 0.0
         return np.asarray(slopes)
-
-    def on(self, face: Face) -> "FaceField":
-        """Another plane of the same displacement."""
-        return replace(self, face=face)
 
     def displacement(self, location: LocatedPoints) -> FloatArray:
         """Displacement in the plane, shape (n, 2), mm."""
@@ -168,10 +164,10 @@ class Fem3dSolver(FieldSettings):
     min_step: float = 1e-2  # Fraction of the load below which the solver gives up
     tolerance: float = 1e-8  # Largest residual force over the largest internal force
     max_iterations: int = 20  # Newton iterations in one step
-    name: ClassVar[str] = "fem-3d"
-    family: ClassVar[Family] = "finite elements"
-    laws: ClassVar[tuple[str, ...]] = ("linear", "neo-hookean", "st-venant-kirchhoff")
-    loads: ClassVar[tuple[str, ...]] = ("mean", "patch", "cylinder")
+    name = "fem-3d"
+    family = "finite elements"
+    laws = ("linear", "neo-hookean", "st-venant-kirchhoff")
+    loads = ("mean", "patch", "cylinder")
 
     def __post_init__(self) -> None:
         if self.layers < 1:

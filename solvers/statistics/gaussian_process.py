@@ -10,7 +10,7 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -23,12 +23,12 @@ from solvers.assimilation.misfit import MarkerSettings, Misfit, misfit_of, stand
 from solvers.energy_and_force import energy_and_force
 from solvers.problem import Problem
 from solvers.solution import Solution, Status, Uncertainty
-from solvers.solver import Family, FieldSettings, Progress, UnsupportedProblemError, check_problem, silent
+from solvers.solver import FieldSettings, Progress, UnsupportedProblemError, check_problem, silent
 from solvers.statistics.kernel_field import (
     SMOOTHNESS,
     Kernel,
     KernelField,
-    Prediction,
+    MarkerPrediction,
     with_markers_left_out,
 )
 
@@ -46,11 +46,11 @@ class GaussianProcessSolver(FieldSettings):
 
     clamp: bool = False  # Whether the process is conditioned on a base at rest, a stronger null model
     kernel: Kernel = "matern52"  # "matern32", "matern52" or "gaussian" (squared exponential)
-    name: ClassVar[str] = "gp"
-    family: ClassVar[Family] = "statistics"
-    laws: ClassVar[tuple[str, ...]] = ("linear",)
-    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch")
-    assimilates: ClassVar[bool] = True
+    name = "gp"
+    family = "statistics"
+    laws = ("linear",)
+    loads = ("mean", "point", "patch")
+    assimilates = True
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
         """Fit the processes to the problem's observations, and again without each marker; see `Solver`."""
@@ -59,7 +59,7 @@ class GaussianProcessSolver(FieldSettings):
         solution, misfit, deviations = self._fitted(problem, MIN_MARKERS + 1)
         base = self._base(problem)
 
-        def without(marker: int) -> Prediction:
+        def without(marker: int) -> MarkerPrediction:
             progress(marker / len(misfit.points), "leaving each marker out")
             others = _fit(misfit.without(marker), np.delete(deviations, marker, axis=0), base, self.kernel)
             there = problem.mesh.locate(misfit.points[[marker]])

@@ -16,7 +16,7 @@ from geometry.mesh.point_location import LocatedPoints
 from solvers.assimilation.misfit import leave_one_out_displacements
 from solvers.solution import Solution
 
-Prediction = tuple[FloatArray, FloatArray]
+MarkerPrediction = tuple[FloatArray, FloatArray]
 """Mean and standard deviation of an observation, each of shape (2,), mm."""
 
 Kernel = Literal["matern32", "matern52", "gaussian"]
@@ -73,7 +73,7 @@ def _distance(points: FloatArray, others: FloatArray, length: float, kernel: Ker
 
 
 def with_markers_left_out(
-    solution: Solution, observed: FloatArray, without: Callable[[int], Prediction], started: float
+    solution: Solution, observed: FloatArray, without: Callable[[int], MarkerPrediction], started: float
 ) -> Solution:
     """A solution with every marker as predicted without it, and the share within two standard deviations.
 

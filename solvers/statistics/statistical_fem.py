@@ -22,7 +22,7 @@ secant from rest, the other is the tangent.
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, cast
+from typing import cast
 
 import numpy as np
 
@@ -35,8 +35,8 @@ from solvers.fem.linear import FemSolver
 from solvers.lagrange import LagrangeField
 from solvers.problem import Problem
 from solvers.solution import Solution, Status, Uncertainty
-from solvers.solver import Family, FieldSettings, Progress, check_problem, silent
-from solvers.statistics.kernel_field import Kernel, Prediction, with_markers_left_out
+from solvers.solver import ElementSettings, Progress, check_problem, silent
+from solvers.statistics.kernel_field import Kernel, MarkerPrediction, with_markers_left_out
 from solvers.statistics.statistical_posterior import Posterior, StatFemData, StatFemField
 
 TANGENT_STEP = 0.1
@@ -44,20 +44,19 @@ TANGENT_STEP = 0.1
 
 
 @dataclass(frozen=True)
-class StatFemSolver(FieldSettings):
+class StatFemSolver(ElementSettings):
     """Finite elements with an uncertain load and a discrepancy, conditioned on the markers."""
 
-    degree: int = 2  # Of the elements, 1 or 2
     stroke_deviation: float = 0.5  # Standard deviation of each prescribed displacement, mm
     kernel: Kernel = "matern52"  # Covariance function of the discrepancy, as of `gp`
-    name: ClassVar[str] = "statfem"
-    family: ClassVar[Family] = "statistics"
-    laws: ClassVar[tuple[str, ...]] = (*FemSolver.laws, *FemNonlinearSolver.laws)
-    loads: ClassVar[tuple[str, ...]] = FemSolver.loads
-    assimilates: ClassVar[bool] = True
+    name = "statfem"
+    family = "statistics"
+    laws = (*FemSolver.laws, *FemNonlinearSolver.laws)
+    loads = FemSolver.loads
+    assimilates = True
 
     def __post_init__(self) -> None:
-        self.check_degree(self.degree)
+        super().__post_init__()
         self.check_not_negative("stroke_deviation")
 
     def solve(self, problem: Problem, progress: Progress = silent) -> Solution:
@@ -73,7 +72,7 @@ class StatFemSolver(FieldSettings):
         data = self._data(problem, problem.observations, shapes)
         solution = self._conditioned(problem, data, shapes)
 
-        def without(marker: int) -> Prediction:
+        def without(marker: int) -> MarkerPrediction:
             progress(0.5 + marker / len(data.points) / 2, "leaving each marker out")
             mean, variance = Posterior.of(data.without(marker)).at(
                 data.points[[marker]], data.shapes[:, [marker]]

@@ -4,7 +4,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
 
 import numpy as np
 
@@ -18,32 +17,31 @@ from solvers.fem.ranks import on_all_ranks
 from solvers.lagrange import LagrangeField, LagrangeSpace
 from solvers.problem import Problem
 from solvers.solution import ErrorEstimate, Solution, Status, unstable_phrase
-from solvers.solver import Family, FieldSettings, Progress, check_problem, silent
+from solvers.solver import ElementSettings, Progress, check_problem, silent
 
 ITERATIONS = 40
 """Newton iterations from given displacements."""
 
 
 @dataclass(frozen=True)
-class FemNonlinearSolver(FieldSettings):
+class FemNonlinearSolver(ElementSettings):
     """Plane strain by Newton's method, the load applied in adaptive steps; see `LoadPath`.
 
     A `patch` whose tangential component is free slides. A `cylinder` presses without friction.
     """
 
-    degree: int = 2  # Of the elements, 1 or 2
     first_step: float = 0.05  # First fraction of the load
     max_step: float = 0.2  # Largest fraction of the load in one step
     min_step: float = 1e-3  # Fraction of the load below which the solver gives up
     tolerance: float = 1e-8  # Largest residual force over the largest internal force
     max_iterations: int = 12  # Newton iterations in one step
-    name: ClassVar[str] = "fem-nonlinear"
-    family: ClassVar[Family] = "finite elements"
-    laws: ClassVar[tuple[str, ...]] = ("neo-hookean", "st-venant-kirchhoff", "gent")
-    loads: ClassVar[tuple[str, ...]] = ("mean", "point", "patch", "cylinder")
+    name = "fem-nonlinear"
+    family = "finite elements"
+    laws = ("neo-hookean", "st-venant-kirchhoff", "gent")
+    loads = ("mean", "point", "patch", "cylinder")
 
     def __post_init__(self) -> None:
-        self.check_degree(self.degree)
+        super().__post_init__()
         if not 0 < self.min_step <= self.first_step <= self.max_step <= 1:
             raise UserError("fem-nonlinear needs 0 < min_step <= first_step <= max_step <= 1")
         check_tolerance(self.name, self.tolerance)
@@ -81,6 +79,10 @@ class FemNonlinearSolver(FieldSettings):
         solved = time.perf_counter()
         error = _error(path, problem, space)
         path.close()
+        names = () if path.equilibrium.contact is None else ("contact_width_mm", "contact_pressure_MPa")
+        pressed = {
+            name: np.array([region.stats()[name] if region else 0.0 for region in regions]) for name in names
+        }
         remarks = [
             f"error of the discretisation {error.phrase}" if error else "",
             locking_advice(self.degree, problem.material),
@@ -103,7 +105,7 @@ class FemNonlinearSolver(FieldSettings):
                 **({} if abscissa is None else {"force_abscissa_mm": abscissa}),
                 **(regions[-1].stats() if regions[-1] else {}),
             },
-            history={**history, **_place_history(path), **_contact_history(path, regions)},
+            history={**history, **_place_history(path), **pressed},
             states=[LagrangeField(space, point.nodal) for point in path.points],
             error=error,
             contact=contact_of(problem, abscissa, regions[-1]),
@@ -192,12 +194,3 @@ def _place_history(path: LoadPath) -> dict[str, FloatArray]:
         return {}
     nearest = np.array(known)[np.searchsorted(known, np.arange(len(found))).clip(max=len(known) - 1)]
     return {"force_abscissa_mm": np.array([found[number] for number in nearest], dtype=np.float64)}
-
-
-def _contact_history(path: LoadPath, regions: Sequence[ContactRegion | None]) -> dict[str, FloatArray]:
-    if path.equilibrium.contact is None:
-        return {}
-    return {
-        name: np.array([region.stats()[name] if region else 0.0 for region in regions])
-        for name in ("contact_width_mm", "contact_pressure_MPa")
-    }

@@ -7,6 +7,7 @@ import json
 import os
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 from mpi4py import MPI
@@ -31,15 +32,9 @@ def sharing(problem, progress) -> int:
     return communicator().size
 
 
-def rank_1_fails(problem, progress) -> None:
-    if RANK == 1:
-        raise UserError("no memory is left on rank 1")
-    communicator().Barrier()
-
-
-def rank_0_fails(problem, progress) -> None:
-    if RANK == 0:
-        raise UserError("no memory is left on rank 0")
+def fail(rank: int, problem, progress) -> None:
+    if rank == RANK:
+        raise UserError(f"no memory is left on rank {rank}")
     communicator().Barrier()
 
 
@@ -80,12 +75,12 @@ def refused() -> int:
 
 
 def failing_on_rank_1() -> int:
-    on_all_ranks(rank_1_fails, STIFF, print)
+    on_all_ranks(partial(fail, 1), STIFF, print)
     return 0
 
 
 def failing_on_rank_0() -> int:
-    on_all_ranks(rank_0_fails, STIFF, print)
+    on_all_ranks(partial(fail, 0), STIFF, print)
     return 0
 
 

@@ -1,6 +1,5 @@
 """`fem-3d` against closed forms, plane strain, plane stress and its own energy."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +20,7 @@ from solvers.problem import Load, Material, Problem
 from solvers.solution import State
 from tests.solvers.bodies import body_mesh
 from tests.solvers.conftest import bar_mesh, beam_compliance
+from tests.solvers.fem.test_fem_ranks import reported
 
 SLIDING = Load(kind="patch", displacement=(None, -4.0))
 
@@ -199,13 +199,9 @@ def test_wrong_settings_are_refused(settings, text):
 def test_two_ranks_find_what_one_finds(start_ranks, wedge, tmp_path):
     wedge.save(tmp_path / "mesh.npz")
     process = start_ranks(2, "-m", "tests.solvers.fem.rank_programs", "solid", str(tmp_path / "mesh.npz"))
-    output, errors = process.communicate()
-    assert process.returncode == 0, errors
-    ((energy, displacement),) = json.loads(output)["solutions"]
     load = Load(displacement=(0.0, -2.0))
     alone = Fem3dSolver(layers=1).solve(Problem(wedge, Material(law="neo-hookean"), load))
-    assert energy == pytest.approx(alone.energy, rel=1e-10)
-    np.testing.assert_allclose(displacement, alone.displacement(wedge.markers), rtol=0, atol=1e-8)
+    reported(process, 0, [alone], wedge)
 
 
 @pytest.mark.slow

@@ -29,31 +29,27 @@ def expected(coarse_mesh):
     return [FemSolver().solve(Problem(coarse_mesh)), FemNonlinearSolver().solve(stiff)]
 
 
-def check(report, expected, mesh):
+def reported(process, code, expected, mesh):
+    """The report of a program that ends with a code, its solutions checked."""
+    output, errors = process.communicate()
+    assert process.returncode == code, errors
+    report = json.loads(output)
     assert len(report["solutions"]) == len(expected)
     for (energy, displacement), solution in zip(report["solutions"], expected, strict=True):
         assert energy == pytest.approx(solution.energy, rel=1e-10)
         np.testing.assert_allclose(displacement, solution.displacement(mesh.markers), rtol=0, atol=1e-8)
+    return report
 
 
 def test_rank_0_leads_and_all_solve(start, expected, coarse_mesh):
     """The numbers are those of one process; only a collective task is shared; processes started are free."""
-    process = start("solve")
-    output, errors = process.communicate()
-    assert process.returncode == 3, errors
-    report = json.loads(output)
-    check(report, expected, coarse_mesh)
+    report = reported(start("solve"), 3, expected, coarse_mesh)
     assert report["sharing"] == [1, 2, 1]
     assert report["launcher"] == []
 
 
 def test_every_rank_may_run_the_whole_program(start, expected, coarse_mesh):
-    process = start("everywhere")
-    output, errors = process.communicate()
-    assert process.returncode == 0, errors
-    report = json.loads(output)
-    check(report, expected[:1], coarse_mesh)
-    assert report["sharing"] == [2]
+    assert reported(start("everywhere"), 0, expected[:1], coarse_mesh)["sharing"] == [2]
 
 
 @pytest.mark.slow
