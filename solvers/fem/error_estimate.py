@@ -40,17 +40,10 @@ from solvers.problem import Material, Problem
 from solvers.solution import ErrorEstimate, State
 
 
-@dataclass(frozen=True, eq=False)
 class GradientRecovery:
     """The linear map from nodal displacements to nodal values of their smoothed gradient."""
 
-    # Along x and y at the sample points, each a matrix (s, N), 1/mm
-    derivatives: tuple[csr_matrix, csr_matrix]
-    smoothing: csr_matrix  # From values at the sample points to nodal values, a matrix (N, s)
-
-    @classmethod
-    def of(cls, space: LagrangeSpace) -> "GradientRecovery":
-        """Fit the polynomials of every patch."""
+    def __init__(self, space: LagrangeSpace) -> None:
         rule, _ = triangle_rule(space.degree)
         samples = space.mesh.at_barycentric(rule)
         fits = _fit(space.mesh, space.degree, samples.points.reshape(-1, len(rule), 2))
@@ -58,16 +51,17 @@ class GradientRecovery:
         smoothing = csr_matrix((fits.weights[0], fits.sample, fits.start), (len(fits.scale), columns))
         if space.degree == 2:
             smoothing = vstack([smoothing, _at_edges(space.mesh, fits, columns)], format="csr")
-        return cls(space.shape_gradients(samples), smoothing)
+        self._smoothing = smoothing  # From values at the s sample points to nodal values, a matrix (N, s)
+        self._derivatives = space.shape_gradients(samples)  # Along x and y, each a matrix (s, N), 1/mm
 
     def gradient(self, nodal: FloatArray) -> FloatArray:
         """Nodal values of the smoothed gradient du_i/dx_j, shape (N, 2, 2)."""
-        return np.stack([self.smoothing @ (along @ nodal) for along in self.derivatives], axis=-1)
+        return np.stack([self._smoothing @ (along @ nodal) for along in self._derivatives], axis=-1)
 
     def transposed(self, nodal: FloatArray) -> FloatArray:
         """The transposed map, from shape (N, 2, 2) to shape (N, 2)."""
-        x, y = (self.smoothing.T @ nodal[..., axis] for axis in (0, 1))
-        return np.asarray(self.derivatives[0].T @ x + self.derivatives[1].T @ y)
+        x, y = (self._smoothing.T @ nodal[..., axis] for axis in (0, 1))
+        return np.asarray(self._derivatives[0].T @ x + self._derivatives[1].T @ y)
 
 
 class _Fits(NamedTuple):
@@ -159,7 +153,7 @@ class ErrorEstimator:
     @cached_property
     def recovery(self) -> GradientRecovery:
         """The smoothing."""
-        return GradientRecovery.of(self.space)
+        return GradientRecovery(self.space)
 
     def gradient_error(self, nodal: FloatArray) -> FloatArray:
         """Smoothed minus own gradient at the quadrature points, shape (q, 2, 2)."""

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -68,37 +68,28 @@ class FaceField:
         return np.stack([dx @ self.values, dy @ self.values, dz], axis=-1)
 
 
-@dataclass(frozen=True)
-class Cost:
-    """The linear solver and its price, fitted to the default finger with 235,000 to 812,000 unknowns.
+class Cost(NamedTuple):
+    """The linear solver and its price."""
+
+    iterative: bool  # Whether multigrid solves, not factors
+    memory_gb: float
+    words: str  # Unknowns, method, memory and time of a Newton step on one core
+
+
+def _cost(unknowns: int, levels: int, iterative: bool) -> Cost:
+    """The price of nodes on so many levels, fitted to the default finger with 235,000 to 812,000 unknowns.
 
     Other bodies may differ by a factor of two.
     """
-
-    unknowns: int
-    levels: int  # Number of nodes above each other
-    iterative: bool  # Whether multigrid solves, not factors
-
-    @property
-    def _entries(self) -> float:
-        """Estimated entries of the factors."""
-        nodes = self.unknowns / (3 * self.levels)
-        return float(self.unknowns * (100 + 33 * self.levels) * (nodes / 8500) ** 0.25)
-
-    @property
-    def memory_gb(self) -> float:
-        """Estimated memory, GB: matrix and vectors, and factors or the coarser matrices."""
-        return 3.4e-6 * self.unknowns if self.iterative else 2.4e-6 * self.unknowns + 1e-8 * self._entries
-
-    @property
-    def words(self) -> str:
-        """Unknowns, method, memory and time of a Newton step on one core."""
-        if self.iterative:
-            how, seconds = "iterative", float(110 * (1e-6 * self.unknowns) ** 1.17)
-        else:
-            how, seconds = "direct", 2e-5 * self.unknowns + 1.3e-10 * self._entries**2 / self.unknowns
-        step = f"{max(1.0, seconds):.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
-        return f"{self.unknowns:,} unknowns, {how}: about {self.memory_gb:.1f} GB, {step} a Newton step"
+    if iterative:
+        how, memory, seconds = "iterative", 3.4e-6 * unknowns, 110 * (1e-6 * unknowns) ** 1.17
+    else:
+        entries = unknowns * (100 + 33 * levels) * (unknowns / (3 * levels) / 8500) ** 0.25  # of the factors
+        memory = 2.4e-6 * unknowns + 1e-8 * entries
+        how, seconds = "direct", 2e-5 * unknowns + 1.3e-10 * entries**2 / unknowns
+    step = f"{max(1.0, seconds):.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
+    words = f"{unknowns:,} unknowns, {how}: about {memory:.1f} GB, {step} a Newton step"
+    return Cost(iterative, memory, words)
 
 
 def affordable(unknowns: int, levels: int, asked: LinearSolver, free_gb: float) -> Cost:
@@ -107,7 +98,7 @@ def affordable(unknowns: int, levels: int, asked: LinearSolver, free_gb: float) 
     A `UserError` says that the memory that is free does not suffice; a solution may take 70 % of it.
     """
     methods = {"auto": (False, True), "direct": (False,), "iterative": (True,)}[asked]
-    costs = [Cost(unknowns, levels, iterative) for iterative in methods]
+    costs = [_cost(unknowns, levels, iterative) for iterative in methods]
     for cost in costs:
         if cost.memory_gb <= 0.7 * free_gb:
             return cost

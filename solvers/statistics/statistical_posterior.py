@@ -56,12 +56,6 @@ class Hyperparameters(NamedTuple):
     amplitudes: FloatArray
     length: float
 
-    @classmethod
-    def of(cls, parameters: FloatArray) -> "Hyperparameters":
-        """From their logarithms, shape (4,)."""
-        factor, u, v, length = np.exp(parameters)
-        return cls(float(factor), np.array([u, v]), float(length))
-
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
@@ -78,7 +72,7 @@ class Posterior:
         """Find the hyperparameters, and condition on the markers."""
 
         def minus_log_likelihood(parameters: FloatArray) -> float:
-            cholesky, residual, coefficients = _condition(data, Hyperparameters.of(parameters))
+            cholesky, residual, coefficients = _condition(data, _exponentials(parameters))
             return float(0.5 * residual @ coefficients) + log_root_determinant(cholesky)
 
         bounds = np.log([FACTORS, SPREADS, SPREADS, LENGTHS])
@@ -88,7 +82,7 @@ class Posterior:
                 for values in START
             ]
         best = min(found, key=lambda result: result.fun)
-        constants = Hyperparameters.of(best.x)
+        constants = _exponentials(best.x)
         cholesky, _, coefficients = _condition(data, constants)
         log_evidence = -float(best.fun) - len(data.points) * np.log(2 * np.pi)
         return cls(data, constants, coefficients.reshape(-1, 2), cholesky, log_evidence)
@@ -141,6 +135,11 @@ class StatFemField:
 
     def _by_load(self, own: FloatArray) -> FloatArray:
         return np.asarray(np.tensordot(self.posterior.constants.factor * self.posterior.load, own, axes=1))
+
+
+def _exponentials(parameters: FloatArray) -> Hyperparameters:
+    factor, u, v, length = np.exp(parameters)
+    return Hyperparameters(float(factor), np.array([u, v]), float(length))
 
 
 def log_root_determinant(cholesky: FloatArray) -> float:
