@@ -46,60 +46,35 @@ def report_html(
     `numbers` are the comparison's `metrics`, where they are known already.
     """
     numbers = metrics(comparison) if numbers is None else numbers
-    reference, design = comparison.reference, comparison.design
-    stills = {quantity.name for quantity in QUANTITIES}
+    design = comparison.design
+    certificates = [each.certificate for each in comparison.evaluations if each.certificate]
+    fields = {quantity.name for quantity in QUANTITIES}
     return _template().render(
         comparison=comparison,
         observations=comparison.observations,
         answers=answers(numbers, unsupported=comparison.unsupported, failed=comparison.failed),
-        reference=reference,
-        reference_label=reference.label,
-        own=reference.uncertainty,
-        own_error=text.own_error_sentence(reference),
-        beside=text.beside,
-        numbers_of=text.solve_numbers,
+        own=comparison.reference.uncertainty,
         table_one=table_one(comparison),
         printed=printed_rows(design),
-        truth_sentences=text.truth_sentences(comparison),
         entries=[_entry(evaluation, comparison) for evaluation in comparison.evaluations],
-        presets=text.preset_meanings(comparison.settings),
         unsupported=[*unsupported_remarks(comparison.unsupported), *comparison.failed.values()],
-        design_rows=design.facts(),
-        headline=text.headline(design),
         has_symbols=any(symbol for _, symbol, _ in design.facts()),
-        support=text.support_sentence(design),
-        regions={
-            name
-            for evaluation in comparison.evaluations
-            if evaluation.certificate
-            for name in evaluation.certificate.regions
-        },
-        material_rows=text.material_rows(
-            comparison.material,
-            {evaluation.label: evaluation.law for evaluation in comparison.evaluations},
-        ),
+        regions={name for certificate in certificates for name in certificate.regions},
         near=REGION_RADIUS,
-        load_sentence=text.load_sentence(comparison.load, design),
-        source=text.source_sentence(comparison.observations),
+        text=text,
         viewer=viewer(comparison),
         urls=picture_urls([picture.path for picture in pictures]),
-        pictures=[picture for picture in pictures if picture.path.stem not in stills],
-        stills=[picture for picture in pictures if picture.path.stem in stills],
-        provenance=text.grouped(provenance),
+        pictures=[picture for picture in pictures if picture.path.stem not in fields],
+        stills=[picture for picture in pictures if picture.path.stem in fields],
+        provenance=provenance,
     )
 
 
 @cache  # compiling takes a fifth of a second
 def _template() -> Template:
     environment = template_environment()
-    environment.filters |= {
-        "millimetres": millimetres,
-        "number": number,
-        "distance": distance,
-        "percent": percent,
-        "sentence": text.sentence,
-        "symbol": text.symbol,
-    }
+    filters = (millimetres, number, distance, percent)
+    environment.filters |= {each.__name__: each for each in filters}
     return environment.get_template("report.html.j2")
 
 

@@ -13,8 +13,7 @@ from compare.evaluation.metrics import force_error, truth_differences
 from compare.runtime.tables import distance, number, percent
 from geometry.arrays import FloatArray
 from geometry.finger.finger import Finger
-from geometry.observations import Observations
-from solvers.problem import Load, Material
+from solvers.problem import Load
 
 FINITE_STRAIN = "finite strain: the strain is Green-Lagrange, the stress Cauchy"
 LAWS = {
@@ -25,13 +24,16 @@ LAWS = {
 }
 
 
-def material_rows(material: Material, laws: Mapping[str, str]) -> list[tuple[str, str]]:
+def material_rows(comparison: Comparison) -> list[tuple[str, str]]:
     """The material in words, and the solvers of each law where they differ."""
+    material = comparison.material
     constants = f"plane {material.plane}; E = {material.young:g} MPa, Poisson’s ratio {material.poisson:g}"
-    if len(set(laws.values())) == 1:
-        return [("Material", f"{LAWS[next(iter(laws.values()))]}; {constants}")]
-    having = {law: [solver for solver in laws if laws[solver] == law] for law in laws.values()}
-    rows = [(f"Law of {', '.join(solvers)}", LAWS[law]) for law, solvers in having.items()]
+    solvers: dict[str, list[str]] = {}
+    for evaluation in comparison.evaluations:
+        solvers.setdefault(evaluation.law, []).append(evaluation.label)
+    if len(solvers) == 1:
+        return [("Material", f"{LAWS[next(iter(solvers))]}; {constants}")]
+    rows = [(f"Law of {', '.join(labels)}", LAWS[law]) for law, labels in solvers.items()]
     return [("Material", constants), *rows]
 
 
@@ -85,11 +87,6 @@ def support_sentence(design: Finger) -> str:
     length = sum(float(loop.lengths[which]) for loop, which in pieces)
     parts = "" if len(pieces) == 1 else f" in {len(pieces)} pieces"
     return f"The base is clamped ({length:.4g} mm{parts}); all else is free of traction."
-
-
-def source_sentence(observations: Observations) -> str:
-    """Provenance of the marker displacements, opened by `Simulated`, `Measured` or `Unknown`."""
-    return sentence(observations.origin)
 
 
 def grouped(provenance: Mapping[str, object]) -> list[tuple[str, list[tuple[str, str]]]]:
