@@ -1,7 +1,6 @@
 """A solver in folds: it does not see what is held out; finished folds are kept."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,12 +14,10 @@ from geometry.arrays import FloatArray
 from geometry.finger.design import Design
 from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
-from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
 from solvers.assimilation.misfit import misfit_of
 from solvers.problem import Load, Material, Problem
 from solvers.registry import make_solver
-from solvers.solution import Estimated, IdentifiedForce, Solution, State, Uncertainty
+from solvers.solution import Estimated, IdentifiedForce, State, Uncertainty
 from tests.compare.crossval.conftest import NOISE
 
 QUICK = {"degree": 1, "law": "given", "parameters": "normal_force,position"}
@@ -29,9 +26,7 @@ SETTINGS: dict[str, dict[str, object]] = {"gp": {}, "fem-id": QUICK}
 
 
 @pytest.fixture
-def task(
-    tmp_path: Path, coarse_mesh: TriangleMesh, truth: Solution, observations: Observations
-) -> SolverTask:
+def task(tmp_path, coarse_mesh, truth, observations) -> SolverTask:
     """`gp` and one fold of each kind, at the full load and half of it."""
     coarse_mesh.save(tmp_path / "mesh.npz")
     sampled = FieldSampler.of(coarse_mesh, coarse_mesh.markers, 0.8).of_solution(truth, coarse_mesh)

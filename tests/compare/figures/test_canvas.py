@@ -54,9 +54,7 @@ def test_the_body_is_drawn_where_its_nodes_have_gone(canvas: Canvas, mesh: Trian
     assert at(image, 3, -3.8)[3] == 0
 
 
-def test_the_body_at_rest_is_where_the_mesh_has_it_after_it_was_elsewhere(
-    canvas: Canvas, mesh: TriangleMesh
-) -> None:
+def test_the_body_at_rest_is_where_the_mesh_has_it_after_it_was_elsewhere(canvas, mesh):
     canvas.picture(halves(mesh), mesh.points + np.array([0, 0.8]))
     np.testing.assert_array_equal(canvas.picture(halves(mesh)), canvas.picture(halves(mesh), mesh.points))
 

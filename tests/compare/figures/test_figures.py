@@ -1,7 +1,6 @@
 """Pictures as a whole: their files, their colours, and type that neither overlaps nor leaves the page."""
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -22,7 +21,6 @@ from compare.figures.overlay import overlay_extent
 from geometry.errors import UserError
 from geometry.figure import DPI, NOTEBOOK_DPI, WIDTH
 from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
 from solvers.problem import Problem
 from tests.compare.figures.drawn_pages import Page, page_of
 
@@ -34,14 +32,7 @@ def certificate_of(evaluation: Evaluation, mesh: TriangleMesh) -> Evaluation:
 
 
 @pytest.fixture(scope="module")
-def comparison(
-    mesh: TriangleMesh,
-    fem: Evaluation,
-    pinn: Evaluation,
-    failed: Evaluation,
-    observe: Callable[..., Observations],
-    compared: Callable[..., Comparison],
-) -> Comparison:
+def comparison(mesh, fem, pinn, failed, observe, compared) -> Comparison:
     """Three solvers, of which one followed the load and failed, with one marker not seen."""
     steps = np.array([0.0, 0.2, 0.6])
     record = {"load_fraction": steps, "energy": steps**2, "reaction_x": 0 * steps, "reaction_y": -(steps**2)}
@@ -90,9 +81,7 @@ FIELDS = tuple(quantity.name for quantity in QUANTITIES)
 ALL = ("overlay", "marker_errors", *FIELDS, "force_displacement", "excess", "energy", "design", "mesh")
 
 
-def test_every_picture_is_written_in_the_order_of_the_report(
-    comparison: Comparison, drawings: dict[str, Illustration], tmp_path: Path
-) -> None:
+def test_every_picture_is_written_in_the_order_of_the_report(comparison, drawings, tmp_path):
     """Each is as wide as a page, and not blank; progress goes from none to all."""
     said: list[float] = []
     pictures = draw_all(tmp_path, comparison, lambda done, _: said.append(done))
@@ -125,9 +114,7 @@ def test_a_picture_that_there_is_not(comparison: Comparison, name: str, message:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_no_text_leaves_the_page_or_runs_into_another(
-    name: str, drawings: dict[str, Illustration], pages: dict[str, Page]
-) -> None:
+def test_no_text_leaves_the_page_or_runs_into_another(name, drawings, pages):
     assert drawings[name].caption.endswith(".")
     assert pages[name].cut_off() == []
     assert pages[name].overlaps() == []
@@ -140,13 +127,7 @@ def test_type_is_readable_in_a_column(name: str, pages: dict[str, Page]) -> None
 
 
 @pytest.mark.slow
-def test_eight_solvers_find_room_too(
-    mesh: TriangleMesh,
-    fem: Evaluation,
-    pinn: Evaluation,
-    failed: Evaluation,
-    compared: Callable[..., Comparison],
-) -> None:
+def test_eight_solvers_find_room_too(mesh, fem, pinn, failed, compared):
     pinn, failed = (certificate_of(evaluation, mesh) for evaluation in (pinn, failed))
     more = [replace(pinn, solver=f"pinn-{name}", converged=name != "asm") for name in ("local", "asm", "x")]
     told = replace(pinn, in_sample=True, left_out=pinn.marker_displacement + 0.5)
@@ -163,17 +144,13 @@ def test_a_solver_that_failed_is_marked(name: str, pages: dict[str, Page]) -> No
 
 
 @pytest.mark.parametrize("name", ["overlay", "marker_errors"])
-def test_a_solver_that_was_given_the_markers_is_marked_at_them(
-    name: str, fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
-) -> None:
+def test_a_solver_that_was_given_the_markers_is_marked_at_them(name, fem, pinn, compared):
     drawing = draw(compared(fem, replace(pinn, in_sample=True)), name)
     assert "pinn-std †" in page_of(drawing.figure).text
     assert "† was given these markers" in drawing.caption
 
 
-def test_pictures_say_which_errors_are_held_out_and_which_are_of_training(
-    fem: Evaluation, pinn: Evaluation, observations: Observations, compared: Callable[..., Comparison]
-) -> None:
+def test_pictures_say_which_errors_are_held_out_and_which_are_of_training(fem, pinn, observations, compared):
     told = replace(pinn, in_sample=True, left_out=pinn.marker_displacement + 0.5)
     untold = replace(told, solver="pinn-x", left_out=None)
     errors = held_out_errors(told, observations), marker_errors(told, observations)
@@ -189,9 +166,7 @@ def test_pictures_say_which_errors_are_held_out_and_which_are_of_training(
     assert (overlay.cut_off(), overlay.overlaps(), bars.cut_off(), bars.overlaps()) == ([], [], [], [])
 
 
-def test_a_circle_shows_a_training_error_that_vanishes(
-    fem: Evaluation, pinn: Evaluation, observations: Observations, compared: Callable[..., Comparison]
-) -> None:
+def test_a_circle_shows_a_training_error_that_vanishes(fem, pinn, observations, compared):
     met = replace(pinn, in_sample=True, marker_displacement=observations.displacements.copy())
     figure = draw(compared(fem, met), "marker_errors").figure
     (circles,) = figure.axes[2].lines
@@ -204,9 +179,7 @@ def test_a_difference_has_its_scale_beside_its_name(pages: dict[str, Page]) -> N
 
 
 @pytest.mark.parametrize("name", ["overlay", "marker_errors"])
-def test_simulated_markers_are_called_simulated(
-    name: str, drawings: dict[str, Illustration], pages: dict[str, Page]
-) -> None:
+def test_simulated_markers_are_called_simulated(name, drawings, pages):
     assert "simulated" in pages[name].text
     assert "simulated by another solver" in drawings[name].caption
 
@@ -225,9 +198,7 @@ def area_of(colour: tuple[int, ...], path: Path) -> float:
     return float((np.abs(pixels - colour).max(axis=2) <= 2).mean())
 
 
-def test_a_field_of_half_the_size_has_the_colour_of_half_the_scale(
-    fem: Evaluation, compared: Callable[..., Comparison], tmp_path: Path
-) -> None:
+def test_a_field_of_half_the_size_has_the_colour_of_half_the_scale(fem, compared, tmp_path):
     whole = replace(fem, von_mises=np.full(len(fem.weights), 2.0))
     half = replace(fem, solver="half", von_mises=np.full(len(fem.weights), 1.0))
     path = draw(compared(whole, half), "von_mises").figure.save(tmp_path / "field.png")
@@ -237,9 +208,7 @@ def test_a_field_of_half_the_size_has_the_colour_of_half_the_scale(
     assert area_of(middle, path) == pytest.approx(area_of(full, path), rel=0.1)
 
 
-def test_the_overlay_shows_the_whole_of_every_solution_that_converged(
-    mesh: TriangleMesh, pinn: Evaluation, failed: Evaluation, compared: Callable[..., Comparison]
-) -> None:
+def test_the_overlay_shows_the_whole_of_every_solution_that_converged(mesh, pinn, failed, compared):
     extent = overlay_extent(compared(pinn, failed), 5.0)
     lowest = (mesh.points + pinn.node_displacement)[:, 1].min()
     assert extent.bottom < lowest
@@ -253,9 +222,7 @@ def test_the_reference_energy_is_a_line(pages: dict[str, Page]) -> None:
     np.testing.assert_allclose(distances.get_lines()[0].get_ydata(), [4400.0, 100.0, 21.0])
 
 
-def test_no_remark_on_a_field_lies_on_a_slender_finger(
-    fem: Evaluation, pinn: Evaluation, mesh: TriangleMesh, compared: Callable[..., Comparison]
-) -> None:
+def test_no_remark_on_a_field_lies_on_a_slender_finger(fem, pinn, mesh, compared):
     x, y = mesh.points.T
     length, width = float(np.ptp(x)), float(np.ptp(y))
     points = np.column_stack([x, y * (1.01 - x / length) * 28 / 120 * length / width])
@@ -272,17 +239,13 @@ def test_no_remark_on_a_field_lies_on_a_slender_finger(
         assert (quantity.name, page.cut_off(), page.overlaps()) == (quantity.name, [], [])
 
 
-def test_the_number_beside_a_field_is_its_largest_mean_of_a_triangle(
-    fem: Evaluation, compared: Callable[..., Comparison]
-) -> None:
+def test_the_number_beside_a_field_is_its_largest_mean_of_a_triangle(fem, compared):
     peak = replace(fem, von_mises=np.zeros(len(fem.weights)))
     peak.von_mises[0] = 3.0  # at one of a triangle's three points, which have equal weights
     assert "largest 1 MPa" in page_of(draw(compared(peak), "von_mises").figure).text
 
 
-def test_ticks_of_six_characters_leave_room_for_the_labels(
-    fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
-) -> None:
+def test_ticks_of_six_characters_leave_room_for_the_labels(fem, pinn, compared):
     history = {"units": np.array([3200.0, 8000.0]), "energy": np.array([1.1015, 1.0881])}
     followed = {"load_fraction": np.array([0.0, 1.0]), "reaction_x": np.zeros(2), "reaction_y": [0, -0.0021]}
     near = replace(fem, energy=1.0924)
@@ -291,9 +254,7 @@ def test_ticks_of_six_characters_leave_room_for_the_labels(
     assert page_of(draw(compared(follower), "force_displacement").figure).cut_off() == []
 
 
-def test_the_field_of_the_truth_is_drawn_where_it_is_known(
-    fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
-) -> None:
+def test_the_field_of_the_truth_is_drawn_where_it_is_known(fem, pinn, compared):
     with_truth, without = (
         page_of(draw(compared(fem, **known), "von_mises").figure).text for known in ({"truth": pinn}, {})
     )

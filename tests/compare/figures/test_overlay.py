@@ -1,16 +1,11 @@
 """The picture of the deformed finger."""
 
-from collections.abc import Callable
-
 import numpy as np
-import pytest
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
-from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.figures.overlay import draw_overlay
-from geometry.mesh.triangle_mesh import TriangleMesh
 from geometry.observations import Observations
 from solvers.problem import Load, Problem
 from solvers.solution import Solution, Status
@@ -19,8 +14,8 @@ from tests.compare.figures.drawn_pages import page_of
 
 
 def test_crosses_are_at_the_observed_points_even_if_they_are_not_the_meshs_markers(
-    mesh: TriangleMesh, compared: Callable[..., Comparison], monkeypatch: pytest.MonkeyPatch
-) -> None:
+    mesh, compared, monkeypatch
+):
     points = np.array([[2.3, -1.1], [7.7, -3.2]])
     solution = Solution(
         solver="bent",
@@ -58,9 +53,7 @@ def test_crosses_are_at_the_observed_points_even_if_they_are_not_the_meshs_marke
         np.testing.assert_allclose(drawn, expected, rtol=1e-12)
 
 
-def test_a_cylinder_is_drawn_where_it_ends(
-    mesh: TriangleMesh, fem: Evaluation, compared: Callable[..., Comparison]
-) -> None:
+def test_a_cylinder_is_drawn_where_it_ends(mesh, fem, compared):
     load = Load(kind="cylinder", displacement=(1.0, -3.0), radius=2.0)
     page = page_of(draw_overlay(compared(fem, load=load)))
     (circle,) = [patch for patch in page.figure.axes[0].patches if isinstance(patch, Circle)]

@@ -1,11 +1,8 @@
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from compare.evaluation.comparison import Comparison
-from compare.evaluation.evaluation import Evaluation
 from compare.figures.record_charts import (
     approaches_reference,
     draw_energy,
@@ -17,9 +14,7 @@ from compare.figures.record_charts import (
 from tests.compare.figures.drawn_pages import page_of
 
 
-def test_records_are_grouped_by_their_first_column(
-    fem: Evaluation, pinn: Evaluation, evaluate: Callable[..., Evaluation]
-) -> None:
+def test_records_are_grouped_by_their_first_column(fem, pinn, evaluate):
     steps = np.array([0.0, 1.0])
     other = evaluate("other", history={"load_fraction": steps, "reaction": steps, "energy": steps})
     loss = evaluate("loss", history={"seconds": steps, "loss": steps})
@@ -30,9 +25,7 @@ def test_records_are_grouped_by_their_first_column(
     }
 
 
-def test_without_a_record_there_is_no_chart_of_energy(
-    fem: Evaluation, compared: Callable[..., Comparison]
-) -> None:
+def test_without_a_record_there_is_no_chart_of_energy(fem, compared):
     assert draw_energy(compared(fem)) is None
 
 
@@ -57,18 +50,14 @@ def test_a_growing_load_does_not_approach_the_reference() -> None:
     assert readable("newton_iterations") == "newton iterations"
 
 
-def test_axes_name_what_a_record_is_over(
-    fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
-) -> None:
+def test_axes_name_what_a_record_is_over(fem, pinn, compared):
     drawn = draw_energy(compared(fem, pinn))
     assert drawn is not None
     assert drawn.axes[0].get_xlabel() == "hidden units of the network"
     assert drawn.axes[1].get_ylabel() == "distance from fem, %"
 
 
-def test_two_results_are_joined_by_dots_and_no_curve(
-    fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
-) -> None:
+def test_two_results_are_joined_by_dots_and_no_curve(fem, pinn, compared):
     short = {name: column[:2] for name, column in pinn.history.items()}
     drawn = draw_energy(compared(fem, replace(pinn, history=short)))
     assert drawn is not None
@@ -79,9 +68,7 @@ EPOCHS = np.array([1.0, 2.0, 3.0])
 PLAIN = {"epoch": EPOCHS, "PDE": 1 / EPOCHS**4, "BC": EPOCHS, "total": EPOCHS, "energy": EPOCHS}
 
 
-def test_every_term_has_a_chart_with_the_solvers_that_have_it(
-    fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
-) -> None:
+def test_every_term_has_a_chart_with_the_solvers_that_have_it(fem, pinn, compared):
     standard = replace(pinn, history=PLAIN)
     given = replace(pinn, solver="pinn-asm", in_sample=True, history={**PLAIN, "ASM": 0.1 * EPOCHS})
     page = page_of(draw_losses(compared(fem, standard, given)))
@@ -91,8 +78,6 @@ def test_every_term_has_a_chart_with_the_solvers_that_have_it(
     assert (page.cut_off(), page.overlaps()) == ([], [])
 
 
-def test_without_such_a_network_there_is_no_chart(
-    fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
-) -> None:
+def test_without_such_a_network_there_is_no_chart(fem, pinn, compared):
     """The network that solves for its output layer has a record of its energy alone."""
     assert draw_losses(compared(fem, pinn)) is None

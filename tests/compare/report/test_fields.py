@@ -50,9 +50,7 @@ def test_tensor_components_are_where_their_names_say(grid: pyvista.UnstructuredG
 
 
 @pytest.mark.parametrize("name", ["stress_zz_MPa", "von_mises_MPa", "energy_density_MPa"])
-def test_scalars_are_means_over_the_triangles(
-    name: str, grid: pyvista.UnstructuredGrid, sheared: Evaluation
-) -> None:
+def test_scalars_are_means_over_the_triangles(name, grid, sheared):
     expected = sheared.per_triangle(getattr(sheared, name.removesuffix("_MPa")))
     np.testing.assert_allclose(grid.cell_data[name], expected)
 
@@ -63,9 +61,7 @@ def test_it_says_whose_result_it_is(grid: pyvista.UnstructuredGrid, sheared: Eva
     np.testing.assert_array_equal(np.ravel(grid.field_data["reaction_N_per_mm"]), sheared.reaction)
 
 
-def test_a_message_keeps_its_meaning_in_the_letters_of_vtk(
-    sheared: Evaluation, mesh: TriangleMesh, tmp_path: Path
-) -> None:
+def test_a_message_keeps_its_meaning_in_the_letters_of_vtk(sheared, mesh, tmp_path):
     message = "its energy is −12 % above"
     write_vtu(tmp_path / "fem.vtu", mesh, replace(sheared, message=message))
     grid = pyvista.read(tmp_path / "fem.vtu")

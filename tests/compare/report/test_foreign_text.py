@@ -3,7 +3,6 @@
 import ast
 import csv
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -11,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from compare.evaluation.comparison import Comparison
-from compare.evaluation.evaluation import Evaluation
 from compare.figures import Picture
 from compare.pipeline.job import Job, checked
 from compare.report.html_report import report_html
@@ -21,7 +19,6 @@ from compare.runtime.html import PNG, SMALL, template_environment
 from geometry import Design, UserError
 from geometry.atomic import write_json
 from geometry.drawing.description import Description
-from geometry.observations import Observations
 from pinnray.cli import main
 from solvers.registry import make_solver
 
@@ -49,12 +46,7 @@ class Elements(HTMLParser):
 
 
 @pytest.fixture
-def hostile(
-    fem: Evaluation,
-    pinn: Evaluation,
-    observe: Callable[..., Observations],
-    compared: Callable[..., Comparison],
-) -> Comparison:
+def hostile(fem, pinn, observe, compared) -> Comparison:
     """A comparison in which every text that a solver, a file or a user can set is hostile."""
     said = {"message": HOSTILE, "stats": {HOSTILE: HOSTILE, "seconds": 1.0}}
     evaluations = [replace(each, solver=f"{each.solver}{HOSTILE}", **said) for each in (fem, pinn)]
@@ -83,9 +75,7 @@ def test_the_report_escapes_every_text_of_others(hostile: Comparison, tmp_path: 
     assert found.text.count("x-evil") > plain.text.count("x-evil") > 10
 
 
-def test_the_page_of_runs_escapes_numbers_and_folders_of_others(
-    hostile: Comparison, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_page_of_runs_escapes_numbers_and_folders_of_others(hostile, tmp_path, capsys):
     folders = [tmp_path / f"run {number} <x-evil onerror=x()> & '\"" for number in range(2)]
     for number, folder in enumerate(folders):
         write_json(folder / "metrics.json", metrics(hostile))
@@ -100,9 +90,7 @@ def test_the_page_of_runs_escapes_numbers_and_folders_of_others(
 
 @pytest.mark.parametrize("padding", [0, SMALL], ids=["small", "large"])
 @pytest.mark.parametrize("content", [b"key of mine", b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n"])
-def test_the_page_of_runs_takes_pictures_alone(
-    hostile: Comparison, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes, padding: int
-) -> None:
+def test_the_page_of_runs_takes_pictures_alone(hostile, tmp_path, monkeypatch, content, padding):
     """Another file would be passed on with the page, and for EPS Pillow runs a program."""
     runs: list[object] = []
     monkeypatch.setattr("subprocess.check_call", lambda *given, **_: runs.append(given))
@@ -127,9 +115,7 @@ def test_a_run_with_a_link_is_not_read(hostile: Comparison, tmp_path: Path) -> N
         read_runs([tmp_path / "run"])
 
 
-def test_a_text_of_others_is_no_formula_and_no_command_of_the_terminal(
-    hostile: Comparison, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_text_of_others_is_no_formula_and_no_command_of_the_terminal(hostile, tmp_path, capsys):
     numbers = metrics(hostile)
     numbers["solvers"]["=1+1\x1b[2J"] = numbers["solvers"].pop(numbers["reference"])
     numbers["reference"] = "=1+1\x1b[2J"

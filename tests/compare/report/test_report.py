@@ -16,7 +16,6 @@ from compare.report import html_report
 from compare.report.text import sentence, solve_numbers, stat
 from compare.runtime.tables import distance, number, percent
 from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
 from solvers.fem.adaptive_refinement import Adaptation, RefinementRound
 from solvers.problem import Load, Problem
 
@@ -146,9 +145,7 @@ def test_simulated_displacements_are_warned_of(content: Comparison) -> None:
     assert "Simulated by another solver." in page.text
 
 
-def test_measured_displacements_are_not(
-    content: Comparison, observe: Callable[..., Observations], fem: Evaluation
-) -> None:
+def test_measured_displacements_are_not(content, observe, fem):
     seen = observe(fem.marker_displacement, simulated=False, hidden=(0,))
     page = Page(render(replace(content, observations=seen)))
     assert "simulated" not in page.values("id")
@@ -182,9 +179,7 @@ def test_the_papers_own_numbers_are_said_to_be_of_another_experiment(content: Co
 
 
 @pytest.mark.parametrize("simulated", [True, False])
-def test_stress_is_held_against_the_truth_only_where_that_is_known(
-    content: Comparison, simulated: bool
-) -> None:
+def test_stress_is_held_against_the_truth_only_where_that_is_known(content, simulated):
     """The truth is the network's field, from which the reference is 9.09 % away."""
     fem, pinn = content.evaluations
     given = replace(pinn, in_sample=True)
@@ -223,9 +218,7 @@ def test_without_certificates_there_is_no_table_of_them(content: Comparison) -> 
     assert {"certificate", "regions"}.isdisjoint(page.values("id"))
 
 
-def test_the_own_error_of_the_reference_stands_beside_every_difference(
-    content: Comparison, estimated: Evaluation, evaluate: Callable[..., Evaluation]
-) -> None:
+def test_the_own_error_of_the_reference_stands_beside_every_difference(content, estimated, evaluate):
     near = evaluate("pinn-std", 1.005)
     page = Page(render(replace(content, evaluations=[estimated, near], reference=estimated)))
     text = page.text.replace("\N{NO-BREAK SPACE}", " ")
@@ -245,9 +238,7 @@ def test_without_an_estimate_there_is_no_plus_or_minus(content: Comparison) -> N
 
 
 @pytest.mark.parametrize(("tolerance", "warned"), [(1e-3, False), (1e-6, True)])
-def test_refinement_is_told_round_by_round(
-    content: Comparison, mesh: TriangleMesh, tolerance: float, warned: bool
-) -> None:
+def test_refinement_is_told_round_by_round(content, mesh, tolerance, warned):
     rounds = (RefinementRound(100, 70, 0.0123, 0.2), RefinementRound(250, 160, 0.00045, 0.1))
     page = Page(render(replace(content, adaptation=Adaptation(tolerance, rounds, mesh))))
     assert {"adapt"} <= set(page.values("id"))
@@ -261,9 +252,7 @@ def test_a_single_solver_is_compared_with_nothing(content: Comparison, fem: Eval
     assert "nothing to compare it with" in text
 
 
-def test_foreign_text_stays_text(
-    content: Comparison, observe: Callable[..., Observations], fem: Evaluation
-) -> None:
+def test_foreign_text_stays_text(content, observe, fem):
     seen = observe(fem.marker_displacement, source='simulated <script>alert("x")</script>')
     foreign = render(replace(content, observations=seen), provenance={"<b>": "<script>"})
     assert foreign.count("<script") == render(content).count("<script")

@@ -3,7 +3,7 @@
 import csv
 import io
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +12,6 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Browser, Page
 
-from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.figures import Picture
 from compare.figures.gallery import draw
@@ -33,14 +32,7 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="module")
-def written(
-    estimated: Evaluation,
-    pinn: Evaluation,
-    failed: Evaluation,
-    evaluate: Callable[..., Evaluation],
-    compared: Callable[..., Comparison],
-    tmp_path_factory: pytest.TempPathFactory,
-) -> Path:
+def written(estimated, pinn, failed, evaluate, compared, tmp_path_factory) -> Path:
     """A report with four solvers, one of which followed the load, a truth and two pictures."""
     folder = tmp_path_factory.mktemp("report")
     given = replace(evaluate("pinn-asm", 1.02), in_sample=True, left_out=estimated.marker_displacement)

@@ -41,36 +41,24 @@ def given(evaluate: Callable[..., Evaluation], fem: Evaluation, observations: Ob
         (1.1, "As a solver to 10 %: that far is pinn-std from fem in displacement."),
     ],
 )
-def test_a_network_is_judged_by_the_error_of_its_reference(
-    compared: Callable[..., Comparison],
-    estimated: Evaluation,
-    evaluate: Callable[..., Evaluation],
-    scale: float,
-    verdict: str,
-) -> None:
+def test_a_network_is_judged_by_the_error_of_its_reference(compared, estimated, evaluate, scale, verdict):
     answer = asked(compared(estimated, evaluate("pinn-std", scale)))[TRUST]
     assert answer.verdict.replace("\N{NO-BREAK SPACE}", " ") == verdict
     assert "±" in answer.sentences[0]
 
 
-def test_a_network_that_did_not_converge_is_not_trusted(
-    compared: Callable[..., Comparison], fem: Evaluation, evaluate: Callable[..., Evaluation]
-) -> None:
+def test_a_network_that_did_not_converge_is_not_trusted(compared, fem, evaluate):
     found = asked(compared(fem, evaluate("pinn-std", converged=False, message="it moves on")))
     assert found[TRUST].verdict == "No, not with pinn-std (not converged)."
     assert found[CONVERGED].verdict == "1 of 2 solvers: pinn-std (not converged)."
     assert "pinn-std (not converged): it moves on." in found[CONVERGED].sentences
 
 
-def test_without_a_network_nobody_asks_for_it(
-    compared: Callable[..., Comparison], fem: Evaluation, failed: Evaluation
-) -> None:
+def test_without_a_network_nobody_asks_for_it(compared, fem, failed):
     assert TRUST not in asked(compared(fem, failed))
 
 
-def test_the_error_of_the_model_is_not_laid_on_the_network(
-    compared: Callable[..., Comparison], fem: Evaluation, evaluate: Callable[..., Evaluation]
-) -> None:
+def test_the_error_of_the_model_is_not_laid_on_the_network(compared, fem, evaluate):
     network, blame = evaluate("pinn-std", 1.001), "That is the error of the model and its load"
     far = asked(compared(fem, network, truth=evaluate("fem-nonlinear", 1.5)))[TRUST]
     assert blame in " ".join(far.sentences)
@@ -78,9 +66,7 @@ def test_the_error_of_the_model_is_not_laid_on_the_network(
     assert blame not in " ".join(near.sentences)
 
 
-def test_markers_help_by_what_was_held_out_never_by_what_was_given(
-    compared: Callable[..., Comparison], fem: Evaluation, given: Evaluation
-) -> None:
+def test_markers_help_by_what_was_held_out_never_by_what_was_given(compared, fem, given):
     """The reference is 0.7 mm off; the other one meets its markers, and counts with its 0.1 mm."""
     answer = asked(compared(fem, given))[MARKERS]
     assert answer.verdict == "Nearer than fem: at held-out simulated markers fem-asm."
@@ -92,12 +78,7 @@ def test_markers_help_by_what_was_held_out_never_by_what_was_given(
     assert "no camera tells them" in " ".join(answer.sentences)
 
 
-def test_stress_and_force_are_answered_where_they_are_known(
-    compared: Callable[..., Comparison],
-    fem: Evaluation,
-    given: Evaluation,
-    evaluate: Callable[..., Evaluation],
-) -> None:
+def test_stress_and_force_are_answered_where_they_are_known(compared, fem, given, evaluate):
     """The truth is half as much again: 1.02 of the reference is nearer in everything but its force."""
     stronger = replace(given, reaction=10 * fem.reaction)
     answer = asked(compared(fem, stronger, truth=evaluate("fem-nonlinear", 1.5)))[MARKERS]
@@ -105,12 +86,7 @@ def test_stress_and_force_are_answered_where_they_are_known(
     assert "simulated body" in answer.verdict
 
 
-def test_measured_markers_are_never_called_simulated(
-    compared: Callable[..., Comparison],
-    fem: Evaluation,
-    given: Evaluation,
-    observe: Callable[..., Observations],
-) -> None:
+def test_measured_markers_are_never_called_simulated(compared, fem, given, observe):
     seen = observe(fem.marker_displacement + np.array([0.3, -0.4]), simulated=False, hidden=(1,))
     found = asked(compared(fem, given, observations=seen))
     assert "measured" in found[MARKERS].verdict
@@ -118,22 +94,13 @@ def test_measured_markers_are_never_called_simulated(
 
 
 @pytest.mark.parametrize(("low", "word"), [(0.4, "inside"), (0.6, "outside")])
-def test_a_found_force_has_its_interval(
-    compared: Callable[..., Comparison],
-    fem: Evaluation,
-    given: Evaluation,
-    evaluate: Callable[..., Evaluation],
-    low: float,
-    word: str,
-) -> None:
+def test_a_found_force_has_its_interval(compared, fem, given, evaluate, low, word):
     found = replace(given, stats={**given.stats, "force_low": low, "force_high": 0.8})
     sentences = asked(compared(fem, found, truth=evaluate("fem-nonlinear", 1.0)))[MARKERS].sentences
     assert f"that of the simulated finger is 0.500, {word} it." in sentences[-1]
 
 
-def test_what_raised_an_exception_or_was_left_out_is_named(
-    compared: Callable[..., Comparison], fem: Evaluation
-) -> None:
+def test_what_raised_an_exception_or_was_left_out_is_named(compared, fem):
     answer = asked(compared(fem), failed={"mine": "it broke"}, unsupported={"gp": "no markers"})[CONVERGED]
     assert answer.verdict == "1 of 2 solvers: mine."
     assert {"mine failed: it broke.", "gp was left out: no markers."} <= set(answer.sentences)
@@ -141,13 +108,8 @@ def test_what_raised_an_exception_or_was_left_out_is_named(
 
 @pytest.mark.parametrize(("converged", "twin"), [(True, True), (False, True), (True, False)])
 def test_a_network_stands_beside_its_twin_whether_both_converged_or_not(
-    compared: Callable[..., Comparison],
-    fem: Evaluation,
-    given: Evaluation,
-    evaluate: Callable[..., Evaluation],
-    converged: bool,
-    twin: bool,
-) -> None:
+    compared, fem, given, evaluate, converged, twin
+):
     network = evaluate("pinn-asm", 1.02, converged=converged)
     network = replace(network, in_sample=True, left_out=given.left_out, twin="fem-asm")
     sentences = asked(compared(fem, replace(given, converged=twin), network))[TRUST].sentences

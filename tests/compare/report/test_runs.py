@@ -10,8 +10,6 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from compare.evaluation.comparison import Comparison
-from compare.evaluation.evaluation import Evaluation
 from compare.report.metrics_json import metrics
 from compare.report.runs import differing_settings, read_runs
 from geometry.atomic import write_json
@@ -21,12 +19,7 @@ Save = Callable[..., Path]
 
 
 @pytest.fixture
-def save(
-    compared: Callable[..., Comparison],
-    estimated: Evaluation,
-    evaluate: Callable[..., Evaluation],
-    tmp_path: Path,
-) -> Save:
+def save(compared, estimated, evaluate, tmp_path) -> Save:
     """`save(name, scale, seed)`: the folder of a run with a network and a solver that was given markers."""
 
     def make(name: str, scale: float = 1.005, seed: int = 0) -> Path:
@@ -100,14 +93,7 @@ def test_runs_of_one_name_are_told_apart_by_their_paths(save: Save) -> None:
         (["first", "second", "--out", "first/run.json"], "is a file"),
     ],
 )
-def test_a_wrong_folder_is_refused_in_a_line(
-    save: Save,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    arguments: list[str],
-    words: str,
-) -> None:
+def test_a_wrong_folder_is_refused_in_a_line(save, tmp_path, monkeypatch, capsys, arguments, words):
     save("first"), save("second")
     for name, text in (("damaged", "{"), ("foreign", json.dumps({"schema": 99}))):
         (tmp_path / name).mkdir()
@@ -124,9 +110,7 @@ def test_a_wrong_folder_is_refused_in_a_line(
     ("solver", "key", "value"),
     [("pinn-std", "to_reference", None), ("pinn-std", "energy", "1.1"), ("fem-asm", "markers", [])],
 )
-def test_a_run_that_lacks_a_number_is_one_line(
-    save: Save, capsys: pytest.CaptureFixture[str], solver: str, key: str, value: object
-) -> None:
+def test_a_run_that_lacks_a_number_is_one_line(save, capsys, solver, key, value):
     folder = save("first")
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
     content["solvers"][solver][key] = value

@@ -1,18 +1,13 @@
 """Table I of the paper, and the same of a run."""
 
 import csv
-from collections.abc import Callable
 from dataclasses import replace
 from math import hypot
-from pathlib import Path
 
 import pytest
 
-from compare.evaluation.comparison import Comparison
-from compare.evaluation.evaluation import Evaluation
 from compare.report.tables import PRINTED, printed_rows, table_one, write_table_one
 from geometry import Design, load_design
-from geometry.observations import Observations
 
 
 def test_disp_of_the_paper_is_the_root_of_the_sum_of_squares():
@@ -22,21 +17,13 @@ def test_disp_of_the_paper_is_the_root_of_the_sum_of_squares():
         assert hypot(u, v) == pytest.approx(rss, abs=5e-4)
 
 
-def test_a_solver_that_does_not_tell_what_it_leaves_out_has_no_held_out_error(
-    pinn: Evaluation, compared: Callable[..., Comparison]
-):
+def test_a_solver_that_does_not_tell_what_it_leaves_out_has_no_held_out_error(pinn, compared):
     (row,) = table_one(compared(replace(pinn, in_sample=True)))
     assert row.given is not None
     assert row.held_out is None
 
 
-def test_the_file_has_this_run_and_the_paper(
-    fem: Evaluation,
-    pinn: Evaluation,
-    observations: Observations,
-    compared: Callable[..., Comparison],
-    tmp_path: Path,
-):
+def test_the_file_has_this_run_and_the_paper(fem, pinn, observations, compared, tmp_path):
     given = replace(pinn, in_sample=True, left_out=observations.displacements + 0.125, converged=False)
     write_table_one(tmp_path / "t.csv", compared(fem, given))
     with (tmp_path / "t.csv").open(newline="", encoding="utf-8") as file:

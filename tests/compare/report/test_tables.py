@@ -11,7 +11,6 @@ from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import marker_errors, reference_differences
 from compare.report.tables import write_markers, write_summary
 from geometry.mesh.triangle_mesh import TriangleMesh
-from geometry.observations import Observations
 
 Rows = list[dict[str, str]]
 Comparing = Callable[..., Comparison]
@@ -27,13 +26,7 @@ def read(path: Path) -> Rows:
 
 
 @pytest.fixture
-def markers(
-    tmp_path: Path,
-    fem: Evaluation,
-    pinn: Evaluation,
-    observe: Callable[..., Observations],
-    compared: Comparing,
-) -> Rows:
+def markers(tmp_path, fem, pinn, observe, compared) -> Rows:
     seen = observe(fem.marker_displacement + np.array([0.3, -0.4]), hidden=(1,))
     write_markers(tmp_path / "markers.csv", compared(fem, pinn, observations=seen))
     return read(tmp_path / "markers.csv")
@@ -70,9 +63,7 @@ def test_a_marker_that_was_not_seen_has_no_observation_and_no_error(markers: Row
     assert [row["visible"] for row in markers] == ["1", "0", "1"]
 
 
-def test_the_held_out_error_of_a_single_marker_is_there(
-    tmp_path: Path, fem: Evaluation, observations: Observations, compared: Comparing
-) -> None:
+def test_the_held_out_error_of_a_single_marker_is_there(tmp_path, fem, observations, compared):
     left_out = observations.displacements + np.array([[0.1, -0.2], [0.0, 0.0], [0.3, 0.4]])
     asm = replace(fem, solver="fem-asm", in_sample=True, left_out=left_out)
     silent = replace(asm, solver="silent", left_out=None)
@@ -88,9 +79,7 @@ def test_every_row_says_that_the_observations_are_simulated(markers: Rows, summa
     assert {row["observations"] for row in markers + summary} == {"simulated"}
 
 
-def test_the_summary_holds_the_metrics(
-    summary: Rows, fem: Evaluation, failed: Evaluation, observations: Observations
-) -> None:
+def test_the_summary_holds_the_metrics(summary, fem, failed, observations):
     row, errors = summary[1], marker_errors(failed, observations)
     differences = reference_differences(failed, fem)
     assert float(row["mae_sum_mm"]) == errors.mae_sum
@@ -104,8 +93,8 @@ def test_the_summary_holds_the_metrics(
 
 
 def test_a_solver_that_was_given_the_markers_is_marked_in_every_table(
-    fem: Evaluation, pinn: Evaluation, observations: Observations, compared: Comparing, tmp_path: Path
-) -> None:
+    fem, pinn, observations, compared, tmp_path
+):
     told = replace(pinn, in_sample=True, left_out=observations.displacements + 0.125)
     write_summary(tmp_path / "t.csv", compared(fem, told))
     row = read(tmp_path / "t.csv")[1]
@@ -120,8 +109,8 @@ def test_a_solver_that_was_given_the_markers_is_marked_in_every_table(
 
 
 def test_the_distance_from_the_truth_is_there_if_the_markers_are_simulated(
-    fem: Evaluation, pinn: Evaluation, summary: Rows, compared: Comparing, tmp_path: Path
-) -> None:
+    fem, pinn, summary, compared, tmp_path
+):
     """The network's field is 1.1 times the true one."""
     write_summary(tmp_path / "s.csv", compared(fem, pinn, truth=fem))
     names = [f"to_truth_{name}_rel_l2" for name in ("displacement", "strain", "von_mises")]
@@ -130,9 +119,7 @@ def test_the_distance_from_the_truth_is_there_if_the_markers_are_simulated(
     assert {row[name] for row in summary for name in names} == {""}
 
 
-def test_the_own_error_of_the_reference_stands_beside_the_difference(
-    estimated: Evaluation, pinn: Evaluation, compared: Comparing, tmp_path: Path
-) -> None:
+def test_the_own_error_of_the_reference_stands_beside_the_difference(estimated, pinn, compared, tmp_path):
     write_summary(tmp_path / "s.csv", compared(estimated, pinn))
     _, row = read(tmp_path / "s.csv")
     assert float(row["reference_uncertainty_displacement_rel_l2"]) == pytest.approx(0.01)

@@ -11,7 +11,6 @@ from rich.table import Table
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.report.terminal import body_table, marker_table
-from geometry.observations import Observations
 
 Comparing = Callable[..., Comparison]
 
@@ -34,9 +33,7 @@ def test_errors_of_a_solver_without_markers_are_predictions(fem: Evaluation, com
     assert "Mean absolute error at 3 markers, mm (simulated displacements)" in text
 
 
-def test_errors_at_markers_that_were_given_stand_apart_from_those_left_out(
-    pinn: Evaluation, observations: Observations, compared: Comparing
-):
+def test_errors_at_markers_that_were_given_stand_apart_from_those_left_out(pinn, observations, compared):
     """What is said of a marker left out is 0.125 mm off in either component."""
     fitted = replace(pinn, in_sample=True, marker_displacement=observations.displacements)
     told = replace(fitted, left_out=observations.displacements + 0.125)
@@ -67,9 +64,7 @@ def test_measured_markers_know_no_truth(fem: Evaluation, pinn: Evaluation, compa
 
 
 @pytest.mark.parametrize("width", [80, 120])
-def test_both_tables_fit_eighty_columns(
-    estimated: Evaluation, failed: Evaluation, compared: Comparing, width: int
-):
+def test_both_tables_fit_eighty_columns(estimated, failed, compared, width):
     slow = replace(failed, stats={"seconds": 12345.2}, in_sample=True, left_out=failed.marker_displacement)
     both = compared(estimated, slow, truth=failed)
     long = compared(replace(estimated, solver="fem-nonlinear"), slow, truth=failed)

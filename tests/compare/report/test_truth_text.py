@@ -1,14 +1,9 @@
-from collections.abc import Callable
 from dataclasses import replace
 
-from compare.evaluation.comparison import Comparison
-from compare.evaluation.evaluation import Evaluation
 from compare.report.text import truth_sentences
 
 
-def test_what_the_markers_change_is_said_of_displacement_stress_and_force(
-    fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
-):
+def test_what_the_markers_change_is_said_of_displacement_stress_and_force(fem, pinn, compared):
     """The truth is the reference times 1.1; the stress of the solver that was given markers is tripled."""
     given = replace(pinn, in_sample=True, von_mises=3 * pinn.von_mises)
     plain, changed, answer = truth_sentences(compared(fem, given, truth=pinn))
@@ -27,9 +22,7 @@ def test_what_the_markers_change_is_said_of_displacement_stress_and_force(
     )
 
 
-def test_there_is_nothing_to_say_without_a_truth_or_a_solver_with_markers(
-    fem: Evaluation, pinn: Evaluation, compared: Callable[..., Comparison]
-):
+def test_there_is_nothing_to_say_without_a_truth_or_a_solver_with_markers(fem, pinn, compared):
     given = replace(pinn, in_sample=True)
     assert truth_sentences(compared(fem, given)) == []
     assert truth_sentences(compared(fem, pinn, truth=pinn)) == []
