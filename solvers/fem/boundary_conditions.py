@@ -11,22 +11,14 @@ from solvers.lagrange import LagrangeSpace
 from solvers.problem import Problem, contact_functional
 
 
-def dirichlet_mask(problem: Problem, space: NodalSpace) -> BoolArray:
-    """Mask (N, d) of components with a Dirichlet condition: base, symmetry and, for a `patch`, contact."""
-    held = space.mirrored.copy()
+def dirichlet_conditions(problem: Problem, space: NodalSpace) -> tuple[BoolArray, FloatArray]:
+    """Components held by base, symmetry and, for a `patch`, contact, and their displacements, (N, d), mm."""
+    held, values = space.mirrored.copy(), np.zeros(space.nodes.shape)
     held[space.boundary_nodes("base")] = True
     if problem.load.kind == "patch":
-        held[np.ix_(space.boundary_nodes("contact"), np.array(problem.load.prescribed))] = True
-    return held
-
-
-def dirichlet_displacement(problem: Problem, space: NodalSpace) -> FloatArray:
-    """Nodal displacements that the Dirichlet conditions prescribe, zero elsewhere, shape (N, d), mm."""
-    values = np.zeros(space.nodes.shape)
-    if problem.load.kind == "patch":
-        nodes = space.boundary_nodes("contact")
-        values[np.ix_(nodes, np.array(problem.load.prescribed))] = problem.load.values
-    return values
+        contact = np.ix_(space.boundary_nodes("contact"), np.array(problem.load.prescribed))
+        held[contact], values[contact] = True, problem.load.values
+    return held, values
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from solvers.constrained_elimination import ConstrainedElimination
 from solvers.cylinder_contact import ContactState, CylinderContact
 from solvers.elasticity import deformation_jacobian, energy_density_of
 from solvers.extrusion import NodalSpace
-from solvers.fem.boundary_conditions import DisplacementConstraints, dirichlet_displacement, dirichlet_mask
+from solvers.fem.boundary_conditions import DisplacementConstraints, dirichlet_conditions
 from solvers.fem.dolfinx_compat import DistributedSpace
 from solvers.fem.linear_solvers import Factorisation, LinearSolver, Multigrid
 from solvers.problem import Problem
@@ -64,8 +64,7 @@ class DiscreteEquilibrium:
         if linear_solver == "auto" and self.linear:
             self.iterative = space.nodes.size > ITERATIVE_BEYOND
         self.distributed = DistributedSpace(space)
-        self.clamped: BoolArray = dirichlet_mask(problem, space)
-        self.prescribed = dirichlet_displacement(problem, space)
+        self.clamped, self.prescribed = dirichlet_conditions(problem, space)
         self.constraints = constraints or DisplacementConstraints.of(problem, space)
         self.contact = CylinderContact.of(problem, space) if problem.load.kind == "cylinder" else None
         material, gradient = problem.material, ufl.grad(self.distributed.function)
@@ -103,8 +102,8 @@ class DiscreteEquilibrium:
         if problem.load == self.problem.load:
             return
         space, functionals = self.distributed.space, self.constraints.functionals
-        clamped, self.constraints = dirichlet_mask(problem, space), DisplacementConstraints.of(problem, space)
-        self.problem, self.prescribed = problem, dirichlet_displacement(problem, space)
+        clamped, self.prescribed = dirichlet_conditions(problem, space)
+        self.problem, self.constraints = problem, DisplacementConstraints.of(problem, space)
         if not np.array_equal(clamped, self.clamped):
             self.factors.destroy()
             self.clamped, self.factors = clamped, self.factorised(clamped)

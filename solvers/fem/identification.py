@@ -14,7 +14,7 @@ from geometry.mesh.point_location import LocatedPoints
 from geometry.mesh.quadrature import body_quadrature
 from geometry.observations import Observations
 from solvers.elasticity import Lame, LawName, deformation_jacobian, energy_density_of
-from solvers.fem.boundary_conditions import dirichlet_mask
+from solvers.fem.boundary_conditions import dirichlet_conditions
 from solvers.fem.dolfinx_compat import DistributedSpace
 from solvers.fem.equilibrium import QUADRATURE_DEGREE
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
@@ -41,7 +41,7 @@ class FemBody:
         space = LagrangeSpace(problem.mesh, degree)
         self.space, self._motion = space, motion
         self._distributed = DistributedSpace(space)
-        self._clamped = dirichlet_mask(Problem(problem.mesh, problem.material, Load()), space)
+        self._clamped, _ = dirichlet_conditions(Problem(problem.mesh, problem.material, Load()), space)
         rule = body_quadrature(problem.mesh, QUADRATURE_DEGREE)
         self._derivatives = space.shape_gradients(rule.location)
         self._wall_gradients = motion.gradients()[:, rule.location.cells]

@@ -14,7 +14,7 @@ from geometry.errors import UserError
 from geometry.finger.design import Design
 from geometry.mesh.settings import MeshSettings
 from solvers.extrusion import ExtrudedSpace
-from solvers.fem.boundary_conditions import dirichlet_displacement, dirichlet_mask
+from solvers.fem.boundary_conditions import dirichlet_conditions
 from solvers.fem.finite_strain.solver import FemNonlinearSolver
 from solvers.fem.linear import FemSolver
 from solvers.fem.solid import Fem3dSolver
@@ -108,7 +108,7 @@ def table(printed: str, title: str) -> FloatArray:
 def deck(problem: Problem, space: LagrangeSpace | ExtrudedSpace) -> str:
     """Input of `ccx`: nodes, quadratic elements, one step; plane elements are 1 mm deep."""
     solid = isinstance(space, ExtrudedSpace)
-    held, values = dirichlet_mask(problem, space), dirichlet_displacement(problem, space)
+    held, values = dirichlet_conditions(problem, space)
     conditions = [
         f"{node + 1},{axis + 1},{axis + 1},{values[node, axis]:.12g}" for node, axis in np.argwhere(held)
     ]

@@ -62,13 +62,7 @@ class LoadPath:
         self._first_step, self._min_step, self._space, self._guide = first_step, min_step, space, guide
         method: LinearSolver = "iterative" if iterative else "direct"
         self.equilibrium = DiscreteEquilibrium(problem, space, constraints, method)
-        self._begin = partial(
-            ConstrainedNewton,
-            self.equilibrium,
-            scale=problem.material.young,
-            tolerance=tolerance,
-            max_iterations=max_iterations,
-        )
+        self._begin = partial(ConstrainedNewton, self.equilibrium, tolerance, max_iterations)
         self._newton = self._begin()
         contact = self.equilibrium.contact
         self._max_step = max_step if contact is None else min(max_step, contact.longest_step)

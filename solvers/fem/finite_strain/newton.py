@@ -1,7 +1,7 @@
 """Newton's method with line search by PETSc's SNES, for displacements and multipliers together."""
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,8 +10,7 @@ from solvers.fem.equilibrium import DiscreteEquilibrium, LoadState
 from solvers.petsc import PETSc
 
 
-@dataclass(frozen=True, eq=False)
-class NewtonResult:
+class NewtonResult(NamedTuple):
     """The end of a Newton iteration."""
 
     state: LoadState
@@ -32,11 +31,9 @@ class ConstrainedNewton:
     The iteration ends where R is below `tolerance` times the largest internal force.
     """
 
-    def __init__(
-        self, equilibrium: DiscreteEquilibrium, *, scale: float, tolerance: float, max_iterations: int
-    ) -> None:
-        self._equilibrium, self._scale, self._tolerance = equilibrium, scale, tolerance
-        self._state = equilibrium.rest
+    def __init__(self, equilibrium: DiscreteEquilibrium, tolerance: float, max_iterations: int) -> None:
+        self._equilibrium, self._tolerance = equilibrium, tolerance
+        self._scale, self._state = equilibrium.problem.material.young, equilibrium.rest
         self._size = 0.0
         self._torn = self._near = self._kept = False
         self._part = equilibrium.matrix.createVecRight()

@@ -84,7 +84,7 @@ def test_a_rotated_body_has_the_same_energy_and_rotated_forces(law):
 
 
 def newton(problem: DiscreteEquilibrium, iterations: int = 12) -> ConstrainedNewton:
-    return ConstrainedNewton(problem, scale=11.4, tolerance=1e-8, max_iterations=iterations)
+    return ConstrainedNewton(problem, 1e-8, iterations)
 
 
 def started(solver: ConstrainedNewton, problem: DiscreteEquilibrium) -> NewtonResult:
