@@ -45,9 +45,10 @@ add_module_names = False
 nitpicky = True
 nitpick_ignore_regex = [
     ("py:.*", r"(numpy|pathlib|annotated_types|collections\.abc|types|pandas|pd|matplotlib|pydantic)\..*"),
-    ("py:.*", r"(Figure|Path|ArrayLike|Array|Value|shapely\..*|T|.*Options)"),
+    ("py:.*", r"(Figure|Path|ArrayLike|Array|Value|shapely\..*|(.*\.)?T|.*Options)"),
     ("py:.*", r"compare\.(runtime|figures|camera|crossval|evaluation\.truths)\..*"),
-    ("py:.*", r"(geometry\.(finger\.(rules|parameters)|drawing\.placement)|solvers\.adaptation)\..*"),
+    ("py:.*", r"geometry\.(finger\.(rules|parameters)|drawing\.placement)\..*"),
+    ("py:.*", r"solvers\.fem\.adaptive_refinement\..*"),
 ]
 
 html_theme = "pydata_sphinx_theme"
