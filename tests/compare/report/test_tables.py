@@ -1,6 +1,7 @@
 import csv
 from collections.abc import Callable
 from dataclasses import replace
+from math import hypot
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,15 @@ import pytest
 from compare.evaluation.comparison import Comparison
 from compare.evaluation.evaluation import Evaluation
 from compare.evaluation.metrics import marker_errors, reference_differences
-from compare.report.tables import write_markers, write_summary
+from compare.report.tables import (
+    PRINTED,
+    printed_rows,
+    table_one,
+    write_markers,
+    write_summary,
+    write_table_one,
+)
+from geometry import Design, load_design
 from geometry.mesh.triangle_mesh import TriangleMesh
 
 Rows = list[dict[str, str]]
@@ -130,3 +139,36 @@ def test_a_reference_without_an_estimate_leaves_its_cells_empty(summary: Rows) -
     cells = {name: cell for name, cell in summary[1].items() if name.startswith("reference_uncertainty")}
     assert len(cells) > 20
     assert set(cells.values()) == {""}
+
+
+def test_disp_of_the_paper_is_the_root_of_the_sum_of_squares():
+    for row in PRINTED:
+        (means,) = [means for means in (row.given, row.held_out) if means is not None]
+        u, v, _, rss = means
+        assert hypot(u, v) == pytest.approx(rss, abs=5e-4)
+
+
+def test_a_solver_that_does_not_tell_what_it_leaves_out_has_no_held_out_error(pinn, compared):
+    (row,) = table_one(compared(replace(pinn, in_sample=True)))
+    assert row.given is not None
+    assert row.held_out is None
+
+
+def test_the_file_has_this_run_and_the_paper(fem, pinn, observations, compared, tmp_path):
+    given = replace(pinn, in_sample=True, left_out=observations.displacements + 0.125, converged=False)
+    write_table_one(tmp_path / "t.csv", compared(fem, given))
+    rows = read(tmp_path / "t.csv")
+    assert [row["observations"] for row in rows] == ["simulated"] * 2 + ["paper"] * 3
+    assert [(row["solver"], row["converged"]) for row in rows[:3]] == [
+        (fem.solver, "1"),
+        (pinn.solver, "0"),
+        ("FEM", ""),
+    ]
+    assert [row["held_out_mae_v_mm"][:5] for row in rows] == ["0.400", "0.125", "0.39", "0.48", ""]
+    assert [bool(row["in_sample_mae_v_mm"]) for row in rows] == [False, True, False, False, True]
+
+
+def test_the_papers_numbers_stand_beside_the_papers_finger_alone() -> None:
+    assert printed_rows(Design()) == printed_rows(Design(marker_layout="front", fillet_radius=1)) == PRINTED
+    assert printed_rows(Design(rib_count=3)) == ()
+    assert printed_rows(load_design("csiro")) == ()
